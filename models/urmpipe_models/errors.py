@@ -1,0 +1,77 @@
+"""The error tree: everything that urmpipe raises on purpose is an `UrmpipeError`.
+
+An error carries *findings*: all that is wrong with an input is collected and reported at once,
+each finding as one line that names the file, the line, the column, what was found and what is
+allowed. The command line prints these lines and exits with 2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True, slots=True)
+class Finding:
+    """One thing that is wrong with an input.
+
+    Attributes:
+        message: What was found and what is allowed.
+        file: The file it was found in, as the user named it.
+        line: Line of the file, counted from 1 (header lines count).
+        row: Data row of the file, counted from 1 (header lines do not count).
+        column: Name of the column.
+    """
+
+    message: str
+    file: str | None = None
+    line: int | None = None
+    row: int | None = None
+    column: str | None = None
+
+    def __str__(self) -> str:
+        place = self.file or ""
+        if self.line is not None:
+            place += f":{self.line}"
+        if self.column is not None:
+            place += f"{', ' if place else ''}column {self.column}"
+        return f"{place}: {self.message}" if place else self.message
+
+
+class UrmpipeError(Exception):
+    """Root of every error that urmpipe raises on purpose.
+
+    Attributes:
+        findings: All that is wrong, at least one.
+    """
+
+    def __init__(self, *findings: Finding | str) -> None:
+        self.findings: tuple[Finding, ...] = tuple(
+            Finding(finding) if isinstance(finding, str) else finding for finding in findings
+        )
+        super().__init__("\n".join(str(finding) for finding in self.findings))
+
+    @classmethod
+    def from_findings(cls, findings: Sequence[Finding]) -> UrmpipeError:
+        """Return an error of this class that holds all the findings."""
+        return cls(*findings)
+
+
+class RobotError(UrmpipeError):
+    """A robot description cannot be found, read or used (unknown name, URDF, TOML, frames)."""
+
+
+class LogError(UrmpipeError):
+    """A log cannot be read, or holds what no log may hold."""
+
+
+class RecordingError(UrmpipeError):
+    """A recording cannot be read, is not ours, or holds too little for what was asked."""
+
+
+class OutputError(UrmpipeError):
+    """An output may not be written there, or could not be verified after writing."""
+
+
+class OptionError(UrmpipeError):
+    """An option's value, or two options together, make no sense."""

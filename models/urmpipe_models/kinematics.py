@@ -1,0 +1,315 @@
+"""Forward kinematics, velocities, accelerations and Jacobian of a chain, elementwise.
+
+Each function takes one element per coordinate (see `elementwise`): arrays over the samples of a log,
+floats, or CasADi symbols. `over_log` runs one of them over the rows of an (n, joints) array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, plus, scale, subtract, times
+from urmpipe_models.transform import Transform, euler_zyx, rotation_about
+
+FloatArray: TypeAlias = NDArray[np.float64]
+
+BLOCK = 4096
+"""Rows worked on at a time: some thirty arrays of this length stay in a core's cache."""
+
+
+@dataclass(frozen=True, slots=True)
+class Motion:
+    """Pose and its first two derivatives of one point, in the world.
+
+    Attributes:
+        pose: Position in [m] and rotation.
+        velocity: In [m/s].
+        acceleration: In [m/s2].
+        omega: Angular velocity in [rad/s].
+        alpha: Angular acceleration in [rad/s2].
+    """
+
+    pose: Transform
+    velocity: Vector
+    acceleration: Vector
+    omega: Vector
+    alpha: Vector
+
+
+def joint_values(chain: Chain, q: Sequence[Element]) -> list[Element]:
+    """Return the value of every joint of the chain, mimics included, fixed ones as 0 (rad or m)."""
+    of = dict(zip(chain.coordinates, q, strict=True))
+    return [_value(joint, of) for joint in chain.joints]
+
+
+def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
+    """Return the poses of the points p1..pn.
+
+    p_{i+1} = Rz1 [r_1 + sum_k prod_j (Ry_{j+1} Rz_{j+1}) r_{k+1}], for any chain as the product of its
+    frames and joint motions.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+
+    Returns:
+        A transform per point, in the world; positions in [m].
+
+    Source: [UrmArm2021]_ eq. 7 and 8.
+    """
+    poses: list[Transform] = []
+    frame = chain.base
+    for k, (joint, value) in enumerate(zip(chain.joints, joint_values(chain, q), strict=True)):
+        at_joint = frame @ joint.origin
+        if k > 0:
+            poses.append(Transform(frame.rotation, at_joint.translation))
+        frame = _moved(at_joint, joint, value)
+    return (*poses, frame @ chain.tip @ chain.tool)
+
+
+def tip_pose(chain: Chain, q: Sequence[Element]) -> Transform:
+    """Return the pose of the tool centre point alone: the last of `forward`, at less cost."""
+    frame = chain.base
+    for joint, value in zip(chain.joints, joint_values(chain, q), strict=True):
+        frame = _moved(frame @ joint.origin, joint, value)
+    return frame @ chain.tip @ chain.tool
+
+
+def motions(
+    chain: Chain, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
+) -> tuple[Motion, ...]:
+    """Return pose, velocity and acceleration of the points p1..pn, from q, q' and q''.
+
+    Outward recursion over the joints, with d the way from one frame's origin to the next:
+    v' = v + omega x d, a' = a + alpha x d + omega x (omega x d); a revolute joint adds z q' to omega and
+    z q'' + omega x z q' to alpha, a prismatic one z q' to v and z q'' + 2 omega x z q' to a.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+        qd: Their rates, in [rad/s] or [m/s].
+        qdd: Their second derivatives, in [rad/s2] or [m/s2].
+
+    Source: [UrmArm2021]_ section 3, Figure 10 b and c (v7 of q', a7 of q'' and q'^2).
+    """
+    values, rates, second = joint_values(chain, q), _joint_rates(chain, qd), _joint_rates(chain, qdd)
+    points: list[Motion] = []
+    body = Motion(chain.base, ZERO, ZERO, ZERO, ZERO)
+    for k, joint in enumerate(chain.joints):
+        at_joint = _carried(body, joint.origin)
+        if k > 0:
+            end = Transform(body.pose.rotation, at_joint.pose.translation)
+            points.append(replace(at_joint, pose=end))
+        body = _driven(at_joint, joint, values[k], rates[k], second[k])
+    return (*points, _carried(body, chain.tip @ chain.tool))
+
+
+def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple[Element, ...], ...]:
+    """Return the geometric Jacobian of a point p1..pn, in the world.
+
+    Column i is (z_i x (p - o_i), z_i) for a revolute and (z_i, 0) for a prismatic joint with axis z_i
+    through o_i; a mimic's column counts with its multiplier towards the joint it follows.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+        point: Index of the point, -1 for the tool centre point.
+
+    Returns:
+        One column a coordinate, each vx, vy, vz in [m/s] and wx, wy, wz in [rad/s] per unit rate.
+    """
+    count = len(chain.joints)
+    last = range(count)[point]
+    axes: list[tuple[Vector, Vector]] = []
+    frame = chain.base
+    target = ZERO
+    for k, (joint, value) in enumerate(zip(chain.joints, joint_values(chain, q), strict=True)):
+        at_joint = frame @ joint.origin
+        if k == last + 1:
+            target = at_joint.translation
+            break
+        axes.append((at_joint.rotate(joint.axis), at_joint.translation))
+        frame = _moved(at_joint, joint, value)
+    else:
+        target = (frame @ chain.tip @ chain.tool).translation
+
+    columns: dict[str, tuple[Element, ...]] = dict.fromkeys(chain.coordinates, (0.0,) * 6)
+    for joint, (axis, origin) in zip(chain.joints, axes, strict=False):
+        if joint.kind == "fixed":
+            continue
+        column = (
+            (*cross(axis, subtract(target, origin)), *axis) if joint.kind == "revolute" else (*axis, *ZERO)
+        )
+        name, factor = (
+            (joint.name, 1.0) if joint.mimic is None else (joint.mimic.joint, joint.mimic.multiplier)
+        )
+        columns[name] = tuple(plus(a, times(factor, b)) for a, b in zip(columns[name], column, strict=True))
+    return tuple(columns.values())
+
+
+@dataclass(frozen=True, slots=True)
+class PointLog:
+    """One point of the arm over the samples of a log, in the world.
+
+    Attributes:
+        position: In [m], shape (n, 3).
+        velocity: In [m/s], shape (n, 3).
+        acceleration: In [m/s2], shape (n, 3).
+        euler_zyx: rz, ry, rx in [rad], shape (n, 3).
+        singular: Where ry = +-pi/2 and rx = 0 by convention, shape (n,).
+    """
+
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    euler_zyx: FloatArray
+    singular: NDArray[np.bool_]
+
+
+def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return the tool centre point in [m], shape (n, 3), of joint values q, shape (n, joints)."""
+    return poses_over_log(chain, q)[0]
+
+
+def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return position [m], shape (n, 3), and rotation, shape (n, 3, 3), of the tool centre point.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints).
+    """
+    position, rotation = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+    for block in _blocks(len(q)):
+        pose = tip_pose(chain, _columns(q[block]))
+        _fill(position[block], pose.translation)
+        for row in range(3):
+            _fill(rotation[block, row], pose.rotation[row])
+    return position, rotation
+
+
+def point_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray, point: int = -1) -> PointLog:
+    """Return the motion of one point p1..pn over a log.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints).
+        qd: Their rates in [rad/s] or [m/s], shape (n, joints).
+        qdd: Their second derivatives in [rad/s2] or [m/s2], shape (n, joints).
+        point: Index of the point, -1 for the tool centre point.
+    """
+    count = len(q)
+    position, velocity, acceleration, euler = (np.empty((count, 3)) for _ in range(4))
+    log = PointLog(position, velocity, acceleration, euler, np.empty(count, dtype=np.bool_))
+    for block in _blocks(count):
+        motion = motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))[point]
+        rz, ry, rx, singular = euler_zyx(motion.pose.rotation)
+        _fill(log.position[block], motion.pose.translation)
+        _fill(log.velocity[block], motion.velocity)
+        _fill(log.acceleration[block], motion.acceleration)
+        _fill(log.euler_zyx[block], (rz, ry, rx))
+        log.singular[block] = singular
+    return log
+
+
+def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return the positions of the base and of p1..pn in [m], shape (n, points + 1, 3): the arm's skeleton."""
+    skeleton = np.empty((len(q), len(chain.joints) + 1, 3))
+    skeleton[:, 0] = [float(x) for x in chain.base.translation]
+    for block in _blocks(len(q)):
+        for k, pose in enumerate(forward(chain, _columns(q[block])), start=1):
+            _fill(skeleton[block, k], pose.translation)
+    return skeleton
+
+
+def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArray:
+    """Return the geometric Jacobian of a point for every row of q: shape (n, 6, joints)."""
+    result = np.empty((len(q), 6, len(chain.coordinates)))
+    for block in _blocks(len(q)):
+        for i, column in enumerate(jacobian(chain, _columns(q[block]), point)):
+            _fill(result[block, :, i], column)
+    return result
+
+
+def _value(joint: Joint, of: dict[str, Element]) -> Element:
+    if joint.kind == "fixed":
+        return 0.0
+    if joint.mimic is None:
+        return of[joint.name]
+    return plus(times(joint.mimic.multiplier, of[joint.mimic.joint]), joint.mimic.offset)
+
+
+def _joint_rates(chain: Chain, rates: Sequence[Element]) -> list[Element]:
+    """Return the derivative of every joint's value: as `joint_values`, but a mimic's offset drops out."""
+    of = dict(zip(chain.coordinates, rates, strict=True))
+    return [
+        times(joint.mimic.multiplier, of[joint.mimic.joint]) if joint.mimic else of.get(joint.name, 0.0)
+        for joint in chain.joints
+    ]
+
+
+def _moved(at_joint: Transform, joint: Joint, value: Element) -> Transform:
+    """Return the joint's moving frame."""
+    if joint.kind == "revolute":
+        return at_joint @ rotation_about(joint.axis, value)
+    if joint.kind == "prismatic":
+        return Transform(at_joint.rotation, at_joint.point(scale(value, joint.axis)))
+    return at_joint
+
+
+def _carried(state: Motion, origin: Transform) -> Motion:
+    """Return the motion of a frame fixed to a moving body."""
+    d = state.pose.rotate(origin.translation)
+    spin = cross(state.omega, d)
+    return Motion(
+        state.pose @ origin,
+        add(state.velocity, spin),
+        add(state.acceleration, add(cross(state.alpha, d), cross(state.omega, spin))),
+        state.omega,
+        state.alpha,
+    )
+
+
+def _driven(state: Motion, joint: Joint, value: Element, rate: Element, second: Element) -> Motion:
+    """Return the motion of the joint's moving frame from that of its fixed one."""
+    pose = _moved(state.pose, joint, value)
+    if joint.kind == "fixed":
+        return state
+    axis = state.pose.rotate(joint.axis)
+    own, own_second = scale(rate, axis), scale(second, axis)
+    coupling = cross(state.omega, own)
+    if joint.kind == "revolute":
+        omega = add(state.omega, own)
+        alpha = add(state.alpha, add(own_second, coupling))
+        return Motion(pose, state.velocity, state.acceleration, omega, alpha)
+    slide = scale(value, axis)
+    spin = cross(state.omega, slide)
+    acceleration = add(cross(state.alpha, slide), cross(state.omega, spin))
+    acceleration = add(acceleration, add(scale(2.0, coupling), own_second))
+    return Motion(
+        pose,
+        add(state.velocity, add(spin, own)),
+        add(state.acceleration, acceleration),
+        state.omega,
+        state.alpha,
+    )
+
+
+def _blocks(count: int) -> Iterator[slice]:
+    return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
+
+
+def _columns(rows: FloatArray) -> list[FloatArray]:
+    """Return the columns of (m, joints) as contiguous arrays."""
+    return list(np.ascontiguousarray(rows.T))
+
+
+def _fill(target: FloatArray, elements: Sequence[Element]) -> None:
+    """Write one element a column into target, shape (m, k); constants spread over the rows."""
+    for i, element in enumerate(elements):
+        target[:, i] = element

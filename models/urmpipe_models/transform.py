@@ -1,0 +1,220 @@
+"""Rigid transforms, elementwise: the constant frames of a chain and its poses over a log alike."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.elementwise import (
+    ZERO,
+    Element,
+    Vector,
+    add,
+    dot,
+    is_constant,
+    minus,
+    plus,
+    scale,
+    times,
+)
+
+SINGULAR_COSINE = 1e-9
+"""Below this cosine of ry, rz and rx are not separately defined (double precision leaves no digits)."""
+
+
+@dataclass(frozen=True, slots=True)
+class Transform:
+    """Rotation R and translation p of a frame B in a frame A: x_A = R x_B + p.
+
+    Attributes:
+        rotation: The rows of R, each three elements [-].
+        translation: p, three elements in [m].
+    """
+
+    rotation: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    translation: Vector = ZERO
+
+    def __matmul__(self, other: Transform) -> Transform:
+        """Return the frame C in A from B in A (self) and C in B (other)."""
+        columns = other.columns
+        return Transform(
+            (
+                (
+                    dot(self.rotation[0], columns[0]),
+                    dot(self.rotation[0], columns[1]),
+                    dot(self.rotation[0], columns[2]),
+                ),
+                (
+                    dot(self.rotation[1], columns[0]),
+                    dot(self.rotation[1], columns[1]),
+                    dot(self.rotation[1], columns[2]),
+                ),
+                (
+                    dot(self.rotation[2], columns[0]),
+                    dot(self.rotation[2], columns[1]),
+                    dot(self.rotation[2], columns[2]),
+                ),
+            ),
+            self.point(other.translation),
+        )
+
+    @property
+    def columns(self) -> tuple[Vector, Vector, Vector]:
+        """The axes x, y, z of the frame: the columns of R."""
+        x, y, z = self.rotation
+        return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
+
+    def rotate(self, vector: Vector) -> Vector:
+        """Return R v, a direction given in B seen from A."""
+        return dot(self.rotation[0], vector), dot(self.rotation[1], vector), dot(self.rotation[2], vector)
+
+    def point(self, position: Vector) -> Vector:
+        """Return R x + p, a point given in B [m] seen from A [m]."""
+        return add(self.rotate(position), self.translation)
+
+    def inverse(self) -> Transform:
+        """Return the frame A in B: R^T, -R^T p."""
+        turned = Transform(self.columns)
+        return Transform(self.columns, scale(-1.0, turned.rotate(self.translation)))
+
+
+def translation(x: Element, y: Element, z: Element) -> Transform:
+    """Return a shift by x, y, z in [m]."""
+    return Transform(translation=(x, y, z))
+
+
+def rotation_x(angle: Element) -> Transform:
+    """Return Rx(angle), angle in [rad]."""
+    c, s = _cosine_sine(angle)
+    return Transform(((1.0, 0.0, 0.0), (0.0, c, minus(0.0, s)), (0.0, s, c)))
+
+
+def rotation_y(angle: Element) -> Transform:
+    """Return Ry(angle), angle in [rad]. Source: [UrmArm2021]_ eq. 2."""
+    c, s = _cosine_sine(angle)
+    return Transform(((c, 0.0, s), (0.0, 1.0, 0.0), (minus(0.0, s), 0.0, c)))
+
+
+def rotation_z(angle: Element) -> Transform:
+    """Return Rz(angle), angle in [rad]. Source: [UrmArm2021]_ eq. 1."""
+    c, s = _cosine_sine(angle)
+    return Transform(((c, minus(0.0, s), 0.0), (s, c, 0.0), (0.0, 0.0, 1.0)))
+
+
+def rotation_about(axis: Sequence[float], angle: Element) -> Transform:
+    """Return the rotation about a constant unit axis.
+
+    R = cos(a) I + (1 - cos(a)) u u^T + sin(a) [u]x (Rodrigues).
+
+    Args:
+        axis: Unit vector u [-].
+        angle: a in [rad], any element.
+    """
+    x, y, z = (float(u) for u in axis)
+    c, s = _cosine_sine(angle)
+    v = minus(1.0, c)
+    return Transform(
+        (
+            (_cosine_entry(c, v, x), minus(times(x * y, v), times(z, s)), plus(times(x * z, v), times(y, s))),
+            (plus(times(x * y, v), times(z, s)), _cosine_entry(c, v, y), minus(times(y * z, v), times(x, s))),
+            (minus(times(x * z, v), times(y, s)), plus(times(y * z, v), times(x, s)), _cosine_entry(c, v, z)),
+        )
+    )
+
+
+def from_rpy(rx: Element, ry: Element, rz: Element) -> Transform:
+    """Return Rz(rz) Ry(ry) Rx(rx), angles in [rad]; URDF calls them roll, pitch, yaw."""
+    return rotation_z(rz) @ rotation_y(ry) @ rotation_x(rx)
+
+
+def from_offset(values: Sequence[float]) -> Transform:
+    """Return the frame written as x, y, z in [m] and optionally rx, ry, rz in [rad] (see `from_rpy`)."""
+    x, y, z, rx, ry, rz = (*map(float, values), *(0.0,) * (6 - len(values)))
+    turned = from_rpy(rx, ry, rz)
+    return Transform(turned.rotation, (x, y, z))
+
+
+def from_rotation_vector(vector: Vector) -> Transform:
+    """Return the rotation by |v| about v / |v|, v in [rad], any elements.
+
+    R = cos(a) I + sinc(a) [v]x + (1 - cos(a)) / a^2 v v^T, with the limits 1 and 1/2 at a = 0.
+    """
+    x, y, z = vector
+    angle = np.sqrt(x * x + y * y + z * z)
+    safe = np.where(angle > 0.0, angle, 1.0)
+    small = angle < 1e-8  # below, the series' first terms are exact to double precision
+    a = np.where(small, 1.0, np.sin(safe) / safe)
+    b = np.where(small, 0.5, (1.0 - np.cos(safe)) / (safe * safe))
+    c = np.cos(angle)
+    return Transform(
+        (
+            (c + b * x * x, b * x * y - a * z, b * x * z + a * y),
+            (b * x * y + a * z, c + b * y * y, b * y * z - a * x),
+            (b * x * z - a * y, b * y * z + a * x, c + b * z * z),
+        )
+    )
+
+
+def euler_zyx(rotation: tuple[Vector, Vector, Vector]) -> tuple[Element, Element, Element, Element]:
+    """Return the moving Z-Y-X Euler angles of R = Rz(rz) Ry(ry) Rx(rx), and where they are singular.
+
+    rx = atan2(a32, a33), ry = atan2(-a31, hypot(a11, a21)), rz = atan2(a21, a11). At ry = +-pi/2
+    only rz -+ rx is defined: there rx = 0 and rz = atan2(-a12, a22) by convention.
+
+    Args:
+        rotation: Rows of R.
+
+    Returns:
+        rz, ry, rx in [rad] and a flag that is true (1 in a trace) where the convention was used.
+
+    Source: [UrmArm2021]_ eq. 9-13, with atan2 (errata).
+    """
+    (a11, a12, _), (a21, a22, _), (a31, a32, a33) = rotation
+    cosine = np.hypot(a11, a21)
+    singular = cosine < SINGULAR_COSINE
+    rz = np.where(singular, np.arctan2(-a12, a22), np.arctan2(a21, a11))
+    ry = np.arctan2(-a31, cosine)
+    rx = np.where(singular, 0.0, np.arctan2(a32, a33))
+    return rz, ry, rx, singular
+
+
+def rpy_of(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float, float]:
+    """Return rx, ry, rz in [rad] such that `from_rpy` gives the constant R back to 1e-15.
+
+    Unlike `euler_zyx` it needs no singular case: rx is taken from what rz leaves, so that the
+    product is R for whatever rz the rounding of a11 and a21 suggests.
+    """
+    (a11, a12, a13), (a21, a22, a23), (a31, _, _) = rotation
+    rz = float(np.arctan2(a21, a11))
+    ry = float(np.arctan2(-a31, np.hypot(a11, a21)))
+    s, c = np.sin(rz), np.cos(rz)
+    rx = float(np.arctan2(s * a13 - c * a23, c * a22 - s * a12))
+    return rx, ry, rz
+
+
+def offset_of(frame: Transform) -> tuple[float, float, float, float, float, float]:
+    """Return x, y, z in [m] and rx, ry, rz in [rad] of a constant frame: `from_offset`'s inverse."""
+    x, y, z = frame.translation
+    return (float(x), float(y), float(z), *rpy_of(frame.rotation))
+
+
+def rotation_angle(a: tuple[Vector, Vector, Vector], b: tuple[Vector, Vector, Vector]) -> Element:
+    """Return the angle in [rad] between two orientations: that of A^T B, well-conditioned from 0 to pi."""
+    first, second = Transform(a).inverse(), Transform(b)
+    (m11, m12, m13), (m21, m22, m23), (m31, m32, m33) = (first @ second).rotation
+    sine = np.sqrt((m32 - m23) ** 2 + (m13 - m31) ** 2 + (m21 - m12) ** 2)
+    return np.arctan2(sine, m11 + m22 + m33 - 1.0)
+
+
+def _cosine_sine(angle: Element) -> tuple[Element, Element]:
+    """Return cos and sin; of the constant 0 as constants, which fold away."""
+    if is_constant(angle, 0.0):
+        return 1.0, 0.0
+    return np.cos(angle), np.sin(angle)
+
+
+def _cosine_entry(c: Element, v: Element, u: float) -> Element:
+    """Return c + u^2 (1 - c), which is the constant 1 on the axis itself."""
+    return 1.0 if abs(u) == 1.0 else plus(c, times(u * u, v))
