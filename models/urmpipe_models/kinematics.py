@@ -185,7 +185,7 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
         q: Joint values in [rad] or [m], shape (n, joints).
     """
     position, rotation = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
-    for block in _blocks(len(q)):
+    for block in row_blocks(len(q)):
         pose = tip_pose(chain, _columns(q[block]))
         _fill(position[block], pose.translation)
         for row in range(3):
@@ -206,7 +206,7 @@ def point_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray,
     count = len(q)
     position, velocity, acceleration, euler = (np.empty((count, 3)) for _ in range(4))
     log = PointLog(position, velocity, acceleration, euler, np.empty(count, dtype=np.bool_))
-    for block in _blocks(count):
+    for block in row_blocks(count):
         motion = motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))[point]
         rz, ry, rx, singular = euler_zyx(motion.pose.rotation)
         _fill(log.position[block], motion.pose.translation)
@@ -221,7 +221,7 @@ def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     """Return the positions of the base and of p1..pn in [m], shape (n, points + 1, 3): the arm's skeleton."""
     skeleton = np.empty((len(q), len(chain.joints) + 1, 3))
     skeleton[:, 0] = [float(x) for x in chain.base.translation]
-    for block in _blocks(len(q)):
+    for block in row_blocks(len(q)):
         for k, pose in enumerate(forward(chain, _columns(q[block])), start=1):
             _fill(skeleton[block, k], pose.translation)
     return skeleton
@@ -230,7 +230,7 @@ def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
 def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArray:
     """Return the geometric Jacobian of a point for every row of q: shape (n, 6, joints)."""
     result = np.empty((len(q), 6, len(chain.coordinates)))
-    for block in _blocks(len(q)):
+    for block in row_blocks(len(q)):
         for i, column in enumerate(jacobian(chain, _columns(q[block]), point)):
             _fill(result[block, :, i], column)
     return result
@@ -300,7 +300,8 @@ def _driven(state: Motion, joint: Joint, value: Element, rate: Element, second: 
     )
 
 
-def _blocks(count: int) -> Iterator[slice]:
+def row_blocks(count: int) -> Iterator[slice]:
+    """Yield the slices that part `count` rows into blocks."""
     return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
 
 

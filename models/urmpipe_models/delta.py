@@ -1,0 +1,44 @@
+"""The deviation delta between where a point should be and where it is, and whether it is tolerated."""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from urmpipe_models.elementwise import Element, Vector, subtract
+
+
+class Delta(NamedTuple):
+    """A deviation in [m].
+
+    Attributes:
+        x: Along x.
+        y: Along y.
+        z: Along z.
+        norm: Length of the vector.
+    """
+
+    x: Element
+    y: Element
+    z: Element
+    norm: Element
+
+
+def delta(reference: Vector, actual: Vector) -> Delta:
+    """Return delta = A_s - p(phi) and its norm, elementwise.
+
+    Args:
+        reference: x, y, z of the point asked for, in [m].
+        actual: x, y, z of the point reached, in [m].
+
+    Source: [UrmArm2021]_ eq. 19-21, 23.
+    """
+    x, y, z = subtract(reference, actual)
+    return Delta(x, y, z, np.sqrt(x * x + y * y + z * z))
+
+
+def outside(deviation: Delta, tolerance: Element) -> Element:
+    """Return where |x|, |y| or |z| is above the tolerance in [m] (1 in a trace)."""
+    largest = np.maximum(np.maximum(np.abs(deviation.x), np.abs(deviation.y)), np.abs(deviation.z))
+    return largest > tolerance

@@ -1,0 +1,33 @@
+"""The deviation delta and its flag."""
+
+import casadi
+import numpy as np
+
+from urmpipe_models.delta import Delta, delta, outside
+
+
+def test_delta_is_reference_minus_actual_with_its_norm():
+    rng = np.random.default_rng(1)
+    a, b = rng.normal(size=(2, 100, 3))
+    result = np.column_stack(delta(tuple(a.T), tuple(b.T)))
+    np.testing.assert_array_equal(result[:, :3], a - b)
+    np.testing.assert_allclose(result[:, 3], np.linalg.norm(a - b, axis=1), rtol=4e-16)  # two roundings
+
+
+def test_the_tolerance_holds_an_axis_and_the_bound_itself_is_inside():
+    x = np.array([0.0035, -0.0035, 0.00350001, 0.0, 0.0])
+    z = np.array([0.0, 0.0, 0.0, -0.004, np.nan])
+    zero = np.zeros(5)
+    assert outside(Delta(x, zero, z, zero), 0.0035).tolist() == [False, False, True, True, False]
+    # an axis at its bound in all three: the norm may reach sqrt(3) times the tolerance
+    assert not outside(Delta(0.0035, -0.0035, 0.0035, 0.00606), 0.0035)
+
+
+def test_delta_and_flag_trace_with_casadi():
+    casadi.GlobalOptions.setNumpyMode(-1)
+    a, b = casadi.SX.sym("a", 3), casadi.SX.sym("b", 3)
+    deviation = delta(tuple(a.elements()), tuple(b.elements()))
+    traced = casadi.Function("delta", [a, b], [casadi.vertcat(*deviation), outside(deviation, 0.0035)])
+    got, flag = traced([1.0, 2.0, 3.0], [1.0, 2.0, 3.004])
+    np.testing.assert_array_equal(np.ravel(got), delta((1.0, 2.0, 3.0), (1.0, 2.0, 3.004)))
+    assert float(flag) == 1.0

@@ -1,0 +1,156 @@
+"""The repolarizer: its laws, sample by sample and over a whole log."""
+
+import math
+from pathlib import Path
+
+import casadi
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as st_np
+
+from urmpipe_models.repolarizer import FULL_TURN, State, max_step, repolarize, step
+
+SHARED = Path(__file__).resolve().parents[2].parent / "shared"
+TSP = 0.005
+
+
+def wrap(x, period=FULL_TURN):
+    """Limit to +-period/2, as an environment with limited joints does."""
+    return x - period * np.floor((x + period / 2.0) / period)
+
+
+def run_steps(q, dt, **options):
+    """Feed a log of one joint to `step`, sample by sample."""
+    state, out, changes, odd = State(), [], [], []
+    for value, elapsed in zip(q, dt, strict=True):
+        state, result, flags = step(state, value, elapsed, **options)
+        out.append(result)
+        changes.append(flags.change)
+        odd.append(flags.unexplained)
+    return np.array(out, dtype=float), np.array(changes, dtype=float), np.array(odd, dtype=bool), state
+
+
+motions = st_np.arrays(
+    float, st.tuples(st.integers(2, 200), st.integers(1, 4)), elements=st.floats(-1.5, 1.5)
+)  # each step below a quarter turn, pi / 2 = 1.57
+
+
+@given(motions, st.sampled_from([FULL_TURN, 360.0]))
+def test_unwrapping_a_wrapped_motion_gives_it_back(steps, period):
+    x = np.cumsum(steps, axis=0) * (period / FULL_TURN)
+    x -= period * np.round(x[0] / period)  # the turns before the log began cannot be known
+    result = repolarize(wrap(x, period), np.full(len(x), TSP), period=period)
+    # wrapping and adding P k each round once; values reach 300 rad (17 200 deg): one unit in the last place
+    np.testing.assert_allclose(result.q, x, rtol=0, atol=4e-14 * period * 50)
+    assert len(result.unexplained) == 0
+
+
+@given(
+    st_np.arrays(float, st.tuples(st.integers(1, 120), st.integers(1, 3)), elements=st.floats(-7, 7)),
+    st_np.arrays(bool, (120, 3)),
+    st.sampled_from([math.inf, 3.0, 300.0]),
+    st.floats(0.001, 0.1),
+)
+@settings(deadline=None)
+def test_the_batch_is_the_steps_bit_for_bit(q, missing, max_speed, period_of_samples):
+    q = np.where(missing[: len(q), : q.shape[1]], np.nan, q)
+    dt = period_of_samples * (1.0 + np.arange(len(q)) % 3)
+    batch = repolarize(q, dt, max_speed=max_speed)
+    for j in range(q.shape[1]):
+        out, changes, odd, _ = run_steps(q[:, j], dt, max_speed=max_speed)
+        assert out.tobytes() == np.ascontiguousarray(batch.q[:, j]).tobytes()
+        mine = batch.joints == j
+        assert np.array_equal(np.flatnonzero(changes), batch.rows[mine])
+        assert np.array_equal(changes[changes != 0], batch.change[mine])
+        assert np.array_equal(np.flatnonzero(odd), batch.unexplained[batch.unexplained[:, 1] == j, 0])
+
+
+def test_before_the_first_repolarization_nothing_changes_by_a_bit():
+    q = np.array([[-0.0], [1.0], [2.5], [3.1], [-3.1], [-3.0]])
+    result = repolarize(q, np.full(6, TSP))
+    assert result.q[:4].tobytes() == q[:4].tobytes()
+    assert result.rows.tolist() == [4]
+    assert result.change.tolist() == [1]
+    assert result.q[4, 0] == -3.1 + FULL_TURN
+
+
+def test_many_turns_in_both_directions_come_back():
+    x = np.concatenate([np.linspace(0, 40, 400), np.linspace(40, -40, 800)])
+    result = repolarize(wrap(x)[:, np.newaxis], np.full(len(x), TSP))
+    np.testing.assert_allclose(result.q[:, 0], x, rtol=0, atol=3e-14)  # 40 rad: a few units in the last place
+    assert result.change.sum() == -6  # from turn 0 to turn -6 (40 / 2 pi = 6.37)
+    assert len(result.rows) == 6 + 6 + 6
+
+
+def test_a_step_larger_than_pi_that_is_no_wrap_stays_and_is_flagged():
+    q = np.array([[5.0], [1.0], [1.1], [-10.8], [-10.7]])
+    result = repolarize(q, np.full(5, TSP))
+    assert result.q.tobytes() == q.tobytes()
+    assert result.unexplained.tolist() == [[1, 0], [3, 0]]
+
+
+def test_a_speed_limit_narrows_what_counts_as_a_wrap():
+    q = np.array([[3.0], [3.0 - FULL_TURN + 0.5]])
+    dt = np.full(2, 0.1)
+    assert repolarize(q, dt).change.tolist() == [1]
+    assert repolarize(q, dt, max_speed=4.0).change.tolist() == []  # 0.5 rad in 0.1 s is 5 rad/s
+    assert max_step(0.1, FULL_TURN, 4.0) == 0.4
+    assert max_step(10.0, FULL_TURN, 4.0) == FULL_TURN / 4
+
+
+def test_missing_samples_keep_the_turns_and_give_more_time():
+    q = np.array([[3.1], [-3.1], [np.nan], [np.nan], [-2.8], [3.1]])
+    result = repolarize(q, np.full(6, 0.1), max_speed=2.0)
+    assert np.isnan(result.q[2:4]).all()
+    np.testing.assert_array_equal(result.q[4], -2.8 + FULL_TURN)
+    assert result.change.tolist() == [1]  # back from -2.8 to 3.1 in 0.1 s would take 3.8 rad/s: not explained
+    assert result.unexplained.tolist() == [[5, 0]]
+
+
+def test_chatter_on_the_limit_leaves_no_net_turn():
+    q = np.array([[3.14], [-3.14], [3.14], [-3.14], [3.14]])
+    result = repolarize(q, np.full(5, TSP))
+    assert result.change.tolist() == [1, -1, 1, -1]
+    assert result.q[-1, 0] == 3.14
+
+
+def test_the_step_remembers_two_samples_back():
+    *_, state = run_steps([0.1, 0.2, math.nan, 0.4], [TSP] * 4)
+    assert (state.last, state.before, state.elapsed, state.seen) == (0.4, 0.2, 0.0, 2.0)
+
+
+@pytest.mark.parametrize("shape", [(0, 3), (1, 3), (5, 0)])
+def test_empty_logs_pass_through(shape):
+    assert repolarize(np.zeros(shape), np.zeros(shape[0])).q.shape == shape
+
+
+def test_the_step_traces_with_casadi():
+    casadi.GlobalOptions.setNumpyMode(-1)
+    state = State(*casadi.SX.sym("state", 5).elements())
+    q, dt, period, speed = casadi.SX.sym("input", 4).elements()
+    following, out, flags = step(state, q, dt, period=period, max_speed=speed)
+    traced = casadi.Function("step", [casadi.vertcat(*state), casadi.vertcat(q, dt, period, speed)],
+                             [casadi.vertcat(*following), casadi.vertcat(out, *flags)])  # fmt: skip
+    rng = np.random.default_rng(7)
+    memory = State(0.0, 0.0, 0.0, 0.0, 0.0)
+    for value in [*wrap(np.cumsum(rng.uniform(-1.5, 1.5, 300))), math.nan, 1.0, 5.0]:
+        expected_state, expected, expected_flags = step(memory, value, TSP, max_speed=1e4)
+        got_state, got = traced([float(x) for x in memory], [value, TSP, FULL_TURN, 1e4])
+        np.testing.assert_array_equal(np.ravel(got_state), np.array(expected_state, dtype=float))
+        np.testing.assert_array_equal(np.ravel(got), np.array([expected, *expected_flags], dtype=float))
+        memory = State(*(float(x) for x in expected_state))
+
+
+@pytest.mark.skipif(not SHARED.is_dir(), reason="the real logs of ../shared are not there")
+def test_real_jumps_of_a_real_log_stay():
+    """fake_joints.csv: -3.99 rad and 11.9 rad (and back) are no wraps; numpy.unwrap moves them."""
+    path = SHARED / "logs" / "plotjuggler" / "fake_joints.csv"
+    header = path.read_text().splitlines()[0].split(",")
+    columns = [header.index(f"field.position{i}") for i in range(6)]
+    q = np.genfromtxt(path, delimiter=",", skip_header=1, usecols=columns)
+    result = repolarize(q, np.full(len(q), 0.001))
+    assert result.q.tobytes() == q.tobytes()
+    assert result.unexplained.tolist() == [[1, 0], [1411, 3], [1412, 3]]
+    assert not np.array_equal(np.unwrap(q[:, 0]), q[:, 0])
