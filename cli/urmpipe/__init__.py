@@ -1,3 +1,59 @@
-"""urmpipe: does the motion this environment produced agree with the motion that was asked for?"""
+"""urmpipe: does the motion this environment produced agree with the motion that was asked for?
+
+    import urmpipe
+    run = urmpipe.ingest("log.csv", robot="urm6")
+    comparison = urmpipe.compare("path.csv", ["log.csv"], robot="urm6")
+    urmpipe.report([comparison], "report.html")
+
+The functions are loaded when they are first used.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from urmpipe.api import Report as Report
+    from urmpipe.api import compare as compare
+    from urmpipe.api import ingest as ingest
+    from urmpipe.api import read_recording as read_recording
+    from urmpipe.api import report as report
+    from urmpipe.api import write_recording as write_recording
+    from urmpipe_models.catalogue import load_robot as load_robot
+    from urmpipe_models.catalogue import robot_names as robot_names
+    from urmpipe_models.chain import Chain as Chain
+    from urmpipe_models.errors import UrmpipeError as UrmpipeError
+    from urmpipe_pipeline.results import Comparison as Comparison
+    from urmpipe_pipeline.results import Run as Run
 
 __version__ = "0.1.0"
+
+_HOME = {
+    "Chain": "urmpipe_models.chain",
+    "Comparison": "urmpipe_pipeline.results",
+    "Report": "urmpipe.api",
+    "Run": "urmpipe_pipeline.results",
+    "UrmpipeError": "urmpipe_models.errors",
+    "compare": "urmpipe.api",
+    "ingest": "urmpipe.api",
+    "load_robot": "urmpipe_models.catalogue",
+    "read_recording": "urmpipe.api",
+    "report": "urmpipe.api",
+    "robot_names": "urmpipe_models.catalogue",
+    "write_recording": "urmpipe.api",
+}
+
+__all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604 - the names are those of _HOME
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first asked for."""
+    from importlib import import_module
+
+    if name not in _HOME:
+        raise AttributeError(f"module 'urmpipe' has no attribute {name!r}")
+    return getattr(import_module(_HOME[name]), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

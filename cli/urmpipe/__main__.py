@@ -1,0 +1,5 @@
+"""`python -m urmpipe`."""
+
+from urmpipe.main import main
+
+main()

@@ -1,0 +1,223 @@
+"""The public functions: each command is a thin shell around one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import Finding, LogError, RecordingError
+from urmpipe_models.transform import Transform
+from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
+from urmpipe_pipeline.derivatives import Method
+from urmpipe_pipeline.ingest import ingest_log
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.operands import load_run, log_files
+from urmpipe_pipeline.recording import is_recording, read_recording, write_recording
+from urmpipe_pipeline.report import write_report
+from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+PathLike = str | Path
+Robot = Chain | str | Path
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Report:
+    """A report that was written.
+
+    Attributes:
+        path: The HTML file.
+        results: What it shows.
+    """
+
+    path: Path
+    results: tuple[Run | Comparison, ...]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a compared log and quantity, as `Comparison.to_frame`, for all comparisons in it."""
+        import pandas as pd
+
+        frames = [result.to_frame() for result in self.results if isinstance(result, Comparison)]
+        return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object that `urmpipe report --json` prints."""
+        kinds = [
+            {"name": result.name, "verdict": result.verdict if isinstance(result, Comparison) else None}
+            for result in self.results
+        ]
+        return {"schema": 1, "report": str(self.path), "recordings": kinds}
+
+
+def ingest(
+    log: PathLike | Sequence[PathLike],
+    *,
+    robot: Robot | None = None,
+    base: Transform | None = None,
+    tool: Transform | None = None,
+    read: ReadOptions | None = None,
+    tsp: float | None = None,
+    derivative: Method | None = None,
+    strict: bool = False,
+    output: PathLike | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Run:
+    """Turn one log into a run, and write its recording if an output is named.
+
+    Args:
+        log: The log's file; several files, or a folder of them, if its source writes one a plot.
+        robot: Name, file (TOML, URDF) or chain of the arm; without it there are no kinematics.
+        base: Where the arm stands in the world.
+        tool: The tool centre point in the frame of the arm's tip.
+        read: How to read the file where it cannot tell by itself.
+        tsp: Period of the grid in [s]; default: the log's own.
+        derivative: central or savgol; default: savgol for quantised logs, else central.
+        strict: Whether a warning is an error.
+        output: The recording (.rrd) to write.
+        progress: Told the share of the recording that is written, 0..1.
+
+    Returns:
+        The run: arrays in SI, `to_frame()`, `to_dict()`.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the input or the output.
+    """
+    given = [Path(log)] if isinstance(log, (str, Path)) else [Path(one) for one in log]
+    if any(is_recording(path) for path in given if path.is_file()):
+        raise LogError(Finding("found a recording, allowed: a log (CSV)", file=str(given[0])))
+    files = [file for path in given for file in log_files(path)]
+    arm = place_robot(robot, base, tool)
+    name = given[0].resolve().name if given[0].is_dir() else None
+    run = ingest_log(files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name)
+    _refuse_warnings(strict, run.warnings)
+    if output is None:
+        return run
+    return replace(run, recording=write_recording(run, Path(output), inputs=files, progress=progress))
+
+
+def compare(
+    reference: PathLike | Run,
+    logs: Sequence[PathLike | Run] = (),
+    *,
+    robot: Robot | None = None,
+    base: Transform | None = None,
+    tool: Transform | None = None,
+    read: ReadOptions | None = None,
+    tsp: float | None = None,
+    derivative: Method | None = None,
+    tolerance: float = DEFAULT_TOLERANCE,
+    tcp: Tcp = "fk",
+    sync_offset: float = 0.0,
+    strict: bool = False,
+    output: PathLike | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Comparison:
+    """Hold logs against a reference: deviation, statistics and verdict.
+
+    Args:
+        reference: A path (t, x, y, z), a log, or a recording. Without `logs` it is a log that
+            recorded its own tool centre point: its forward kinematics are held against that.
+        logs: The logs or recordings to judge.
+        robot: Name, file (TOML, URDF) or chain of the arm; a recording brings its own.
+        base: Where the arm stands in the world.
+        tool: The tool centre point in the frame of the arm's tip.
+        read: How to read a file where it cannot tell by itself.
+        tsp: Period of the grid in [s]; default: each log's own.
+        derivative: central or savgol; default: savgol for quantised logs, else central.
+        tolerance: Largest deviation allowed on an axis, in [m].
+        tcp: fk or recorded: where a log was.
+        sync_offset: t_reference = t_log + sync_offset in [s]; 0 starts both together.
+        strict: Whether a warning is an error.
+        output: The recording (.rrd) to write.
+        progress: Told the share of the recording that is written, 0..1.
+
+    Returns:
+        The comparison: its verdict, `to_frame()`, `to_dict()`.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the input or the output.
+
+    Source: [UrmArm2021]_ eq. 19-23.
+    """
+    options = CompareOptions(tolerance, tcp, sync_offset)
+    arm = place_robot(robot, base, tool)
+
+    def run_of(operand: PathLike | Run) -> Run:
+        if isinstance(operand, Run):
+            return operand
+        return load_run(Path(operand), robot=arm, read=read, tsp=tsp, derivative=derivative)
+
+    first, others = run_of(reference), [run_of(log) for log in logs]
+    result = compare_runs(first, others, options) if others else compare_recorded(first, options)
+    _refuse_warnings(
+        strict, (*first.warnings, *(w for run in others for w in run.warnings), *result.warnings)
+    )
+    if output is None:
+        return result
+    inputs = [Path(operand) for operand in (reference, *logs) if not isinstance(operand, Run)]
+    return replace(result, recording=write_recording(result, Path(output), inputs=inputs, progress=progress))
+
+
+def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> Report:
+    """Write one self-contained HTML file about recordings or results.
+
+    Args:
+        results: Recordings (.rrd), or what `ingest` and `compare` returned; at least one.
+        output: The HTML file to write.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the recordings or the output.
+    """
+    files = [Path(one) for one in results if isinstance(one, (str, Path))]
+    foreign = [path for path in files if path.exists() and not is_recording(path)]
+    if foreign:
+        raise RecordingError(
+            *(
+                Finding(
+                    "found no recording of urmpipe, allowed: a .rrd that ingest or compare wrote",
+                    file=str(path),
+                )
+                for path in foreign
+            )
+        )
+    shown = tuple(read_recording(Path(one)) if isinstance(one, (str, Path)) else one for one in results)
+    return Report(write_report(shown, Path(output), inputs=files), shown)
+
+
+def place_robot(robot: Robot | None, base: Transform | None, tool: Transform | None) -> Chain | None:
+    """Return the arm on its base and with its tool; None without a robot.
+
+    Raises:
+        RobotError: If the robot is unknown, or a base or tool is given without one.
+    """
+    if robot is None:
+        if base is not None or tool is not None:
+            from urmpipe_models.errors import OptionError
+
+            raise OptionError(
+                "--base and --tool place a robot, but none is given; allowed: --robot NAME|FILE"
+            )
+        return None
+    chain = robot if isinstance(robot, Chain) else load_robot(robot)
+    return chain.placed(base, tool)
+
+
+def _refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:
+    if strict and warnings:
+        raise LogError(*(Finding(f"{w.kind}: {w.message} (--strict)", row=w.row) for w in warnings))
+
+
+def read_options(values: Mapping[str, Any]) -> ReadOptions:
+    """Return the reading options among some named values; None means not given."""
+    known = asdict(ReadOptions())
+    return ReadOptions(
+        **{name: value for name, value in values.items() if name in known and value is not None}
+    )

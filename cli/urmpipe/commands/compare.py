@@ -1,0 +1,105 @@
+"""`urmpipe compare`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from urmpipe.options import log_options, output_options
+
+TOLERANCE = 0.0035
+
+
+def _sync(ctx: click.Context, param: click.Parameter, value: str) -> float:
+    """Return the time offset in [s] that start or SECONDS stands for."""
+    try:
+        return 0.0 if value == "start" else float(value)
+    except ValueError:
+        raise click.BadParameter(f"found {value!r}, allowed: start, or a time in s") from None
+
+
+@click.command(short_help="Hold logs against a reference and give a verdict.")
+@click.argument("reference", type=click.Path(path_type=Path))
+@click.argument("logs", metavar="[LOG...]", nargs=-1, type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    help="The recording [default: LOG-against-REFERENCE.rrd here].",
+)
+@click.option(
+    "--tolerance",
+    type=float,
+    default=TOLERANCE,
+    show_default=True,
+    metavar="M",
+    help="Largest deviation allowed on an axis, in m.",
+)
+@click.option(
+    "--tcp",
+    type=click.Choice(["fk", "recorded"]),
+    default="fk",
+    show_default=True,
+    help="Where a log was: by its joints, or as it recorded itself.",
+)
+@click.option(
+    "--sync",
+    "sync_offset",
+    default="start",
+    show_default=True,
+    callback=_sync,
+    metavar="start|SECONDS",
+    help="t_reference = t_log + SECONDS, from the first samples of both.",
+)
+@log_options
+@output_options
+def compare(
+    reference: Path, logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bool, **options: Any
+) -> int:
+    """Hold logs against a reference: deviation, statistics, verdict.
+
+    REFERENCE is a path (t, x, y, z), a log, or a recording; so is each LOG. With REFERENCE alone, the
+    forward kinematics of that log are held against the tool centre point that it recorded itself. A
+    folder stands for the files of one log.
+
+    \b
+    Examples:
+      urmpipe compare path.csv log.csv --robot urm6
+      urmpipe compare path.csv coppelia.csv matlab.csv solidworks/ --robot urm6 --json
+      urmpipe compare robot_data.csv --robot ur5e --tolerance 0.002
+
+    Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
+    """
+    from urmpipe.printing import print_comparison, print_json, print_warnings, progress_bar
+    from urmpipe_pipeline.recording import warm_up
+
+    warm_up()
+    from urmpipe import api
+
+    names = ("robot", "base", "tool", "tsp", "derivative", "strict", "tolerance", "tcp", "sync_offset")
+    shared = {name: options.pop(name) for name in names}
+    target = output or Path(default_name(reference, logs))
+    with progress_bar(f"Writing {target}", quiet=quiet) as progress:
+        result = api.compare(
+            reference, logs, read=api.read_options(options), output=target, progress=progress, **shared
+        )
+    if not quiet:
+        for one in result.runs:
+            print_warnings(one.run.warnings)
+        print_warnings(result.warnings)
+    if as_json:
+        print_json(result.to_dict())
+    elif not quiet:
+        print_comparison(result)
+        click.echo(f"Recording: {result.recording}  (open it: rerun {result.recording})")
+    return 0 if result.verdict == "pass" else 1
+
+
+def default_name(reference: Path, logs: tuple[Path, ...]) -> str:
+    """Return LOG-against-REFERENCE.rrd; of several logs the first names it."""
+    if not logs:
+        return f"{reference.stem}-against-itself.rrd"
+    more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
+    return f"{logs[0].stem}{more}-against-{reference.stem}.rrd"

@@ -1,0 +1,66 @@
+"""`urmpipe demo`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from urmpipe.options import output_options
+
+EXPECTED = {"coppeliasim": "pass", "matlab": "pass", "solidworks": "pass", "counter_rotating": "fail"}
+"""The bundled logs and the verdict each should get: the last comes from an arm with one module the wrong
+way round."""
+
+
+@click.command(short_help="Run the whole way on bundled logs.")
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=Path("urmpipe-demo"),
+    show_default=True,
+    help="Folder for recordings and report.",
+)
+@output_options
+def demo(output: Path, as_json: bool, quiet: bool) -> int:
+    """Run the whole way on bundled logs: ingest, compare, report.
+
+    One motion of the six-module URM arm, as three environments logged it and as an arm with a
+    counter-rotating module did. Exit code 0 if the verdicts are as they should be.
+
+    \b
+    Examples:
+      urmpipe demo
+      urmpipe demo -o somewhere --json
+    """
+    from urmpipe import api
+    from urmpipe.printing import print_comparison, print_json, progress_bar
+    from urmpipe_datasets import LOGS
+
+    output.mkdir(parents=True, exist_ok=True)
+    runs = []
+    steps = len(EXPECTED) + 2
+    with progress_bar("Demo", quiet=quiet) as progress:
+        for number, name in enumerate(EXPECTED, start=1):
+            source = LOGS / name if (LOGS / name).is_dir() else LOGS / f"{name}.csv"
+            runs.append(api.ingest(source, robot="urm6", output=output / f"{name}.rrd"))
+            if progress:
+                progress(number / steps)
+        result = api.compare(LOGS / "path.csv", runs, output=output / "demo.rrd")
+        if progress:
+            progress((steps - 1) / steps)
+        report = api.report([result], output / "report.html")
+    got = {one.name: one.verdict for one in result.runs}
+    as_expected = list(got.values()) == list(EXPECTED.values())
+    if as_json:
+        print_json(result.to_dict() | {"as_expected": as_expected, "report": str(report.path)})
+    elif not quiet:
+        print_comparison(result)
+        click.echo("The verdicts are as they should be: three environments agree, the arm with the")
+        click.echo("counter-rotating module does not.") if as_expected else click.echo(
+            f"Expected: {EXPECTED}"
+        )
+        click.echo(f"Report:    {report.path}  (open it in any browser)")
+        click.echo(f"Recording: {result.recording}  (open it: rerun {result.recording})")
+    return 0 if as_expected else 1

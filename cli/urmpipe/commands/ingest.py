@@ -1,0 +1,48 @@
+"""`urmpipe ingest`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from urmpipe.options import log_options, output_options
+
+
+@click.command(short_help="Turn one log into a recording.")
+@click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: LOG.rrd here]."
+)
+@log_options
+@output_options
+def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """Turn one log into a recording: checked, repolarized, with the arm's kinematics.
+
+    Several files are one log whose source writes one a plot (SolidWorks); a folder stands for the
+    files in it.
+
+    \b
+    Examples:
+      urmpipe ingest log.csv --robot urm6
+      urmpipe ingest phi1.csv phi2.csv phi3.csv -o run.rrd
+      urmpipe ingest table.txt --robot ur5e --unit deg --period 8ms --json
+    """
+    from urmpipe.printing import print_json, print_run, print_warnings, progress_bar
+    from urmpipe_pipeline.recording import warm_up
+
+    warm_up()
+    from urmpipe import api
+
+    target = output or Path(f"{logs[0].stem if len(logs) == 1 else logs[0].resolve().parent.name}.rrd")
+    shared = {name: options.pop(name) for name in ("robot", "base", "tool", "tsp", "derivative", "strict")}
+    with progress_bar(f"Writing {target}", quiet=quiet) as progress:
+        run = api.ingest(logs, read=api.read_options(options), output=target, progress=progress, **shared)
+    print_warnings(() if quiet else run.warnings)
+    if as_json:
+        print_json(run.to_dict())
+    elif not quiet:
+        print_run(run)
+        click.echo(f"Recording: {run.recording}  (open it: rerun {run.recording})")
+    return 0

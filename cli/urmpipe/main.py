@@ -1,0 +1,131 @@
+"""The command line: a group that loads only the command it runs, and the one error boundary.
+
+Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
+"""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+from importlib import import_module
+from typing import TYPE_CHECKING
+
+import click
+
+from urmpipe import __version__
+
+if TYPE_CHECKING:
+    from urmpipe_models.errors import Finding
+
+COMMANDS = {
+    "demo": "Run the whole way on bundled logs.",
+    "ingest": "Turn one log into a recording.",
+    "compare": "Hold logs against a reference and give a verdict.",
+    "report": "Write the HTML report of recordings.",
+    "robot": "List, show and export robots.",
+}
+"""Each command and its short help: --help must not import them all (a test holds both together)."""
+
+SHOWN_FINDINGS = 20
+"""Errors printed line by line; the others are counted."""
+
+
+class LazyGroup(click.Group):
+    """A group whose commands are modules, loaded when they are run."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        """Return the names, in the order of the way of the data."""
+        return list(COMMANDS)
+
+    def get_command(self, ctx: click.Context, cmd_name: str) -> click.Command | None:
+        """Load one command."""
+        if cmd_name not in COMMANDS:
+            return None
+        command = getattr(import_module(f"urmpipe.commands.{cmd_name}"), cmd_name)
+        if not isinstance(command, click.Command):
+            raise TypeError(f"urmpipe.commands.{cmd_name} defines no command of its name")
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        """Write the commands with their short help, without loading them."""
+        with formatter.section("Commands"):
+            formatter.write_dl(list(COMMANDS.items()))
+
+
+@click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="urmpipe")
+def cli() -> None:
+    """Hold the motion of a robot arm against the motion that was asked for.
+
+    Joint logs of any environment go in as CSV; a verdict, a recording (.rrd, viewed offline in Rerun)
+    and an HTML report come out.
+
+    \b
+    Examples:
+      urmpipe demo
+      urmpipe ingest log.csv --robot urm6
+      urmpipe compare path.csv log.csv --robot urm6 --tolerance 0.0035
+      urmpipe report log-against-path.rrd
+
+    Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
+    """
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the command line and exit: errors become lines on standard error and the exit code 2."""
+    given = list(sys.argv[1:] if arguments is None else arguments)
+    sys.exit(run(given))
+
+
+def run(arguments: Sequence[str]) -> int:
+    """Run the command line and return the exit code."""
+    from urmpipe_models.errors import Finding, UrmpipeError
+
+    debug, as_json = "--debug" in arguments, "--json" in arguments
+    try:
+        return int(cli.main(list(arguments), prog_name="urmpipe", standalone_mode=False) or 0)
+    except UrmpipeError as error:
+        findings: Sequence[Finding] = error.findings
+    except click.UsageError as error:
+        if not as_json:
+            error.show()
+            return 2
+        findings = [Finding(error.format_message())]
+    except click.ClickException as error:
+        findings = [Finding(error.format_message())]
+    except click.Abort:
+        findings = [Finding("stopped before it was done; nothing was written")]
+    except BrokenPipeError:  # the reader of our output left, as head does
+        sys.stderr.close()
+        return 2
+    except OSError as error:
+        findings = [Finding(error.strerror or str(error), file=error.filename and str(error.filename))]
+    except MemoryError:
+        findings = [Finding("out of memory")]
+    except Exception as error:
+        if debug:
+            raise
+        findings = [
+            Finding(f"{type(error).__name__}: {error} (a fault of urmpipe itself; --debug shows where)")
+        ]
+    if debug:
+        import traceback
+
+        traceback.print_exc()
+    _print_findings(findings, as_json)
+    return 2
+
+
+def _print_findings(findings: Sequence[Finding], as_json: bool) -> None:
+    for finding in findings[:SHOWN_FINDINGS]:
+        click.echo(f"error: {finding}", err=True)
+    if len(findings) > SHOWN_FINDINGS:
+        click.echo(f"error: and {len(findings) - SHOWN_FINDINGS} more", err=True)
+    if as_json:
+        import json
+
+        errors = [
+            {"file": one.file, "row": one.row, "column": one.column, "message": one.message}
+            for one in findings
+        ]
+        click.echo(json.dumps({"schema": 1, "errors": errors}, ensure_ascii=False))

@@ -1,0 +1,128 @@
+"""Options that several commands share."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from typing import Any, TypeVar
+
+import click
+from click.shell_completion import CompletionItem
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+class RobotType(click.ParamType):
+    """A robot's name in the catalogue, or a TOML or URDF file; names complete in the shell."""
+
+    name = "NAME|FILE"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Offer the catalogue's names and then files."""
+        from urmpipe_models.catalogue import robot_names
+
+        names = [CompletionItem(name) for name in robot_names() if name.startswith(incomplete)]
+        return [*names, CompletionItem(incomplete, type="file")]
+
+
+class OffsetType(click.ParamType):
+    """A frame as X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad."""
+
+    name = "X,Y,Z[,RX,RY,RZ]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the transform."""
+        from urmpipe_models.catalogue import parse_offset
+
+        return parse_offset(value) if isinstance(value, str) else value
+
+
+class NamesType(click.ParamType):
+    """Some names, parted by commas."""
+
+    name = "A,B,C"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the names as a tuple."""
+        return tuple(part.strip() for part in value.split(",")) if isinstance(value, str) else value
+
+
+class DurationType(click.ParamType):
+    """A time in seconds, or with its unit: 0.005, 5ms."""
+
+    name = "SECONDS"
+    FACTOR = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}  # noqa: RUF012 - a constant
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the time in [s]."""
+        if isinstance(value, float):
+            return value
+        match = re.fullmatch(r"([0-9.eE+-]+?)\s*(s|ms|us)?", str(value).strip())
+        try:
+            seconds = float(match[1]) * self.FACTOR[match[2] or ""] if match else float("nan")
+        except ValueError:
+            seconds = float("nan")
+        if not 0.0 < seconds < float("inf"):
+            self.fail(f"found {value!r}, allowed: a positive time in s, such as 0.005 or 5ms", param, ctx)
+        return seconds
+
+
+def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str] | None:
+    """Return UNIT (all joint angles) and COLUMN=UNIT options as a mapping."""
+    pairs = (value.rpartition("=") for value in values)
+    return {column: unit for column, _, unit in pairs} or None
+
+
+def robot_options(command: Command) -> Command:
+    """Add --robot, --base and --tool."""
+    for option in (
+        click.option("--tool", type=OffsetType(), help="Tool centre point in the tip's frame (m, rad)."),
+        click.option("--base", type=OffsetType(), help="Where the arm stands in the world (m, rad)."),
+        click.option("--robot", type=RobotType(), help="The arm: a name of the catalogue, a TOML or a URDF."),
+    ):
+        command = option(command)
+    return command
+
+
+def log_options(command: Command) -> Command:
+    """Add the options of every command that takes a log."""
+    for option in (
+        click.option("--strict", is_flag=True, help="Warnings are errors (exit 2)."),
+        click.option(
+            "--derivative",
+            type=click.Choice(["central", "savgol"]),
+            help="How joints are differentiated [default: by the digits].",
+        ),
+        click.option("--tsp", type=DurationType(), help="Period of the grid [default: the log's own]."),
+        click.option(
+            "--period", type=DurationType(), help="Period of a log without a time column [default: 5ms]."
+        ),
+        click.option(
+            "--unit",
+            "units",
+            multiple=True,
+            callback=_units,
+            metavar="[COLUMN=]UNIT",
+            help="Unit of the joint angles (rad, deg), or of one column.",
+        ),
+        click.option("--joints", type=NamesType(), help="The joint columns, in the robot's order."),
+        click.option("--time", metavar="COLUMN", help="The time column."),
+        click.option("--decimal", type=click.Choice([".", ","]), help="The decimal sign."),
+        click.option("--delimiter", metavar="CHAR", help="What parts the columns: , ; tab space."),
+        click.option("--source", metavar="NAME", help="Who wrote the log: coppeliasim, solidworks, ..."),
+    ):
+        command = option(command)
+    return robot_options(command)
+
+
+def output_options(command: Command) -> Command:
+    """Add --json, -q and --debug."""
+    for option in (
+        click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error."),
+        click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
+        click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output."),
+    ):
+        command = option(command)
+    return command

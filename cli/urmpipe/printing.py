@@ -1,0 +1,144 @@
+"""What people read in a terminal: tables on standard output, warnings and progress on standard error."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Any
+
+import click
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from urmpipe_pipeline.joint_log import LogWarning
+    from urmpipe_pipeline.results import Comparison, Run
+
+LISTED = 30
+"""Rows of a list that are printed; the others are counted (the recording and --json have them all)."""
+
+PIPE_WIDTH = 120
+"""Columns of a table that goes into a pipe, where no terminal tells."""
+
+
+def print_json(value: Any) -> None:
+    """Print one JSON object, NaN as null."""
+    from urmpipe_pipeline.results import json_ready
+
+    click.echo(json.dumps(json_ready(value), ensure_ascii=False, indent=2))
+
+
+def print_warnings(warnings: Sequence[LogWarning]) -> None:
+    """Print warnings on standard error, one unwrapped line each."""
+    for warning in warnings[:LISTED]:
+        place = f"row {warning.row}: " if warning.row is not None else ""
+        click.echo(f"warning: {place}{warning.message}", err=True)
+    if len(warnings) > LISTED:
+        click.echo(f"warning: and {len(warnings) - LISTED} more", err=True)
+
+
+def print_run(run: Run) -> None:
+    """Print what ingest inferred and what it changed."""
+    console = _console()
+    log = run.log
+    table = _table("What", "Found", "Because", title=f"{log.name}: {log.rows} rows, {run.duration:.6g} s")
+    for inference in log.inferences:
+        table.add_row(inference.what, inference.value, inference.evidence)
+    grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
+    own = len(run.t_ns) == log.rows and bool((run.t_ns == log.t_ns).all())
+    table.add_row("grid", grid, "the log's own rows" if own else "resampled")
+    table.add_row(
+        "robot",
+        run.robot.name if run.robot else "none",
+        run.robot.description if run.robot else "not given: no kinematics (--robot NAME|FILE)",
+    )
+    console.print(table)
+    if not run.repolarizations:
+        console.print("No repolarization.")
+        return
+    audit = _table(
+        "Joint", "Row", "t_r [s]", "Step [rad]", "Turns", title=f"{len(run.repolarizations)} repolarizations"
+    )
+    for one in run.repolarizations[:LISTED]:
+        instant = f"{one.t:.6g} ± {one.half_period:.4g}"
+        audit.add_row(
+            one.joint, str(one.row), instant, f"{one.step:+.5f}", f"{one.before:+d} → {one.after:+d}"
+        )
+    console.print(audit)
+    if len(run.repolarizations) > LISTED:
+        console.print(f"... and {len(run.repolarizations) - LISTED} more")
+
+
+def print_comparison(result: Comparison) -> None:
+    """Print the statistics, the verdict of each log and the verdict of all."""
+    console = _console()
+    tolerance = result.tolerance["axis"] * 1e3
+    table = _table(
+        "Log", "Axis", "max |Δ| [mm]", "rms", "mean", "std", "p95", "at t [s]", "Verdict",
+        title=f"Deviation from {result.reference.name}, tolerance ±{tolerance:.4g} mm an axis",
+    )  # fmt: skip
+    for run in result.runs:
+        for axis, one in run.statistics.items():
+            figures = (one.max, one.rms, one.mean, one.std, one.p95)
+            table.add_row(
+                run.name if axis == "x" else "",
+                axis,
+                *(f"{value * 1e3:.4f}" for value in figures),
+                f"{one.t_max:.4g}",
+                _verdict(one.verdict),
+                end_section=axis == "norm",
+            )
+    console.print(table)
+    for run in result.runs:
+        worst = run.worst
+        left_out = f", {run.left_out} left out" if run.left_out else ""
+        said = (
+            f" {run.name}: {len(run.sample)} samples compared{left_out}, {run.share_out:.2%} out of"
+            f" tolerance, worst |Δ| {run.delta[worst, 3] * 1e3:.4f} mm at t = {run.t[worst]:.4g} s,"
+            f" {run.start[3] * 1e3:.4f} mm at the start"
+        )
+        console.print(_verdict(run.verdict).append(said, style="not bold default"), soft_wrap=True)
+
+
+@contextmanager
+def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float], None] | None]:
+    """Show a bar on standard error while work goes on; on a terminal only, never in a pipe."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import Progress
+
+    with Progress(console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(title, total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+def _verdict(verdict: str | None) -> Text:
+    """Return a verdict as a word, with a colour on a terminal."""
+    from rich.text import Text
+
+    style = {"pass": "bold green", "fail": "bold red"}
+    return Text("-") if verdict is None else Text(verdict.upper(), style=style[verdict])
+
+
+def _console() -> Console:
+    """Return a console that takes text as it is: names from files may hold brackets."""
+    from rich.console import Console
+
+    width = None if sys.stdout.isatty() else PIPE_WIDTH
+    return Console(width=width, markup=False, emoji=False, highlight=False)
+
+
+def _table(*columns: str, title: str) -> Table:
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table

@@ -1,0 +1,191 @@
+"""Compare: the deviation of some logs from a reference, and the verdict on it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from urmpipe_models.delta import Delta, delta, outside
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.kinematics import positions_over_log
+from urmpipe_pipeline.grid import interpolate
+from urmpipe_pipeline.joint_log import FloatArray, LogWarning, seconds
+from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.results import Comparison, Deviation, Run, Trajectory
+from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE, describe, overall
+
+Tcp = Literal["fk", "recorded"]
+
+
+@dataclass(frozen=True, slots=True)
+class CompareOptions:
+    """How logs are held against a reference.
+
+    Attributes:
+        tolerance: Largest deviation allowed on an axis, in [m].
+        tcp: Where a log was: by forward kinematics of its joints, or as it recorded itself.
+        sync_offset: t_reference = t_log + sync_offset in [s], both from their first samples; 0 starts
+            both together.
+    """
+
+    tolerance: float = DEFAULT_TOLERANCE
+    tcp: Tcp = "fk"
+    sync_offset: float = 0.0
+
+    def __post_init__(self) -> None:
+        if not (np.isfinite(self.tolerance) and self.tolerance > 0):
+            raise OptionError(f"--tolerance: found {self.tolerance}, allowed: a positive length in m")
+        if not np.isfinite(self.sync_offset):
+            raise OptionError(f"--sync: found {self.sync_offset}, allowed: start, or a time in s")
+
+
+def trajectory(run: Run, tcp: Tcp = "fk") -> Trajectory:
+    """Return where a run's tool centre point was, on its grid.
+
+    A log without joints (a path) is where it recorded itself; one with joints goes by `tcp`.
+
+    Raises:
+        LogError: If the run has neither kinematics nor a recorded position to go by.
+    """
+    if run.log.joints and tcp == "fk":
+        if run.tcp is None:
+            raise LogError(_lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
+        return Trajectory(run.name, run.t_ns, run.tcp.position, run.log.files)
+    if run.tcp_recorded is None:
+        raise LogError(_lacking(run, "no recorded tool centre point; allowed: --tcp fk with a --robot"))
+    return Trajectory(run.name, run.t_ns, run.tcp_recorded, run.log.files)
+
+
+def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | None = None) -> Comparison:
+    """Hold runs against a reference run: delta on the samples of each run, statistics, verdict.
+
+    The reference is interpolated linearly at the samples of the run; samples outside its time, inside a
+    gap of it, or without a value of their own are left out and counted.
+
+    Args:
+        reference: A path, or a run of its own.
+        runs: The logs to judge, at least one.
+        options: Tolerance, which tool centre point, and the time offset.
+
+    Raises:
+        LogError: If a run has no position to go by, or shares no time with the reference.
+
+    Source: [UrmArm2021]_ eq. 19-23.
+    """
+    chosen = options or CompareOptions()
+    if not runs:
+        raise OptionError("compare: no log to hold against the reference; at least one is needed")
+    wanted = trajectory(reference, chosen.tcp if reference.log.joints else "recorded")
+    deviations = [
+        _deviation(name, run, wanted, trajectory(run, chosen.tcp), chosen)
+        for name, run in zip(_unique([run.name for run in runs]), runs, strict=True)
+    ]
+    return _comparison(wanted, deviations, chosen)
+
+
+def compare_recorded(run: Run, options: CompareOptions | None = None) -> Comparison:
+    """Hold the forward kinematics of a log against the tool centre point that the same log recorded.
+
+    Both stand in the same rows of one file: nothing is resampled; samples are rows, from 0.
+
+    Raises:
+        LogError: If the log has no joints, no robot, or recorded no position.
+    """
+    chosen = options or CompareOptions()
+    log = run.log
+    if run.robot is None:
+        raise LogError(_lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
+    if log.tcp_position is None:
+        raise LogError(
+            _lacking(run, "one log, which recorded no tool centre point; allowed: a reference before the log")
+        )
+    recorded = Trajectory(f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files)
+    computed = Trajectory(run.name, log.t_ns, positions_over_log(run.robot, log.q), log.files)
+    return _comparison(
+        recorded, [_deviation(run.name, run, recorded, computed, replace(chosen, sync_offset=0.0))], chosen
+    )
+
+
+def _comparison(
+    reference: Trajectory, deviations: Sequence[Deviation], options: CompareOptions
+) -> Comparison:
+    warnings = [
+        LogWarning(
+            "left-out",
+            f"{one.name}: {one.left_out} of {one.left_out + len(one.sample)} samples have no reference"
+            " or no value",
+        )
+        for one in deviations
+        if one.left_out
+    ]
+    inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
+    given = {"tolerance": options.tolerance, "tcp": options.tcp, "sync_offset": options.sync_offset}
+    name = (
+        f"{deviations[0].name}-against-{reference.name}"
+        if len(deviations) == 1
+        else f"against-{reference.name}"
+    )
+    return Comparison(
+        name=name,
+        reference=reference,
+        runs=tuple(deviations),
+        tolerance={"axis": options.tolerance},
+        warnings=tuple(warnings),
+        provenance=provenance("compare", given, inputs),
+    )
+
+
+def _deviation(
+    name: str, run: Run, reference: Trajectory, actual: Trajectory, options: CompareOptions
+) -> Deviation:
+    """Return the deviation of one trajectory, at its own samples."""
+    offset = round(options.sync_offset * 1e9)
+    wanted = interpolate(actual.t_ns + offset, reference.t_ns, reference.position)
+    sample = np.flatnonzero(np.isfinite(wanted).all(axis=1) & np.isfinite(actual.position).all(axis=1))
+    if not len(sample):
+        raise LogError(
+            _lacking(run, f"no sample in common with {reference.name} (time offset {options.sync_offset} s)")
+        )
+    t_ns, there, here = actual.t_ns[sample], wanted[sample], actual.position[sample]
+    deviation = delta(_columns(there), _columns(here))
+    values = np.column_stack(deviation)
+    statistics = describe(values, seconds(t_ns), sample, {"axis": options.tolerance})
+    x, y, z, norm = (float(value) for value in values[0])
+    return Deviation(
+        name=name,
+        run=run,
+        sample=sample,
+        t_ns=t_ns,
+        reference=there,
+        actual=here,
+        delta=values,
+        outside=np.asarray(outside(Delta(*deviation), options.tolerance)),
+        sync_offset=options.sync_offset,
+        left_out=len(actual.t_ns) - len(sample),
+        statistics=statistics,
+        start=(x, y, z, norm),
+        verdict=overall(statistics),
+    )
+
+
+def _columns(position: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    x, y, z = position.T
+    return x, y, z
+
+
+def _unique(names: Sequence[str]) -> list[str]:
+    """Return the names, those that repeat with a number."""
+    result: list[str] = []
+    for name in names:
+        candidate, number = name, 2
+        while candidate in result:
+            candidate, number = f"{name}-{number}", number + 1
+        result.append(candidate)
+    return result
+
+
+def _lacking(run: Run, message: str) -> Finding:
+    return Finding(message, file=run.log.files[0].name if run.log.files else run.name)

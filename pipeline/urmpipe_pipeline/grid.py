@@ -1,0 +1,122 @@
+"""The uniform time grid of a run: the log's own samples where they are regular, else a resampling.
+
+Times are integer nanoseconds from the log's first row. Nothing is upsampled in silence, and nothing is
+interpolated across a gap.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning
+
+REGULAR = 0.01
+"""A log is regular if no sample is further from its place on the grid than this share of the period."""
+
+GAP = 3.0
+"""Two rows further apart than this many median periods have a gap between them."""
+
+ROUNDING_NS = 1000
+"""Clocks are printed to the microsecond or finer: so much beyond the last known time is still at it."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """Where a run is sampled.
+
+    Attributes:
+        t_ns: Times from the log's first row in integer [ns], shape (g,).
+        tsp: Sampling period in [s]; 0 for a single sample.
+        own: True if the grid is the log's own rows.
+        source_ns: The rows' times in integer [ns], shape (n,).
+        warnings: What was changed.
+    """
+
+    t_ns: IntArray
+    tsp: float
+    own: bool
+    source_ns: IntArray
+    warnings: tuple[LogWarning, ...]
+
+    def resample(self, values: FloatArray) -> FloatArray:
+        """Return values of the rows, shape (n, k), on the grid, shape (g, k): linear, NaN inside gaps."""
+        if self.own:
+            return values
+        return interpolate(self.t_ns, self.source_ns, values)
+
+
+def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> FloatArray:
+    """Return values at given times: linear between the known ones, NaN outside them and inside gaps.
+
+    Args:
+        at_ns: Times wanted in integer [ns], shape (m,).
+        known_ns: Times known in integer [ns], strictly increasing, shape (n,).
+        values: Values at the known times, shape (n, k).
+
+    Returns:
+        Values at the times wanted, shape (m, k).
+    """
+    x, known = at_ns.astype(np.float64), known_ns.astype(np.float64)
+    within = np.clip(x, known[0], known[-1])
+    x = np.where(np.abs(within - x) <= ROUNDING_NS, within, x)
+    result = np.empty((len(x), values.shape[1]))
+    for i, column in enumerate(values.T):
+        result[:, i] = np.interp(x, known, column, np.nan, np.nan)
+    result[inside_gaps(at_ns, known_ns)] = np.nan
+    return result
+
+
+def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> NDArray[np.bool_]:
+    """Tell which times lie strictly between two known ones that are more than 3 median periods apart."""
+    if len(known_ns) < 2:
+        return np.zeros(len(at_ns), dtype=np.bool_)
+    after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)
+    step = np.diff(known_ns)
+    wide = (step > GAP * np.median(step))[after - 1]
+    return np.asarray(wide & (at_ns > known_ns[after - 1]) & (at_ns < known_ns[after]))
+
+
+def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
+    """Return the grid of a log.
+
+    Args:
+        log: The log, its times strictly increasing.
+        tsp: The period wanted in [s]; None for the log's own, which is its rows where they are
+            regular and else its median period.
+    """
+    t = log.t_ns
+    if len(t) < 2:
+        return Grid(t, tsp or 0.0, True, t, ())
+    mean = float(t[-1] - t[0]) / (len(t) - 1)
+    ideal = t[0] + np.arange(len(t)) * mean
+    regular = bool(np.max(np.abs(t - ideal)) <= REGULAR * mean)
+    wanted = tsp * 1e9 if tsp is not None else mean if regular else float(np.median(np.diff(t)))
+    if regular and abs(wanted - mean) <= REGULAR * mean / len(t):
+        return Grid(t, mean / 1e9, True, t, ())
+    count = int((t[-1] - t[0]) / wanted + 1e-6) + 1
+    grid = np.rint(np.arange(count) * wanted).astype(np.int64) + t[0]
+    in_gap = inside_gaps(grid, t)
+    return Grid(grid, wanted / 1e9, False, t, tuple(_changes(log, wanted, count, in_gap)))
+
+
+def _changes(log: JointLog, wanted: float, count: int, in_gap: NDArray[np.bool_]) -> list[LogWarning]:
+    """Say what the resampling did."""
+    median = float(np.median(np.diff(log.t_ns)))
+    said = f"{log.rows} rows with a median period of {median / 1e6:.6g} ms became {count} samples"
+    warnings = [LogWarning("resampled", f"{said} every {wanted / 1e6:.6g} ms (linear)")]
+    if wanted < (1.0 - REGULAR) * median:
+        warnings.append(
+            LogWarning(
+                "upsampled",
+                f"the grid of {wanted / 1e6:.6g} ms is finer than the log's {median / 1e6:.6g} ms: the"
+                " samples between its rows are interpolated, not measured",
+            )
+        )
+    if in_gap.any():
+        warnings.append(
+            LogWarning("gap-left-open", f"{int(in_gap.sum())} grid samples lie inside gaps and have no value")
+        )
+    return warnings

@@ -1,0 +1,209 @@
+"""Ingest: a log becomes a run - repolarized, on a uniform grid, with the arm's kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import LogError
+from urmpipe_models.kinematics import PointLog, point_over_log
+from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
+from urmpipe_pipeline.derivatives import Method, derivatives, recorded_agree
+from urmpipe_pipeline.grid import Grid, make_grid
+from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning, seconds
+from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.results import Repolarization, Run
+from urmpipe_pipeline.sources import ReadOptions, read_log
+
+QUANTISED_DIGITS = 5
+"""Joint values with this many significant digits or fewer are differentiated with smoothing."""
+
+LISTED_STEPS = 20
+"""Unexplained steps named one by one; the others are counted."""
+
+
+def ingest_log(
+    files: Sequence[Path],
+    *,
+    robot: Chain | None = None,
+    read: ReadOptions | None = None,
+    tsp: float | None = None,
+    derivative: Method | None = None,
+    name: str | None = None,
+) -> Run:
+    """Return the run of one log.
+
+    The joints are repolarized on the file's own rows, then put on the grid, differentiated, and
+    taken through the robot's kinematics.
+
+    Args:
+        files: The log's file, or its files if its source writes one a plot.
+        robot: The arm, with base and tool; None for a log without kinematics.
+        read: How to read the file where it cannot tell by itself.
+        tsp: Period of the grid in [s]; default: the log's own.
+        derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
+        name: What to call it; default: the file's stem.
+
+    Raises:
+        LogError: With everything that is wrong with the files.
+    """
+    options = read or ReadOptions()
+    log = read_log(files, options, robot)
+    warnings = list(log.warnings)
+    revolute = _revolute(log, robot)
+    fixed = repolarize(log.q[:, revolute], _periods(log), max_speed=_speed_limits(robot, revolute))
+    repolarized = log.q.copy()
+    repolarized[:, revolute] = fixed.q
+    names = [log.joints[j] for j in revolute]
+    warnings += _unexplained(log, fixed, names)
+    grid = make_grid(log, tsp)
+    warnings += grid.warnings
+    q = grid.resample(repolarized)
+    method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
+    qd, qdd = _rates(log, grid, q, method, warnings)
+    tcp, noticed = kinematics(robot, q, qd, qdd)
+    warnings += noticed
+    given = {
+        "robot": robot.name if robot else None,
+        "tsp": tsp,
+        "derivative": derivative,
+        "read": _given(options),
+    }
+    return Run(
+        name=name or log.name,
+        log=log,
+        robot=robot,
+        tsp=grid.tsp,
+        t_ns=grid.t_ns,
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        tcp=tcp,
+        tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
+        repolarizations=tuple(_audit(log, fixed, names)),
+        warnings=tuple(warnings),
+        provenance=provenance("ingest", given, log.files),
+    )
+
+
+def _given(options: ReadOptions) -> dict[str, Any] | None:
+    """Return the reading options that differ from the defaults."""
+    default = asdict(ReadOptions())
+    return {name: value for name, value in asdict(options).items() if value != default[name]} or None
+
+
+def _revolute(log: JointLog, robot: Chain | None) -> list[int]:
+    """Return the indices of the joints that turn: the robot says so, or else the column's unit."""
+    if robot is not None and log.joints:
+        return [j for j, joint in enumerate(robot.moving) if joint.kind == "revolute"]
+    return [j for j, name in enumerate(log.joints) if log.units.get(name) in ("rad", "deg")]
+
+
+def _periods(log: JointLog) -> FloatArray:
+    """Return the time from the row before in [s], shape (n,), 0 for the first."""
+    return seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
+
+
+def _speed_limits(robot: Chain | None, revolute: Sequence[int]) -> FloatArray | float:
+    return np.inf if robot is None else np.array([robot.moving[j].velocity for j in revolute])
+
+
+def _audit(log: JointLog, fixed: Repolarized, names: Sequence[str]) -> list[Repolarization]:
+    """List every repolarization with its place, its instant and its turns."""
+    turns = [0] * len(names)
+    original = {name: log.q[:, log.joints.index(name)] for name in names}
+    audit = []
+    for row, j, change in zip(fixed.rows.tolist(), fixed.joints.tolist(), fixed.change.tolist(), strict=True):
+        column = original[names[j]]
+        previous = row - 1
+        while np.isnan(column[previous]):
+            previous -= 1
+        start, end = int(log.t_ns[previous]), int(log.t_ns[row])
+        audit.append(
+            Repolarization(
+                joint=names[j],
+                row=row + 1,
+                t=(start + end) / 2e9,
+                half_period=(end - start) / 2e9,
+                step=float(column[row] - column[previous]),
+                before=turns[j],
+                after=turns[j] + change,
+            )
+        )
+        turns[j] += change
+    return audit
+
+
+def _unexplained(log: JointLog, fixed: Repolarized, names: Sequence[str]) -> list[LogWarning]:
+    """Warn of steps above a quarter turn that are no repolarization."""
+    places = fixed.unexplained
+    warnings = [
+        LogWarning(
+            "large-step",
+            f"{names[j]} steps by more than {np.degrees(FULL_TURN / 4):.0f} deg from the value before, to"
+            f" {log.q[row, log.joints.index(names[j])]:.6g} rad, which is no wrap: it stays",
+            int(row) + 1,
+        )
+        for row, j in places[:LISTED_STEPS]
+    ]
+    if len(places) > LISTED_STEPS:
+        warnings.append(
+            LogWarning("large-step", f"{len(places) - LISTED_STEPS} more steps that are no wraps")
+        )
+    return warnings
+
+
+def _rates(
+    log: JointLog, grid: Grid, q: FloatArray, method: Method, warnings: list[LogWarning]
+) -> tuple[FloatArray, FloatArray]:
+    """Return q' and q'' on the grid: the recorded ones where they agree with the differences."""
+    computed = derivatives(q, grid.tsp, method)
+    recorded = (log.qd, log.qdd)
+    result = []
+    for values, own, word in zip(computed, recorded, ("rates", "accelerations"), strict=True):
+        on_grid = None if own is None else grid.resample(own)
+        if on_grid is None or recorded_agree(on_grid, values):
+            result.append(values if on_grid is None else on_grid)
+            continue
+        result.append(values)
+        warnings.append(
+            LogWarning(
+                f"recorded-{word}",
+                f"the recorded {word} do not agree with the differences of the joint values;"
+                " the differences are used",
+            )
+        )
+    return result[0], result[1]
+
+
+def kinematics(
+    robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray
+) -> tuple[PointLog | None, list[LogWarning]]:
+    """Return the motion of the tool centre point, if there is a robot, and what there is to say about it.
+
+    Args:
+        robot: The arm, or None.
+        q: Joint values in [rad] or [m], shape (g, joints).
+        qd: Their rates in [rad/s] or [m/s], shape (g, joints).
+        qdd: Their second derivatives in [rad/s2] or [m/s2], shape (g, joints).
+
+    Raises:
+        LogError: If the log has another number of joints than the robot.
+    """
+    if robot is None or q.shape[1] == 0:
+        return None, []
+    if q.shape[1] != len(robot.coordinates):
+        raise LogError(
+            f"found {q.shape[1]} joints, allowed: {len(robot.coordinates)}, as robot {robot.name} has"
+        )
+    tcp = point_over_log(robot, q, qd, qdd)
+    if not tcp.singular.any():
+        return tcp, []
+    count, first = int(tcp.singular.sum()), int(np.argmax(tcp.singular))
+    said = "ry is +-90 deg: rz and rx are not separately defined, rx = 0 by convention"
+    return tcp, [LogWarning("euler-singular", f"at {count} samples from {first} on {said}")]

@@ -1,0 +1,67 @@
+"""Operands of a command: a log, a folder of plots, a path or a recording, each as a run."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import Finding, LogError, RecordingError
+from urmpipe_pipeline.derivatives import Method
+from urmpipe_pipeline.ingest import ingest_log, kinematics
+from urmpipe_pipeline.recording import is_recording, read_recording
+from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.sources import ReadOptions
+
+
+def load_run(
+    operand: Path,
+    *,
+    robot: Chain | None = None,
+    read: ReadOptions | None = None,
+    tsp: float | None = None,
+    derivative: Method | None = None,
+) -> Run:
+    """Return the run of one operand: read from a recording, or ingested on the way.
+
+    Args:
+        operand: A recording (.rrd), a log or path (CSV), or a folder whose CSV files make one log.
+        robot: The arm; of a recording it replaces the one inside.
+        read: How to read a CSV where it cannot tell by itself.
+        tsp: Period of the grid in [s], of a CSV.
+        derivative: How a CSV's joints are differentiated.
+
+    Raises:
+        LogError: If the CSV is bad.
+        RecordingError: If the recording is bad, or holds a comparison.
+    """
+    if not (operand.suffix == ".rrd" or (operand.is_file() and is_recording(operand))):
+        name = operand.resolve().name if operand.is_dir() else None
+        return ingest_log(
+            log_files(operand), robot=robot, read=read, tsp=tsp, derivative=derivative, name=name
+        )
+    result = read_recording(operand)
+    if isinstance(result, Comparison):
+        raise RecordingError(
+            Finding("found the recording of a comparison, allowed: one that ingest wrote", file=str(operand))
+        )
+    if robot is not None and robot != result.robot:
+        tcp, warnings = kinematics(robot, result.q, result.qd, result.qdd)
+        return replace(result, robot=robot, tcp=tcp, warnings=(*result.warnings, *warnings))
+    return result
+
+
+def log_files(operand: Path) -> list[Path]:
+    """Return the files of one log: the file itself, or the CSV files of a folder by name.
+
+    Raises:
+        LogError: If a folder holds no CSV file.
+    """
+    if not operand.is_dir():
+        return [operand]
+    files = sorted(path for path in operand.iterdir() if path.suffix.lower() in (".csv", ".txt"))
+    if not files:
+        raise LogError(
+            Finding("found a folder without CSV files, allowed: the plots of one log", file=str(operand))
+        )
+    return files

@@ -1,0 +1,152 @@
+"""Deviation, statistics and verdict, from plain arrays."""
+
+import numpy as np
+import pytest
+
+from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.kinematics import point_over_log, positions_over_log
+from urmpipe_models.urm import urm_chain
+from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.derivatives import derivatives
+from urmpipe_pipeline.joint_log import JointLog, SourceFile
+from urmpipe_pipeline.results import Provenance, Run
+
+URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
+TSP = 0.005
+PROVENANCE = Provenance("ingest", {}, (), {}, "")
+
+
+def arm_run(q, *, name="log", robot=URM6, start_ns=0, recorded=None):
+    """A run of joint values at 5 ms."""
+    t_ns = np.arange(len(q)) * 5_000_000 + start_ns
+    joints = tuple(f"q{i}" for i in range(1, 7))
+    log = JointLog(
+        name, "table", (SourceFile(f"{name}.csv", "0", 1),), t_ns, joints, q, tcp_position=recorded
+    )
+    qd, qdd = derivatives(q, TSP)
+    tcp = None if robot is None else point_over_log(robot, q, qd, qdd)
+    return Run(name, log, robot, TSP, t_ns, q, qd, qdd, tcp, recorded, (), (), PROVENANCE)
+
+
+def path_run(position, name="path"):
+    """A path: a log without joints."""
+    t_ns = np.arange(len(position)) * 5_000_000
+    nothing = np.empty((len(position), 0))
+    file = SourceFile(f"{name}.csv", "0", 1)
+    log = JointLog(name, "table", (file,), t_ns, (), nothing, tcp_position=position)
+    return Run(name, log, None, TSP, t_ns, nothing, nothing, nothing, None, position, (), (), PROVENANCE)
+
+
+@pytest.fixture
+def q():
+    t = TSP * np.arange(500)
+    return np.column_stack([0.5 * np.sin(t * (1 + i)) + i for i in range(6)])
+
+
+def test_a_path_made_by_the_arm_itself_has_no_deviation(q):
+    result = compare_runs(path_run(positions_over_log(URM6, q)), [arm_run(q)])
+    assert result.verdict == "pass"
+    assert result.runs[0].delta.max() == 0.0
+    assert result.runs[0].left_out == 0
+    assert result.runs[0].sync_offset == 0.0
+    assert result.name == "log-against-path"
+
+
+def test_statistics_are_those_of_numpy_and_the_sign_is_reference_minus_actual(q):
+    rng = np.random.default_rng(5)
+    shift = rng.normal(0.001, 0.0005, (500, 3))
+    wanted = positions_over_log(URM6, q) + shift
+    deviation = compare_runs(path_run(wanted), [arm_run(q)]).runs[0]
+    np.testing.assert_allclose(deviation.delta[:, :3], shift, atol=1e-15)  # p of 1 m rounds at 2e-16
+    one = deviation.statistics["y"]
+    y = deviation.delta[:, 1]
+    worst = int(np.argmax(np.abs(y)))
+    assert (one.max, one.sample_max, one.t_max) == (np.abs(y).max(), worst, worst * 0.005)
+    assert one.rms == pytest.approx(np.sqrt(np.mean(y**2)), rel=1e-14)
+    assert (one.mean, one.std) == (np.mean(y), np.std(y))
+    assert one.p95 == np.percentile(np.abs(y), 95)
+    norm = deviation.statistics["norm"]
+    assert norm.verdict is None
+    assert norm.tolerance is None
+    assert norm.max == pytest.approx(np.linalg.norm(shift, axis=1).max(), rel=1e-12)
+    assert deviation.start == tuple(deviation.delta[0])
+
+
+def test_the_tolerance_decides_axis_by_axis(q):
+    wanted = positions_over_log(URM6, q)
+    wanted[100:110, 2] += 0.0036
+    result = compare_runs(path_run(wanted), [arm_run(q)])
+    deviation = result.runs[0]
+    verdicts = {axis: one.verdict for axis, one in deviation.statistics.items()}
+    assert verdicts == {"x": "pass", "y": "pass", "z": "fail", "norm": None}
+    assert (result.verdict, deviation.verdict) == ("fail", "fail")
+    assert np.flatnonzero(deviation.outside).tolist() == list(range(100, 110))
+    assert deviation.share_out == 10 / 500
+    assert compare_runs(path_run(wanted), [arm_run(q)], CompareOptions(tolerance=0.0037)).verdict == "pass"
+
+
+def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q):
+    broken = q.copy()
+    broken[7, 3] = np.nan
+    result = compare_runs(path_run(positions_over_log(URM6, q)[:400]), [arm_run(broken)])
+    deviation = result.runs[0]
+    assert deviation.left_out == 101
+    assert 7 not in deviation.sample
+    assert deviation.sample[-1] == 399
+    assert [w.message for w in result.warnings] == ["log: 101 of 500 samples have no reference or no value"]
+
+
+def test_an_offset_shifts_the_log_against_the_reference(q):
+    wanted = path_run(positions_over_log(URM6, q))
+    late = compare_runs(wanted, [arm_run(q[100:])], CompareOptions(sync_offset=0.5)).runs[0]
+    assert late.delta.max() == 0.0
+    assert late.sync_offset == 0.5
+    assert len(late.sample) == 400
+
+
+def test_logs_with_one_name_are_told_apart(q):
+    wanted = path_run(positions_over_log(URM6, q))
+    assert [r.name for r in compare_runs(wanted, [arm_run(q), arm_run(q), arm_run(q, name="b")]).runs] == [
+        "log", "log-2", "b",
+    ]  # fmt: skip
+
+
+def test_one_log_is_held_against_what_it_recorded_itself(q):
+    recorded = positions_over_log(URM6, q) + np.array([0.001, 0.0, 0.0])
+    recorded[3] = np.nan
+    result = compare_recorded(arm_run(q, recorded=recorded))
+    assert result.runs[0].statistics["x"].mean == pytest.approx(0.001, abs=1e-15)
+    assert result.runs[0].left_out == 1
+
+
+def test_what_is_lacking_is_named(q):
+    wanted = path_run(positions_over_log(URM6, q))
+    with pytest.raises(LogError) as error:
+        compare_runs(wanted, [arm_run(q, robot=None)])
+    assert str(error.value) == ("log.csv: no robot, so no forward kinematics; allowed: --robot NAME|FILE")
+    with pytest.raises(LogError) as error:
+        compare_recorded(arm_run(q))
+    assert str(error.value) == (
+        "log.csv: one log, which recorded no tool centre point; allowed: a reference before the log"
+    )
+    with pytest.raises(LogError) as error:
+        compare_runs(wanted, [arm_run(q)], CompareOptions(sync_offset=99.0))
+    assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
+    with pytest.raises(OptionError) as error:
+        CompareOptions(tolerance=-1.0)
+    assert str(error.value) == "--tolerance: found -1.0, allowed: a positive length in m"
+
+
+def test_the_result_is_a_table_and_json(q):
+    result = compare_runs(path_run(positions_over_log(URM6, q) + 0.004), [arm_run(q)])
+    frame = result.to_frame()
+    assert frame["quantity"].tolist() == ["x", "y", "z", "norm"]
+    assert frame["verdict"].tolist()[:3] == ["fail"] * 3
+    as_dict = result.to_dict()
+    assert list(as_dict)[:3] == ["schema", "verdict", "tolerance"]
+    assert as_dict["tolerance"] == {"axis": 0.0035}
+    one = as_dict["runs"][0]
+    assert set(one) >= {"name", "samples", "left_out", "duration", "sync_offset", "delta", "worst",
+                        "out_of_tolerance", "share_out", "verdict"}  # fmt: skip
+    assert set(one["delta"]["x"]) == {"max", "rms", "mean", "std", "p95", "t_max", "sample_max", "verdict"}
+    assert one["share_out"] == 1.0

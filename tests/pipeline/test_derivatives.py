@@ -1,0 +1,61 @@
+"""Rates on the grid: exact on polynomials, smooth on quantised logs."""
+
+import numpy as np
+import pytest
+
+from urmpipe_pipeline.derivatives import WINDOW, derivatives, recorded_agree
+
+TSP = 0.005
+T = TSP * np.arange(400)
+
+
+@pytest.mark.parametrize("method", ["central", "savgol"])
+def test_a_parabola_is_differentiated_exactly(method):
+    q = np.column_stack([1.0 + 2.0 * T - 3.0 * T**2, T, np.ones_like(T)])
+    qd, qdd = derivatives(q, TSP, method)
+    # q to 10 rounds at 1e-15; over T^2 = 2.5e-5 this is 1e-10, the filter's sums a little more
+    np.testing.assert_allclose(qd, np.column_stack([2.0 - 6.0 * T, np.ones_like(T), 0 * T]), atol=1e-9)
+    np.testing.assert_allclose(qdd, np.column_stack([np.full_like(T, -6.0), 0 * T, 0 * T]), atol=1e-7)
+
+
+def test_central_differences_are_second_order():
+    q = np.sin(T)[:, None]
+    qd, qdd = derivatives(q, TSP)
+    assert np.abs(qd[:, 0] - np.cos(T)).max() < TSP**2  # error T^2 / 6 inside, T^2 / 3 at the ends
+    assert np.abs(qdd[1:-1, 0] + np.sin(T)[1:-1]).max() < TSP**2
+
+
+def test_four_digit_angles_need_smoothing():
+    q = 2.0 * np.sin(T)[:, None]
+    quantised = np.round(q, 3)
+    _, rough = derivatives(quantised, TSP)
+    _, smooth = derivatives(quantised, TSP, "savgol")
+    exact = -2.0 * np.sin(T)[:, None]
+    inner = slice(WINDOW, -WINDOW)
+    assert np.abs(rough - exact)[inner].max() > 10.0
+    assert np.abs(smooth - exact)[inner].max() < 1.0
+
+
+def test_a_missing_sample_leaves_only_its_neighbours_without_a_derivative():
+    q = T[:, None].copy()
+    q[100] = np.nan
+    qd, qdd = derivatives(q, TSP)
+    assert np.flatnonzero(np.isnan(qd)).tolist() == [99, 101]
+    assert np.flatnonzero(np.isnan(qdd)).tolist() == [99, 100, 101]
+
+
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_too_few_samples_have_no_derivative(count):
+    qd, qdd = derivatives(np.ones((count, 2)), TSP)
+    assert qd.shape == qdd.shape == (count, 2)
+    assert np.isnan(qd).all()
+
+
+def test_recorded_rates_are_trusted_only_where_they_are_rates():
+    q = np.sin(5 * T)[:, None]
+    qd, _ = derivatives(q, TSP)
+    assert recorded_agree(5 * np.cos(5 * T)[:, None], qd)
+    assert not recorded_agree(np.zeros_like(qd), qd)  # velocity columns of 0 while the joints move
+    assert not recorded_agree(np.degrees(qd), qd)
+    assert recorded_agree(np.zeros_like(qd), 1e-3 * qd)  # a robot at rest
+    assert not recorded_agree(np.full_like(qd, np.nan), qd)

@@ -1,0 +1,90 @@
+"""The uniform grid: the log's own rows, or a resampling that says so."""
+
+import numpy as np
+import pytest
+
+from urmpipe_pipeline.grid import inside_gaps, interpolate, make_grid
+from urmpipe_pipeline.joint_log import JointLog
+
+MS = 1_000_000
+
+
+def log_at(t_ns, q=None):
+    t = np.asarray(t_ns, dtype=np.int64)
+    values = np.zeros((len(t), 1)) if q is None else np.asarray(q, dtype=float).reshape(len(t), -1)
+    return JointLog("log", "table", (), t, ("q1",), values)
+
+
+def test_a_regular_log_keeps_its_own_rows():
+    log = log_at(np.arange(100) * 5 * MS)
+    grid = make_grid(log)
+    assert grid.own
+    assert grid.t_ns is log.t_ns
+    assert grid.tsp == 0.005
+    assert grid.warnings == ()
+    assert make_grid(log, 0.005).own
+
+
+def test_rounded_clocks_are_regular():
+    """A period of 1/240 s printed to the microsecond."""
+    assert make_grid(log_at(np.rint(np.arange(1000) / 240 * 1e6).astype(np.int64) * 1000)).own
+
+
+def test_an_irregular_log_is_resampled_to_its_median_period_and_says_so():
+    rng = np.random.default_rng(3)
+    t = np.sort(np.arange(200) * 10 * MS + rng.integers(-2 * MS, 2 * MS, 200))
+    t -= t[0]
+    grid = make_grid(log_at(t, 2.0 * t))
+    assert not grid.own
+    assert grid.tsp == pytest.approx(np.median(np.diff(t)) / 1e9)
+    # a straight line stays itself; values to 4e9, doubles round at 1e-6 of them
+    np.testing.assert_allclose(grid.resample(2.0 * t[:, None])[:, 0], 2.0 * grid.t_ns, rtol=1e-12, atol=1e-5)
+    assert [w.kind for w in grid.warnings] == ["resampled"]
+    assert grid.warnings[0].message.startswith("200 rows with a median period of")
+
+
+def test_nothing_is_upsampled_in_silence():
+    grid = make_grid(log_at(np.arange(10) * 50 * MS), 0.005)
+    assert len(grid.t_ns) == 91
+    assert [w.kind for w in grid.warnings] == ["resampled", "upsampled"]
+    assert grid.warnings[1].message == (
+        "the grid of 5 ms is finer than the log's 50 ms: the samples between its rows are interpolated, not"
+        " measured"
+    )
+
+
+def test_a_coarser_grid_takes_every_fourth_row():
+    q = np.arange(101.0)
+    grid = make_grid(log_at(np.arange(101) * 5 * MS, q), 0.02)
+    np.testing.assert_array_equal(grid.resample(q[:, None])[:, 0], q[::4])
+    assert [w.kind for w in grid.warnings] == ["resampled"]
+
+
+def test_a_gap_is_left_open():
+    t = np.concatenate([np.arange(50), np.arange(80, 120)]) * 5 * MS
+    log = log_at(t, t * 1.0)
+    grid = make_grid(log)
+    values = grid.resample(log.q)[:, 0]
+    assert len(values) == 120
+    assert np.flatnonzero(np.isnan(values)).tolist() == list(range(50, 80))
+    assert [w.kind for w in grid.warnings] == ["resampled", "gap-left-open"]
+    assert grid.warnings[1].message == "30 grid samples lie inside gaps and have no value"
+
+
+def test_interpolation_gives_known_values_exactly_and_nothing_outside():
+    known = np.array([0, 10, 20, 30]) * MS
+    values = np.array([[0.1], [0.2], [0.7], [np.nan]])
+    got = interpolate(np.array([-1, 0, 5, 10, 20, 25, 31]) * MS, known, values)[:, 0]
+    np.testing.assert_array_equal(got[[1, 3, 4]], [0.1, 0.2, 0.7])
+    assert np.isnan(got[[0, 5, 6]]).all()
+    assert got[2] == pytest.approx(0.15)
+    # a clock printed to the microsecond may end a rounding later
+    np.testing.assert_array_equal(interpolate(np.array([-1000, -1001]), known, values)[:, 0], [0.1, np.nan])
+
+
+@pytest.mark.parametrize("count", [0, 1])
+def test_logs_of_no_and_one_row_have_a_grid(count):
+    grid = make_grid(log_at(np.arange(count)))
+    assert len(grid.t_ns) == count
+    assert grid.own
+    assert not inside_gaps(np.arange(3), np.arange(count)).any()
