@@ -1,0 +1,85 @@
+"""Ingest of a 1e6 x 6 log against pandas.read_csv alone and the leanest user's script.
+
+python benchmarks/ingest.py [--rows N] [--rounds N] [--peer PYTHON]
+
+PEER is the Python of an environment with pandas, rerun-sdk and roboticstoolbox-python (default: this one).
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+import numpy as np
+from pairs import machine, rounds, table, write_results
+
+HERE = Path(__file__).parent
+
+
+def write_log(path: Path, rows: int) -> None:
+    """Write a smooth multi-turn motion of six joints, wrapped to +-pi, at 5 ms."""
+    t = 0.005 * np.arange(rows)
+    rng = np.random.default_rng(11)
+    q = np.column_stack(
+        [
+            a * np.sin(w * t + p) + s * t
+            for a, w, p, s in rng.uniform((1, 0.1, 0, -0.05), (3, 0.5, 6, 0.05), (6, 4))
+        ]
+    )
+    wrapped = q - 2.0 * np.pi * np.floor((q + np.pi) / (2.0 * np.pi))
+    header = "t,q1,q2,q3,q4,q5,q6"
+    np.savetxt(
+        path,
+        np.column_stack([t, wrapped]),
+        fmt=["%.3f", *["%.7f"] * 6],
+        delimiter=",",
+        header=header,
+        comments="",
+    )
+
+
+def main() -> None:
+    """Measure and keep the results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--rows", type=int, default=1_000_000)
+    parser.add_argument("--rounds", type=int, default=5)
+    parser.add_argument("--peer", default=sys.executable)
+    options = parser.parse_args()
+    with tempfile.TemporaryDirectory() as folder:
+        log = Path(folder) / "log.csv"
+        write_log(log, options.rows)
+        urmpipe = str(Path(sys.executable).parent / "urmpipe")
+        read = f"import pandas; pandas.read_csv({str(log)!r})"
+        commands = {
+            "pandas.read_csv alone": [sys.executable, "-c", read],
+            "urmpipe ingest": [
+                urmpipe,
+                "ingest",
+                str(log),
+                "--robot",
+                "urm6",
+                "-q",
+                "-o",
+                f"{folder}/ours.rrd",
+            ],
+            "user's script": [options.peer, str(HERE / "users_script.py"), str(log), f"{folder}/theirs.rrd"],
+        }
+        taken = rounds(commands, options.rounds)
+        size = log.stat().st_size / 1e6
+    lines = [
+        f"# Ingest of {options.rows} rows x 6 joints ({size:.0f} MB CSV): {options.rounds} rounds in turn",
+        "",
+        *machine("pandas", "pyarrow", "rerun-sdk"),
+        "The user's script is `users_script.py`: pandas.read_csv, numpy.unwrap, roboticstoolbox ETS.fkine",
+        "and send_columns; it writes joints and positions. urmpipe also checks the log, lists the wraps, and",
+        "writes velocities, accelerations, Euler angles and the moving arm.",
+        "",
+    ]
+    write_results(
+        "ingest", [*lines, *table(taken, "pandas.read_csv alone"), "", *table(taken, "user's script")]
+    )
+
+
+main()

@@ -1,0 +1,100 @@
+"""Forward kinematics of 1e6 urm6 poses against Pinocchio's Python loop, in one process.
+
+python benchmarks/kinematics.py [--poses N] [--rounds N]
+"""
+
+from __future__ import annotations
+
+import argparse
+import statistics
+import time
+from collections.abc import Callable
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+from pairs import machine, write_results
+
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.chain import Chain
+from urmpipe_models.kinematics import poses_over_log
+from urmpipe_models.transform import Transform
+
+FloatArray = NDArray[np.float64]
+
+
+def placement(frame: Transform) -> pin.SE3:
+    """Return a constant frame as Pinocchio's."""
+    return pin.SE3(np.array(frame.rotation, dtype=float), np.array(frame.translation, dtype=float))
+
+
+def peer_model(chain: Chain) -> tuple[pin.Model, int]:
+    """Return Pinocchio's model of a chain of revolute joints about z, and its tip frame."""
+    model = pin.Model()
+    parent, frame = 0, pin.SE3.Identity()
+    for joint in chain.joints:
+        frame = frame * placement(joint.origin)
+        if joint.kind == "revolute":
+            parent = model.addJoint(parent, pin.JointModelRZ(), frame, joint.name)
+            frame = pin.SE3.Identity()
+    tip = pin.Frame("tip", parent, 0, frame * placement(chain.tip), pin.FrameType.OP_FRAME)
+    return model, model.addFrame(tip)
+
+
+def main() -> None:
+    """Measure and keep the results."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--poses", type=int, default=1_000_000)
+    parser.add_argument("--rounds", type=int, default=5)
+    options = parser.parse_args()
+    chain = load_robot("urm6")
+    model, tip = peer_model(chain)
+    data = model.createData()
+    q = np.random.default_rng(0).uniform(-np.pi, np.pi, (options.poses, 6))
+    position, rotation = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
+
+    def bare() -> None:
+        for row in q:
+            pin.forwardKinematics(model, data, row)
+
+    def stored() -> None:
+        for i, row in enumerate(q):
+            pin.forwardKinematics(model, data, row)
+            pose = pin.updateFramePlacement(model, data, tip)
+            position[i], rotation[i] = pose.translation, pose.rotation
+
+    ours: list[tuple[FloatArray, FloatArray]] = []
+    jobs: dict[str, Callable[[], object]] = {
+        "urmpipe poses_over_log": lambda: ours.append(poses_over_log(chain, q)),
+        "Pinocchio loop, poses stored": stored,
+        "Pinocchio loop, poses computed and dropped": bare,
+    }
+    taken: dict[str, list[float]] = {name: [] for name in jobs}
+    for number in range(options.rounds + 1):
+        for name, job in jobs.items():
+            ours.clear()
+            start = time.perf_counter()
+            job()
+            if number:
+                taken[name].append(time.perf_counter() - start)
+    mine = poses_over_log(chain, q)
+    error = max(np.abs(mine[0] - position).max(), np.abs(mine[1] - rotation).max())
+    base = taken["urmpipe poses_over_log"]
+    lines = [
+        f"# Forward kinematics of {options.poses} urm6 poses: {options.rounds} rounds in turn, one process",
+        "",
+        *machine("pin"),
+        f"Largest difference between the two, position [m] and rotation: {error:.1e}.",
+        "",
+        "| job | s, median (min-max) | thousand poses a second | times urmpipe's, median of pairs |",
+        "|---|---|---|---|",
+    ]
+    for name, seconds in taken.items():
+        middle = statistics.median(seconds)
+        ratio = statistics.median(a / b for a, b in zip(seconds, base, strict=True))
+        span = f"{middle:.3f} ({min(seconds):.3f}-{max(seconds):.3f})"
+        lines.append(f"| {name} | {span} | {options.poses / middle / 1e3:.0f} | {ratio:.2f} |")
+    write_results("kinematics", lines)
+
+
+main()

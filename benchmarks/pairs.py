@@ -1,0 +1,98 @@
+"""Whole processes side by side: each round runs every command once, so that a drifting machine hits all."""
+
+from __future__ import annotations
+
+import os
+import platform
+import statistics
+import subprocess
+import time
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import UTC, datetime
+from importlib.metadata import PackageNotFoundError, version
+from pathlib import Path
+
+RESULTS = Path(__file__).parent / "results"
+
+
+@dataclass(frozen=True, slots=True)
+class Usage:
+    """What one process took, by the operating system's own account: seconds and MB."""
+
+    wall: float
+    cpu: float
+    rss: float
+
+
+def measure(command: Sequence[str], env: Mapping[str, str] | None = None) -> Usage:
+    """Run a command to its end; a failing one stops the benchmark."""
+    start = time.perf_counter()
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=env)
+    assert process.stderr is not None
+    complaint = process.stderr.read()
+    _, status, usage = os.wait4(process.pid, 0)
+    wall = time.perf_counter() - start
+    process.returncode = os.waitstatus_to_exitcode(status)
+    if process.returncode:
+        raise RuntimeError(f"{' '.join(command)} failed: {complaint.decode()}")
+    return Usage(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
+
+
+def rounds(commands: Mapping[str, Sequence[str]], count: int) -> dict[str, list[Usage]]:
+    """Run all commands in turn, one warm-up round first."""
+    taken: dict[str, list[Usage]] = {name: [] for name in commands}
+    for number in range(count + 1):
+        for name, command in commands.items():
+            usage = measure(command)
+            if number:
+                taken[name].append(usage)
+    return taken
+
+
+def table(taken: Mapping[str, Sequence[Usage]], base: str) -> list[str]:
+    """Return a Markdown table: medians, and the ratio of wall times pair by pair against `base`."""
+    lines = [
+        f"| whole process | wall s (min-max) | CPU s | peak MB | wall / {base}, median of pairs |",
+        "|---|---|---|---|---|",
+    ]
+    for name, usages in taken.items():
+        walls = [usage.wall for usage in usages]
+        ratio = statistics.median(a.wall / b.wall for a, b in zip(usages, taken[base], strict=True))
+        cpu, rss = (statistics.median(getattr(usage, what) for usage in usages) for what in ("cpu", "rss"))
+        lines.append(
+            f"| {name} | {statistics.median(walls):.3f} ({min(walls):.3f}-{max(walls):.3f}) | {cpu:.3f} |"
+            f" {rss:.0f} | {ratio:.2f} |"
+        )
+    return lines
+
+
+def machine(*distributions: str) -> list[str]:
+    """Return lines that say when, on what, and with which versions something was measured."""
+    model = next(
+        (
+            line.split(":")[1].strip()
+            for line in Path("/proc/cpuinfo").read_text().splitlines()
+            if "model name" in line
+        ),
+        platform.processor(),
+    )
+    versions = []
+    for name in ("urmpipe", "numpy", *distributions):
+        try:
+            versions.append(f"{name} {version(name)}")
+        except PackageNotFoundError:
+            versions.append(f"{name} not installed")
+    return [
+        f"Measured {datetime.now(UTC):%Y-%m-%d} on {os.cpu_count()} shared cores ({model}), Python"
+        f" {platform.python_version()}, {', '.join(versions)}.",
+        "",
+    ]
+
+
+def write_results(name: str, lines: Sequence[str]) -> None:
+    """Print the results and keep them."""
+    text = "\n".join(lines) + "\n"
+    print(text)
+    RESULTS.mkdir(exist_ok=True)
+    (RESULTS / f"{name}.md").write_text(text, encoding="utf-8")
