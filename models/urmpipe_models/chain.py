@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Literal
@@ -11,6 +12,9 @@ from urmpipe_models.errors import RobotError
 from urmpipe_models.transform import Transform
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
+
+AXIS_TOLERANCE = 1e-9
+"""An axis may differ from unit length by this: rounding, not a forgotten normalisation."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -76,24 +80,34 @@ class Chain:
     source: str = ""
 
     def __post_init__(self) -> None:
-        names = [joint.name for joint in self.joints]
-        if len(set(names)) != len(names):
-            raise RobotError(f"robot {self.name}: joint names repeat: {', '.join(names)}")
-        if not self.coordinates:
-            raise RobotError(f"robot {self.name}: has no moving joint; at least one is needed")
-        for joint in self.joints:
-            if joint.mimic is not None and joint.mimic.joint not in self.coordinates:
-                raise RobotError(
-                    f"robot {self.name}: joint {joint.name} mimics {joint.mimic.joint}, no moving joint"
-                    f" of the chain; allowed: {', '.join(self.coordinates)}"
-                )
         if not self.start:
             object.__setattr__(self, "start", (0.0,) * len(self.coordinates))
+        faults = [f"robot {self.name}: {fault}" for fault in self._faults()]
+        if faults:
+            raise RobotError(*faults)
+
+    def _faults(self) -> Iterator[str]:
+        names = [joint.name for joint in self.joints]
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            yield f"joint names repeat: {', '.join(repeated)}; allowed: each once"
+        if not self.coordinates:
+            yield "has no moving joint; at least one is needed"
+        for joint in self.joints:
+            length = math.hypot(*joint.axis)
+            if abs(length - 1.0) > AXIS_TOLERANCE:
+                yield f"joint {joint.name}: axis {list(joint.axis)} has length {length:g}; allowed: 1"
+            if not joint.lower <= joint.upper:
+                yield f"joint {joint.name}: lower limit {joint.lower:g} above upper {joint.upper:g}"
+            if not joint.velocity > 0.0:
+                yield f"joint {joint.name}: velocity {joint.velocity:g}; allowed: more than 0"
+            if joint.mimic is not None and joint.mimic.joint not in self.coordinates:
+                yield (
+                    f"joint {joint.name} mimics {joint.mimic.joint}, no moving joint of the chain;"
+                    f" allowed: {', '.join(self.coordinates)}"
+                )
         if len(self.start) != len(self.coordinates):
-            raise RobotError(
-                f"robot {self.name}: start has {len(self.start)} values, the chain has"
-                f" {len(self.coordinates)} coordinates"
-            )
+            yield f"start has {len(self.start)} values; allowed: {len(self.coordinates)}, one a coordinate"
 
     @cached_property
     def moving(self) -> tuple[Joint, ...]:

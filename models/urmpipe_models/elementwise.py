@@ -18,38 +18,34 @@ Vector: TypeAlias = tuple[Element, Element, Element]
 ZERO: Vector = (0.0, 0.0, 0.0)
 
 
-def is_constant(a: Element, value: float) -> bool:
-    """Tell whether an element is the float constant `value` (never true of arrays and symbols)."""
-    return isinstance(a, float) and a == value
-
-
 def times(a: Element, b: Element) -> Element:
     """Return a b, folding the constants 0, 1 and -1."""
-    for factor, other in ((a, b), (b, a)):
-        if isinstance(factor, float):
-            if factor == 0.0:
-                return 0.0
-            if factor == 1.0:
-                return other
-            if factor == -1.0:
-                return -other
+    if isinstance(b, float):
+        a, b = b, a
+    if isinstance(a, float):
+        if a == 0.0:
+            return 0.0
+        if a == 1.0:
+            return b
+        if a == -1.0:
+            return -b
     return a * b
 
 
 def plus(a: Element, b: Element) -> Element:
     """Return a + b, folding the constant 0."""
-    if is_constant(a, 0.0):
+    if isinstance(a, float) and a == 0.0:
         return b
-    if is_constant(b, 0.0):
+    if isinstance(b, float) and b == 0.0:
         return a
     return a + b
 
 
 def minus(a: Element, b: Element) -> Element:
     """Return a - b, folding the constant 0."""
-    if is_constant(b, 0.0):
+    if isinstance(b, float) and b == 0.0:
         return a
-    if is_constant(a, 0.0):
+    if isinstance(a, float) and a == 0.0:
         return -b
     return a - b
 

@@ -6,7 +6,8 @@ floats, or CasADi symbols. `over_log` runs one of them over the rows of an (n, j
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+import os
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TypeAlias
 
@@ -15,12 +16,15 @@ from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, plus, scale, subtract, times
-from urmpipe_models.transform import Transform, euler_zyx, rotation_about
+from urmpipe_models.transform import Transform, euler_zyx
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-BLOCK = 4096
-"""Rows worked on at a time: some thirty arrays of this length stay in a core's cache."""
+BLOCK = 16384
+"""Rows worked on at a time: enough to outweigh Python's own work, few enough for a core's cache."""
+
+THREADS = min(4, os.cpu_count() or 1)
+"""Blocks worked on side by side: beyond some, Python's own work, which runs alone, sets the pace."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -174,7 +178,13 @@ class PointLog:
 
 def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     """Return the tool centre point in [m], shape (n, 3), of joint values q, shape (n, joints)."""
-    return poses_over_log(chain, q)[0]
+    position = np.empty((3, len(q)))
+
+    def work(block: slice) -> None:
+        _fill(position[:, block], tip_pose(chain, _columns(q[block])).translation)
+
+    _each_block(work, len(q))
+    return position.T
 
 
 def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -184,13 +194,16 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
         chain: The arm.
         q: Joint values in [rad] or [m], shape (n, joints).
     """
-    position, rotation = np.empty((len(q), 3)), np.empty((len(q), 3, 3))
-    for block in row_blocks(len(q)):
+    position, rotation = np.empty((3, len(q))), np.empty((3, 3, len(q)))
+
+    def work(block: slice) -> None:
         pose = tip_pose(chain, _columns(q[block]))
-        _fill(position[block], pose.translation)
+        _fill(position[:, block], pose.translation)
         for row in range(3):
-            _fill(rotation[block, row], pose.rotation[row])
-    return position, rotation
+            _fill(rotation[row, :, block], pose.rotation[row])
+
+    _each_block(work, len(q))
+    return position.T, rotation.transpose(2, 0, 1)
 
 
 def point_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray, point: int = -1) -> PointLog:
@@ -204,36 +217,44 @@ def point_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray,
         point: Index of the point, -1 for the tool centre point.
     """
     count = len(q)
-    position, velocity, acceleration, euler = (np.empty((count, 3)) for _ in range(4))
-    log = PointLog(position, velocity, acceleration, euler, np.empty(count, dtype=np.bool_))
-    for block in row_blocks(count):
+    position, velocity, acceleration, euler = (np.empty((3, count)) for _ in range(4))
+    singular = np.empty(count, dtype=np.bool_)
+
+    def work(block: slice) -> None:
         motion = motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))[point]
-        rz, ry, rx, singular = euler_zyx(motion.pose.rotation)
-        _fill(log.position[block], motion.pose.translation)
-        _fill(log.velocity[block], motion.velocity)
-        _fill(log.acceleration[block], motion.acceleration)
-        _fill(log.euler_zyx[block], (rz, ry, rx))
-        log.singular[block] = singular
-    return log
+        rz, ry, rx, singular[block] = euler_zyx(motion.pose.rotation)
+        _fill(position[:, block], motion.pose.translation)
+        _fill(velocity[:, block], motion.velocity)
+        _fill(acceleration[:, block], motion.acceleration)
+        _fill(euler[:, block], (rz, ry, rx))
+
+    _each_block(work, count)
+    return PointLog(position.T, velocity.T, acceleration.T, euler.T, singular)
 
 
 def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     """Return the positions of the base and of p1..pn in [m], shape (n, points + 1, 3): the arm's skeleton."""
-    skeleton = np.empty((len(q), len(chain.joints) + 1, 3))
-    skeleton[:, 0] = [float(x) for x in chain.base.translation]
-    for block in row_blocks(len(q)):
+    skeleton = np.empty((len(chain.joints) + 1, 3, len(q)))
+    _fill(skeleton[0], chain.base.translation)
+
+    def work(block: slice) -> None:
         for k, pose in enumerate(forward(chain, _columns(q[block])), start=1):
-            _fill(skeleton[block, k], pose.translation)
-    return skeleton
+            _fill(skeleton[k, :, block], pose.translation)
+
+    _each_block(work, len(q))
+    return skeleton.transpose(2, 0, 1)
 
 
 def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArray:
     """Return the geometric Jacobian of a point for every row of q: shape (n, 6, joints)."""
-    result = np.empty((len(q), 6, len(chain.coordinates)))
-    for block in row_blocks(len(q)):
+    result = np.empty((len(chain.coordinates), 6, len(q)))
+
+    def work(block: slice) -> None:
         for i, column in enumerate(jacobian(chain, _columns(q[block]), point)):
-            _fill(result[block, :, i], column)
-    return result
+            _fill(result[i, :, block], column)
+
+    _each_block(work, len(q))
+    return result.transpose(2, 1, 0)
 
 
 def _value(joint: Joint, of: dict[str, Element]) -> Element:
@@ -256,7 +277,7 @@ def _joint_rates(chain: Chain, rates: Sequence[Element]) -> list[Element]:
 def _moved(at_joint: Transform, joint: Joint, value: Element) -> Transform:
     """Return the joint's moving frame."""
     if joint.kind == "revolute":
-        return at_joint @ rotation_about(joint.axis, value)
+        return at_joint.turned(joint.axis, value)
     if joint.kind == "prismatic":
         return Transform(at_joint.rotation, at_joint.point(scale(value, joint.axis)))
     return at_joint
@@ -305,12 +326,23 @@ def row_blocks(count: int) -> Iterator[slice]:
     return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
 
 
+def _each_block(work: Callable[[slice], None], count: int) -> None:
+    """Run work on every block of rows, several at a time: NumPy computes without Python's lock."""
+    if count <= BLOCK:
+        work(slice(0, count))
+        return
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(THREADS) as pool:
+        list(pool.map(work, row_blocks(count)))  # taking the results raises what went wrong in a block
+
+
 def _columns(rows: FloatArray) -> list[FloatArray]:
     """Return the columns of (m, joints) as contiguous arrays."""
     return list(np.ascontiguousarray(rows.T))
 
 
 def _fill(target: FloatArray, elements: Sequence[Element]) -> None:
-    """Write one element a column into target, shape (m, k); constants spread over the rows."""
+    """Write one element a row into target, shape (k, m); constants spread over the columns."""
     for i, element in enumerate(elements):
-        target[:, i] = element
+        target[i] = element

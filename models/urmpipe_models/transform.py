@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -13,15 +14,18 @@ from urmpipe_models.elementwise import (
     Vector,
     add,
     dot,
-    is_constant,
     minus,
     plus,
     scale,
+    subtract,
     times,
 )
 
 SINGULAR_COSINE = 1e-9
 """Below this cosine of ry, rz and rx are not separately defined (double precision leaves no digits)."""
+
+_QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
+"""cos and sin of 0, 1, 2 and 3 quarter turns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -78,6 +82,27 @@ class Transform:
         """Return the frame A in B: R^T, -R^T p."""
         turned = Transform(self.columns)
         return Transform(self.columns, scale(-1.0, turned.rotate(self.translation)))
+
+    def turned(self, axis: Sequence[float], angle: Element) -> Transform:
+        """Return the frame after a rotation about an axis of its own: R rotation_about(axis, angle), p.
+
+        About x, y or z the other two axes y, z (z, x; x, y) become c y + s z, c z - s y: 12 products
+        instead of 27.
+
+        Args:
+            axis: Unit vector [-].
+            angle: In [rad], any element.
+        """
+        if sorted(map(abs, axis)) != [0.0, 0.0, 1.0]:
+            return Transform((self @ rotation_about(axis, angle)).rotation, self.translation)
+        along = next(i for i in range(3) if axis[i] != 0.0)
+        c, s = _cosine_sine(angle)
+        s = times(axis[along], s)
+        columns = list(self.columns)
+        first, second = columns[along - 2], columns[along - 1]
+        columns[along - 2] = add(scale(c, first), scale(s, second))
+        columns[along - 1] = subtract(scale(c, second), scale(s, first))
+        return Transform(Transform((columns[0], columns[1], columns[2])).columns, self.translation)
 
 
 def translation(x: Element, y: Element, z: Element) -> Transform:
@@ -209,10 +234,16 @@ def rotation_angle(a: tuple[Vector, Vector, Vector], b: tuple[Vector, Vector, Ve
 
 
 def _cosine_sine(angle: Element) -> tuple[Element, Element]:
-    """Return cos and sin; of the constant 0 as constants, which fold away."""
-    if is_constant(angle, 0.0):
-        return 1.0, 0.0
-    return np.cos(angle), np.sin(angle)
+    """Return cos and sin; of the constants 0, +-pi/2, +-pi, ... +-2 pi exactly, as 0 and +-1 fold away.
+
+    A right angle in a robot's description is meant as one: cos(pi/2) in double precision is 6e-17.
+    """
+    if not isinstance(angle, float):
+        return np.cos(angle), np.sin(angle)
+    quarters, rest = divmod(angle, math.pi / 2)
+    if rest == 0.0 and abs(quarters) <= 4:
+        return _QUARTERS[int(quarters) % 4]
+    return float(np.cos(angle)), float(np.sin(angle))
 
 
 def _cosine_entry(c: Element, v: Element, u: float) -> Element:

@@ -15,7 +15,7 @@ def urm_chain(
     lengths: Sequence[Element],
     tilts: Sequence[Element],
     *,
-    directions: Sequence[int] = (),
+    directions: Sequence[float] = (),
     start: Sequence[float] = (),
     description: str = "",
     source: str = "",

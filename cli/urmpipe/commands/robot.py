@@ -1,0 +1,180 @@
+"""`urmpipe robot list|show|export`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TypeVar
+
+import click
+
+from urmpipe.options import OffsetType, RobotType, output_options
+
+if TYPE_CHECKING:
+    from urmpipe_models.chain import Chain
+    from urmpipe_models.transform import Transform
+
+Command = TypeVar("Command", bound=Callable[..., Any])
+
+
+def _joint_values(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[float, ...] | None:
+    """Return joint values written as Q1,Q2,... in rad and m."""
+    if value is None:
+        return None
+    try:
+        values = tuple(float(part) for part in value.split(","))
+    except ValueError:
+        values = ()
+    if not values or not all(map(math.isfinite, values)):
+        raise click.BadParameter(f"found {value!r}, allowed: numbers in rad and m, such as 0,3.14,0.5")
+    return values
+
+
+def chain_options(command: Command) -> Command:
+    """Add what places and cuts an arm: --base, --tool, --base-link, --tip."""
+    for option in (
+        click.option("--tip", metavar="LINK", help="Link of a URDF where the arm ends [default: its end]."),
+        click.option(
+            "--base-link", metavar="LINK", help="Link of a URDF where it begins [default: the root]."
+        ),
+        click.option("--tool", type=OffsetType(), help="Tool centre point in the tip's frame (m, rad)."),
+        click.option("--base", type=OffsetType(), help="Where the arm stands in the world (m, rad)."),
+    ):
+        command = option(command)
+    return command
+
+
+@click.group(short_help="List, show and export robots.")
+def robot() -> None:
+    """List, show and export robots: those that urmpipe brings along, and your own files.
+
+    A robot is a name of the list, a URDF, or a TOML file of URM modules, DH parameters or frames.
+    """
+
+
+@robot.command("list", short_help="List the robots that urmpipe brings along.")
+@output_options
+def list_(as_json: bool, quiet: bool) -> int:
+    """List the robots that urmpipe brings along.
+
+    \b
+    Examples:
+      urmpipe robot list
+      urmpipe robot list --json
+    """
+    from urmpipe.printing import print_json
+    from urmpipe.robot_printing import print_robots
+    from urmpipe_models.catalogue import load_robot, robot_names
+
+    robots = [load_robot(name) for name in robot_names()]
+    if as_json:
+        listed = [
+            {
+                "name": chain.name,
+                "joints": list(chain.coordinates),
+                "description": chain.description,
+                "source": chain.source,
+            }
+            for chain in robots
+        ]
+        print_json({"schema": 1, "robots": listed})
+    elif not quiet:
+        print_robots(robots)
+    return 0
+
+
+@robot.command(short_help="Print the parameters of a robot and draw it.")
+@click.argument("name", metavar="NAME|FILE", type=RobotType())
+@click.option(
+    "--q",
+    metavar="Q1,Q2,...",
+    callback=_joint_values,
+    help="Pose to draw, in rad and m [default: the start pose].",
+)
+@click.option("--picture", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw into a file, too.")
+@chain_options
+@output_options
+def show(
+    name: str,
+    q: tuple[float, ...] | None,
+    picture: Path | None,
+    as_json: bool,
+    quiet: bool,
+    **options: Any,
+) -> int:
+    """Print the parameters of a robot, where its points are, and draw it from two sides.
+
+    The points p1..pn are the ends of its segments, the last one the tool centre point.
+
+    \b
+    Examples:
+      urmpipe robot show urm6
+      urmpipe robot show urm6 --q 0,3.14,0,3.14,0,0 --picture urm6.svg
+      urmpipe robot show panda.urdf --tip panda_hand_tcp --json
+    """
+    from urmpipe.chain_drawing import chain_svg
+    from urmpipe.printing import print_json
+    from urmpipe.robot_printing import chain_at, print_chain
+    from urmpipe_models.errors import OptionError
+    from urmpipe_models.export import write_export
+
+    chain = _load(name, **options)
+    q = chain.start if q is None else q
+    if len(q) != len(chain.coordinates):
+        allowed = f"{len(chain.coordinates)}, one for each of {', '.join(chain.coordinates)}"
+        raise OptionError(f"--q: found {len(q)} values, allowed: {allowed}")
+    posed = chain_at(chain, q)
+    if picture is not None:
+        write_export(picture, chain_svg(posed.skeleton, f"{chain.name}: {chain.description}"), Path(name))
+    if as_json:
+        print_json(posed.to_dict())
+    elif not quiet:
+        print_chain(posed)
+    return 0
+
+
+@robot.command(short_help="Write a robot as URDF or TOML.")
+@click.argument("name", metavar="NAME|FILE", type=RobotType())
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="A .urdf or .toml file [default: NAME.urdf here]."
+)
+@chain_options
+@output_options
+def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """Write a robot as URDF (cylinders for its links) or as a TOML robot file.
+
+    Read back, the file is the same arm: of a TOML bit by bit, of a URDF to rounding. It replaces only
+    another export.
+
+    \b
+    Examples:
+      urmpipe robot export urm6
+      urmpipe robot export ur5e --tool 0,0,0.15 -o ur5e-gripper.urdf
+      urmpipe robot export urm8 -o urm8.toml
+    """
+    from urmpipe.printing import print_json
+    from urmpipe_models.errors import OptionError
+    from urmpipe_models.export import write_export
+    from urmpipe_models.robot_file import robot_toml
+    from urmpipe_models.urdf_writer import urdf_text
+
+    target = output or Path(f"{Path(name).stem}.urdf")
+    writers = {".urdf": urdf_text, ".toml": robot_toml}
+    if target.suffix.lower() not in writers:
+        raise OptionError(f"--output: found {str(target)!r}, allowed: a name that ends in .urdf or .toml")
+    chain = _load(name, **options)
+    write_export(target, writers[target.suffix.lower()](chain), Path(name))
+    if as_json:
+        print_json({"schema": 1, "robot": chain.name, "file": target})
+    elif not quiet:
+        click.echo(f"Robot: {target}")
+    return 0
+
+
+def _load(
+    name: str, *, base: Transform | None, tool: Transform | None, base_link: str | None, tip: str | None
+) -> Chain:
+    from urmpipe_models.catalogue import load_robot
+
+    return load_robot(name, base_link=base_link, tip_link=tip).placed(base, tool)

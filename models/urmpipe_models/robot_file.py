@@ -1,0 +1,333 @@
+"""Robots as data: TOML files for people, and the dictionary that a recording stores."""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from decimal import Decimal
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias, cast
+
+from urmpipe_models.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.dh import DHRow, dh_chain, modified_dh_chain
+from urmpipe_models.elementwise import cross, dot
+from urmpipe_models.errors import Finding, RobotError
+from urmpipe_models.export import EXPORT_MARK
+from urmpipe_models.tables import Table
+from urmpipe_models.transform import Transform, from_rpy
+from urmpipe_models.urdf_reader import read_urdf
+from urmpipe_models.urm import urm_chain
+
+Build: TypeAlias = Callable[[str], Chain]
+"""Makes the chain of a given name, once all keys are read and found right."""
+
+ORTHONORMAL = 1e-9
+"""R R^T may differ from the identity by this: rounding, not a matrix that is no rotation."""
+
+
+class _Limits(NamedTuple):
+    lower: float
+    upper: float
+    velocity: float
+
+
+@dataclass(frozen=True, slots=True)
+class _Units:
+    """The units of a robot file, made SI where the file is read and nowhere else."""
+
+    millimetres: bool = False
+    degrees: bool = False
+
+    def length(self, value: float) -> float:
+        # by decimals: 243.215 mm is then the very double that 0.243215 is
+        return float(Decimal(repr(value)).scaleb(-3)) if self.millimetres else value
+
+    def angle(self, value: float) -> float:
+        return math.radians(value) if self.degrees else value
+
+    def of_joint(self, kind: str, value: float) -> float:
+        return self.length(value) if kind == "prismatic" else self.angle(value)
+
+
+def read_robot_file(path: str | Path) -> Chain:
+    """Return the arm that a TOML file describes.
+
+    Common keys: `kind` (urm, dh, modified_dh, joints or urdf), `name` (the file's stem by default),
+    `description`, `source`, `length_unit` (m, mm), `angle_unit` (rad, deg), `start`, and the tables
+    `[base]` and `[tool]` with `translation` and `rpy` (or `rotation`, three rows). By kind:
+
+    - urm: `lengths`, `tilts`, `directions`; `[limits]` with `lower`, `upper`, `velocity`, each one number
+      or one a joint.
+    - dh, modified_dh: `[[joints]]` with `name`, `kind`, `theta`, `d`, `a`, `alpha`; `[limits]`.
+    - joints: `[[joints]]` with `name`, `kind`, `origin`, `axis`, `lower`, `upper`, `velocity`, `mimic`;
+      `[tip]`. A mimic has `joint`, `offset` and `multiplier`, the last in rad and m always.
+    - urdf: `file` (relative to this one), `base_link`, `tip_link`.
+
+    Args:
+        path: The file.
+
+    Raises:
+        RobotError: With everything that is wrong: the key, what was found and what is allowed.
+    """
+    path = Path(path)
+    return _read(_parse(path), tuple(_READERS), file=str(path), stem=path.stem, folder=path.parent)
+
+
+def chain_to_dict(chain: Chain) -> dict[str, Any]:
+    """Return a chain as a JSON object of kind `joints`: SI, floats bit by bit, infinities as None."""
+    return {
+        "kind": "joints",
+        "name": chain.name,
+        "description": chain.description,
+        "source": chain.source,
+        "start": [float(value) for value in chain.start],
+        "base": _frame_to_dict(chain.base),
+        "tip": _frame_to_dict(chain.tip),
+        "tool": _frame_to_dict(chain.tool),
+        "joints": [_joint_to_dict(joint) for joint in chain.joints],
+    }
+
+
+def chain_from_dict(data: Mapping[str, Any], file: str | None = None) -> Chain:
+    """Return the chain of a dictionary: `chain_to_dict`'s exact inverse.
+
+    Args:
+        data: What `chain_to_dict` returned; no other kind, so that a stranger's data open no file.
+        file: Where it came from, for the errors.
+
+    Raises:
+        RobotError: With everything that is wrong.
+    """
+    return _read(data, ("joints",), file=file)
+
+
+def robot_toml(chain: Chain) -> str:
+    """Return a chain as a TOML robot file of kind `joints`; read back it is the same chain, bit by bit."""
+    data = chain_to_dict(chain)
+    joints, frames = data.pop("joints"), {key: data.pop(key) for key in ("base", "tip", "tool")}
+    lines = [f"# {EXPORT_MARK}: lengths in m, angles in rad", *_toml_lines(data)]
+    for key, frame in frames.items():
+        lines += ["", f"[{key}]", *_toml_lines(frame)]
+    for joint in joints:
+        lines += ["", "[[joints]]", *_toml_lines(joint)]
+    return "\n".join(lines) + "\n"
+
+
+def _parse(path: Path) -> dict[str, Any]:
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except UnicodeDecodeError as error:
+        raise RobotError(
+            Finding(f"byte {error.start} is no UTF-8; allowed: TOML in UTF-8", str(path))
+        ) from error
+    except OSError as error:
+        raise RobotError(Finding(f"cannot be read: {error.strerror}", str(path))) from error
+    except tomllib.TOMLDecodeError as error:
+        place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
+        line = int(place[1]) if place else None
+        raise RobotError(Finding(f"not valid TOML: {error}", str(path), line=line)) from error
+
+
+def _read(
+    data: Mapping[str, Any],
+    kinds: Sequence[str],
+    *,
+    file: str | None,
+    stem: str = "",
+    folder: Path = Path(),
+) -> Chain:
+    """Read every key, raise what is wrong, and only then build."""
+    faults: list[Finding] = []
+    table = Table(data, faults, file)
+    kind = table.choice("kind", kinds)
+    if faults:  # without a kind every other key would be called unknown
+        raise RobotError(*faults)
+    units = _Units(
+        table.choice("length_unit", ("m", "mm"), "m") == "mm",
+        table.choice("angle_unit", ("rad", "deg"), "rad") == "deg",
+    )
+    name, description, source = (
+        table.text(key, default) for key, default in (("name", stem), ("description", ""), ("source", ""))
+    )
+    start = table.numbers("start", None, ())
+    base, tool = (_frame(table.table(key), units) if table.has(key) else None for key in ("base", "tool"))
+    build = _READERS[kind](table, units, folder)
+    table.close()
+    if faults:
+        raise RobotError(*faults)
+    try:
+        chain = build(name)
+        return replace(
+            chain.placed(base, tool),
+            name=name or chain.name,
+            start=_start(chain, start, units) or chain.start,
+            description=description or chain.description,
+            source=source or chain.source,
+        )
+    except RobotError as error:
+        raise RobotError(*(replace(fault, file=fault.file or file) for fault in error.findings)) from error
+
+
+def _read_urm(table: Table, units: _Units, folder: Path) -> Build:
+    lengths = tuple(units.length(value) for value in table.numbers("lengths", None))
+    tilts = tuple(units.angle(value) for value in table.numbers("tilts", None))
+    directions = table.numbers("directions", None, ())
+    limits = _limits(table.table("limits"), ["revolute"] * len(tilts), units)
+
+    def build(name: str) -> Chain:
+        chain = urm_chain(name, lengths, tilts, directions=directions)
+        *modules, effector = chain.joints
+        limited = [replace(joint, **limit._asdict()) for joint, limit in zip(modules, limits, strict=True)]
+        return replace(chain, joints=(*limited, effector))
+
+    return build
+
+
+def _read_dh(table: Table, units: _Units, folder: Path, *, modified: bool = False) -> Build:
+    rows = [_dh_row(row, units) for row in table.tables("joints")]
+    limits = _limits(table.table("limits"), [row.kind for row in rows], units)
+    limited = [replace(row, **limit._asdict()) for row, limit in zip(rows, limits, strict=True)]
+    return partial(modified_dh_chain if modified else dh_chain, rows=limited)
+
+
+def _read_joints(table: Table, units: _Units, folder: Path) -> Build:
+    joints = tuple(_joint(row, units) for row in table.tables("joints"))
+    return partial(Chain, joints=joints, tip=_frame(table.table("tip"), units))
+
+
+def _read_urdf(table: Table, units: _Units, folder: Path) -> Build:
+    file = table.text("file")
+    base_link, tip_link = (table.text(key, "") or None for key in ("base_link", "tip_link"))
+    return lambda name: read_urdf(folder / file, base_link=base_link, tip_link=tip_link)
+
+
+_READERS: dict[str, Callable[[Table, _Units, Path], Build]] = {
+    "urm": _read_urm,
+    "dh": _read_dh,
+    "modified_dh": partial(_read_dh, modified=True),
+    "joints": _read_joints,
+    "urdf": _read_urdf,
+}
+
+
+def _dh_row(table: Table, units: _Units) -> DHRow:
+    row = DHRow(
+        theta=units.angle(table.number("theta", 0.0)),
+        d=units.length(table.number("d", 0.0)),
+        a=units.length(table.number("a", 0.0)),
+        alpha=units.angle(table.number("alpha", 0.0)),
+        name=table.text("name", ""),
+        kind=cast("JointKind", table.choice("kind", ("revolute", "prismatic"), "revolute")),
+    )
+    table.close()
+    return row
+
+
+def _joint(table: Table, units: _Units) -> Joint:
+    kind = table.choice("kind", ("revolute", "prismatic", "fixed"), "revolute")
+    joint = Joint(
+        table.text("name"),
+        cast("JointKind", kind),
+        _frame(table.table("origin"), units),
+        cast("tuple[float, float, float]", table.numbers("axis", 3, (0.0, 0.0, 1.0))),
+        lower=units.of_joint(kind, table.number("lower", -math.inf, infinite=True)),
+        upper=units.of_joint(kind, table.number("upper", math.inf, infinite=True)),
+        velocity=units.of_joint(kind, table.number("velocity", math.inf, infinite=True)),
+        mimic=_mimic(table.table("mimic"), kind, units) if table.has("mimic") else None,
+    )
+    table.close()
+    return joint
+
+
+def _mimic(table: Table, kind: str, units: _Units) -> Mimic:
+    mimic = Mimic(
+        table.text("joint"),
+        table.number("multiplier", 1.0),
+        units.of_joint(kind, table.number("offset", 0.0)),
+    )
+    table.close()
+    return mimic
+
+
+def _limits(table: Table, kinds: Sequence[JointKind], units: _Units) -> list[_Limits]:
+    """Return the limits of every joint, in SI."""
+    given = [
+        table.spread(key, len(kinds), default)
+        for key, default in (("lower", -math.inf), ("upper", math.inf), ("velocity", math.inf))
+    ]
+    table.close()
+    return [
+        _Limits(*(units.of_joint(kind, value) for value in values))
+        for kind, *values in zip(kinds, *given, strict=True)
+    ]
+
+
+def _frame(table: Table, units: _Units) -> Transform:
+    x, y, z = (units.length(value) for value in table.numbers("translation", 3, (0.0, 0.0, 0.0)))
+    rx, ry, rz = (units.angle(value) for value in table.numbers("rpy", 3, (0.0, 0.0, 0.0)))
+    rotation = from_rpy(rx, ry, rz).rotation
+    if table.has("rotation"):
+        rotation = cast("Any", table.rows("rotation"))
+        if table.has("rpy"):
+            table.fault("rotation", "found beside rpy; allowed: one of the two")
+        elif not _is_rotation(Transform(rotation)):
+            table.fault("rotation", "is no rotation matrix; allowed: orthonormal rows, right-handed")
+    table.close()
+    return Transform(rotation, (x, y, z))
+
+
+def _is_rotation(frame: Transform) -> bool:
+    x, y, z = frame.rotation
+    product = (frame @ Transform(frame.columns)).rotation
+    orthonormal = all(abs(product[i][j] - float(i == j)) <= ORTHONORMAL for i in range(3) for j in range(3))
+    return orthonormal and bool(dot(x, cross(y, z)) > 0.0)
+
+
+def _start(chain: Chain, values: tuple[float, ...], units: _Units) -> tuple[float, ...]:
+    if len(values) != len(chain.moving):  # Chain says what is wrong
+        return values
+    return tuple(units.of_joint(joint.kind, value) for joint, value in zip(chain.moving, values, strict=True))
+
+
+def _frame_to_dict(frame: Transform) -> dict[str, Any]:
+    return {
+        "translation": [float(value) for value in frame.translation],
+        "rotation": [[float(value) for value in row] for row in frame.rotation],
+    }
+
+
+def _joint_to_dict(joint: Joint) -> dict[str, Any]:
+    mimic = joint.mimic
+    return {
+        "name": joint.name,
+        "kind": joint.kind,
+        "origin": _frame_to_dict(joint.origin),
+        "axis": [float(value) for value in joint.axis],
+        "lower": _finite_or_none(joint.lower),
+        "upper": _finite_or_none(joint.upper),
+        "velocity": _finite_or_none(joint.velocity),
+        "mimic": mimic and {"joint": mimic.joint, "multiplier": mimic.multiplier, "offset": mimic.offset},
+    }
+
+
+def _finite_or_none(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def _toml_lines(table: Mapping[str, Any]) -> list[str]:
+    return [f"{key} = {_toml_value(value)}" for key, value in table.items() if value is not None]
+
+
+def _toml_value(value: Any) -> str:
+    if isinstance(value, str):
+        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
+    if isinstance(value, Mapping):
+        return f"{{ {', '.join(_toml_lines(value))} }}"
+    if isinstance(value, list):
+        return f"[{', '.join(_toml_value(item) for item in value)}]"
+    return repr(value)

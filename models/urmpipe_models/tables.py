@@ -1,0 +1,173 @@
+"""Checked reading of a table of keys and values, such as TOML or JSON gives: all faults at once."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from difflib import get_close_matches
+from typing import Any, TypeAlias
+
+from urmpipe_models.errors import Finding
+
+Rows3: TypeAlias = tuple[tuple[float, ...], ...]
+
+
+class Table:
+    """One table, read key by key.
+
+    A getter returns what the key holds. Where that is missing or not allowed, the fault is noted and
+    a stand-in comes back, so that reading goes on and every fault is found. `close` then reports the
+    keys that nobody asked for.
+
+    Attributes:
+        faults: What was found to be wrong, shared with all tables within.
+        place: Where the table stands, such as `joints[2].` (empty for the outermost one).
+    """
+
+    def __init__(
+        self, data: Mapping[str, Any], faults: list[Finding], file: str | None, place: str = ""
+    ) -> None:
+        self.faults = faults
+        self.place = place
+        self._data = data
+        self._file = file
+        self._known: list[str] = []
+
+    def fault(self, key: str, message: str) -> None:
+        """Note that something is wrong with a key."""
+        self.faults.append(Finding(f"key {self.place}{key}: {message}", self._file))
+
+    def has(self, key: str) -> bool:
+        """Tell whether the key is there and not null."""
+        self._known.append(key)
+        return self._data.get(key) is not None
+
+    def text(self, key: str, default: str | None = None) -> str:
+        """Return a string; without a default the key is required."""
+        value = self._get(key, "a text", default)
+        if isinstance(value, str):
+            return value
+        self._refuse(key, value, "a text")
+        return ""
+
+    def choice(self, key: str, allowed: Sequence[str], default: str | None = None) -> str:
+        """Return one of the allowed strings; without a default the key is required."""
+        value = self._get(key, _one_of(allowed), default)
+        if value in allowed:
+            return str(value)
+        near = get_close_matches(str(value), allowed, 1)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        self._refuse(key, value, _one_of(allowed) + hint)
+        return allowed[0]
+
+    def number(self, key: str, default: float | None = None, *, infinite: bool = False) -> float:
+        """Return a number; without a default the key is required; infinities only where `infinite`."""
+        if default is not None and not self.has(key):
+            return default
+        allowed = "a number" if infinite else "a finite number"
+        value = self._get(key, allowed, None)
+        if _is_number(value, infinite):
+            return float(value)
+        self._refuse(key, value, allowed)
+        return default if default is not None else 0.0
+
+    def numbers(
+        self, key: str, count: int | None, default: Sequence[float] | None = None
+    ) -> tuple[float, ...]:
+        """Return finite numbers, `count` of them (or any); without a default the key is required."""
+        allowed = "a list of finite numbers" if count is None else f"{count} finite numbers"
+        value = self._get(key, allowed, default)
+        if isinstance(value, (list, tuple)) and count in {None, len(value)}:
+            if all(_is_number(item) for item in value):
+                return tuple(float(item) for item in value)
+            for index, item in enumerate(value):
+                if not _is_number(item):
+                    self._refuse(f"{key}[{index}]", item, "a finite number")
+        else:
+            self._refuse(key, value, allowed)
+        return (0.0,) * (count or 0)
+
+    def spread(self, key: str, count: int, default: float) -> tuple[float, ...]:
+        """Return `count` numbers, infinities included; one number in the file stands for all of them."""
+        value = self._get(key, "", default)
+        if _is_number(value, infinite=True):
+            return (float(value),) * count
+        if _are_numbers(value, count, infinite=True):
+            return tuple(float(item) for item in value)
+        self._refuse(key, value, f"a number, or {count} numbers, one a joint")
+        return (default,) * count
+
+    def rows(self, key: str) -> Rows3:
+        """Return the three rows of a 3x3 matrix; the key is required."""
+        value = self._get(key, "three rows of three finite numbers", None)
+        rows = value if isinstance(value, (list, tuple)) else ()
+        if len(rows) == 3 and all(_are_numbers(row, 3) for row in rows):
+            return tuple(tuple(float(item) for item in row) for row in rows)
+        self._refuse(key, value, "three rows of three finite numbers")
+        return ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+
+    def table(self, key: str) -> Table:
+        """Return the table under a key, an empty one where it is missing."""
+        value = self._get(key, "a table", {})
+        if not isinstance(value, Mapping):
+            self._refuse(key, value, "a table")
+            value = {}
+        return Table(value, self.faults, self._file, f"{self.place}{key}.")
+
+    def tables(self, key: str) -> list[Table]:
+        """Return the tables of a list; the key is required."""
+        value = self._get(key, "a list of tables", None)
+        if not isinstance(value, (list, tuple)) or not all(isinstance(item, Mapping) for item in value):
+            self._refuse(key, value, "a list of tables")
+            return []
+        places = (f"{self.place}{key}[{index}]." for index in range(len(value)))
+        return [
+            Table(item, self.faults, self._file, place) for item, place in zip(value, places, strict=True)
+        ]
+
+    def close(self) -> None:
+        """Note every key that was not asked for, with the nearest one that was."""
+        for key in self._data:
+            if key not in self._known:
+                near = get_close_matches(key, self._known, 1)
+                hint = f" (did you mean {near[0]}?)" if near else ""
+                allowed = ", ".join(dict.fromkeys(self._known))
+                self.fault(key, f"unknown{hint}; allowed: {allowed}")
+
+    def _get(self, key: str, allowed: str, default: Any) -> Any:
+        self._known.append(key)
+        if key in self._data:
+            return self._data[key]
+        return _Missing if default is None else default
+
+    def _refuse(self, key: str, value: Any, allowed: str) -> None:
+        found = "nothing" if value is _Missing else shown(value)
+        self.fault(key, f"found {found}, allowed: {allowed}")
+
+
+class _Missing:
+    """Stands for a required key that is not there."""
+
+
+def shown(value: Any) -> str:
+    """Return a value as an error message shows it, cut where it is long."""
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:57]}..."
+
+
+def _is_number(value: Any, infinite: bool = False) -> bool:
+    if isinstance(value, bool) or not isinstance(value, (int, float)):
+        return False
+    try:
+        return not math.isnan(value) if infinite else math.isfinite(value)
+    except OverflowError:  # an integer beyond what a float holds
+        return False
+
+
+def _are_numbers(value: Any, count: int, infinite: bool = False) -> bool:
+    given = isinstance(value, (list, tuple)) and len(value) == count
+    return given and all(_is_number(item, infinite) for item in value)
+
+
+def _one_of(allowed: Sequence[str]) -> str:
+    return f"one of {', '.join(allowed)}"

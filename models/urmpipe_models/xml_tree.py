@@ -1,0 +1,83 @@
+"""XML in, as a plain tree with line numbers; documents that could expand are refused unread."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+from xml.parsers import expat
+
+from urmpipe_models.errors import Finding, RobotError
+
+
+@dataclass(slots=True)
+class Node:
+    """One element.
+
+    Attributes:
+        tag: Its name as written, prefix included.
+        attributes: Its attributes.
+        line: Where it starts in the file, from 1.
+        children: The elements in it.
+    """
+
+    tag: str
+    attributes: dict[str, str]
+    line: int
+    children: list[Node] = field(default_factory=list)
+
+    def all(self, tag: str) -> list[Node]:
+        """Return the children of that name."""
+        return [child for child in self.children if child.tag == tag]
+
+    def first(self, tag: str) -> Node | None:
+        """Return the first child of that name, or None."""
+        return next(iter(self.all(tag)), None)
+
+    def walk(self) -> Iterator[Node]:
+        """Yield this element and all below it."""
+        waiting = [self]
+        while waiting:
+            node = waiting.pop()
+            yield node
+            waiting.extend(node.children)
+
+
+def read_xml(path: Path) -> Node:
+    """Return the root element of an XML file.
+
+    Entities can be declared only in a document type, so a document with one is refused at its first
+    character: nothing is ever expanded or fetched.
+
+    Raises:
+        RobotError: If the file cannot be read, is not well-formed, or has a document type.
+    """
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise RobotError(Finding(f"cannot be read: {error.strerror}", str(path))) from error
+    parser = expat.ParserCreate()
+    document = Node("", {}, 0)
+    ancestors = [document]
+
+    def start(tag: str, attributes: dict[str, str]) -> None:
+        node = Node(tag, attributes, parser.CurrentLineNumber)
+        ancestors[-1].children.append(node)
+        ancestors.append(node)
+
+    def end(_: str) -> None:
+        ancestors.pop()
+
+    def doctype(*_: object) -> None:
+        message = "found a document type (<!DOCTYPE ...>); allowed: XML without document type and entities"
+        raise RobotError(Finding(message, str(path), line=parser.CurrentLineNumber))
+
+    parser.StartElementHandler = start
+    parser.EndElementHandler = end
+    parser.StartDoctypeDeclHandler = doctype
+    try:
+        parser.Parse(content, True)
+    except expat.ExpatError as error:
+        reason = expat.ErrorString(error.code)
+        raise RobotError(Finding(f"not well-formed XML: {reason}", str(path), line=error.lineno)) from error
+    return document.children[0]

@@ -1,0 +1,200 @@
+"""`urmpipe robot` as a user runs it."""
+
+from __future__ import annotations
+
+import json
+import math
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from urmpipe.chain_drawing import chain_svg, chain_text
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.kinematics import points_over_log
+from urmpipe_models.robot_file import chain_from_dict
+from urmpipe_models.urdf_reader import read_urdf
+from urmpipe_models.urdf_writer import write_urdf
+
+NAMES = ["ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "urm4", "urm6", "urm8"]
+
+
+def skeleton(name: str) -> Any:
+    chain = load_robot(name)
+    return points_over_log(chain, np.array([chain.start]))[0]
+
+
+# --- list ------------------------------------------------------------------------------------------
+
+
+def test_list_names_every_robot(urmpipe: Any) -> None:
+    ran = urmpipe("robot", "list")
+    assert (ran.code, ran.err) == (0, "")
+    for name in NAMES:
+        assert f" {name} " in ran.out
+        assert load_robot(name).description in ran.out
+
+
+def test_list_as_json(urmpipe: Any) -> None:
+    answer = json.loads(urmpipe("robot", "list", "--json").out)
+    assert answer["schema"] == 1
+    assert [robot["name"] for robot in answer["robots"]] == NAMES
+    assert answer["robots"][6]["joints"] == ["phi1", "phi2", "phi3", "phi4"]
+
+
+# --- show ------------------------------------------------------------------------------------------
+
+
+def test_show_prints_parameters_points_and_a_drawing(urmpipe: Any) -> None:
+    ran = urmpipe("robot", "show", "urm6")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out.startswith("urm6: URM arm of 6 modules: the paper's\n")
+    (phi2,) = [" ".join(line.split()) for line in ran.out.splitlines() if " phi2 " in line]
+    assert phi2 == "phi2 revolute 0, 0, 0.243215 0, 52, 0 0, 0, 1 no limit no limit 180 deg"
+    assert "p7      0.167397, 0, 1.10264   180, 0, 0" in ran.out
+    for label in ("base", "p1", "p2", "p3", "p4", "p5", "p6", "p7"):
+        assert label in ran.out.partition("side: x to the right, z up")[2]
+    assert "\x1b" not in ran.out  # no colours in a pipe
+
+
+def test_show_as_json_is_the_chain_and_its_points(urmpipe: Any) -> None:
+    ran = urmpipe("robot", "show", "ur5e", "--q", "0,0,0,0,0,0", "--tool", "0,0,0.1", "--json")
+    answer = json.loads(ran.out)
+    assert (answer["schema"], answer["name"], answer["q"]) == (1, "ur5e", [0.0] * 6)
+    np.testing.assert_allclose(answer["points"]["p6"]["position"], [-0.8172, -0.3329, 0.0628], atol=1e-15)
+    np.testing.assert_allclose(answer["points"]["p1"]["euler_zyx"], [0.0, 0.0, 0.0], atol=1e-15)
+    described = {key: answer[key] for key in ("kind", "name", "joints", "base", "tip", "tool", "start")}
+    assert chain_from_dict(described).joints == load_robot("ur5e").joints
+
+
+def test_show_draws_a_picture_and_replaces_only_its_own(urmpipe: Any, tmp_path: Path) -> None:
+    picture = tmp_path / "urm6.svg"
+    assert urmpipe("robot", "show", "urm6", "--picture", picture.name, "-q").out == ""
+    assert ET.parse(picture).getroot().tag == "{http://www.w3.org/2000/svg}svg"
+    assert urmpipe("robot", "show", "urm4", "--picture", picture.name).code == 0
+    assert "urm4" in picture.read_text(encoding="utf-8")
+    picture.write_text("mine", encoding="utf-8")
+    ran = urmpipe("robot", "show", "urm6", "--picture", picture.name)
+    assert ran.code == 2
+    assert ran.err == (
+        "error: urm6.svg: found a file that is no robot export of urmpipe, allowed: a new name, or such an"
+        " export to replace\n"
+    )
+    assert picture.read_text(encoding="utf-8") == "mine"
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["urm7"], "error: unknown robot 'urm7' (did you mean urm8?); allowed: " + ", ".join(NAMES)),
+        (
+            ["urm4", "--q", "1,2"],
+            "error: --q: found 2 values, allowed: 4, one for each of phi1, phi2, phi3, phi4",
+        ),
+        (
+            ["urm4", "--tip", "x"],
+            "error: robot urm4: found a base or tip link, allowed only for a .urdf file",
+        ),
+        (["urm4", "--base", "1"], "error: found '1', allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad"),
+        (["arm.urdf"], "error: arm.urdf: cannot be read: No such file or directory"),
+    ],
+)
+def test_show_errors_are_one_line(urmpipe: Any, arguments: list[str], said: str) -> None:
+    ran = urmpipe("robot", "show", *arguments)
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith(said)
+    assert ran.err.count("\n") == 1
+
+
+def test_joint_values_that_are_none_are_usage(urmpipe: Any) -> None:
+    ran = urmpipe("robot", "show", "urm4", "--q", "1,2,x,4")
+    assert ran.code == 2
+    assert "found '1,2,x,4', allowed: numbers in rad and m, such as 0,3.14,0.5" in ran.err
+
+
+# --- export ----------------------------------------------------------------------------------------
+
+
+def test_export_writes_a_urdf_that_is_the_same_arm(urmpipe: Any, tmp_path: Path) -> None:
+    ran = urmpipe("robot", "export", "urm6", "--tool", "0,0,0.1")
+    assert (ran.code, ran.out) == (0, "Robot: urm6.urdf\n")
+    assert [path.name for path in tmp_path.iterdir()] == ["urm6.urdf"]
+    back = read_urdf(tmp_path / "urm6.urdf")
+    assert back.point_names == load_robot("urm6").point_names
+    assert back.tool.translation == (0.0, 0.0, 0.1)
+
+
+def test_export_writes_a_toml_and_cuts_a_urdf(urmpipe: Any, tmp_path: Path) -> None:
+    write_urdf(load_robot("ur3"), tmp_path / "whole.urdf")
+    cut = ["--base-link", "link1", "--tip", "link3"]
+    ran = urmpipe("robot", "export", "whole.urdf", *cut, "-o", "cut.toml", "--json")
+    assert json.loads(ran.out) == {"schema": 1, "robot": "ur3", "file": "cut.toml"}
+    assert load_robot(tmp_path / "cut.toml") == read_urdf(
+        tmp_path / "whole.urdf", base_link="link1", tip_link="link3"
+    )
+
+
+def test_export_replaces_an_export_and_nothing_else(urmpipe: Any, tmp_path: Path) -> None:
+    assert urmpipe("robot", "export", "urm4", "-o", "arm.urdf").code == 0
+    assert urmpipe("robot", "export", "urm6", "-o", "arm.urdf").code == 0
+    before = (tmp_path / "arm.urdf").read_bytes()
+    ran = urmpipe("robot", "export", "arm.urdf")
+    assert ran.code == 2
+    assert ran.err == "error: arm.urdf: found the input of this command, allowed: any other name\n"
+    (tmp_path / "mine.urdf").write_text("<robot/>", encoding="utf-8")
+    ran = urmpipe("robot", "export", "urm6", "-o", "mine.urdf")
+    assert ran.code == 2
+    assert ran.err.startswith("error: mine.urdf: found a file that is no robot export of urmpipe, allowed:")
+    assert (tmp_path / "mine.urdf").read_text(encoding="utf-8") == "<robot/>"
+    assert (tmp_path / "arm.urdf").read_bytes() == before
+    (tmp_path / "folder.urdf").mkdir()
+    ran = urmpipe("robot", "export", "urm6", "-o", "folder.urdf")
+    assert ran.err == "error: folder.urdf: found a folder, allowed: the name of a file\n"
+    assert urmpipe("robot", "export", "urm6", "-o", "arm.stl").err == (
+        "error: --output: found 'arm.stl', allowed: a name that ends in .urdf or .toml\n"
+    )
+
+
+# --- the drawing -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("width", [30, 60, 120])
+def test_drawings_fit_and_label_every_point(name: str, width: int) -> None:
+    for unicode in (True, False):
+        text = chain_text(skeleton(name), width, unicode=unicode)
+        assert max(map(len, text.splitlines())) <= width
+        assert unicode or text.isascii()
+        for k in range(1, len(load_robot(name).joints) + 1):
+            assert text.count(f"p{k}") == 2  # once a view
+
+
+def test_a_drawing_is_to_scale_and_the_right_way_up() -> None:
+    points = np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1.0], [0.5, 0.0, 1.0]])
+    lines = chain_text(points, 120, unicode=False).splitlines()
+    rows = [k for k, line in enumerate(lines) if "#" in line or "o p1" in line or "o" in line.strip(" p12,.")]
+    base = next(k for k, line in enumerate(lines) if "# base" in line)
+    top = next(k for k, line in enumerate(lines) if "p1" in line)
+    assert top < base == max(rows)
+    left, right = (lines[top].index("o", start) for start in (0, lines[top].index("o") + 1))
+    # half as long as high, and a row is as high as two columns are wide: one cell of rounding
+    assert right - left == pytest.approx(base - top, abs=1.0)
+
+
+def test_points_in_one_place_share_a_label_and_a_degenerate_arm_is_drawn() -> None:
+    chain = Chain("spin", (Joint("a"), Joint("b")))
+    text = chain_text(points_over_log(chain, np.zeros((1, 2)))[0], 80)
+    assert "■ base,p1,p2" in text
+
+
+def test_the_picture_is_svg_with_all_points() -> None:
+    root = ET.fromstring(chain_svg(skeleton("urm8"), "<urm8> & co"))
+    texts = [element.text for element in root.iter("{http://www.w3.org/2000/svg}text")]
+    assert texts[0] == "<urm8> & co"
+    assert texts.count("p9") == 2
+    circles = list(root.iter("{http://www.w3.org/2000/svg}circle"))
+    assert len(circles) == 2 * 10
+    assert all(math.isfinite(float(circle.get("cx", "nan"))) for circle in circles)

@@ -1,0 +1,95 @@
+"""Random chains, and the files beside the repository that some tests read."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import pytest
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+
+from urmpipe_models.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.dh import DHRow
+from urmpipe_models.transform import Transform, from_offset
+
+SHARED = Path(__file__).resolve().parents[2].parent / "shared"
+
+lengths = st.floats(-1.0, 1.0, allow_subnormal=False)
+angles = st.floats(-math.pi, math.pi, allow_subnormal=False) | st.sampled_from(
+    [0.0, math.pi / 2, -math.pi / 2, math.pi]
+)
+kinds: SearchStrategy[JointKind] = st.sampled_from(["revolute", "prismatic"])
+texts = st.text(
+    st.characters(exclude_categories=["Cs", "Cc"], exclude_characters="\ufffe\uffff"), max_size=20
+)
+
+
+def frames() -> SearchStrategy[Transform]:
+    offsets = st.tuples(lengths, lengths, lengths, angles, angles, angles).map(from_offset)
+    return st.just(Transform()) | offsets
+
+
+@st.composite
+def axes(draw: DrawFn) -> tuple[float, float, float]:
+    if draw(st.booleans()):
+        return draw(st.sampled_from([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)]))
+    polar, azimuth = draw(angles), draw(angles)
+    x, y, z = math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)
+    length = math.hypot(x, y, z)
+    return x / length, y / length, z / length
+
+
+@st.composite
+def joints(draw: DrawFn, name: str, leaders: list[str]) -> Joint:
+    kind: JointKind = draw(st.sampled_from(["revolute", "revolute", "prismatic", "fixed"]))
+    if kind == "fixed" and leaders:
+        return Joint(name, "fixed", draw(frames()))
+    kind = "revolute" if kind == "fixed" else kind
+    mimic = None
+    if leaders and draw(st.integers(0, 3)) == 0:
+        mimic = Mimic(draw(st.sampled_from(leaders)), draw(lengths), draw(lengths))
+    lower, upper = sorted((draw(lengths), draw(lengths)))
+    if draw(st.booleans()):
+        lower, upper = -math.inf, math.inf
+    velocity = draw(st.floats(0.1, 10.0) | st.just(math.inf))
+    return Joint(name, kind, draw(frames()), draw(axes()), lower, upper, velocity, mimic)
+
+
+@st.composite
+def random_chains(draw: DrawFn) -> Chain:
+    """A chain of one to seven joints of every kind, mimics and sensor frames among them."""
+    chosen: list[Joint] = []
+    for k in range(draw(st.integers(1, 7))):
+        leaders = [joint.name for joint in chosen if joint.kind != "fixed" and joint.mimic is None]
+        chosen.append(draw(joints(f"j{k}", leaders)))
+    count = sum(joint.kind != "fixed" and joint.mimic is None for joint in chosen)
+    start = tuple(draw(st.lists(lengths, min_size=count, max_size=count)))
+    name, description, source = draw(texts), draw(texts), draw(texts)
+    base, tip, tool = draw(frames()), draw(frames()), draw(frames())
+    return Chain(name, tuple(chosen), tip, base, tool, start, description, source)
+
+
+@st.composite
+def random_dh_rows(draw: DrawFn) -> list[DHRow]:
+    """One to seven rows of DH parameters, prismatic joints among them."""
+    row = st.builds(DHRow, theta=angles, d=lengths, a=lengths, alpha=angles, kind=kinds)
+    return draw(st.lists(row, min_size=1, max_size=7))
+
+
+@pytest.fixture(scope="session")
+def chains() -> SearchStrategy[Chain]:
+    return random_chains()
+
+
+@pytest.fixture(scope="session")
+def dh_rows() -> SearchStrategy[list[DHRow]]:
+    return random_dh_rows()
+
+
+@pytest.fixture(scope="session")
+def shared() -> Path:
+    """The folder of robots and logs of others, which lies beside the repository where there is one."""
+    if not SHARED.is_dir():
+        pytest.skip("the folder shared with robots and logs of others is not beside this repository")
+    return SHARED

@@ -1,0 +1,95 @@
+"""The kinematics as CasADi traces them: the very functions, with symbols in place of numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import casadi
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.kinematics import forward, jacobian, motions
+from urmpipe_models.transform import euler_zyx
+from urmpipe_models.urm import urm_chain
+
+FloatArray = NDArray[np.float64]
+
+TRACED = 1e-14
+"""The same operations on values of about 1; CasADi may take another sine and simplify, each some 1e-16."""
+
+
+def traced(name: str, arguments: Sequence[Any], results: Sequence[Any]) -> Callable[..., FloatArray]:
+    """Compile what came out of a trace, flat, as a function of numbers."""
+    function = casadi.Function(name, list(arguments), [casadi.vertcat(*results)])
+    return lambda *values: np.ravel(np.array(function(*values)))
+
+
+def flat(results: Any) -> list[Any]:
+    """Return nested tuples of elements as one list."""
+    return [leaf for one in results for leaf in flat(one)] if isinstance(results, tuple) else [results]
+
+
+def everything(motion: Any) -> list[Any]:
+    pose = motion.pose
+    return flat(
+        (pose.translation, pose.rotation, motion.velocity, motion.acceleration, motion.omega, motion.alpha)
+    )
+
+
+def hold(got: FloatArray, expected: list[Any], size: float = 1.0) -> None:
+    np.testing.assert_allclose(got, np.array(expected, dtype=float), rtol=0.0, atol=size * TRACED)
+
+
+@pytest.fixture
+def symbols() -> list[Any]:
+    casadi.GlobalOptions.setNumpyMode(-1)
+    return [casadi.SX.sym(name, 6) for name in ("q", "qd", "qdd")]
+
+
+@pytest.mark.parametrize("name", ["urm6", "ur5e"])
+def test_forward_jacobian_and_motions_trace_with_symbolic_joints(symbols: list[Any], name: str) -> None:
+    chain = load_robot(name)
+    q, qd, qdd = symbols
+    x, xd, xdd = (symbol.elements() for symbol in symbols)
+    pose_of = traced("pose", [q], [*forward(chain, x)[-1].translation])
+    euler_of = traced("euler", [q], [*euler_zyx(forward(chain, x)[-1].rotation)])
+    jacobian_of = traced("jacobian", [q], flat(jacobian(chain, x)))
+    motion_of = traced("motion", [q, qd, qdd], everything(motions(chain, x, xd, xdd)[-1]))
+    for values in np.random.default_rng(11).uniform(-1.0, 1.0, (20, 3, 6)).tolist():
+        tip = forward(chain, values[0])[-1]
+        hold(pose_of(values[0]), flat(tip.translation))
+        hold(euler_of(values[0]), flat(euler_zyx(tip.rotation)), size=20.0)  # 1 / cos(ry)
+        hold(jacobian_of(values[0]), flat(jacobian(chain, values[0])))
+        hold(motion_of(*values), everything(motions(chain, *values)[-1]), size=20.0)  # speeds of up to 6
+
+
+def test_lengths_and_tilts_trace_as_parameters(symbols: list[Any]) -> None:
+    q, r, theta = symbols[0], casadi.SX.sym("r", 7), casadi.SX.sym("theta", 6)
+    x, zero = q.elements(), [0.0] * 6
+    chain = urm_chain("urm6", r.elements(), theta.elements())
+    pose_of = traced("pose", [q, r, theta], [*forward(chain, x)[-1].translation])
+    jacobian_of = traced("jacobian", [q, r, theta], flat(jacobian(chain, x)))
+    motion_of = traced("motion", [q, r, theta], everything(motions(chain, x, zero, x)[-1]))
+    rng = np.random.default_rng(12)
+    for _ in range(20):
+        values = rng.uniform(-1.0, 1.0, 6).tolist()
+        lengths, tilts = rng.uniform(0.1, 0.3, 7).tolist(), rng.uniform(0.0, 1.5, 6).tolist()
+        numeric, given = urm_chain("urm6", lengths, tilts), (values, lengths, tilts)
+        hold(pose_of(*given), flat(forward(numeric, values)[-1].translation))
+        hold(jacobian_of(*given), flat(jacobian(numeric, values)))
+        hold(motion_of(*given), everything(motions(numeric, values, zero, values)[-1]), size=20.0)
+
+
+def test_one_trace_serves_a_float_and_a_column() -> None:
+    casadi.GlobalOptions.setNumpyMode(-1)
+    chain = load_robot("urm4")
+    q = casadi.SX.sym("q", 4)
+    pose_of = casadi.Function("pose", [q], [casadi.vertcat(*forward(chain, q.elements())[-1].translation)])
+    rows = np.random.default_rng(13).uniform(-4.0, 4.0, (50, 4))
+    columns = forward(chain, list(rows.T))[-1].translation
+    singles = [forward(chain, row)[-1].translation for row in rows.tolist()]
+    np.testing.assert_allclose(np.column_stack(columns), singles, rtol=0.0, atol=TRACED)
+    np.testing.assert_allclose(np.array(pose_of.map(50)(rows.T)).T, singles, rtol=0.0, atol=TRACED)

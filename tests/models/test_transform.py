@@ -1,0 +1,198 @@
+"""Rigid transforms against SciPy, and the laws that they keep."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
+
+from urmpipe_models.transform import (
+    Transform,
+    euler_zyx,
+    from_offset,
+    from_rotation_vector,
+    from_rpy,
+    offset_of,
+    rotation_about,
+    rotation_angle,
+    rotation_x,
+    rotation_y,
+    rotation_z,
+    rpy_of,
+    translation,
+)
+
+ROUNDING = 2e-15  # a few products of entries up to 1, each rounded to 1.1e-16
+angles = st.floats(-math.pi, math.pi)
+units = st.floats(-1.0, 1.0)
+
+
+def matrix(rotation: Any) -> NDArray[np.float64]:
+    return np.array(rotation, dtype=float)
+
+
+def rows(values: NDArray[np.float64]) -> Any:
+    return tuple(tuple(row) for row in values.tolist())
+
+
+@given(angles, angles, angles)
+def test_from_rpy_is_scipys_moving_z_y_x(rx: float, ry: float, rz: float) -> None:
+    expected = Rotation.from_euler("ZYX", [rz, ry, rx]).as_matrix()
+    np.testing.assert_allclose(matrix(from_rpy(rx, ry, rz).rotation), expected, atol=ROUNDING)
+
+
+@given(angles, angles, angles)
+def test_rotation_about_is_scipys_and_orthogonal(angle: float, polar: float, azimuth: float) -> None:
+    axis = np.array(
+        [math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)]
+    )
+    axis /= np.linalg.norm(axis)
+    turned = rotation_about(axis.tolist(), angle)
+    np.testing.assert_allclose(
+        matrix(turned.rotation), Rotation.from_rotvec(angle * axis).as_matrix(), atol=ROUNDING
+    )
+    np.testing.assert_allclose(matrix((turned @ turned.inverse()).rotation), np.eye(3), atol=ROUNDING)
+
+
+@given(st.integers(0, 2**32 - 1), angles)
+@pytest.mark.parametrize(
+    "axis",
+    [
+        (1.0, 0.0, 0.0),
+        (0.0, -1.0, 0.0),
+        (0.0, 0.0, 1.0),
+        (0.6, 0.0, -0.8),
+        (1e-8, 0.0, 1.0),
+        (0.0, 1.0, -1e-9),
+    ],
+)
+def test_turned_is_the_product_with_rotation_about(
+    axis: tuple[float, float, float], seed: int, angle: float
+) -> None:
+    frame = from_offset(np.random.default_rng(seed).uniform(-1.0, 1.0, 6).tolist())
+    turned, product = frame.turned(axis, angle), frame @ rotation_about(axis, angle)
+    np.testing.assert_allclose(matrix(turned.rotation), matrix(product.rotation), atol=ROUNDING)
+    assert turned.translation == frame.translation
+
+
+@pytest.mark.parametrize(("turn", "axis"), [(rotation_x, "x"), (rotation_y, "y"), (rotation_z, "z")])
+@pytest.mark.parametrize("quarters", range(-4, 5))
+def test_constant_right_angles_are_exact(
+    turn: Callable[[float], Transform], axis: str, quarters: int
+) -> None:
+    angle = quarters * math.pi / 2
+    expected = np.rint(Rotation.from_euler(axis, angle).as_matrix())
+    np.testing.assert_array_equal(matrix(turn(angle).rotation), expected)
+
+
+@given(st.lists(units, min_size=12, max_size=12))
+def test_products_are_those_of_4x4_matrices(values: list[float]) -> None:
+    a, b = from_offset(values[:6]), from_offset(values[6:])
+    product = homogeneous(a) @ homogeneous(b)
+    np.testing.assert_allclose(homogeneous(a @ b), product, atol=ROUNDING)
+    np.testing.assert_allclose(homogeneous(a.inverse()), np.linalg.inv(homogeneous(a)), atol=ROUNDING)
+    point = (values[0], values[1], values[2])
+    seen = homogeneous(a) @ np.array([*point, 1.0])
+    np.testing.assert_allclose(a.point(point), seen[:3], atol=ROUNDING)
+
+
+def homogeneous(frame: Transform) -> NDArray[np.float64]:
+    result = np.eye(4)
+    result[:3, :3], result[:3, 3] = frame.rotation, frame.translation
+    return result
+
+
+def test_constants_fold_away() -> None:
+    q = np.linspace(-1.0, 1.0, 5)
+    turned = translation(0.0, 0.0, 0.3) @ rotation_y(math.pi / 2) @ rotation_z(q)
+    (_, _, a13), (_, _, a23), (_, _, a33) = turned.rotation
+    assert (a13, a23, a33) == (1.0, 0.0, 0.0)
+    assert turned.translation == (0.0, 0.0, 0.3)
+
+
+@given(angles, st.floats(-1.5, 1.5), angles)
+def test_euler_angles_come_back_away_from_the_singular_ones(rz: float, ry: float, rx: float) -> None:
+    got = euler_zyx(from_rpy(rx, ry, rz).rotation)
+    # the sine of the angle between is ill-conditioned by 1 / cos(ry) <= 15
+    turned = [np.sin(np.subtract(a, b) / 2.0) for a, b in zip(got[:3], (rz, ry, rx), strict=True)]
+    np.testing.assert_allclose(turned, 0.0, atol=15 * ROUNDING)
+    assert not got[3]
+
+
+@pytest.mark.parametrize("ry", [math.pi / 2, -math.pi / 2])
+@given(rz=angles, rx=angles)
+def test_at_ninety_degrees_rx_is_zero_and_rz_turns_all(ry: float, rz: float, rx: float) -> None:
+    rotation = from_rpy(rx, ry, rz).rotation
+    got_rz, got_ry, got_rx, singular = euler_zyx(rotation)
+    assert singular
+    assert got_rx == 0.0
+    assert got_ry == pytest.approx(ry, abs=1e-15)
+    back = from_rpy(0.0, float(got_ry), float(got_rz)).rotation
+    np.testing.assert_allclose(matrix(back), matrix(rotation), atol=ROUNDING)
+
+
+@given(st.floats(-9.5, -7.0), angles, angles)
+def test_near_ninety_degrees_the_rotation_still_comes_back(power: float, rz: float, rx: float) -> None:
+    rotation = from_rpy(rx, math.pi / 2 - 10.0**power, rz).rotation
+    got_rz, got_ry, got_rx, _ = euler_zyx(rotation)
+    back = from_rpy(float(got_rx), float(got_ry), float(got_rz)).rotation
+    # rz and rx are lost below a cosine of 1e-9 and known to 1e-16 / cosine above: 1e-7 at worst, but
+    # they err together; what the convention drops is at most the cosine itself
+    np.testing.assert_allclose(matrix(back), matrix(rotation), atol=3e-7)
+
+
+def test_euler_angles_of_a_column_of_rotations() -> None:
+    rx = np.array([0.1, 0.2, -3.0])
+    rz, ry, got, singular = euler_zyx((rotation_z(0.5) @ rotation_y(math.pi / 2) @ rotation_x(rx)).rotation)
+    np.testing.assert_allclose(rz, np.remainder(0.5 - rx + np.pi, 2 * np.pi) - np.pi, atol=ROUNDING)
+    assert ry == pytest.approx(math.pi / 2)
+    np.testing.assert_array_equal(got, 0.0)
+    assert np.all(singular)
+
+
+@given(angles, angles | st.sampled_from([math.pi / 2, -math.pi / 2]), angles)
+def test_rpy_gives_the_rotation_back_everywhere(rx: float, ry: float, rz: float) -> None:
+    rotation = from_rpy(rx, ry, rz).rotation
+    np.testing.assert_allclose(matrix(from_rpy(*rpy_of(rotation)).rotation), matrix(rotation), atol=ROUNDING)
+
+
+@given(st.lists(units, min_size=6, max_size=6))
+def test_offsets_come_back(values: list[float]) -> None:
+    back = offset_of(from_offset(values))
+    assert back[:3] == tuple(values[:3])
+    np.testing.assert_allclose(back[3:], values[3:], atol=2 * ROUNDING)  # 1 / cos(1) < 2
+    assert offset_of(from_offset(values[:3])) == (*values[:3], 0.0, 0.0, 0.0)
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-12.0, 0.0), st.booleans())
+def test_rotation_angle_is_scipys_from_zero_to_pi(seed: int, power: float, near_pi: bool) -> None:
+    rng = np.random.default_rng(seed)
+    axis = rng.normal(size=3)
+    angle = math.pi - 10.0**power if near_pi else 10.0**power
+    first = Rotation.random(rng=rng)
+    second = first * Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
+    got = rotation_angle(rows(first.as_matrix()), rows(second.as_matrix()))
+    assert got == pytest.approx((first.inv() * second).magnitude(), abs=4e-15)  # the matrices' own rounding
+
+
+@given(st.integers(0, 2**32 - 1), st.floats(-20.0, 0.4))
+def test_rotation_vectors_are_scipys(seed: int, power: float) -> None:
+    axis = np.random.default_rng(seed).normal(size=3)
+    vector = axis / np.linalg.norm(axis) * 10.0**power
+    expected = Rotation.from_rotvec(vector).as_matrix()
+    got = from_rotation_vector(tuple(vector.tolist())).rotation
+    np.testing.assert_allclose(matrix(got), expected, atol=ROUNDING)
+
+
+def test_rotation_vectors_of_zero_and_pi_in_one_column() -> None:
+    vectors = np.array([[0.0, 0.0, 0.0], [math.pi, 0.0, 0.0], [0.0, -math.pi, 0.0], [1e-9, 2e-9, 0.0]])
+    got = from_rotation_vector(tuple(vectors.T)).rotation
+    expected = np.moveaxis(Rotation.from_rotvec(vectors).as_matrix(), 0, -1)
+    np.testing.assert_allclose(np.array([list(row) for row in got]), expected, atol=ROUNDING)
