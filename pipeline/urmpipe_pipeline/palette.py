@@ -1,0 +1,57 @@
+"""The colours of joints, axes and runs: the same in every view of a recording and in the report.
+
+Chosen by search so that any two joints keep a CIE76 distance of 30 or more, also as protanopes,
+deuteranopes and tritanopes see them (Machado, Oliveira, Fernandes, 2009), on white and on the viewer's
+dark ground alike; the tests hold this.
+"""
+
+from __future__ import annotations
+
+JOINT_COLOURS = (
+    "#8652ed",  # violet
+    "#fda201",  # orange
+    "#03835c",  # green
+    "#21c3ff",  # sky blue
+    "#c25000",  # vermilion
+    "#a457a0",  # purple
+    "#ccb671",  # sand
+    "#a2bcbc",  # silver
+)
+"""One a joint, from the base outwards; a ninth joint starts again."""
+
+AXIS_COLOURS = {"x": "#c25000", "y": "#03835c", "z": "#21c3ff", "norm": "#fda201"}
+"""One a coordinate, and one for the Euclidean norm."""
+
+REFERENCE_COLOUR = "#8f9ba0"
+"""What was asked for: the reference, and the lines of a tolerance; grey."""
+
+RUN_COLOURS = {
+    "orange": "#fda201",
+    "sky blue": "#21c3ff",
+    "violet": "#8652ed",
+    "vermilion": "#c25000",
+    "green": "#03835c",
+    "purple": "#a457a0",
+    "sand": "#ccb671",
+}
+"""One a run of a comparison, by the word for it; none like the reference."""
+
+
+def joint_colour(index: int) -> str:
+    """Return the colour of a joint as #rrggbb, counted from 0 at the base."""
+    return JOINT_COLOURS[index % len(JOINT_COLOURS)]
+
+
+def run_colour(index: int) -> str:
+    """Return the colour of a run as #rrggbb, counted from 0."""
+    return list(RUN_COLOURS.values())[index % len(RUN_COLOURS)]
+
+
+def run_colour_word(index: int) -> str:
+    """Return the word for the colour of a run, counted from 0."""
+    return list(RUN_COLOURS)[index % len(RUN_COLOURS)]
+
+
+def rgb(colour: str) -> tuple[int, int, int]:
+    """Return red, green and blue of #rrggbb, each 0..255."""
+    return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

@@ -1,0 +1,134 @@
+"""The figures of a report in space: paths of the tool centre point, equal scale on all axes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR
+from urmpipe_pipeline.report import text
+from urmpipe_pipeline.report.decimate import decimate
+from urmpipe_pipeline.report.spec import FAULT, INK, Figure, Spec, base_layout, space_axis, typed
+from urmpipe_pipeline.results import Deviation, Run
+
+DEVIATION_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
+"""Small to large deviation: darker all the way, blue to red, legible on white and to the colour-blind."""
+
+CAMERA = {"eye": {"x": 1.3, "y": -1.3, "z": 0.75}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
+"""Looked at from the front right, a little from above; in lengths of the scene."""
+
+HANDLING = "Drag to turn; pinch to zoom, with a mouse by the bar at the top right."
+
+SCENE_PX = 540
+"""Height of a scene."""
+
+
+def path_figure(deviation: Deviation) -> Figure:
+    """Return the reference and the actual path in space, the actual one coloured by its deviation."""
+    norm = deviation.delta[:, 3] * 1e3
+    kept = decimate(np.column_stack([deviation.actual, norm]))
+    actual = _trail(
+        "actual", deviation.actual[kept], deviation.t[kept], norm[kept], line=_by_deviation(norm, kept)
+    )
+    reference = _way("reference", deviation.reference, deviation.t, REFERENCE_COLOUR, 2)
+    worst = deviation.worst
+    where = text.point(deviation.actual[worst])
+    spots = [
+        _spot("start", deviation.actual[0], INK, "circle"),
+        _spot("worst", deviation.actual[worst], FAULT, "diamond"),
+    ]
+    return Figure(
+        "Path in space",
+        "Equal scale on all axes. The colour is the distance from the reference at the same time. "
+        f"{HANDLING}",
+        f"Paths of the reference and of {deviation.name} in three dimensions. The worst point is at"
+        f" x, y, z = {where} m, {text.millimetres(deviation.statistics['norm'].max)} mm off.",
+        _scene([reference, actual, *spots]),
+        SCENE_PX,
+        space=True,
+    )
+
+
+def run_path_figure(run: Run) -> Figure | None:
+    """Return the path of a run's tool centre point in space, by kinematics and as the log recorded it."""
+    traces: list[Spec] = []
+    if run.tcp_recorded is not None:
+        traces.append(_way("recorded by the log", run.tcp_recorded, run.t, REFERENCE_COLOUR, 2))
+    if run.tcp is not None:
+        traces.append(_way("forward kinematics", run.tcp.position, run.t, AXIS_COLOURS["norm"], 4))
+    known = run.tcp.position if run.tcp is not None else run.tcp_recorded
+    if known is None or not np.isfinite(known).any():
+        return None
+    low, high = np.nanmin(known, axis=0), np.nanmax(known, axis=0)
+    return Figure(
+        "Path in space",
+        f"The tool centre point, equal scale on all axes. {HANDLING}",
+        f"Path of {run.name} in three dimensions, within ({text.point(low)}) m and ({text.point(high)}) m.",
+        _scene([*traces, _spot("start", known[0], INK, "circle")]),
+        SCENE_PX,
+        space=True,
+    )
+
+
+def _by_deviation(norm: FloatArray, kept: IntArray) -> Spec:
+    """Return a line's style that colours it by the norm in [mm], with its scale."""
+    return {
+        "color": typed(norm[kept]),
+        "colorscale": [list(stop) for stop in DEVIATION_SCALE],
+        "cmin": 0.0,
+        "cmax": float(norm.max()) or 1.0,
+        "width": 6,
+        "showscale": True,
+        "colorbar": {
+            "title": {"text": "actual path: ‖Δ‖ [mm]", "side": "top"},
+            "orientation": "h",
+            "thickness": 10,
+            "len": 0.6,
+            "y": 0,
+            "yanchor": "top",
+        },
+    }
+
+
+def _way(name: str, position: FloatArray, t: FloatArray, colour: str, width: int) -> Spec:
+    """Return a path of one colour."""
+    kept = decimate(position)
+    return _trail(name, position[kept], t[kept], None, line={"color": colour, "width": width})
+
+
+def _trail(name: str, position: FloatArray, t: FloatArray, norm: FloatArray | None, **more: Spec) -> Spec:
+    """Return a path in space; the pointer tells its time, place and deviation in [mm]."""
+    told = "t %{customdata[0]:.3f} s<br>x %{x:.4f} m<br>y %{y:.4f} m<br>z %{z:.4f} m"
+    told += "" if norm is None else "<br>‖Δ‖ %{customdata[1]:.4f} mm"
+    columns = [t] if norm is None else [t, norm]
+    return _in_space(position) | {
+        "mode": "lines",
+        "name": name,
+        "showlegend": norm is None,  # a line of many colours is told by its colour scale
+        "customdata": typed(np.column_stack(columns), "f8"),
+        "hovertemplate": told + f"<extra>{name}</extra>",
+        **more,
+    }
+
+
+def _spot(name: str, position: FloatArray, colour: str, symbol: str) -> Spec:
+    """Return one marked point in space."""
+    return _in_space(position[np.newaxis]) | {
+        "mode": "markers",
+        "name": name,
+        "marker": {"color": colour, "size": 6, "symbol": symbol},
+        "hovertemplate": f"x %{{x:.4f}} m<br>y %{{y:.4f}} m<br>z %{{z:.4f}} m<extra>{name}</extra>",
+    }
+
+
+def _in_space(position: FloatArray) -> Spec:
+    x, y, z = (typed(column) for column in position.T)
+    return {"type": "scatter3d", "x": x, "y": y, "z": z}
+
+
+def _scene(traces: list[Spec]) -> Spec:
+    """Return a scene with equal scale on all axes, the z axis up."""
+    axes = {f"{name}axis": space_axis(f"{name} [m]") for name in "xyz"}
+    scene = axes | {"aspectmode": "data", "camera": CAMERA}
+    layout = base_layout() | {"scene": scene, "margin": {"l": 0, "r": 0, "t": 0, "b": 56}}
+    return {"data": traces, "layout": layout}
