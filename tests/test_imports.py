@@ -1,5 +1,7 @@
 """Imports run one way: cli -> pipeline, fmus -> models -> datasets; libraries keep their place."""
 
+from __future__ import annotations
+
 import ast
 import subprocess
 import sys
@@ -9,7 +11,7 @@ import pytest
 
 ROOT = Path(__file__).resolve().parents[1]
 AREAS = {"models", "fmus", "pipeline", "cli", "datasets"}
-ALLOWED = {
+ALLOWED: dict[str, set[str]] = {
     "datasets": set(),
     "models": {"datasets"},
     "fmus": {"models", "datasets"},
@@ -25,12 +27,12 @@ ONLY = {  # who alone may import a distribution
 MODELS_MAY_IMPORT = {"numpy", "scipy"}
 
 
-def modules():
+def modules() -> list[Path]:
     return sorted(path for area in AREAS for path in (ROOT / area).rglob("*.py"))
 
 
-def imported(path):
-    names = set()
+def imported(path: Path) -> set[str]:
+    names: set[str] = set()
     for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
         if isinstance(node, ast.Import):
             names |= {alias.name.split(".")[0] for alias in node.names}
@@ -40,7 +42,7 @@ def imported(path):
 
 
 @pytest.mark.parametrize("path", modules(), ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_imports_run_one_way(path):
+def test_imports_run_one_way(path: Path) -> None:
     place = path.relative_to(ROOT).as_posix()
     area = place.split("/")[0]
     names = imported(path)
@@ -55,7 +57,7 @@ def test_imports_run_one_way(path):
         assert names <= known
 
 
-def loaded_by(code):
+def loaded_by(code: str) -> set[str]:
     """The modules that a fresh Python has loaded after some code."""
     said = subprocess.run(
         [sys.executable, "-c", f"import sys\n{code}\nprint(*sys.modules)"],
@@ -66,13 +68,13 @@ def loaded_by(code):
     return set(said.stdout.split())
 
 
-def test_help_loads_nothing_heavy():
+def test_help_loads_nothing_heavy() -> None:
     code = "from urmpipe.main import cli\ntry: cli.main(['--help'])\nexcept SystemExit: pass"
     heavy = {"numpy", "pandas", "scipy", "rerun", "pyarrow", "plotly", "rich", "jinja2"}
     assert not loaded_by(code) & heavy
 
 
-def test_importing_the_package_loads_nothing_heavy_and_knows_its_names():
+def test_importing_the_package_loads_nothing_heavy_and_knows_its_names() -> None:
     assert not loaded_by("import urmpipe") & {"numpy", "pandas", "rerun", "click"}
     import urmpipe
 

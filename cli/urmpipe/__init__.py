@@ -16,13 +16,13 @@ if TYPE_CHECKING:
     from urmpipe.api import Report as Report
     from urmpipe.api import compare as compare
     from urmpipe.api import ingest as ingest
-    from urmpipe.api import read_recording as read_recording
     from urmpipe.api import report as report
-    from urmpipe.api import write_recording as write_recording
     from urmpipe_models.catalogue import load_robot as load_robot
     from urmpipe_models.catalogue import robot_names as robot_names
     from urmpipe_models.chain import Chain as Chain
     from urmpipe_models.errors import UrmpipeError as UrmpipeError
+    from urmpipe_pipeline.recording import read_recording as read_recording
+    from urmpipe_pipeline.recording import write_recording as write_recording
     from urmpipe_pipeline.results import Comparison as Comparison
     from urmpipe_pipeline.results import Run as Run
 
@@ -37,10 +37,10 @@ _HOME = {
     "compare": "urmpipe.api",
     "ingest": "urmpipe.api",
     "load_robot": "urmpipe_models.catalogue",
-    "read_recording": "urmpipe.api",
+    "read_recording": "urmpipe_pipeline.recording",
     "report": "urmpipe.api",
     "robot_names": "urmpipe_models.catalogue",
-    "write_recording": "urmpipe.api",
+    "write_recording": "urmpipe_pipeline.recording",
 }
 
 __all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604 - the names are those of _HOME

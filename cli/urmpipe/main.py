@@ -79,41 +79,40 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 def run(arguments: Sequence[str]) -> int:
     """Run the command line and return the exit code."""
-    from urmpipe_models.errors import Finding, UrmpipeError
-
-    debug, as_json = "--debug" in arguments, "--json" in arguments
+    as_json = "--json" in arguments
     try:
         return int(cli.main(list(arguments), prog_name="urmpipe", standalone_mode=False) or 0)
-    except UrmpipeError as error:
-        findings: Sequence[Finding] = error.findings
-    except click.UsageError as error:
-        if not as_json:
-            error.show()
-            return 2
-        findings = [Finding(error.format_message())]
-    except click.ClickException as error:
-        findings = [Finding(error.format_message())]
-    except click.Abort:
-        findings = [Finding("stopped before it was done; nothing was written")]
     except BrokenPipeError:  # the reader of our output left, as head does
         sys.stderr.close()
-        return 2
-    except OSError as error:
-        findings = [Finding(error.strerror or str(error), file=error.filename and str(error.filename))]
-    except MemoryError:
-        findings = [Finding("out of memory")]
-    except Exception as error:
-        if debug:
-            raise
-        findings = [
-            Finding(f"{type(error).__name__}: {error} (a fault of urmpipe itself; --debug shows where)")
-        ]
-    if debug:
-        import traceback
+    except (Exception, KeyboardInterrupt) as error:
+        if "--debug" in arguments:
+            import traceback
 
-        traceback.print_exc()
-    _print_findings(findings, as_json)
+            traceback.print_exception(error)
+        if isinstance(error, click.UsageError) and not as_json:
+            error.show()
+        else:
+            _print_findings(_findings(error), as_json)
     return 2
+
+
+def _findings(error: BaseException) -> Sequence[Finding]:
+    """Return what to tell the user about an error, whoever raised it."""
+    from urmpipe_models.errors import Finding, UrmpipeError
+
+    match error:
+        case UrmpipeError():
+            return error.findings
+        case click.ClickException():
+            return [Finding(error.format_message())]
+        case click.Abort() | KeyboardInterrupt():
+            return [Finding("stopped before it was done; nothing was written")]
+        case OSError():
+            return [Finding(error.strerror or str(error), file=error.filename and str(error.filename))]
+        case MemoryError():
+            return [Finding("out of memory")]
+    fault = f"{type(error).__name__}: {error}"
+    return [Finding(f"{fault} (a fault of urmpipe itself; --debug shows where)")]
 
 
 def _print_findings(findings: Sequence[Finding], as_json: bool) -> None:

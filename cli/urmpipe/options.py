@@ -12,7 +12,7 @@ from click.shell_completion import CompletionItem
 Command = TypeVar("Command", bound=Callable[..., Any])
 
 
-class RobotType(click.ParamType):
+class RobotType(click.ParamType[str]):
     """A robot's name in the catalogue, or a TOML or URDF file; names complete in the shell."""
 
     name = "NAME|FILE"
@@ -27,7 +27,7 @@ class RobotType(click.ParamType):
         return [*names, CompletionItem(incomplete, type="file")]
 
 
-class OffsetType(click.ParamType):
+class OffsetType(click.ParamType[Any]):
     """A frame as X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad."""
 
     name = "X,Y,Z[,RX,RY,RZ]"
@@ -39,7 +39,7 @@ class OffsetType(click.ParamType):
         return parse_offset(value) if isinstance(value, str) else value
 
 
-class NamesType(click.ParamType):
+class NamesType(click.ParamType[Any]):
     """Some names, parted by commas."""
 
     name = "A,B,C"
@@ -49,7 +49,7 @@ class NamesType(click.ParamType):
         return tuple(part.strip() for part in value.split(",")) if isinstance(value, str) else value
 
 
-class DurationType(click.ParamType):
+class DurationType(click.ParamType[float]):
     """A time in seconds, or with its unit: 0.005, 5ms."""
 
     name = "SECONDS"

@@ -21,7 +21,7 @@ from urmpipe_models.transform import Transform, euler_zyx
 FloatArray: TypeAlias = NDArray[np.float64]
 
 BLOCK = 16384
-"""Rows worked on at a time: enough to outweigh Python's own work, few enough for a core's cache."""
+"""Rows worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
 
 THREADS = min(4, os.cpu_count() or 1)
 """Blocks worked on side by side: beyond some, Python's own work, which runs alone, sets the pace."""

@@ -1,7 +1,11 @@
 """The group, its help and the one error boundary."""
 
+from __future__ import annotations
+
 import json
+from collections.abc import Callable, Iterator
 from importlib.metadata import version
+from typing import Any
 
 import click
 import pytest
@@ -9,8 +13,11 @@ from click.testing import CliRunner
 
 from urmpipe.main import COMMANDS, cli
 
+RunCommand = Callable[..., Any]
+"""What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
 
-def test_the_short_help_of_every_command_is_its_own():
+
+def test_the_short_help_of_every_command_is_its_own() -> None:
     context = click.Context(cli)
     for name, short in COMMANDS.items():
         command = cli.get_command(context, name)
@@ -18,18 +25,25 @@ def test_the_short_help_of_every_command_is_its_own():
         assert command.get_short_help_str(limit=200) == short
 
 
-def commands():
+def commands() -> Iterator[tuple[tuple[str, ...], click.Command]]:
     """Every command and subcommand with its words."""
     context = click.Context(cli)
     for name in COMMANDS:
         command = cli.get_command(context, name)
+        assert command is not None
         yield (name,), command
         if isinstance(command, click.Group):
             yield from (((name, sub), command.commands[sub]) for sub in command.commands)
 
 
-@pytest.mark.parametrize(("words", "command"), list(commands()), ids=lambda value: " ".join(value) if isinstance(value, tuple) else "")
-def test_every_command_has_help_with_examples_and_every_option_says_what_it_does(words, command):
+@pytest.mark.parametrize(
+    ("words", "command"),
+    list(commands()),
+    ids=lambda value: " ".join(value) if isinstance(value, tuple) else "",
+)
+def test_every_command_has_help_with_examples_and_every_option_says_what_it_does(
+    words: tuple[str, ...], command: click.Command
+) -> None:
     result = CliRunner().invoke(cli, [*words, "--help"])
     assert result.exit_code == 0
     if not isinstance(command, click.Group):
@@ -40,19 +54,19 @@ def test_every_command_has_help_with_examples_and_every_option_says_what_it_does
             assert parameter.help, f"{parameter.name} has no help"
 
 
-def test_version(urmpipe):
+def test_version(urmpipe: RunCommand) -> None:
     ran = urmpipe("--version")
     assert (ran.code, ran.out) == (0, f"urmpipe, version {version('urmpipe')}\n")
 
 
-def test_an_unknown_command_is_usage_and_exits_with_2(urmpipe):
+def test_an_unknown_command_is_usage_and_exits_with_2(urmpipe: RunCommand) -> None:
     ran = urmpipe("ingset")
     assert ran.code == 2
     assert "No such command 'ingset'" in ran.err
     assert ran.out == ""
 
 
-def test_an_error_is_one_line_and_json_if_asked_for(urmpipe):
+def test_an_error_is_one_line_and_json_if_asked_for(urmpipe: RunCommand) -> None:
     ran = urmpipe("ingest", "missing.csv")
     assert ran.code == 2
     assert ran.out == ""
@@ -66,7 +80,7 @@ def test_an_error_is_one_line_and_json_if_asked_for(urmpipe):
     assert answer["errors"][0]["file"] == "missing.csv"
 
 
-def test_debug_adds_the_traceback(urmpipe):
+def test_debug_adds_the_traceback(urmpipe: RunCommand) -> None:
     ran = urmpipe("ingest", "missing.csv", "--debug")
     assert ran.code == 2
     assert "Traceback (most recent call last)" in ran.err
@@ -80,13 +94,13 @@ def test_debug_adds_the_traceback(urmpipe):
         (["--derivative", "magic"], "'magic' is not one of 'central', 'savgol'."),
     ],
 )
-def test_wrong_options_say_what_is_allowed(urmpipe, arguments, found):
+def test_wrong_options_say_what_is_allowed(urmpipe: RunCommand, arguments: list[str], found: str) -> None:
     ran = urmpipe("ingest", "log.csv", *arguments)
     assert ran.code == 2
     assert found in ran.err
 
 
-def test_shell_completion_offers_commands_and_robots():
+def test_shell_completion_offers_commands_and_robots() -> None:
     from urmpipe.options import RobotType
 
     robots = RobotType().shell_complete(click.Context(cli), click.Option(["--robot"]), "ur5")

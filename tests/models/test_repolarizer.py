@@ -1,6 +1,9 @@
 """The repolarizer: its laws, sample by sample and over a whole log."""
 
+from __future__ import annotations
+
 import math
+from collections.abc import Iterable
 from pathlib import Path
 
 import casadi
@@ -9,19 +12,23 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_np
+from numpy.typing import NDArray
 
+from urmpipe_models.kinematics import FloatArray
 from urmpipe_models.repolarizer import FULL_TURN, State, max_step, repolarize, step
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 TSP = 0.005
 
 
-def wrap(x, period=FULL_TURN):
+def wrap(x: FloatArray, period: float = FULL_TURN) -> FloatArray:
     """Limit to +-period/2, as an environment with limited joints does."""
     return x - period * np.floor((x + period / 2.0) / period)
 
 
-def run_steps(q, dt, **options):
+def run_steps(
+    q: Iterable[float], dt: Iterable[float], **options: float
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], State]:
     """Feed a log of one joint to `step`, sample by sample."""
     state, out, changes, odd = State(), [], [], []
     for value, elapsed in zip(q, dt, strict=True):
@@ -38,7 +45,7 @@ motions = st_np.arrays(
 
 
 @given(motions, st.sampled_from([FULL_TURN, 360.0]))
-def test_unwrapping_a_wrapped_motion_gives_it_back(steps, period):
+def test_unwrapping_a_wrapped_motion_gives_it_back(steps: FloatArray, period: float) -> None:
     x = np.cumsum(steps, axis=0) * (period / FULL_TURN)
     x -= period * np.round(x[0] / period)  # the turns before the log began cannot be known
     result = repolarize(wrap(x, period), np.full(len(x), TSP), period=period)
@@ -54,9 +61,11 @@ def test_unwrapping_a_wrapped_motion_gives_it_back(steps, period):
     st.floats(0.001, 0.1),
 )
 @settings(deadline=None)
-def test_the_batch_is_the_steps_bit_for_bit(q, missing, max_speed, period_of_samples):
+def test_the_batch_is_the_steps_bit_for_bit(
+    q: FloatArray, missing: NDArray[np.bool_], max_speed: float, period_of_samples: float
+) -> None:
     q = np.where(missing[: len(q), : q.shape[1]], np.nan, q)
-    dt = period_of_samples * (1.0 + np.arange(len(q)) % 3)
+    dt = period_of_samples * (1.0 + np.arange(len(q), dtype=np.float64) % 3)
     batch = repolarize(q, dt, max_speed=max_speed)
     for j in range(q.shape[1]):
         out, changes, odd, _ = run_steps(q[:, j], dt, max_speed=max_speed)
@@ -67,7 +76,7 @@ def test_the_batch_is_the_steps_bit_for_bit(q, missing, max_speed, period_of_sam
         assert np.array_equal(np.flatnonzero(odd), batch.unexplained[batch.unexplained[:, 1] == j, 0])
 
 
-def test_before_the_first_repolarization_nothing_changes_by_a_bit():
+def test_before_the_first_repolarization_nothing_changes_by_a_bit() -> None:
     q = np.array([[-0.0], [1.0], [2.5], [3.1], [-3.1], [-3.0]])
     result = repolarize(q, np.full(6, TSP))
     assert result.q[:4].tobytes() == q[:4].tobytes()
@@ -76,7 +85,7 @@ def test_before_the_first_repolarization_nothing_changes_by_a_bit():
     assert result.q[4, 0] == -3.1 + FULL_TURN
 
 
-def test_many_turns_in_both_directions_come_back():
+def test_many_turns_in_both_directions_come_back() -> None:
     x = np.concatenate([np.linspace(0, 40, 400), np.linspace(40, -40, 800)])
     result = repolarize(wrap(x)[:, np.newaxis], np.full(len(x), TSP))
     np.testing.assert_allclose(result.q[:, 0], x, rtol=0, atol=3e-14)  # 40 rad: a few units in the last place
@@ -84,14 +93,14 @@ def test_many_turns_in_both_directions_come_back():
     assert len(result.rows) == 6 + 6 + 6
 
 
-def test_a_step_larger_than_pi_that_is_no_wrap_stays_and_is_flagged():
+def test_a_step_larger_than_pi_that_is_no_wrap_stays_and_is_flagged() -> None:
     q = np.array([[5.0], [1.0], [1.1], [-10.8], [-10.7]])
     result = repolarize(q, np.full(5, TSP))
     assert result.q.tobytes() == q.tobytes()
     assert result.unexplained.tolist() == [[1, 0], [3, 0]]
 
 
-def test_a_speed_limit_narrows_what_counts_as_a_wrap():
+def test_a_speed_limit_narrows_what_counts_as_a_wrap() -> None:
     q = np.array([[3.0], [3.0 - FULL_TURN + 0.5]])
     dt = np.full(2, 0.1)
     assert repolarize(q, dt).change.tolist() == [1]
@@ -100,7 +109,7 @@ def test_a_speed_limit_narrows_what_counts_as_a_wrap():
     assert max_step(10.0, FULL_TURN, 4.0) == FULL_TURN / 4
 
 
-def test_missing_samples_keep_the_turns_and_give_more_time():
+def test_missing_samples_keep_the_turns_and_give_more_time() -> None:
     q = np.array([[3.1], [-3.1], [np.nan], [np.nan], [-2.8], [3.1]])
     result = repolarize(q, np.full(6, 0.1), max_speed=2.0)
     assert np.isnan(result.q[2:4]).all()
@@ -109,29 +118,30 @@ def test_missing_samples_keep_the_turns_and_give_more_time():
     assert result.unexplained.tolist() == [[5, 0]]
 
 
-def test_chatter_on_the_limit_leaves_no_net_turn():
+def test_chatter_on_the_limit_leaves_no_net_turn() -> None:
     q = np.array([[3.14], [-3.14], [3.14], [-3.14], [3.14]])
     result = repolarize(q, np.full(5, TSP))
     assert result.change.tolist() == [1, -1, 1, -1]
     assert result.q[-1, 0] == 3.14
 
 
-def test_the_step_remembers_two_samples_back():
+def test_the_step_remembers_two_samples_back() -> None:
     *_, state = run_steps([0.1, 0.2, math.nan, 0.4], [TSP] * 4)
     assert (state.last, state.before, state.elapsed, state.seen) == (0.4, 0.2, 0.0, 2.0)
 
 
 @pytest.mark.parametrize("shape", [(0, 3), (1, 3), (5, 0)])
-def test_empty_logs_pass_through(shape):
+def test_empty_logs_pass_through(shape: tuple[int, int]) -> None:
     assert repolarize(np.zeros(shape), np.zeros(shape[0])).q.shape == shape
 
 
-def test_the_step_traces_with_casadi():
+def test_the_step_traces_with_casadi() -> None:
     casadi.GlobalOptions.setNumpyMode(-1)
     state = State(*casadi.SX.sym("state", 5).elements())
-    q, dt, period, speed = casadi.SX.sym("input", 4).elements()
+    inputs = casadi.SX.sym("input", 4)
+    q, dt, period, speed = inputs.elements()
     following, out, flags = step(state, q, dt, period=period, max_speed=speed)
-    traced = casadi.Function("step", [casadi.vertcat(*state), casadi.vertcat(q, dt, period, speed)],
+    traced = casadi.Function("step", [casadi.vertcat(*state), inputs],
                              [casadi.vertcat(*following), casadi.vertcat(out, *flags)])  # fmt: skip
     rng = np.random.default_rng(7)
     memory = State(0.0, 0.0, 0.0, 0.0, 0.0)
@@ -144,7 +154,7 @@ def test_the_step_traces_with_casadi():
 
 
 @pytest.mark.skipif(not SHARED.is_dir(), reason="the real logs of ../shared are not there")
-def test_real_jumps_of_a_real_log_stay():
+def test_real_jumps_of_a_real_log_stay() -> None:
     """fake_joints.csv: -3.99 rad and 11.9 rad (and back) are no wraps; numpy.unwrap moves them."""
     path = SHARED / "logs" / "plotjuggler" / "fake_joints.csv"
     header = path.read_text().splitlines()[0].split(",")

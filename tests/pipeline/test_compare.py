@@ -1,14 +1,17 @@
 """Deviation, statistics and verdict, from plain arrays."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 
+from urmpipe_models.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics import point_over_log, positions_over_log
 from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import derivatives
-from urmpipe_pipeline.joint_log import JointLog, SourceFile
+from urmpipe_pipeline.joint_log import FloatArray, JointLog, SourceFile
 from urmpipe_pipeline.results import Provenance, Run
 
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
@@ -16,7 +19,14 @@ TSP = 0.005
 PROVENANCE = Provenance("ingest", {}, (), {}, "")
 
 
-def arm_run(q, *, name="log", robot=URM6, start_ns=0, recorded=None):
+def arm_run(
+    q: FloatArray,
+    *,
+    name: str = "log",
+    robot: Chain | None = URM6,
+    start_ns: int = 0,
+    recorded: FloatArray | None = None,
+) -> Run:
     """A run of joint values at 5 ms."""
     t_ns = np.arange(len(q)) * 5_000_000 + start_ns
     joints = tuple(f"q{i}" for i in range(1, 7))
@@ -28,7 +38,7 @@ def arm_run(q, *, name="log", robot=URM6, start_ns=0, recorded=None):
     return Run(name, log, robot, TSP, t_ns, q, qd, qdd, tcp, recorded, (), (), PROVENANCE)
 
 
-def path_run(position, name="path"):
+def path_run(position: FloatArray, name: str = "path") -> Run:
     """A path: a log without joints."""
     t_ns = np.arange(len(position)) * 5_000_000
     nothing = np.empty((len(position), 0))
@@ -38,12 +48,12 @@ def path_run(position, name="path"):
 
 
 @pytest.fixture
-def q():
+def q() -> FloatArray:
     t = TSP * np.arange(500)
     return np.column_stack([0.5 * np.sin(t * (1 + i)) + i for i in range(6)])
 
 
-def test_a_path_made_by_the_arm_itself_has_no_deviation(q):
+def test_a_path_made_by_the_arm_itself_has_no_deviation(q: FloatArray) -> None:
     result = compare_runs(path_run(positions_over_log(URM6, q)), [arm_run(q)])
     assert result.verdict == "pass"
     assert result.runs[0].delta.max() == 0.0
@@ -52,7 +62,7 @@ def test_a_path_made_by_the_arm_itself_has_no_deviation(q):
     assert result.name == "log-against-path"
 
 
-def test_statistics_are_those_of_numpy_and_the_sign_is_reference_minus_actual(q):
+def test_statistics_are_those_of_numpy_and_the_sign_is_reference_minus_actual(q: FloatArray) -> None:
     rng = np.random.default_rng(5)
     shift = rng.normal(0.001, 0.0005, (500, 3))
     wanted = positions_over_log(URM6, q) + shift
@@ -63,7 +73,7 @@ def test_statistics_are_those_of_numpy_and_the_sign_is_reference_minus_actual(q)
     worst = int(np.argmax(np.abs(y)))
     assert (one.max, one.sample_max, one.t_max) == (np.abs(y).max(), worst, worst * 0.005)
     assert one.rms == pytest.approx(np.sqrt(np.mean(y**2)), rel=1e-14)
-    assert (one.mean, one.std) == (np.mean(y), np.std(y))
+    assert (one.mean, one.std) == (float(np.mean(y)), float(np.std(y)))
     assert one.p95 == np.percentile(np.abs(y), 95)
     norm = deviation.statistics["norm"]
     assert norm.verdict is None
@@ -72,7 +82,7 @@ def test_statistics_are_those_of_numpy_and_the_sign_is_reference_minus_actual(q)
     assert deviation.start == tuple(deviation.delta[0])
 
 
-def test_the_tolerance_decides_axis_by_axis(q):
+def test_the_tolerance_decides_axis_by_axis(q: FloatArray) -> None:
     wanted = positions_over_log(URM6, q)
     wanted[100:110, 2] += 0.0036
     result = compare_runs(path_run(wanted), [arm_run(q)])
@@ -85,7 +95,7 @@ def test_the_tolerance_decides_axis_by_axis(q):
     assert compare_runs(path_run(wanted), [arm_run(q)], CompareOptions(tolerance=0.0037)).verdict == "pass"
 
 
-def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q):
+def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q: FloatArray) -> None:
     broken = q.copy()
     broken[7, 3] = np.nan
     result = compare_runs(path_run(positions_over_log(URM6, q)[:400]), [arm_run(broken)])
@@ -96,7 +106,7 @@ def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q):
     assert [w.message for w in result.warnings] == ["log: 101 of 500 samples have no reference or no value"]
 
 
-def test_an_offset_shifts_the_log_against_the_reference(q):
+def test_an_offset_shifts_the_log_against_the_reference(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     late = compare_runs(wanted, [arm_run(q[100:])], CompareOptions(sync_offset=0.5)).runs[0]
     assert late.delta.max() == 0.0
@@ -104,14 +114,14 @@ def test_an_offset_shifts_the_log_against_the_reference(q):
     assert len(late.sample) == 400
 
 
-def test_logs_with_one_name_are_told_apart(q):
+def test_logs_with_one_name_are_told_apart(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     assert [r.name for r in compare_runs(wanted, [arm_run(q), arm_run(q), arm_run(q, name="b")]).runs] == [
         "log", "log-2", "b",
     ]  # fmt: skip
 
 
-def test_one_log_is_held_against_what_it_recorded_itself(q):
+def test_one_log_is_held_against_what_it_recorded_itself(q: FloatArray) -> None:
     recorded = positions_over_log(URM6, q) + np.array([0.001, 0.0, 0.0])
     recorded[3] = np.nan
     result = compare_recorded(arm_run(q, recorded=recorded))
@@ -119,7 +129,7 @@ def test_one_log_is_held_against_what_it_recorded_itself(q):
     assert result.runs[0].left_out == 1
 
 
-def test_what_is_lacking_is_named(q):
+def test_what_is_lacking_is_named(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     with pytest.raises(LogError) as error:
         compare_runs(wanted, [arm_run(q, robot=None)])
@@ -132,12 +142,12 @@ def test_what_is_lacking_is_named(q):
     with pytest.raises(LogError) as error:
         compare_runs(wanted, [arm_run(q)], CompareOptions(sync_offset=99.0))
     assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
-    with pytest.raises(OptionError) as error:
+    with pytest.raises(OptionError) as option_error:
         CompareOptions(tolerance=-1.0)
-    assert str(error.value) == "--tolerance: found -1.0, allowed: a positive length in m"
+    assert str(option_error.value) == "--tolerance: found -1.0, allowed: a positive length in m"
 
 
-def test_the_result_is_a_table_and_json(q):
+def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
     result = compare_runs(path_run(positions_over_log(URM6, q) + 0.004), [arm_run(q)])
     frame = result.to_frame()
     assert frame["quantity"].tolist() == ["x", "y", "z", "norm"]

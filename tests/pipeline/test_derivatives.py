@@ -1,16 +1,18 @@
 """Rates on the grid: exact on polynomials, smooth on quantised logs."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
 
-from urmpipe_pipeline.derivatives import WINDOW, derivatives, recorded_agree
+from urmpipe_pipeline.derivatives import WINDOW, Method, derivatives, recorded_agree
 
 TSP = 0.005
-T = TSP * np.arange(400)
+T = TSP * np.arange(400, dtype=np.float64)
 
 
 @pytest.mark.parametrize("method", ["central", "savgol"])
-def test_a_parabola_is_differentiated_exactly(method):
+def test_a_parabola_is_differentiated_exactly(method: Method) -> None:
     q = np.column_stack([1.0 + 2.0 * T - 3.0 * T**2, T, np.ones_like(T)])
     qd, qdd = derivatives(q, TSP, method)
     # q to 10 rounds at 1e-15; over T^2 = 2.5e-5 this is 1e-10, the filter's sums a little more
@@ -18,14 +20,14 @@ def test_a_parabola_is_differentiated_exactly(method):
     np.testing.assert_allclose(qdd, np.column_stack([np.full_like(T, -6.0), 0 * T, 0 * T]), atol=1e-7)
 
 
-def test_central_differences_are_second_order():
+def test_central_differences_are_second_order() -> None:
     q = np.sin(T)[:, None]
     qd, qdd = derivatives(q, TSP)
     assert np.abs(qd[:, 0] - np.cos(T)).max() < TSP**2  # error T^2 / 6 inside, T^2 / 3 at the ends
     assert np.abs(qdd[1:-1, 0] + np.sin(T)[1:-1]).max() < TSP**2
 
 
-def test_four_digit_angles_need_smoothing():
+def test_four_digit_angles_need_smoothing() -> None:
     q = 2.0 * np.sin(T)[:, None]
     quantised = np.round(q, 3)
     _, rough = derivatives(quantised, TSP)
@@ -36,7 +38,7 @@ def test_four_digit_angles_need_smoothing():
     assert np.abs(smooth - exact)[inner].max() < 1.0
 
 
-def test_a_missing_sample_leaves_only_its_neighbours_without_a_derivative():
+def test_a_missing_sample_leaves_only_its_neighbours_without_a_derivative() -> None:
     q = T[:, None].copy()
     q[100] = np.nan
     qd, qdd = derivatives(q, TSP)
@@ -45,13 +47,13 @@ def test_a_missing_sample_leaves_only_its_neighbours_without_a_derivative():
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_too_few_samples_have_no_derivative(count):
+def test_too_few_samples_have_no_derivative(count: int) -> None:
     qd, qdd = derivatives(np.ones((count, 2)), TSP)
     assert qd.shape == qdd.shape == (count, 2)
     assert np.isnan(qd).all()
 
 
-def test_recorded_rates_are_trusted_only_where_they_are_rates():
+def test_recorded_rates_are_trusted_only_where_they_are_rates() -> None:
     q = np.sin(5 * T)[:, None]
     qd, _ = derivatives(q, TSP)
     assert recorded_agree(5 * np.cos(5 * T)[:, None], qd)

@@ -1,7 +1,10 @@
 """The uniform grid: the log's own rows, or a resampling that says so."""
 
+from __future__ import annotations
+
 import numpy as np
 import pytest
+from numpy.typing import ArrayLike
 
 from urmpipe_pipeline.grid import inside_gaps, interpolate, make_grid
 from urmpipe_pipeline.joint_log import JointLog
@@ -9,13 +12,13 @@ from urmpipe_pipeline.joint_log import JointLog
 MS = 1_000_000
 
 
-def log_at(t_ns, q=None):
+def log_at(t_ns: ArrayLike, q: ArrayLike | None = None) -> JointLog:
     t = np.asarray(t_ns, dtype=np.int64)
     values = np.zeros((len(t), 1)) if q is None else np.asarray(q, dtype=float).reshape(len(t), -1)
     return JointLog("log", "table", (), t, ("q1",), values)
 
 
-def test_a_regular_log_keeps_its_own_rows():
+def test_a_regular_log_keeps_its_own_rows() -> None:
     log = log_at(np.arange(100) * 5 * MS)
     grid = make_grid(log)
     assert grid.own
@@ -25,12 +28,12 @@ def test_a_regular_log_keeps_its_own_rows():
     assert make_grid(log, 0.005).own
 
 
-def test_rounded_clocks_are_regular():
+def test_rounded_clocks_are_regular() -> None:
     """A period of 1/240 s printed to the microsecond."""
     assert make_grid(log_at(np.rint(np.arange(1000) / 240 * 1e6).astype(np.int64) * 1000)).own
 
 
-def test_an_irregular_log_is_resampled_to_its_median_period_and_says_so():
+def test_an_irregular_log_is_resampled_to_its_median_period_and_says_so() -> None:
     rng = np.random.default_rng(3)
     t = np.sort(np.arange(200) * 10 * MS + rng.integers(-2 * MS, 2 * MS, 200))
     t -= t[0]
@@ -43,7 +46,7 @@ def test_an_irregular_log_is_resampled_to_its_median_period_and_says_so():
     assert grid.warnings[0].message.startswith("200 rows with a median period of")
 
 
-def test_nothing_is_upsampled_in_silence():
+def test_nothing_is_upsampled_in_silence() -> None:
     grid = make_grid(log_at(np.arange(10) * 50 * MS), 0.005)
     assert len(grid.t_ns) == 91
     assert [w.kind for w in grid.warnings] == ["resampled", "upsampled"]
@@ -53,14 +56,14 @@ def test_nothing_is_upsampled_in_silence():
     )
 
 
-def test_a_coarser_grid_takes_every_fourth_row():
+def test_a_coarser_grid_takes_every_fourth_row() -> None:
     q = np.arange(101.0)
     grid = make_grid(log_at(np.arange(101) * 5 * MS, q), 0.02)
     np.testing.assert_array_equal(grid.resample(q[:, None])[:, 0], q[::4])
     assert [w.kind for w in grid.warnings] == ["resampled"]
 
 
-def test_a_gap_is_left_open():
+def test_a_gap_is_left_open() -> None:
     t = np.concatenate([np.arange(50), np.arange(80, 120)]) * 5 * MS
     log = log_at(t, t * 1.0)
     grid = make_grid(log)
@@ -71,7 +74,7 @@ def test_a_gap_is_left_open():
     assert grid.warnings[1].message == "30 grid samples lie inside gaps and have no value"
 
 
-def test_interpolation_gives_known_values_exactly_and_nothing_outside():
+def test_interpolation_gives_known_values_exactly_and_nothing_outside() -> None:
     known = np.array([0, 10, 20, 30]) * MS
     values = np.array([[0.1], [0.2], [0.7], [np.nan]])
     got = interpolate(np.array([-1, 0, 5, 10, 20, 25, 31]) * MS, known, values)[:, 0]
@@ -83,7 +86,7 @@ def test_interpolation_gives_known_values_exactly_and_nothing_outside():
 
 
 @pytest.mark.parametrize("count", [0, 1])
-def test_logs_of_no_and_one_row_have_a_grid(count):
+def test_logs_of_no_and_one_row_have_a_grid(count: int) -> None:
     grid = make_grid(log_at(np.arange(count)))
     assert len(grid.t_ns) == count
     assert grid.own

@@ -1,0 +1,203 @@
+"""ingest, compare, report and demo as a user runs them."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from urmpipe_datasets import LOGS
+from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.results import Run
+
+PATH, COPPELIA, MATLAB = LOGS / "path.csv", LOGS / "coppeliasim.csv", LOGS / "matlab.csv"
+
+RunCommand = Callable[..., Any]
+"""What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
+
+
+def files_in(folder: Path) -> list[str]:
+    return sorted(path.name for path in folder.iterdir())
+
+
+def test_ingest_says_what_it_inferred_and_changed(urmpipe: RunCommand, tmp_path: Path) -> None:
+    ran = urmpipe("ingest", COPPELIA, "--robot", "urm6")
+    assert ran.code == 0, ran.err
+    assert files_in(tmp_path) == ["coppeliasim.rrd"]
+    for word in ("delimiter", "coppeliasim", "repolarizations", "urm6", "Recording: coppeliasim.rrd"):
+        assert word in ran.out
+    assert "error" not in ran.err
+
+
+def test_ingest_json_is_all_that_stands_on_standard_output(urmpipe: RunCommand, tmp_path: Path) -> None:
+    ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "--json", "-o", "run.rrd")
+    assert ran.code == 0
+    answer = json.loads(ran.out)
+    run = read_recording(tmp_path / "run.rrd")
+    assert isinstance(run, Run)
+    assert answer["samples"] == answer["grid_samples"] == run.log.rows == 7383
+    assert answer["period"] == answer["tsp"] == 0.005
+    assert answer["duration"] == 36.91
+    assert answer["joints"] == list(run.log.joints)
+    assert [one["row"] for one in answer["repolarizations"]] == [one.row for one in run.repolarizations]
+    assert all(one["row"] == one["sample"] + 1 for one in answer["repolarizations"])
+    assert answer["recording"] == "run.rrd"
+    assert "assumed-unit" in [w["kind"] for w in answer["warnings"]]
+    assert "warning:" in ran.err
+
+
+def test_quiet_prints_nothing(urmpipe: RunCommand) -> None:
+    ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "-q")
+    assert (ran.code, ran.out, ran.err) == (0, "", "")
+
+
+def test_without_a_robot_it_says_so(urmpipe: RunCommand) -> None:
+    ran = urmpipe("ingest", MATLAB)
+    assert ran.code == 0
+    assert "no kinematics" in ran.out
+
+
+def test_strict_makes_a_warning_an_error_and_writes_nothing(urmpipe: RunCommand, tmp_path: Path) -> None:
+    ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "--strict")
+    assert ran.code == 2
+    assert "(--strict)" in ran.err
+    assert files_in(tmp_path) == []
+
+
+def test_an_output_that_is_not_ours_or_is_an_input_is_never_replaced(
+    urmpipe: RunCommand, tmp_path: Path
+) -> None:
+    log = tmp_path / "log.csv"
+    log.write_bytes(MATLAB.read_bytes())
+    before = hashlib.sha256(log.read_bytes()).hexdigest()
+    ran = urmpipe("ingest", log, "--robot", "urm6", "-o", log)
+    assert ran.code == 2
+    other = tmp_path / "thesis.txt"
+    other.write_text("precious")
+    assert urmpipe("ingest", log, "--robot", "urm6", "-o", other).code == 2
+    assert urmpipe("ingest", log, "--robot", "urm6", "-o", "nowhere/run.rrd").code == 2
+    assert hashlib.sha256(log.read_bytes()).hexdigest() == before
+    assert other.read_text() == "precious"
+    assert files_in(tmp_path) == ["log.csv", "thesis.txt"]
+
+
+def test_compare_passes_and_its_exit_code_is_the_verdict(urmpipe: RunCommand, tmp_path: Path) -> None:
+    ran = urmpipe(
+        "compare", PATH, COPPELIA, MATLAB, LOGS / "solidworks", "--robot", "urm6", "--json", "-o", "a.rrd"
+    )
+    assert ran.code == 0, ran.err
+    answer = json.loads(ran.out)
+    assert answer["verdict"] == "pass"
+    assert [run["name"] for run in answer["runs"]] == ["coppeliasim", "matlab", "solidworks"]
+    stored = read_recording(tmp_path / "a.rrd")
+    assert json.loads(json.dumps(stored.to_dict()["runs"])) == answer["runs"]
+    shifted = answer["runs"][2]["delta"]["norm"]
+    assert shifted["mean"] == pytest.approx(0.0025, abs=5e-5)
+    assert shifted["std"] < 5e-5
+
+
+def test_compare_of_the_counter_rotating_module_fails(urmpipe: RunCommand, tmp_path: Path) -> None:
+    ran = urmpipe("compare", PATH, LOGS / "counter_rotating.csv", "--robot", "urm6")
+    assert ran.code == 1
+    assert "FAIL counter_rotating" in ran.out
+    assert files_in(tmp_path) == ["counter_rotating-against-path.rrd"]
+
+
+def test_recordings_are_operands_too(urmpipe: RunCommand) -> None:
+    assert urmpipe("ingest", MATLAB, "--robot", "urm6", "-o", "m.rrd").code == 0
+    direct = json.loads(urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "--json", "-o", "a.rrd").out)
+    recorded = json.loads(urmpipe("compare", PATH, "m.rrd", "--json", "-o", "b.rrd").out)
+    assert direct["runs"][0]["delta"] == recorded["runs"][0]["delta"]
+    own = urmpipe("compare", "m.rrd", "m.rrd", "--json", "-o", "c.rrd")
+    assert own.code == 0
+    assert json.loads(own.out)["runs"][0]["delta"]["norm"]["max"] == 0.0
+    ran = urmpipe("compare", PATH, "a.rrd")
+    assert ran.code == 2
+    assert "found the recording of a comparison, allowed: one that ingest wrote" in ran.err
+
+
+def test_a_path_without_time_goes_by_sample_index(urmpipe: RunCommand, tmp_path: Path) -> None:
+    rows = np.loadtxt(PATH, delimiter=",", skiprows=1)
+    np.savetxt(tmp_path / "as.csv", rows[:, 1:], delimiter=",", header="x,y,z", comments="", fmt="%.9f")
+    ran = urmpipe("compare", "as.csv", MATLAB, "--robot", "urm6", "--json")
+    assert ran.code == 0, ran.err
+    assert json.loads(ran.out)["runs"][0]["samples"] == 7383
+
+
+def test_report_is_written_beside_and_named_after_the_recording(urmpipe: RunCommand, tmp_path: Path) -> None:
+    assert urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "-q", "-o", "run.rrd").code == 0
+    ran = urmpipe("report", "run.rrd")
+    assert ran.code == 0, ran.err
+    assert ran.out.startswith("Report: run.html")
+    text = (tmp_path / "run.html").read_text(encoding="utf-8")
+    assert "PASS" in text
+    assert json.loads(urmpipe("report", "run.rrd", "--json").out)["report"] == "run.html"
+    (tmp_path / "run.html").write_text("<p>somebody's own page</p>")
+    ran = urmpipe("report", "run.rrd")
+    assert ran.code == 2
+    assert (tmp_path / "run.html").read_text() == "<p>somebody's own page</p>"
+
+
+def test_report_refuses_what_is_no_recording(urmpipe: RunCommand) -> None:
+    ran = urmpipe("report", MATLAB)
+    assert ran.code == 2
+    assert "found no recording of urmpipe" in ran.err
+
+
+@pytest.mark.parametrize(
+    ("change", "line", "column", "found"),
+    [
+        (lambda cells: [cells[0], "abc", *cells[2:]], 6, "q1", "'abc'"),
+        (lambda cells: ["-1.0", *cells[1:]], 6, "t", ""),
+        (lambda cells: cells[:-1], 6, None, "6"),
+    ],
+)
+def test_bad_input_is_named_by_line_and_column_and_outputs_stay(
+    urmpipe: RunCommand,
+    tmp_path: Path,
+    change: Callable[[list[str]], list[str]],
+    line: int,
+    column: str | None,
+    found: str,
+) -> None:
+    lines = MATLAB.read_text().splitlines()
+    lines[5] = ",".join(change(lines[5].split(",")))
+    (tmp_path / "bad.csv").write_text("\n".join(lines) + "\n")
+    assert urmpipe("ingest", MATLAB, "--robot", "urm6", "-q", "-o", "run.rrd").code == 0
+    before = (tmp_path / "run.rrd").read_bytes()
+    ran = urmpipe("ingest", "bad.csv", "--robot", "urm6", "-o", "run.rrd", "--json")
+    assert ran.code == 2
+    assert f"bad.csv:{line}" in ran.err
+    assert found in ran.err
+    assert "allowed" in ran.err
+    error = json.loads(ran.out)["errors"][0]
+    assert (error["row"], error["column"]) == (5, column)
+    assert (tmp_path / "run.rrd").read_bytes() == before
+
+
+def test_the_demo_goes_the_whole_way(urmpipe: RunCommand, tmp_path: Path) -> None:
+    ran = urmpipe("demo", "--json")
+    assert ran.code == 0, ran.err
+    answer = json.loads(ran.out)
+    assert answer["as_expected"] is True
+    verdicts = {run["name"]: run["verdict"] for run in answer["runs"]}
+    assert verdicts == {
+        "coppeliasim": "pass",
+        "matlab": "pass",
+        "solidworks": "pass",
+        "counter_rotating": "fail",
+    }
+    folder = tmp_path / "urmpipe-demo"
+    assert files_in(folder) == [
+        "coppeliasim.rrd", "counter_rotating.rrd", "demo.rrd", "matlab.rrd", "report.html", "solidworks.rrd",
+    ]  # fmt: skip
+    assert (folder / "report.html").stat().st_size < 15e6
+    again = urmpipe("demo")
+    assert again.code == 0
+    assert "Report:" in again.out
+    assert "Recording:" in again.out
