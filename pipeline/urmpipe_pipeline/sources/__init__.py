@@ -1,0 +1,12 @@
+"""Sources: log files in, a `JointLog` out. Only this package knows who wrote a file.
+
+A file goes through `text` (is it text?), `sniff` (how is it written?), `clock` and `roles` (what are its
+columns?), `table` (its numbers, fast), `diagnose` (where it is wrong, with line and column), `units` and
+`read` (SI). The words by which columns, units and sources are known are in `vocabulary.toml`.
+"""
+
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.read import read_log
+from urmpipe_pipeline.sources.tables import source_names
+
+__all__ = ["ReadOptions", "read_log", "source_names"]

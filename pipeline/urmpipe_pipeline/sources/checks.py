@@ -1,0 +1,165 @@
+"""What no log may hold, and what a person should know about one: found at once, over whole arrays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from decimal import Decimal
+
+import numpy as np
+
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning
+from urmpipe_pipeline.sources.clock import EXPONENTS, Clock
+from urmpipe_pipeline.sources.diagnose import SHOWN_FINDINGS, lines_of_rows
+from urmpipe_pipeline.sources.sniff import Layout
+from urmpipe_pipeline.sources.table import NO_TIME, REPORTED, Numbers
+
+GAP = 3.0
+"""Times the median period: more than this between two rows is a gap."""
+
+SHOWN_GAPS = 10
+"""Gaps that are told one by one; the others are counted."""
+
+
+def trimmed(numbers: Numbers) -> Numbers:
+    """Return the numbers without rows at the end that hold neither a time nor a value (spreadsheets)."""
+    if numbers.clock is None:
+        return numbers
+    end = len(numbers.clock)
+    while end and numbers.clock[end - 1] == NO_TIME and np.isnan(numbers.values[end - 1]).all():
+        end -= 1
+    if end == len(numbers.clock):
+        return numbers
+    lines = None if numbers.lines is None else numbers.lines[:end]
+    return Numbers(numbers.values[:end], numbers.clock[:end], numbers.findings, numbers.wrong, lines)
+
+
+def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
+    """Return everything that is wrong with the rows of a table, in the order of its lines.
+
+    Args:
+        layout: The table.
+        numbers: What was read of it.
+        names: Names of the columns of numbers.values, as the file has them.
+        clock: Its clock.
+
+    Returns:
+        The first findings, and one that counts the others.
+    """
+    wrong: list[tuple[int, str, str]] = []
+    total = numbers.wrong
+    for found in (_clock_errors(numbers, clock), _infinities(numbers, names)):
+        rows = list(found)
+        total += len(rows)
+        wrong += rows
+    wrong = sorted(wrong)[:SHOWN_FINDINGS]
+    line_of = _line_finder(layout, numbers, [row for row, _, _ in wrong])
+    file = str(layout.segment.path)
+    findings = [*numbers.findings, *(Finding(m, file, line_of(row), row, c) for row, c, m in wrong)]
+    findings = sorted(findings, key=lambda finding: finding.line or 0)[:SHOWN_FINDINGS]
+    if total > len(findings):
+        findings.append(Finding(f"{total - len(findings)} more findings", file=file))
+    return findings
+
+
+def missing_samples(values: FloatArray, names: Sequence[str]) -> list[LogWarning]:
+    """Return one warning for each column in which samples are missing.
+
+    Args:
+        values: The columns, shape (n, columns).
+        names: Their names.
+    """
+    warnings = []
+    for j in _unusual(values):
+        missing = np.flatnonzero(np.isnan(values[:, j]))
+        if len(missing):
+            first = int(missing[0]) + 1
+            said = f"{names[j]} has no value in {len(missing)} of {len(values)} rows, first in row {first}"
+            warnings.append(LogWarning("missing", said, first))
+    return warnings
+
+
+def refuse_empty(values: FloatArray, names: Sequence[str], file: str) -> None:
+    """Raise if a column has no value at all.
+
+    Raises:
+        LogError: With a finding for each such column.
+    """
+    findings = [
+        Finding(f"found no value in any of {len(values)} rows, allowed: at least one", file, column=names[j])
+        for j in _unusual(values)
+        if np.isnan(values[:, j]).all()
+    ]
+    if findings:
+        raise LogError(*findings)
+
+
+def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, str]]:
+    """Yield row, column and message where the time is missing, repeated or runs backwards."""
+    times = numbers.clock
+    if times is None or not clock.columns:
+        return
+    name = clock.columns[0].header
+    if times.min() > REPORTED and (np.diff(times) > 0).all():
+        return
+    for index in np.flatnonzero(times == NO_TIME).tolist():
+        yield index + 1, name, "found no time, allowed: a time in every row"
+    valid = np.flatnonzero(times > REPORTED)
+    steps = np.diff(times[valid])
+    for k in np.flatnonzero(steps <= 0).tolist():
+        now, before = (_shown(int(times[valid[i]]), clock.unit) for i in (k + 1, k))
+        found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
+        yield int(valid[k + 1]) + 1, name, f"{found}, allowed: times that increase from row to row"
+
+
+def _infinities(numbers: Numbers, names: Sequence[str]) -> Iterable[tuple[int, str, str]]:
+    for j in _unusual(numbers.values):
+        column = numbers.values[:, j]
+        for row in np.flatnonzero(np.isinf(column)).tolist():
+            yield row + 1, names[j], f"found {column[row]}, allowed: finite numbers"
+
+
+def _unusual(values: FloatArray) -> list[int]:
+    """Return the columns that may hold NaN or infinities: their sums are not finite, as is quickly seen."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        return np.flatnonzero(~np.isfinite(values.sum(axis=0))).tolist()
+
+
+def _shown(nanoseconds: int, unit: str) -> str:
+    """Return a time in the file's own unit."""
+    value = Decimal(nanoseconds).scaleb(-EXPONENTS[unit]).normalize()
+    return f"{value:f} {unit}"
+
+
+def _line_finder(layout: Layout, numbers: Numbers, rows: Sequence[int]) -> Callable[[int], int | None]:
+    """Return the function from row to line, both from 1."""
+    if numbers.lines is not None:
+        lines = numbers.lines
+        return lambda row: int(lines[row - 1])
+    return (lines_of_rows(layout, rows) if rows else {}).get
+
+
+def gaps(t_ns: IntArray) -> list[LogWarning]:
+    """Return a warning for each place where more than `GAP` median periods pass between two rows.
+
+    Args:
+        t_ns: Times in [ns], shape (n,).
+    """
+    steps = np.diff(t_ns)
+    if len(steps) < 2:
+        return []
+    period = float(np.median(steps))
+    places = np.flatnonzero(steps > GAP * period).tolist()
+    warnings = [
+        LogWarning(
+            "gap",
+            f"{steps[k] / 1e9:.6g} s pass before row {k + 2}, the median period is {period / 1e9:.6g} s",
+            k + 2,
+        )
+        for k in places[:SHOWN_GAPS]
+    ]
+    if len(places) > SHOWN_GAPS:
+        longest = max(places, key=lambda k: steps[k])
+        more = f"{len(places) - SHOWN_GAPS} more gaps; the longest of all is {steps[longest] / 1e9:.6g} s"
+        warnings.append(LogWarning("gap", f"{more}, before row {longest + 2}", longest + 2))
+    return warnings

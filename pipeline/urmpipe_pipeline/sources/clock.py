@@ -1,0 +1,243 @@
+"""The clock: which column is the time, its unit, and integer nanoseconds from its text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_pipeline.joint_log import Inference, IntArray, LogWarning
+from urmpipe_pipeline.sources.cells import LONGEST_NS, count_up, to_float
+from urmpipe_pipeline.sources.columns import Column, find_column
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.sniff import Layout
+from urmpipe_pipeline.sources.table import ClockColumn
+from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
+
+PAPER_PERIOD = 0.005
+"""Tsp of the paper in [s]: taken where nothing tells the time. Source: [UrmArm2021]_ eq. 22."""
+
+EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
+"""Powers of ten from a unit to [ns]."""
+
+SHORTEST, LONGEST = 0.0005, 1.0
+"""Usual periods of a log in [s]: they tell the unit of a clock that does not say it."""
+
+_EPOCH = (946_684_800.0, 4_102_444_800.0)  # 2000 to 2100 as Unix time in [s]
+_EVEN = 0.01  # steps of a clock in a file without header differ by less than this share
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The clock of one table.
+
+    Attributes:
+        columns: One column, or seconds and nanoseconds apart; none if the table has no time.
+        parts: The same for the reader.
+        unit: Its unit.
+        inferences: What was found out.
+        warnings: What a person should know.
+    """
+
+    columns: tuple[Column, ...] = ()
+    parts: tuple[ClockColumn, ...] = ()
+    unit: str = "s"
+    inferences: tuple[Inference, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each of its columns by name."""
+        names = {exponent: unit for unit, exponent in EXPONENTS.items()}
+        return {c.name: names[part.exponent] for c, part in zip(self.columns, self.parts, strict=True)}
+
+
+def find_clock(
+    columns: Sequence[Column],
+    layout: Layout,
+    options: ReadOptions,
+    source: KnownSource | None,
+    units: Mapping[int, Unit],
+    joints: int | None = None,
+) -> Clock:
+    """Return the clock of a table.
+
+    Args:
+        columns: The table's columns.
+        layout: The table.
+        options: What the user says.
+        source: The source, if it is known.
+        units: Units given by the user, by the column's number.
+        joints: How many joints the robot has, if there is one.
+
+    Raises:
+        LogError: If the time is a date, or its unit cannot be told.
+        OptionError: If its unit is given as one that is no time.
+    """
+    chosen, why = _columns(columns, layout, options, joints)
+    if not chosen:
+        return Clock(inferences=(Inference("time column", "none", why),))
+    dates = [column for column in chosen if column.text]
+    if dates:
+        message = f"found {layout.cells(dates[0].index)[0]!r}, allowed: times as numbers in s, ms, us or ns"
+        file = str(layout.segment.path)
+        raise LogError(Finding(message, file, layout.first_line, 1, dates[0].header))
+    found = Inference("time column", " and ".join(column.name for column in chosen), why)
+    if len(chosen) == 2:
+        both = (ClockColumn(chosen[0].index, 9), ClockColumn(chosen[1].index, 0))
+        return Clock(chosen, both, "s", (found,))
+    time = chosen[0]
+    unit, evidence, warnings = _unit(time, layout, source, units)
+    _refuse_ages(time, layout, unit)
+    parts = (ClockColumn(time.index, EXPONENTS[unit]),)
+    return Clock(chosen, parts, unit, (found, Inference("unit of the time", unit, evidence)), warnings)
+
+
+def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
+    """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
+    for value in _times(layout.cells(time.index), layout)[:1]:
+        if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
+            message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
+            hint = f"say the unit with --unit {time.name}=ns"
+            raise LogError(
+                Finding(f"{message}; {hint}", str(layout.segment.path), layout.first_line, 1, time.header)
+            )
+
+
+def even_clock(rows: int, period: float | None) -> tuple[IntArray, tuple[Inference, ...], list[LogWarning]]:
+    """Return the times in [ns] of a log without a clock, what that rests on, and a warning if it is assumed.
+
+    Args:
+        rows: Number of rows.
+        period: Time between rows in [s], if the user gave it.
+
+    Raises:
+        OptionError: If the period is not a positive time of 1 ns or more.
+    """
+    if period is not None and not (math.isfinite(period) and period >= 1e-9):
+        raise OptionError(f"--period: found {period:g} s, allowed: a positive time of 1e-9 s or more")
+    step = PAPER_PERIOD if period is None else period
+    times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
+    if period is not None:
+        return times, (Inference("period", f"{step:g} s", "given as an option"),), []
+    said = "no time column: the rows are taken as 5 ms apart; --period S says otherwise"
+    return times, (Inference("period", "0.005 s", "assumed"),), [LogWarning("assumed-period", said)]
+
+
+def _columns(
+    columns: Sequence[Column], layout: Layout, options: ReadOptions, joints: int | None
+) -> tuple[tuple[Column, ...], str]:
+    """Return the columns that hold the time, and why."""
+    if options.time is not None:
+        if options.time.lower() == "none":
+            return (), "given as an option"
+        return (find_column(columns, options.time, "--time"),), "given as an option"
+    if layout.header is None:
+        return _without_header(columns, layout, joints)
+    return _by_name(columns) or _by_content(columns, layout) or ((), "no column is named like a time")
+
+
+def _by_name(columns: Sequence[Column]) -> tuple[tuple[Column, ...], str] | None:
+    words = vocabulary()
+    dates = []
+    for pattern in words.time:
+        for column in (column for column in columns if pattern.search(column.key)):
+            if not column.text:
+                return (column,), "its name"
+            dates.append(column)
+    for seconds, nanoseconds in words.time_pairs:
+        for first in (column for column in columns if seconds.search(column.key)):
+            stem = seconds.sub("", first.key)
+            for second in columns:
+                if nanoseconds.search(second.key) and nanoseconds.sub("", second.key) == stem:
+                    return (first, second), "their names: seconds and nanoseconds apart"
+    return ((dates[0],), "its name") if dates else None
+
+
+def _by_content(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column, ...], str] | None:
+    """Return a column with a unit of time, or an unnamed first one that runs like a clock."""
+    timed = [c for c in columns if not c.text and c.unit and (c.unit.quantity, c.unit.order) == ("time", 0)]
+    if len(timed) == 1:
+        return (timed[0],), f"its unit, {timed[0].unit_text}"
+    cells = layout.cells(0)
+    if columns[0].key == "" and not columns[0].text and not count_up(cells) and _increases(cells, layout):
+        return (columns[0],), "the first column has no name and always increases"
+    return None
+
+
+def _without_header(
+    columns: Sequence[Column], layout: Layout, joints: int | None
+) -> tuple[tuple[Column, ...], str]:
+    """Return the first column if it alone runs in even steps, unless the robot's joints take all columns."""
+    even = [column for column in columns if not column.text and _even(layout.cells(column.index), layout)]
+    counts = count_up(layout.cells(0))
+    if even == [columns[0]] and not counts and len(columns) > 1 and len(columns) != joints:
+        return (columns[0],), "the first column alone increases in even steps"
+    return (), "there is no header"
+
+
+def _steps(cells: Sequence[str], layout: Layout) -> list[float]:
+    """Return the steps between sampled times."""
+    times = _times(cells, layout)
+    return [after - before for before, after in pairwise(times)]
+
+
+def _times(cells: Sequence[str], layout: Layout) -> list[float]:
+    values = (to_float(cell, layout.decimal) for cell in cells)
+    return [value for value in values if value is not None and math.isfinite(value)]
+
+
+def _increases(cells: Sequence[str], layout: Layout) -> bool:
+    steps = _steps(cells, layout)
+    return bool(steps) and min(steps) > 0
+
+
+def _even(cells: Sequence[str], layout: Layout) -> bool:
+    steps = _steps(cells, layout)
+    return len(steps) >= 2 and min(steps) > 0 and max(steps) - min(steps) <= _EVEN * max(steps)
+
+
+def _unit(
+    time: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]
+) -> tuple[str, str, tuple[LogWarning, ...]]:
+    """Return the unit of a time column, why, and a warning if it is assumed."""
+    given = units.get(time.number)
+    if given is not None:
+        if given.name not in EXPONENTS:
+            raise OptionError(
+                f"--unit: found {given.name} for the time {time.name!r}, allowed: s, ms, us, ns"
+            )
+        return given.name, "given as an option", ()
+    if time.unit is not None and time.unit.name in EXPONENTS:
+        return time.unit.name, "its name", ()
+    if source is not None and "time" in source.units:
+        return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()
+    return _unit_from_values(time, layout)
+
+
+def _unit_from_values(time: Column, layout: Layout) -> tuple[str, str, tuple[LogWarning, ...]]:
+    """Tell the unit by the year that the times give, or else by their steps."""
+    cells = layout.cells(time.index)
+    start = next(iter(_times(cells, layout)), 0.0)
+    steps = sorted(step for step in _steps(cells, layout) if step > 0)
+    step = steps[len(steps) // 2] if steps else 0.0
+    for unit, exponent in EXPONENTS.items():
+        scale = 10.0 ** (exponent - 9)
+        if _EPOCH[0] <= start * scale <= _EPOCH[1] and step * scale <= 20 * LONGEST:
+            return unit, "it counts from 1970, so as Unix time it is of our years", ()
+    if step <= SHORTEST:
+        return "s", "the usual unit", ()
+    likely = [u for u, e in EXPONENTS.items() if SHORTEST < step * 10.0 ** (e - 9) <= LONGEST]
+    evidence = f"its steps of {step:g}"
+    if len(likely) == 1:
+        return likely[0], evidence, ()
+    if "s" in likely:
+        warning = LogWarning("assumed-unit", f"the time {time.name!r} steps by {step:g}: taken as s")
+        return "s", evidence, (warning,)
+    names = " or ".join(likely) or "s, ms, us or ns"
+    message = f"found steps of {step:g}, which may be {names}: say which with --unit {time.name}=ms"
+    raise LogError(Finding(message, str(layout.segment.path), layout.first_line, 1, time.header))

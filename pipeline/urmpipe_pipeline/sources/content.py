@@ -1,0 +1,140 @@
+"""The numbers of a log's tables: read, checked, and joined on the same time."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray
+from urmpipe_pipeline.sources.checks import find_errors, trimmed
+from urmpipe_pipeline.sources.columns import Column
+from urmpipe_pipeline.sources.diagnose import lines_of_rows, read_carefully
+from urmpipe_pipeline.sources.plan import Plan
+from urmpipe_pipeline.sources.roles import Roles
+from urmpipe_pipeline.sources.sniff import Layout
+from urmpipe_pipeline.sources.table import Numbers, read_fast
+from urmpipe_pipeline.sources.tables import for_all
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Content:
+    """The numbers of the columns that are used, in the file's own units.
+
+    Attributes:
+        columns: The columns that were read, by table.
+        numbers: Their numbers, by table.
+        clock: Times of the rows in [ns] on the file's clock, None without one.
+        rows: How many rows there are.
+        roles: The columns, without those that could not be joined.
+        inferences: What was found out while joining.
+    """
+
+    columns: Mapping[int, tuple[Column, ...]]
+    numbers: Mapping[int, Numbers]
+    clock: IntArray | None
+    rows: int
+    roles: Roles
+    inferences: tuple[Inference, ...]
+
+    def values(self, group: Sequence[Column]) -> FloatArray:
+        """Return the numbers of some columns, shape (n, columns), C-contiguous; no copy if they are all."""
+        if not group:
+            return np.empty((self.rows, 0))
+        table = group[0].table
+        if tuple(group) == self.columns[table]:
+            return self.numbers[table].values
+        return np.stack([self._column(column) for column in group], axis=1)
+
+    def _column(self, column: Column) -> FloatArray:
+        return self.numbers[column.table].values[:, self.columns[column.table].index(column)]
+
+
+def read_content(plan: Plan) -> Content:
+    """Return the numbers that a plan asks for.
+
+    Raises:
+        LogError: With everything that is wrong with rows, cells and times of all tables, or if the files
+            of one log differ in their times.
+    """
+    columns = {t: tuple(c for c in plan.roles.columns if c.table == t) for t in plan.used}
+    read = for_all(plan.used, lambda table: _numbers(plan, table, columns[table]))
+    numbers = dict(zip(plan.used, read, strict=True))
+    roles, said = _joined(plan, numbers)
+    main = numbers[plan.main]
+    return Content(columns, numbers, main.clock, len(main.values), roles, said)
+
+
+def _numbers(plan: Plan, table: int, columns: Sequence[Column]) -> Numbers:
+    """Return the numbers of one table; raise what is wrong with them."""
+    layout, clock = plan.tables.layouts[table], plan.clocks[table]
+    places = [column.index for column in columns]
+    numbers = read_fast(layout, places, clock.parts) or read_carefully(layout, places, clock.parts)
+    numbers = trimmed(numbers)
+    findings = find_errors(layout, numbers, [column.header for column in columns], clock)
+    if findings:
+        raise LogError(*findings)
+    return numbers
+
+
+def _joined(plan: Plan, numbers: Mapping[int, Numbers]) -> tuple[Roles, tuple[Inference, ...]]:
+    """Return the roles, without a recorded TCP from another graph that was sampled at other times."""
+    roles = plan.roles
+    findings = []
+    for table in plan.used[1:]:
+        difference = _difference(plan, numbers, table)
+        if difference is None:
+            continue
+        if any(column.table == table for column in roles.joints) or len(set(plan.tables.paths)) > 1:
+            findings.append(difference)
+            continue
+        roles = _without(roles, table)
+    if findings:
+        raise LogError(*findings)
+    if roles == plan.roles:
+        return roles, ()
+    return roles, (Inference("other graphs", "left out", "they were sampled at other times than the joints"),)
+
+
+def _without(roles: Roles, table: int) -> Roles:
+    """Return the roles without the groups that have a column in a table."""
+
+    def kept(group: tuple[Column, ...]) -> tuple[Column, ...]:
+        return () if any(column.table == table for column in group) else group
+
+    return replace(
+        roles,
+        rates=kept(roles.rates),
+        accelerations=kept(roles.accelerations),
+        position=kept(roles.position),
+        rotation=kept(roles.rotation),
+    )
+
+
+def _difference(plan: Plan, numbers: Mapping[int, Numbers], table: int) -> Finding | None:
+    """Return where the times of a table differ from those of the main one."""
+    main, other = numbers[plan.main], numbers[table]
+    layout = plan.tables.layouts[table]
+    file, title = str(layout.segment.path), plan.tables.titles[plan.main]
+    if (main.clock is None) != (other.clock is None):
+        here, there = ("no time column", "with one") if other.clock is None else ("a time column", "without")
+        return Finding(f"found {here}, allowed: {there}, as in {title}: one log has one clock", file)
+    if main.clock is not None and other.clock is not None:
+        count = min(len(main.clock), len(other.clock))
+        different = np.flatnonzero(main.clock[:count] != other.clock[:count])
+        if len(different):
+            row = int(different[0])
+            times = f"{other.clock[row] / 1e9:.9g} s, allowed: {main.clock[row] / 1e9:.9g} s"
+            message = f"found {times}, as in {title}: the tables of one log share their times"
+            return _at_row(message, layout, row + 1, plan.clocks[table].columns[0].header)
+    if len(main.values) != len(other.values):
+        message = f"found {len(other.values)} rows, allowed: {len(main.values)}, as in {title}"
+        return Finding(f"{message}: the tables of one log share their times", file)
+    return None
+
+
+def _at_row(message: str, layout: Layout, row: int, column: str) -> Finding:
+    line = lines_of_rows(layout, [row]).get(row)
+    return Finding(message, str(layout.segment.path), line, row, column)

@@ -1,0 +1,104 @@
+"""Joints by their place: tables without a header, and plots with one result a file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.columns import Column, find_column, listed
+from urmpipe_pipeline.sources.roles import OPTION, Roles, check_count
+from urmpipe_pipeline.sources.sniff import Layout
+
+
+def without_header(
+    columns: Sequence[Column], layout: Layout, chosen: Sequence[str], robot: Chain | None, *, path: bool
+) -> Roles:
+    """Return the roles of the columns of a table without a header: joints in order, as many as the robot has.
+
+    Args:
+        columns: The columns, without the clock.
+        layout: The table.
+        chosen: The user's joint columns.
+        robot: The arm; without one every column is a joint.
+        path: The user says that it is a path: the columns are x, y, z.
+
+    Raises:
+        LogError: If there are too few columns, or one of them holds text.
+    """
+    file = str(layout.segment.path)
+    columns = [column for column in columns if column.header]
+    if chosen:
+        joints = tuple(find_column(columns, text, "--joints") for text in chosen)
+        check_count(joints, file, robot)
+        return _by_place(joints, columns, robot, "given as an option")
+    for column in columns:
+        if column.text:
+            shown = layout.cells(column.index)[0]
+            message = f"found {shown!r} in a table without a header, allowed: numbers; {OPTION}"
+            raise LogError(Finding(message, file, layout.first_line, 1, column.name))
+    if path:
+        if len(columns) < 3:
+            raise LogError(Finding(f"found {len(columns)} columns, allowed: x, y, z", file=file))
+        said = Inference("path", "the first three columns", "there is no header")
+        return Roles(position=tuple(columns[:3]), inferences=(said,))
+    if not columns:
+        raise LogError(Finding("found no column beside the time, allowed: the joints", file=file))
+    count = len(robot.coordinates) if robot else len(columns)
+    joints = tuple(columns[:count])
+    check_count(joints, file, robot)
+    many = ", as many as the robot has" if robot else ""
+    return _by_place(joints, columns, robot, f"no header: joints in order{many}")
+
+
+def one_plot_a_file(
+    columns: Sequence[Column], paths: Sequence[Path], robot: Chain | None
+) -> tuple[Column, ...] | None:
+    """Return the joint columns, in order, of files that hold one result each; None if one holds more.
+
+    The order is that of the numbers in the files' names, if these differ only by a number; else that of
+    the numbers in the columns' names; else the order in which the files were given.
+
+    Args:
+        columns: The columns of all files, without the clocks.
+        paths: The files, one a table.
+        robot: The arm: a plot for each of its joints is needed.
+    """
+    numeric = [column for column in columns if not column.text and not column.counts_rows]
+    if [column.table for column in numeric] != list(range(len(paths))):
+        return None
+    if robot is not None and len(numeric) != len(robot.coordinates):
+        return None
+    for names in ([path.stem for path in paths], [column.name for column in numeric]):
+        numbers = _only_numbers_differ(names)
+        if numbers:
+            return tuple(
+                column for _, column in sorted(zip(numbers, numeric, strict=True), key=lambda p: p[0])
+            )
+    return tuple(numeric)
+
+
+def _only_numbers_differ(names: Sequence[str]) -> list[int] | None:
+    """Return the last number in each name, if the names are the same without it and the numbers differ."""
+    found = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
+    parts = [match.groups() for match in found if match]
+    numbers = [int(number) for _, number, _ in parts]
+    same = len({(before, after) for before, _, after in parts}) == 1
+    return numbers if same and len(set(numbers)) == len(names) else None
+
+
+def _by_place(
+    joints: Sequence[Column], columns: Sequence[Column], robot: Chain | None, evidence: str
+) -> Roles:
+    """Return joints that are named by the robot, or q1, q2, ..."""
+    said = [Inference("joint columns", ", ".join(column.name for column in joints), evidence)]
+    rest = [column for column in columns if column not in joints]
+    if rest:
+        said.append(Inference("columns not used", listed(rest, most=8), "no header tells what they are"))
+    names = robot.coordinates if robot else [f"q{k + 1}" for k in range(len(joints))]
+    named = tuple(replace(column, name=name) for column, name in zip(joints, names, strict=True))
+    return Roles(joints=named, inferences=tuple(said))

@@ -1,0 +1,102 @@
+"""What is to be read of a log's tables: the clock of each, and the columns that matter."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from urmpipe_models.chain import Chain
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.clock import Clock, find_clock
+from urmpipe_pipeline.sources.columns import (
+    Column,
+    columns_of,
+    given_units,
+    refuse_twins,
+)
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.places import one_plot_a_file, without_header
+from urmpipe_pipeline.sources.roles import Roles, assign
+from urmpipe_pipeline.sources.tables import PATH, Tables
+from urmpipe_pipeline.sources.vocabulary import Unit
+
+
+@dataclass(frozen=True, slots=True)
+class Plan:
+    """What is to be read.
+
+    Attributes:
+        tables: The tables.
+        clocks: The clock of each table.
+        roles: The columns that matter.
+        units: Units given by the user, by the column's number; by 0 that of all joints that turn.
+    """
+
+    tables: Tables
+    clocks: tuple[Clock, ...]
+    roles: Roles
+    units: Mapping[int, Unit]
+
+    @property
+    def main(self) -> int:
+        """Index of the table with the first joint; of a path, with x."""
+        return self.roles.columns[0].table
+
+    @property
+    def used(self) -> list[int]:
+        """Indices of the tables that hold a column that matters, the main one first."""
+        return list(dict.fromkeys(column.table for column in self.roles.columns))
+
+
+def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan:
+    """Return what is to be read of a log's tables.
+
+    Args:
+        tables: The tables.
+        options: What the user says.
+        robot: The arm, or None.
+
+    Raises:
+        LogError: If clock or joints cannot be told.
+        OptionError: If an option's value makes no sense.
+    """
+    columns = columns_of(tables.layouts, tables.titles)
+    units = given_units(columns, options)
+    joints = len(robot.coordinates) if robot else None
+    clocks = tuple(
+        find_clock([c for c in columns if c.table == i], layout, options, tables.known, units, joints)
+        for i, layout in enumerate(tables.layouts)
+    )
+    for i, clock in enumerate(() if options.time else clocks):
+        own = [column for column in columns if column.table == i]
+        refuse_twins(clock.columns, own, tables.layouts, "give the number of the right one with --time")
+    times = {column for clock in clocks for column in clock.columns}
+    rest = [column for column in columns if column not in times]
+    return Plan(tables, clocks, _roles(rest, tables, options, robot), units)
+
+
+def _roles(columns: Sequence[Column], tables: Tables, options: ReadOptions, robot: Chain | None) -> Roles:
+    main = tables.layouts[0]
+    several = len(set(tables.paths)) > 1
+    if main.header is None and not several:
+        return without_header(columns, main, options.joints, robot, path=options.source == PATH)
+    plots = one_plot_a_file(columns, tables.paths, robot) if several and not options.joints else None
+    if plots is not None:
+        return _plots(plots, tables)
+    file = str(main.segment.path)
+    roles = assign(columns, file, options.joints, robot, path=options.source == PATH)
+    if not options.joints:
+        refuse_twins(
+            roles.joints, columns, tables.layouts, "give the numbers of the right ones with --joints"
+        )
+    refuse_twins(roles.position, columns, tables.layouts, "rename or remove the others")
+    return roles
+
+
+def _plots(plots: Sequence[Column], tables: Tables) -> Roles:
+    """Return the roles of one plot a file, named by their columns or, if these repeat, by their files."""
+    names = [column.header for column in plots]
+    if len(set(names)) < len(names) or tables.layouts[0].header is None:
+        plots = [replace(column, name=tables.titles[column.table]) for column in plots]
+    said = Inference("joint columns", ", ".join(column.name for column in plots), "one plot a file")
+    return Roles(joints=tuple(plots), inferences=(said,))

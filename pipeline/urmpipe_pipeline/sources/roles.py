@@ -1,0 +1,279 @@
+"""What each column is: joints and their order, recorded rates, recorded tool centre point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.columns import Column, find_column, listed
+from urmpipe_pipeline.sources.families import Family, families, measured
+from urmpipe_pipeline.sources.vocabulary import Patterns, key, vocabulary
+
+OPTION = "name them in the robot's order with --joints A,B,C"
+
+
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """The columns of a log that are used, each group in order.
+
+    Attributes:
+        joints: Joint values, in the robot's order; none for a path.
+        rates: Recorded rates of the same joints, or none.
+        accelerations: Recorded second derivatives of the same joints, or none.
+        position: Recorded x, y, z of the tool centre point, or none.
+        rotation: Recorded rotation vector of the tool, or none.
+        inferences: What was found out.
+    """
+
+    joints: tuple[Column, ...] = ()
+    rates: tuple[Column, ...] = ()
+    accelerations: tuple[Column, ...] = ()
+    position: tuple[Column, ...] = ()
+    rotation: tuple[Column, ...] = ()
+    inferences: tuple[Inference, ...] = ()
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """All of them."""
+        return (*self.joints, *self.rates, *self.accelerations, *self.position, *self.rotation)
+
+
+def assign(
+    columns: Sequence[Column], file: str, chosen: Sequence[str], robot: Chain | None, *, path: bool = False
+) -> Roles:
+    """Return the roles of the columns of a table with a header.
+
+    The joints are, in this order: the columns that the user names; those named like the robot's
+    joints; those with a word for a joint and its number; those with a unit of angle; as many
+    columns as the robot has joints, if no more are left. Without any, x, y, z make a path.
+
+    Args:
+        columns: The columns, without the clock.
+        file: The file, for errors.
+        chosen: The user's joint columns.
+        robot: The arm, or None.
+        path: The user says that it is a path: joints are not looked for.
+
+    Raises:
+        LogError: If the joints cannot be told, or are too few or too many for the robot.
+    """
+    numeric = [column for column in columns if not column.text and not column.counts_rows]
+    if chosen:
+        joints = tuple(find_column(columns, text, "--joints") for text in chosen)
+        found = _Joints(joints, "given as an option")
+        position, rotation = _tcp([column for column in numeric if column not in joints], None)
+    else:
+        position, rotation = _tcp(numeric, None)
+        free = [column for column in numeric if column not in (*position, *rotation)]
+        found = _Joints(()) if path else _find_joints(free, file, robot)
+    if not found.columns:
+        return _path(columns, numeric, position, file, robot)
+    check_count(found.columns, file, robot)
+    rates = _derivative("rate", numeric, found)
+    accelerations = _derivative("acceleration", numeric, found)
+    roles = Roles(found.columns, rates, accelerations, position, rotation)
+    said = [Inference("joint columns", ", ".join(c.name for c in found.columns), found.evidence)]
+    for what, group in (("rates", rates), ("accelerations", accelerations), ("recorded TCP", position)):
+        if group:
+            said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
+    return _with_rest(roles, said, numeric)
+
+
+@dataclass(frozen=True, slots=True)
+class _Joints:
+    """Joint columns, why they are, and the names and numbers that their rates share."""
+
+    columns: tuple[Column, ...]
+    evidence: str = ""
+    numbers: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
+
+
+def _find_joints(free: Sequence[Column], file: str, robot: Chain | None) -> _Joints:
+    count = len(robot.coordinates) if robot else None
+    orders = [*((robot.coordinates,) if robot else ()), *vocabulary().orders]
+    for names in orders:
+        by_name = named_after(free, names, "position")
+        if by_name and count in (None, len(by_name)):
+            evidence = (
+                "the robot's joint names" if robot and names == robot.coordinates else "known joint names"
+            )
+            return _Joints(by_name, evidence, names=tuple(names))
+    by_number = _numbered(free, file, count)
+    if by_number:
+        return by_number
+    return _without_number(free, count)
+
+
+def _without_number(free: Sequence[Column], count: int | None) -> _Joints:
+    """Return joints without numbers: by the word position, by their units, or as all that is left."""
+    words = vocabulary()
+    about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
+    still = tuple(c for c in free if not c.words & about_else and not (c.unit and c.unit.order))
+    marked = tuple(column for column in still if column.words & words.marks)
+    if marked and count in (None, len(marked)):
+        names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in marked)
+        evidence = "the word position or angle in their names; the order is the file's"
+        return _Joints(marked, evidence, names=names)
+    sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
+    if any(c.unit and c.unit.quantity == "angle" for c in sized) and count in (None, len(sized)):
+        return _Joints(sized, "their units; the order is the file's")
+    if count is not None and len(still) == count:
+        return _Joints(still, f"the only {count} columns left; the order is the file's")
+    return _Joints(())
+
+
+def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> tuple[Column, ...]:
+    """Return the columns that carry the names of joints, one each in their order, or nothing.
+
+    Args:
+        columns: Candidates.
+        names: Names of the joints.
+        role: position, rate or acceleration: decided by the words beside the joint's name.
+    """
+    result = []
+    for name in names:
+        matches = [column for column in columns if _role_beside(column, name) == role]
+        matches = measured(matches, lambda column: column.words)
+        exact = [c for c in matches if c.words - _words(name) <= vocabulary().joint_words["position"]]
+        matches = exact if len(exact) == 1 else matches
+        if len(matches) != 1:
+            return ()
+        result.append(matches[0])
+    return tuple(result) if len(set(result)) == len(result) else ()
+
+
+def _words(name: str) -> frozenset[str]:
+    return frozenset(key(name).split("_"))
+
+
+def _role_beside(column: Column, name: str) -> str | None:
+    """Return what a column says about a joint: by the words beside the joint's name in its own."""
+    padded, inner = f"_{column.key}_", f"_{key(name)}_"
+    if inner not in padded:
+        return None
+    beside = frozenset(padded.replace(inner, "_", 1).strip("_").split("_")) - {""}
+    words = vocabulary().joint_words
+    if beside & vocabulary().other:
+        return None
+    for role in ("acceleration", "rate"):
+        if beside & words[role] or (
+            column.unit and column.unit.order == ("rate", "acceleration").index(role) + 1
+        ):
+            return role
+    return "position"
+
+
+def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints | None:
+    """Return the joints by a word and a number: q1, J1_Angle, actual_q_0, ..."""
+    words = vocabulary()
+    moving = words.joint_words["rate"] | words.joint_words["acceleration"]
+    still = [column for column in free if not column.words & moving]
+    found = families(still, words.joint["position"], order=0)
+    if not found:
+        return None
+    fitting = [family for family in found if len(family.columns) == count] or found
+    best = [family for family in fitting if family.rank == min(f.rank for f in fitting)]
+    if len(best) > 1 and not all(len(family.columns) == 1 for family in best):
+        groups = "; ".join(listed(family.ordered()) for family in best)
+        raise LogError(Finding(f"found several groups of joint columns: {groups}; {OPTION}", file=file))
+    if len(best) > 1:  # one plot a joint, each with a number of its own
+        columns = tuple(column for family in best for column in family.ordered())
+        return _Joints(columns, "their names; the order is the file's")
+    family = best[0]
+    lowest = min(family.columns)
+    gaps = [n for n in range(lowest, lowest + len(family.columns)) if n not in family.columns]
+    if gaps:
+        missing = ", ".join(map(str, gaps))
+        said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
+        raise LogError(Finding(f"{said}; {OPTION}", file=file))
+    return _Joints(
+        family.ordered(), "their names, in the order of their numbers", tuple(sorted(family.columns))
+    )
+
+
+def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> None:
+    """Raise unless there are as many joint columns as the robot has joints, each once.
+
+    Raises:
+        LogError: With what was found and what the robot needs.
+    """
+    if len(set(joints)) < len(joints):
+        raise LogError(Finding(f"--joints: found {listed(joints)}, allowed: each column once", file=file))
+    if robot is None or len(joints) == len(robot.coordinates):
+        return
+    need = f"allowed: {len(robot.coordinates)}, as robot {robot.name} has"
+    message = f"found {len(joints)} joint columns ({listed(joints)}), {need}"
+    more = len(joints) > len(robot.coordinates)
+    raise LogError(Finding(f"{message}; {OPTION}" if more else message, file=file))
+
+
+def _derivative(role: str, numeric: Sequence[Column], joints: _Joints) -> tuple[Column, ...]:
+    """Return the recorded rates or accelerations of exactly these joints, or nothing."""
+    if joints.names:
+        return named_after(numeric, joints.names, role)
+    order = ("position", "rate", "acceleration").index(role)
+    asked = any(column.words & vocabulary().commanded for column in joints.columns)
+    matching = [
+        family
+        for family in families(numeric, vocabulary().joint[role], order=order)
+        if tuple(sorted(family.columns)) == joints.numbers and family.commanded == asked
+    ]
+    best = [family for family in matching if family.rank == min(f.rank for f in matching)]
+    return best[0].ordered() if len(best) == 1 else ()
+
+
+def _tcp(numeric: Sequence[Column], file: str | None) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
+    """Return the columns of the recorded position and rotation vector.
+
+    Args:
+        numeric: Candidates.
+        file: The file, if it is an error that several positions are recorded; else they are left.
+    """
+    poses = [
+        f for f in families(numeric, vocabulary().tcp_pose_vector, order=0) if set(f.columns) == set(range(6))
+    ]
+    if len(poses) == 1:
+        ordered = poses[0].ordered()
+        return ordered[:3], ordered[3:]
+    found = _triples(numeric, vocabulary().tcp_position)
+    best = [family for family in found if family.rank == found[0].rank]
+    if len(best) > 1 and file is not None:
+        groups = "; ".join(listed(family.ordered()) for family in best)
+        raise LogError(Finding(f"found several positions: {groups}; allowed: one x, y, z", file=file))
+    return (best[0].ordered(), ()) if len(best) == 1 else ((), ())
+
+
+def _triples(numeric: Sequence[Column], patterns: Patterns) -> list[Family]:
+    return [family for family in families(numeric, patterns, order=0) if set(family.columns) == {0, 1, 2}]
+
+
+def _path(
+    columns: Sequence[Column],
+    numeric: Sequence[Column],
+    position: tuple[Column, ...],
+    file: str,
+    robot: Chain | None,
+) -> Roles:
+    """Return the roles of a path; raise if it is none either."""
+    position = position or _tcp(numeric, file)[0]
+    if position:
+        said = Inference(
+            "path", ", ".join(column.name for column in position), "x, y, z and no joint columns"
+        )
+        return _with_rest(Roles(position=position), [said], numeric)
+    need = (
+        f"{len(robot.coordinates)} for robot {robot.name}" if robot else "such as q1, q2, ... or J1, J2, ..."
+    )
+    message = f"found no joint columns in {listed(columns)}, allowed: {need}; {OPTION}"
+    raise LogError(Finding(message, file=file))
+
+
+def _with_rest(roles: Roles, said: list[Inference], numeric: Sequence[Column]) -> Roles:
+    rest = [column for column in numeric if column not in roles.columns]
+    if rest:
+        said.append(Inference("columns not used", listed(rest, most=8), "no role is known for them"))
+    return Roles(roles.joints, roles.rates, roles.accelerations, roles.position, roles.rotation, tuple(said))

@@ -1,0 +1,51 @@
+"""`ros2 topic echo --csv /joint_states`: a table without header whose rows name the joints themselves.
+
+Source: rosidl_runtime_py, message_to_csv: the fields of sensor_msgs/JointState in order, arrays spread over
+cells, an empty array as one empty cell: seconds, nanoseconds, frame, names, positions, velocities, efforts.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.cells import is_text, printable
+from urmpipe_pipeline.sources.sniff import Layout
+
+_FIRST_NAME = 3
+
+
+def with_names(layout: Layout) -> Layout:
+    """Return the layout with names for its columns if it is such a table, else as it is."""
+    joints = _joints(layout)
+    if layout.header is not None or not joints:
+        return layout
+    count, row = len(joints), layout.sample[0]
+    velocity = _FIRST_NAME + 2 * count
+    has_rates = row[velocity : velocity + 1] != ("",)
+    full = {
+        2 * count: (True, True, True),
+        count + 1: (True, has_rates, not has_rates),
+        2: (True, False, False),
+    }.get(len(row) - velocity)
+    if full is None:
+        return layout
+    names = ["sec", "nanosec", "frame_id", *(f"name.{joint}" for joint in joints)]
+    for group, spread in zip(("position", "velocity", "effort"), full, strict=True):
+        names += [f"{group}.{joint}" for joint in joints] if spread else [f"{group}."]
+    said = Inference("header", "none", "seconds, nanoseconds and names of joints, as ros2 topic echo writes")
+    kept = tuple(inference for inference in layout.inferences if inference.what != "header")
+    return replace(layout, names=tuple(names), header=layout.first_line, inferences=(*kept, said))
+
+
+def _joints(layout: Layout) -> tuple[str, ...]:
+    """Return the names of the joints, if each row begins with a stamp and has the same names."""
+    row = layout.sample[0]
+    if len(row) < _FIRST_NAME + 4 or not (row[0].isdigit() and row[1].isdigit() and int(row[1]) < 10**9):
+        return ()
+    end = _FIRST_NAME
+    while end < len(row) and is_text(row[end], layout.decimal):
+        end += 1
+    names = row[_FIRST_NAME:end]
+    same = all(other[_FIRST_NAME:end] == names for other in layout.sample)
+    return tuple(map(printable, names)) if same and len(set(names)) == len(names) else ()

@@ -1,0 +1,190 @@
+"""The numbers of a table, fast: pyarrow parses the columns that are needed straight into float64."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.errors import Finding
+from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.sources.cells import is_number, plain
+from urmpipe_pipeline.sources.sniff import Layout
+from urmpipe_pipeline.sources.stream import TableStream
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+if TYPE_CHECKING:
+    import pyarrow as pa
+
+BLOCK_BYTES = 1 << 20
+NO_TIME = np.iinfo(np.int64).min
+"""Stands where a row has no time."""
+REPORTED = NO_TIME + 1
+"""Stands where a row has no time because of a finding that is reported already."""
+
+_PRECISION = 38  # digits of a decimal128
+
+
+@dataclass(frozen=True, slots=True)
+class ClockColumn:
+    """A column of the clock: its place, and the power of ten from its unit to [ns] (9 for s)."""
+
+    column: int
+    exponent: int
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Numbers:
+    """What was read of a table.
+
+    Attributes:
+        values: Numbers in the file's own units, shape (n, columns); NaN where a sample is missing.
+        clock: Time of each row in [ns] on the file's clock, or NO_TIME, or REPORTED; None without a clock.
+        findings: What is wrong with rows and cells, the first of them.
+        wrong: How many such findings there are.
+        lines: Line of the file of each row, where they were counted.
+    """
+
+    values: FloatArray
+    clock: IntArray | None
+    findings: tuple[Finding, ...] = ()
+    wrong: int = 0
+    lines: IntArray | None = None
+
+
+def read_fast(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn]) -> Numbers | None:
+    """Return the numbers of some columns, or None if the parser stumbles over a row or a cell.
+
+    Args:
+        layout: How the table is written.
+        columns: Which columns hold numbers.
+        clock: The columns of its clock; their values in [ns] are added.
+    """
+    import pyarrow as pa
+
+    pool = pa.system_memory_pool()
+    narrow, wide = ([_scale(layout, part, exact) for part in clock] for exact in (False, True))
+    for scales in (narrow,) if narrow == wide else (narrow, wide):
+        try:
+            return _numbers(_parse(layout, columns, clock, scales, pool), columns, clock, scales)
+        except (pa.ArrowInvalid, OverflowError):
+            continue
+        finally:
+            pool.release_unused()  # the table's memory goes back before the arrays to come need as much
+    return None
+
+
+@lru_cache
+def _nulls() -> list[str]:
+    """Return the words for a missing sample in the usual spellings; the careful pass takes all."""
+    words = vocabulary().missing
+    return sorted({spelled for word in words for spelled in (word, word.upper(), word.capitalize(), "NaN")})
+
+
+def _numbers(
+    table: pa.Table, columns: Sequence[int], clock: Sequence[ClockColumn], scales: Sequence[int]
+) -> Numbers:
+    """Return a parsed table as arrays, block by block, so that the rows being filled stay in the cache."""
+    values = np.empty((table.num_rows, len(columns)))
+    times = np.zeros(table.num_rows, dtype=np.int64)
+    start = 0
+    for batch in table.to_batches():
+        rows = slice(start, start + batch.num_rows)
+        for j, column in enumerate(columns):
+            _fill(values[rows, j], batch.column(str(column)))
+        for part, scale in zip(clock, scales, strict=True):
+            _add_time(times[rows], batch.column(str(part.column)), part.exponent, scale)
+        start += batch.num_rows
+    return Numbers(values, times if clock else None)
+
+
+def _parse(
+    layout: Layout,
+    columns: Sequence[int],
+    clock: Sequence[ClockColumn],
+    scales: Sequence[int],
+    pool: pa.MemoryPool,
+) -> pa.Table:
+    import pyarrow as pa
+    from pyarrow import csv
+
+    types: dict[str, Any] = {str(column): pa.float64() for column in columns}
+    for part, scale in zip(clock, scales, strict=True):
+        types[str(part.column)] = pa.decimal128(_PRECISION, scale)
+    names = [str(column) for column in range(len(layout.names))]
+    quoted_commas = layout.delimiter == layout.decimal  # "0,5","1,5": the stream leaves them
+    with TableStream(layout) as stream:
+        return csv.read_csv(
+            stream,
+            csv.ReadOptions(column_names=names, block_size=BLOCK_BYTES, use_threads=not quoted_commas),
+            csv.ParseOptions(delimiter=layout.delimiter),
+            csv.ConvertOptions(
+                column_types=types,
+                include_columns=list(types),
+                null_values=_nulls(),
+                decimal_point=layout.decimal if quoted_commas else ".",
+            ),
+            memory_pool=pool,
+        )
+
+
+def _fill(target: FloatArray, chunk: pa.Array) -> None:
+    """Copy a chunk of float64, with NaN where it has no value."""
+    target[:] = np.frombuffer(chunk.buffers()[1], dtype="<f8")[chunk.offset : chunk.offset + len(chunk)]
+    if chunk.null_count:
+        target[_missing(chunk)] = np.nan
+
+
+def _add_time(target: IntArray, chunk: pa.Array, exponent: int, scale: int) -> None:
+    """Add a chunk of the clock in [ns], NO_TIME where it has no value.
+
+    A decimal128 is an integer of two 64-bit words, the low one first; of scale 9 it is [ns], if the unit
+    is s, and the low word holds it if the high one only repeats its sign.
+
+    Raises:
+        OverflowError: If a time is beyond what 64 bits hold.
+    """
+    missing = (target == NO_TIME) | (_missing(chunk) if chunk.null_count else False)
+    if scale > exponent:
+        import pyarrow as pa
+        from pyarrow import compute
+
+        rounded = compute.round(chunk, ndigits=exponent, round_mode="half_to_even")
+        chunk = rounded.cast(pa.decimal128(_PRECISION, exponent))
+    words = np.frombuffer(chunk.buffers()[1], dtype="<i8").reshape(-1, 2)
+    low, high = words[chunk.offset : chunk.offset + len(chunk)].T
+    if (((low >> 63) != high) & ~missing).any():
+        raise OverflowError
+    target += low
+    target[missing] = NO_TIME
+
+
+def _missing(chunk: pa.Array) -> NDArray[np.bool_]:
+    """Return where a chunk has no value: its validity bits, the first row in the lowest bit, turned round.
+
+    Read from the buffer, since `to_numpy` and `is_null` load pandas and pyarrow.compute first.
+    """
+    bits = np.frombuffer(chunk.buffers()[0], dtype=np.uint8)
+    valid = np.unpackbits(bits, bitorder="little")[chunk.offset : chunk.offset + len(chunk)]
+    missing: NDArray[np.bool_] = valid == 0
+    return missing
+
+
+def _scale(layout: Layout, part: ClockColumn, exact: bool) -> int:
+    """Return how many decimals of the clock are read.
+
+    As many as reach [ns] if the sampled cells have no more: then the parsed integers are [ns]. Else as
+    many as fit beside the digits before the point (and two more, since the clock goes on).
+    """
+    cells = [plain(c, layout.decimal) for c in layout.cells(part.column) if is_number(c, layout.decimal)]
+    decimals = max((len(cell.partition("e")[0].partition(".")[2]) for cell in cells), default=0)
+    if not exact and decimals <= part.exponent:
+        return part.exponent
+    values = [abs(float(cell)) for cell in cells]
+    before = max((len(str(int(value))) for value in values if math.isfinite(value)), default=1)
+    return max(part.exponent, _PRECISION - before - 2)

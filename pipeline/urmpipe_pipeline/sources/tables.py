@@ -1,0 +1,123 @@
+"""The tables of a log: what its files are, which source wrote them, how each table is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeVar
+
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources import coppeliasim
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.ros2 import with_names
+from urmpipe_pipeline.sources.sniff import Layout, sniff
+from urmpipe_pipeline.sources.text import Segment, open_text
+from urmpipe_pipeline.sources.vocabulary import KnownSource, vocabulary
+
+T = TypeVar("T")
+U = TypeVar("U")
+
+COPPELIASIM, PATH, TABLE = "coppeliasim", "path", "table"
+
+
+def source_names() -> tuple[str, ...]:
+    """Return the names that `ReadOptions.source` takes."""
+    return (COPPELIASIM, *(source.name for source in vocabulary().sources), PATH, TABLE)
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """The tables of a log before their columns are understood.
+
+    Attributes:
+        source: Name of the source.
+        known: What is known of it, if anything.
+        layouts: How each table is written.
+        titles: Title of each table: the file's stem, or the graph's path.
+        paths: The file of each table.
+        inferences: What was found out.
+    """
+
+    source: str
+    known: KnownSource | None
+    layouts: tuple[Layout, ...]
+    titles: tuple[str, ...]
+    inferences: tuple[Inference, ...]
+
+    @property
+    def paths(self) -> list[Path]:
+        """The file of each table."""
+        return [layout.segment.path for layout in self.layouts]
+
+
+def open_tables(files: Sequence[Path], options: ReadOptions) -> Tables:
+    """Return the tables of a log's files.
+
+    Args:
+        files: The files.
+        options: What the user says.
+
+    Raises:
+        LogError: If a file is no text table; all files are looked at first.
+        OptionError: If there is no file, or the source is unknown.
+    """
+    if not files:
+        raise OptionError("found no log file, allowed: one, or several if a source writes one a plot")
+    if options.source is not None and options.source not in source_names():
+        raise OptionError(f"--source: found {options.source!r}, allowed: {', '.join(source_names())}")
+    segments = for_all(files, lambda path: open_text(path, any_suffix=options.source is not None))
+    titled = [(file.stem, segment) for file, segment in zip(files, segments, strict=True)]
+    forced = options.source == COPPELIASIM
+    if len(files) == 1 and (forced or (options.source is None and coppeliasim.is_export(segments[0]))):
+        titled = coppeliasim.graphs(segments[0]) or titled
+        forced = True
+    layouts = for_all(titled, lambda item: with_names(sniff(item[1], options.delimiter, options.decimal)))
+    known, said = _known(layouts, options) if not forced else (None, _coppeliasim(titled, options))
+    name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
+    encoding = Inference(
+        "encoding", segments[0].encoding, "byte order mark" if segments[0].start else "its bytes"
+    )
+    return Tables(
+        source=name,
+        known=known,
+        layouts=tuple(layouts),
+        titles=tuple(title for title, _ in titled),
+        inferences=(encoding, said),
+    )
+
+
+def for_all(items: Sequence[T], function: Callable[[T], U]) -> list[U]:
+    """Return the function of every item; raise what is wrong with all of them at once.
+
+    Raises:
+        LogError: With the findings of every item that raised one.
+    """
+    results: list[U] = []
+    findings: list[Finding] = []
+    for item in items:
+        try:
+            results.append(function(item))
+        except LogError as error:
+            findings += error.findings
+    if findings:
+        raise LogError(*findings)
+    return results
+
+
+def _known(layouts: Sequence[Layout], options: ReadOptions) -> tuple[KnownSource | None, Inference]:
+    """Return the source that the columns give away."""
+    if options.source is not None:
+        return vocabulary().source(options.source), Inference("source", options.source, "given as an option")
+    names = [name for layout in layouts for name in layout.names]
+    for source in vocabulary().sources:
+        if source.wrote(names):
+            return source, Inference("source", source.name, "the names of its columns")
+    return None, Inference("source", TABLE, "no source is known by these columns")
+
+
+def _coppeliasim(titled: Sequence[tuple[str, Segment]], options: ReadOptions) -> Inference:
+    graphs = ", ".join(title for title, _ in titled)
+    evidence = "given as an option" if options.source else f"each graph has its path and header: {graphs}"
+    return Inference("source", COPPELIASIM, evidence)

@@ -1,0 +1,181 @@
+"""Files as text: what is no log at all, which encoding, where lines begin, and the hash of the bytes."""
+
+from __future__ import annotations
+
+import codecs
+import hashlib
+import io
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.joint_log import SourceFile
+from urmpipe_pipeline.sources.vocabulary import Container, vocabulary
+
+HEAD_BYTES = 64 * 1024
+"""What is looked at to find out how a file is written."""
+
+_BYTE_ORDER_MARKS = (
+    (codecs.BOM_UTF8, "utf-8"),
+    (codecs.BOM_UTF16_LE, "utf-16-le"),
+    (codecs.BOM_UTF16_BE, "utf-16-be"),
+)
+_CONTROL = bytes(set(range(32)) - set(b"\t\n\v\f\r\x1a\x1b"))
+
+
+@dataclass(frozen=True, slots=True)
+class Segment:
+    """A stretch of a text file that holds one table.
+
+    Attributes:
+        path: The file, as the user named it.
+        encoding: Python's name of its encoding.
+        start: Offset of the first byte, after a byte order mark.
+        end: Offset behind the last byte.
+        first_line: Line of the file that the segment begins with, from 1.
+        head: Its beginning as text, cut at the end of a line.
+    """
+
+    path: Path
+    encoding: str
+    start: int
+    end: int
+    first_line: int
+    head: str
+
+    @property
+    def newline(self) -> str:
+        """What ends a line: a line feed, or a carriage return in files that have no line feeds."""
+        return "\r" if "\r" in self.head and "\n" not in self.head else "\n"
+
+    def cut(self, start: int, end: int, first_line: int) -> Segment:
+        """Return a stretch of the same file, with its own head."""
+        with self.path.open("rb") as file:
+            file.seek(start)
+            raw = file.read(min(HEAD_BYTES, end - start))
+        head = _decoded_head(raw, self.encoding, whole=end - start <= HEAD_BYTES)
+        return replace(self, start=start, end=end, first_line=first_line, head=head)
+
+    def lines(self) -> Iterator[tuple[int, str]]:
+        """Yield each line with its number in the file, without its end."""
+        with self.path.open("rb") as file:
+            file.seek(self.start)
+            text = io.TextIOWrapper(file, self.encoding, _errors(self.encoding), newline=self.newline)
+            whole = self.end == self.path.stat().st_size
+            left = self.end - self.start
+            for number, line in enumerate(text, start=self.first_line):
+                if left <= 0:
+                    return
+                left -= 0 if whole else len(line.encode(self.encoding, _errors(self.encoding)))
+                yield number, line.rstrip("\r\n")
+
+
+@dataclass(frozen=True, slots=True)
+class HeadLine:
+    """A line of a segment's head: its number in the file, where it begins in bytes, its text."""
+
+    number: int
+    offset: int
+    text: str
+
+
+def head_lines(segment: Segment) -> list[HeadLine]:
+    """Return the lines of the head that are not blank."""
+    result = []
+    offset = segment.start
+    for number, line in enumerate(segment.head.split(segment.newline), start=segment.first_line):
+        if line.strip():
+            result.append(HeadLine(number, offset, line.strip("\r")))
+        offset += len((line + segment.newline).encode(segment.encoding, _errors(segment.encoding)))
+    return result
+
+
+def open_text(path: Path, *, any_suffix: bool = False) -> Segment:
+    """Return a file as one segment, having made sure that it is text.
+
+    Args:
+        path: The file.
+        any_suffix: Read it as text even if its suffix says that it is none (.mat from `save -ascii`).
+
+    Raises:
+        LogError: If it is missing, a folder, empty, a known container (with the command that exports
+            it), or binary.
+    """
+    size = _size(path)
+    with path.open("rb") as file:
+        raw = file.read(HEAD_BYTES)
+    container = _container(path, raw, any_suffix)
+    if container is not None:
+        advice = container.advice.format(file=path.name)
+        raise LogError(Finding(f"found {container.what}, allowed: a text table; {advice}", file=str(path)))
+    if size == 0:
+        raise LogError(Finding("found an empty file, allowed: a table with a row a sample", file=str(path)))
+    mark, encoding = _encoding(raw)
+    if encoding is None:
+        raise LogError(Finding("found a binary file, allowed: a text table (CSV)", file=str(path)))
+    head = _decoded_head(raw[mark:], encoding, whole=size <= HEAD_BYTES)
+    return Segment(path, encoding, mark, size, 1, head)
+
+
+def fingerprint(path: Path) -> SourceFile:
+    """Return a file's name, hash and length."""
+    with path.open("rb") as file:
+        digest = hashlib.file_digest(file, "sha256")
+        return SourceFile(path.name, digest.hexdigest(), file.tell())
+
+
+def _size(path: Path) -> int:
+    try:
+        if path.is_dir():
+            raise LogError(Finding("found a folder, allowed: a file", file=str(path)))
+        with path.open("rb"):
+            return path.stat().st_size
+    except FileNotFoundError:
+        raise LogError(Finding("found no such file", file=str(path))) from None
+    except OSError as error:
+        raise LogError(Finding(f"cannot be read: {error.strerror}", file=str(path))) from error
+
+
+def _container(path: Path, raw: bytes, any_suffix: bool) -> Container | None:
+    """Return what a file is if it is no text: by its suffix, or by its first bytes where the suffix lies."""
+    for container in vocabulary().containers:
+        if path.suffix.lower() in container.suffixes and not any_suffix:
+            return container
+    return next((c for c in vocabulary().containers if raw.startswith(c.magic)), None)
+
+
+def _encoding(raw: bytes) -> tuple[int, str | None]:
+    """Return the length of the byte order mark and the encoding, None for a binary file.
+
+    Source: the marks of the Unicode standard; without one, text of mostly Latin letters in UTF-16 has
+    a zero in every second byte. Latin-1 is what remains: every byte is a letter in it.
+    """
+    for mark, encoding in _BYTE_ORDER_MARKS:
+        if raw.startswith(mark):
+            return len(mark), encoding
+    half = len(raw) // 2
+    odd, even = raw[1::2].count(0), raw[0::2].count(0)
+    if max(odd, even) > 0.5 * half and min(odd, even) == 0:
+        return 0, "utf-16-le" if odd else "utf-16-be"
+    if len(raw.translate(None, _CONTROL)) < len(raw):
+        return 0, None
+    try:
+        codecs.getincrementaldecoder("utf-8")().decode(raw)
+    except UnicodeDecodeError:
+        return 0, "latin-1"
+    return 0, "utf-8"
+
+
+def _errors(encoding: str) -> str:
+    """Return what becomes of bytes that are no text: in UTF-8 they come back, so that lengths stay."""
+    return "surrogateescape" if encoding == "utf-8" else "replace"
+
+
+def _decoded_head(raw: bytes, encoding: str, *, whole: bool) -> str:
+    """Return the text of the first bytes; unless they are the whole, without the last, cut line."""
+    text = codecs.getincrementaldecoder(encoding)(_errors(encoding)).decode(raw)
+    if whole:
+        return text
+    cut = (text.rfind("\n") + 1) or (text.rfind("\r") + 1)
+    return text[:cut] if cut else text

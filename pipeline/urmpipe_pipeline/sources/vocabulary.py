@@ -1,0 +1,185 @@
+"""The words of log files: patterns for column names, units, known sources (from vocabulary.toml)."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+from importlib.resources import files
+from typing import Any, Literal
+
+Quantity = Literal["angle", "length", "time"]
+Patterns = tuple[re.Pattern[str], ...]
+
+_BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
+_PER_SECOND = re.compile(r"\s*(?:/|per\s+)\s*(?:s|sec|second|sek)\s*(?:\^|\*\*)?\s*(?P<power>[2²]?)$")
+
+
+@dataclass(frozen=True, slots=True)
+class Unit:
+    """A unit of a column.
+
+    Attributes:
+        name: How urmpipe spells it: rad, deg/s, mm, ...
+        quantity: What it measures.
+        factor: To SI: value in SI = factor * value in this unit.
+        order: How often time divides it: 0 for deg, 1 for deg/s, 2 for deg/s2.
+    """
+
+    name: str
+    quantity: Quantity
+    factor: float
+    order: int = 0
+
+    def per_second(self, order: int) -> Unit:
+        """Return the unit of the derivative of this order."""
+        suffix = ("", "/s", "/s2")[order]
+        return Unit(self.name + suffix, self.quantity, self.factor, order)
+
+
+@dataclass(frozen=True, slots=True)
+class KnownSource:
+    """A source that its columns give away.
+
+    Attributes:
+        name: Its name.
+        columns: Patterns that must each match a column's name; none if nothing gives it away.
+        units: Unit of a quantity where a column's name does not say its own.
+    """
+
+    name: str
+    columns: Patterns
+    units: Mapping[str, Unit]
+
+    def wrote(self, names: Sequence[str]) -> bool:
+        """Return whether a file with these column names comes from this source."""
+        return bool(self.columns) and all(any(p.search(n) for n in names) for p in self.columns)
+
+
+@dataclass(frozen=True, slots=True)
+class Container:
+    """A kind of file that is no text, and how it becomes a CSV file."""
+
+    what: str
+    suffixes: tuple[str, ...]
+    magic: tuple[bytes, ...]
+    advice: str
+
+
+@dataclass(frozen=True, slots=True)
+class Vocabulary:
+    """All words, as vocabulary.toml has them."""
+
+    time: Patterns
+    time_pairs: tuple[tuple[re.Pattern[str], re.Pattern[str]], ...]
+    index: Patterns
+    joint: Mapping[str, Patterns]
+    joint_words: Mapping[str, frozenset[str]]
+    marks: frozenset[str]
+    orders: tuple[tuple[str, ...], ...]
+    other: frozenset[str]
+    commanded: frozenset[str]
+    tcp_position: Patterns
+    tcp_pose_vector: Patterns
+    units: Mapping[str, Unit]
+    missing: frozenset[str]
+    sources: tuple[KnownSource, ...]
+    containers: tuple[Container, ...]
+
+    def unit(self, text: str) -> Unit | None:
+        """Return the unit that a text means, such as deg, "°", mm or rad/s^2; None if it means none."""
+        words = text.strip().lower()
+        rate = _PER_SECOND.search(words)
+        base = self.units.get(words[: rate.start()] if rate else words)
+        if base is None or rate is None:
+            return base
+        return base.per_second(2 if rate["power"] else 1)
+
+    def spelled(self, quantity: Quantity) -> list[str]:
+        """Return the names of the units of a quantity."""
+        return list(dict.fromkeys(unit.name for unit in self.units.values() if unit.quantity == quantity))
+
+    def source(self, name: str | None) -> KnownSource | None:
+        """Return the known source of this name."""
+        return next((source for source in self.sources if source.name == name), None)
+
+
+@lru_cache
+def vocabulary() -> Vocabulary:
+    """Return the words that are shipped with urmpipe."""
+    data = tomllib.loads(files(__package__).joinpath("vocabulary.toml").read_text(encoding="utf-8"))
+    units = dict(_units(data["units"]))
+    joint = data["joint"]
+    return Vocabulary(
+        time=_compiled(data["time"]["patterns"]),
+        time_pairs=tuple(
+            (re.compile(pair["seconds"]), re.compile(pair["nanoseconds"])) for pair in data["time"]["pairs"]
+        ),
+        index=_compiled(data["index"]["patterns"]),
+        joint={role: _compiled(joint[role]) for role in ("position", "rate", "acceleration")},
+        joint_words={
+            role: frozenset(joint[f"{role}_words"]) for role in ("position", "rate", "acceleration")
+        },
+        marks=frozenset(joint["marks"]),
+        orders=tuple(tuple(order) for order in joint["orders"]),
+        other=frozenset(joint["other"]),
+        commanded=frozenset(joint["commanded"]),
+        tcp_position=_compiled(data["tcp"]["position"]),
+        tcp_pose_vector=_compiled(data["tcp"]["pose_vector"]),
+        units=units,
+        missing=frozenset(data["missing"]["words"]),
+        sources=tuple(_source(entry, units) for entry in data["source"]),
+        containers=tuple(_container(entry) for entry in data["container"]),
+    )
+
+
+def split_unit(name: str) -> tuple[str, str | None]:
+    """Return a column's name without its unit, and the unit's text: "q1 [deg]" is q1 and deg.
+
+    An index such as in state.q[0] and joint(1) stays part of the name. A unit as the last word
+    (c_arm_wigwag_deg) is told, and stays part of the name as well.
+
+    Args:
+        name: The name as the header has it.
+    """
+    match = _BRACKETS.match(name)
+    if match and not match["inside"].strip().isdigit():
+        return match["label"].strip(), match["inside"].strip()
+    word = re.split(r"[\s_./]+", name.strip())[-1].lower()
+    known = word in vocabulary().units and word != name.strip().lower()
+    return name.strip(), word if known else None
+
+
+def key(label: str) -> str:
+    """Return a column's name for comparison: lower case, every run of other signs an underscore."""
+    return re.sub(r"[\W_]+", "_", label.lower()).strip("_")
+
+
+def _compiled(patterns: Sequence[str]) -> Patterns:
+    return tuple(re.compile(pattern) for pattern in patterns)
+
+
+def _units(data: Mapping[Quantity, Mapping[str, Any]]) -> Iterator[tuple[str, Unit]]:
+    for quantity, of_quantity in data.items():
+        for name, entry in of_quantity.items():
+            for word in entry["words"]:
+                yield word, Unit(name, quantity, entry["factor"])
+
+
+def _source(entry: Mapping[str, Any], units: Mapping[str, Unit]) -> KnownSource:
+    return KnownSource(
+        entry["name"],
+        _compiled(entry["columns"]),
+        {quantity: units[word] for quantity, word in entry["units"].items()},
+    )
+
+
+def _container(entry: Mapping[str, Any]) -> Container:
+    return Container(
+        entry["what"],
+        tuple(entry["suffixes"]),
+        tuple(magic.encode("latin-1") for magic in entry["magic"]),
+        entry["advice"],
+    )

@@ -1,0 +1,177 @@
+"""The clock: its column, its unit, exact integer nanoseconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from urmpipe_pipeline.joint_log import JointLog
+
+Read = Callable[..., JointLog]
+Wrong = Callable[..., list[str]]
+
+
+def clocked(name: str, *times: str) -> str:
+    return "\n".join([f"{name},q1", *(f"{time},{k}" for k, time in enumerate(times)), ""])
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["t", "time", "Time", "Zeit", "timestamp", "Time (s)", "Zeit[sec]", "t_s", "time_sec", "simulation time",
+     "__time", "%time", "field.header.stamp", "elapsed_time [s]", "robot time", "duration [s]"],
+)  # fmt: skip
+def test_names_of_the_time(read: Read, name: str) -> None:
+    log = read(clocked(name, "1.5", "1.51", "1.53"))
+    assert log.t_ns.tolist() == [0, 10_000_000, 30_000_000]
+    assert log.clock_start == 1.5
+
+
+@pytest.mark.parametrize(
+    ("name", "times", "steps", "unit"),
+    [
+        ("t_ms", ["0", "5", "10"], [5_000_000, 5_000_000], "ms"),
+        ("time [us]", ["0", "5", "10"], [5000, 5000], "us"),
+        ("t (ns)", ["0", "5", "10"], [5, 5], "ns"),
+        ("t", ["0", "5", "10"], [5_000_000, 5_000_000], "ms"),
+        ("t", ["0", "0.005", "0.01"], [5_000_000, 5_000_000], "s"),
+        ("t", ["0", "5000", "10000"], [5_000_000, 5_000_000], "us"),
+        ("t", ["0", "5000000", "10000000"], [5_000_000, 5_000_000], "ns"),
+        ("timestamp", ["1740416404.0470498", "1740416404.0571585"], [10_108_700], "s"),
+        ("timestamp", ["1740416404047", "1740416404052"], [5_000_000], "ms"),
+        ("timestamp", ["1740416404047049", "1740416404052050"], [5_001_000], "us"),
+        ("%time", ["1486559106139796569", "1486559106140360682"], [564_113], "ns"),
+        ("__time", ["1396293888.886", "1396293888.985"], [99_000_000], "s"),
+    ],
+)
+def test_units_of_the_time(read: Read, name: str, times: list[str], steps: list[int], unit: str) -> None:
+    log = read(clocked(name, *times))
+    assert np.diff(log.t_ns).tolist() == steps
+    assert next(iter(log.units.values())) == unit
+
+
+def test_nanoseconds_since_1970_lose_nothing(read: Read) -> None:
+    start = 1486559106139796569
+    log = read(clocked("%time", *(str(start + k) for k in (0, 1, 2, 1001))))
+    assert log.t_ns.tolist() == [0, 1, 2, 1001]
+    assert log.clock_start == start / 10**9
+
+
+@pytest.mark.parametrize("quoted", ["", '"'])
+def test_decimals_are_rounded_once_to_the_nearest_ns(read: Read, quoted: str) -> None:
+    """4029.6389999999997 and its kind are what a binary clock prints; a tie goes to the even one."""
+    times = ["4029.5389999999998", "4029.6389999999997", "4029.7390000005", "4029.8390000015", "4.0299e+03"]
+    times = [f"{quoted}{time}{quoted}" for time in times]
+    log = read(clocked("t", *times))
+    assert log.t_ns.tolist() == [0, 100_000_000, 200_000_000, 300_000_002, 361_000_000]
+    assert log.clock_start == 4029.539
+
+
+def test_small_decimals_with_many_digits(read: Read) -> None:
+    log = read(clocked("t", "8.881784197001252e-16", "0.0033333333333333335", "0.010000000000000002"))
+    assert log.t_ns.tolist() == [0, 3_333_333, 10_000_000]
+
+
+def test_negative_times(read: Read) -> None:
+    log = read(clocked("t", "-0.1", "0.05", "0.2"))
+    assert log.t_ns.tolist() == [0, 150_000_000, 300_000_000]
+    assert log.clock_start == -0.1
+
+
+def test_seconds_and_nanoseconds_apart(read: Read) -> None:
+    text = "header.stamp.sec,header.stamp.nanosec,q1\n1740416404,999999999,1\n1740416405,4,2\n"
+    log = read(text)
+    assert log.t_ns.tolist() == [0, 5]
+    assert log.units == {"header.stamp.sec": "s", "header.stamp.nanosec": "ns", "q1": "rad"}
+
+
+def test_steps_that_may_be_two_units_are_asked_for(wrong: Wrong, read: Read) -> None:
+    text = clocked("t", "0", "600", "1200")
+    assert wrong(text) == [
+        "log.csv:2, column t: found steps of 600, which may be ms or us: say which with --unit t=ms"
+    ]
+    assert read(text, units={"t": "us"}).t_ns.tolist() == [0, 600_000, 1_200_000]
+
+
+def test_a_step_of_one_is_taken_as_a_second_and_said(read: Read) -> None:
+    log = read(clocked("t", "0", "1", "2"))
+    assert log.period == 1.0
+    assert log.warnings[0].message == "the time 't' steps by 1: taken as s"
+
+
+def test_without_a_time_the_period_is_given_or_that_of_the_paper(read: Read, wrong: Wrong) -> None:
+    text = "q1,q2\n0.1,0.2\n0.3,0.4\n0.5,0.1\n"
+    log = read(text)
+    assert log.t_ns.tolist() == [0, 5_000_000, 10_000_000]
+    assert (log.warnings[0].kind, log.warnings[0].message) == (
+        "assumed-period",
+        "no time column: the rows are taken as 5 ms apart; --period S says otherwise",
+    )
+    log = read(text, period=1 / 3)
+    assert log.t_ns.tolist() == [0, 333_333_333, 666_666_667]
+    assert [warning.kind for warning in log.warnings] == ["assumed-unit"]
+    for period in (0.0, -1.0, float("nan"), float("inf")):
+        assert wrong(text, period=period) == [
+            f"--period: found {period:g} s, allowed: a positive time of 1e-9 s or more"
+        ]
+
+
+def test_the_time_as_the_user_says(read: Read, wrong: Wrong) -> None:
+    text = "a,b,q1\n0,0.5,1\n0,0.6,2\n"
+    assert read(text, time="b").t_ns.tolist() == [0, 100_000_000]
+    assert read(text, time="2").t_ns.tolist() == [0, 100_000_000]
+    assert read(clocked("t", "0", "0"), time="none").t_ns.tolist() == [0, 5_000_000]
+    assert wrong(text, time="c") == ["--time: found no column 'c', allowed: a, b, q1"]
+
+
+def test_dates_are_not_read(wrong: Wrong) -> None:
+    said = "found '2021-04-11 22:27:21.573641', allowed: times as numbers in s, ms, us or ns"
+    text = "date,timestamp,q1\nx,2021-04-11 22:27:21.573641,1\ny,2021-04-11 22:27:21.583641,1\n"
+    assert wrong(text) == [f"log.csv:2, column timestamp: {said}"]
+    assert wrong(text, time="timestamp") == [f"log.csv:2, column timestamp: {said}"]
+
+
+def test_two_columns_of_one_name(wrong: Wrong, read: Read) -> None:
+    text = "time,time,q1\n0,0.5,1\n1,0.6,2\n"
+    assert wrong(text) == [
+        "log.csv:1, column time: found as columns 1, 2, allowed: once; give the number of the right one"
+        " with --time"
+    ]
+    assert read(text, time="2").period == 0.1
+
+
+def test_a_date_beside_a_number_does_not_matter(read: Read) -> None:
+    log = read("timestamp,t,q1\n22:27:21,0,1\n22:27:22,0.1,1\n")
+    assert log.period == 0.1
+
+
+def test_gaps(read: Read) -> None:
+    times = np.cumsum([0, *[0.01] * 10, 0.031, *[0.01] * 5, 5.0, *[0.01] * 3])
+    log = read(clocked("t", *(f"{time:.3f}" for time in times)))
+    assert [(w.kind, w.row, w.message) for w in log.warnings if w.kind == "gap"] == [
+        ("gap", 12, "0.031 s pass before row 12, the median period is 0.01 s"),
+        ("gap", 18, "5 s pass before row 18, the median period is 0.01 s"),
+    ]
+
+
+def test_many_gaps_are_counted(read: Read) -> None:
+    times = np.cumsum(np.where(np.arange(200) % 4 == 3, 0.05, 0.01))
+    times[150:] += 1.0
+    log = read(clocked("t", *(f"{time:.3f}" for time in times)))
+    gaps = [warning for warning in log.warnings if warning.kind == "gap"]
+    assert len(gaps) == 11
+    assert gaps[-1].message == "41 more gaps; the longest of all is 1.01 s, before row 151"
+
+
+def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:
+    """Windows counts 100 ns since 1601: no unit that is known, and as s an age."""
+    text = clocked("t [s]", "133500000000000000", "133500000000050000")
+    assert wrong(text) == [
+        "log.csv:2, column t [s]: found 1.335e+17 s, allowed: times within 146 years of 0;"
+        " say the unit with --unit t=ns"
+    ]
+    assert read(text, units={"t": "ns"}).t_ns.tolist() == [0, 50_000]
+    assert wrong(clocked("t [s]", "0", "1", "1e30")) == [
+        "log.csv:4, column t [s]: found '1e30', allowed: a number in every row"
+    ]

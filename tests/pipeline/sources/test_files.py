@@ -1,0 +1,115 @@
+"""What is no log: one clear line each, with the command that makes it one."""
+
+from __future__ import annotations
+
+import gzip
+import sqlite3
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from urmpipe_models.errors import LogError, OptionError
+from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.sources import ReadOptions, read_log
+
+Read = Callable[..., JointLog]
+Wrong = Callable[..., list[str]]
+
+ROS2 = "ros2 topic echo --csv /joint_states > log.csv, while in another terminal: ros2 bag play"
+CONTAINERS = {
+    ".mat": "a MATLAB file, allowed: a text table;"
+    ' in MATLAB: writetable(struct2table(load("{name}")), "log.csv")',
+    ".xlsx": "an Excel workbook, allowed: a text table; File > Save As > CSV in Excel, or:"
+    " libreoffice --headless --convert-to csv {name}",
+    ".bag": "a ROS 1 bag, allowed: a text table; rostopic echo -b {name} -p /joint_states > log.csv",
+    ".mcap": f"an MCAP recording, allowed: a text table; {ROS2} {{name}}",
+    ".db3": f"a ROS 2 bag, allowed: a text table; {ROS2} {{name}}",
+    ".gz": "a gzip archive, allowed: a text table; gunzip {name}",
+}
+MAGIC = {
+    ".mat": b"MATLAB 5.0 MAT-file, Platform: GLNXA64" + bytes(90),
+    ".xlsx": b"PK\x03\x04\x14\x00",
+    ".bag": b"#ROSBAG V2.0\n",
+    ".mcap": b"\x89MCAP0\r\n",
+    ".db3": b"SQLite format 3\x00",
+    ".gz": b"\x1f\x8b\x08\x00",
+}
+
+
+@pytest.mark.parametrize("suffix", CONTAINERS)
+def test_containers_by_suffix_and_by_their_first_bytes(wrong: Wrong, suffix: str) -> None:
+    for name, content in (
+        (f"log{suffix}", b"t,q1\n0,1\n"),
+        ("log.csv", MAGIC[suffix]),
+        (f"log{suffix.upper()}", b""),
+    ):
+        assert wrong(content, name=name) == [f"{name}: found {CONTAINERS[suffix].format(name=name)}"]
+
+
+def test_real_containers_are_known(tmp_path: Path) -> None:
+    from scipy.io import savemat
+
+    paths = [tmp_path / f"{name}.csv" for name in ("mat", "db3", "gz")]
+    savemat(paths[0], {"q": np.zeros(3)}, appendmat=False)
+    connection = sqlite3.connect(paths[1])
+    connection.execute("create table messages (id integer)")
+    connection.close()
+    paths[2].write_bytes(gzip.compress(b"t,q1\n0,1\n"))
+    with pytest.raises(LogError) as caught:
+        read_log(paths)
+    kinds = ["a MATLAB file", "a ROS 2 bag", "a gzip archive"]
+    assert [str(f).partition("found ")[2].partition(",")[0] for f in caught.value.findings] == kinds
+
+
+def test_matlab_save_ascii_may_be_called_mat(read: Read, arm: Callable[..., object]) -> None:
+    text = "   7.6916151e-01  -2.4290446e-01\r\n   7.6915741e-01  -2.4292719e-01\r\n"
+    log = read(text, arm(2), name="q.mat", source="matlab")
+    assert log.q[0].tolist() == [0.76916151, -0.24290446]
+    assert log.source == "matlab"
+
+
+def test_missing_folder_empty_binary(wrong: Wrong, tmp_path: Path) -> None:
+    assert wrong(b"") == ["log.csv: found an empty file, allowed: a table with a row a sample"]
+    assert wrong(bytes(range(256))) == ["log.csv: found a binary file, allowed: a text table (CSV)"]
+    assert wrong(np.arange(50.0).tobytes()) == ["log.csv: found a binary file, allowed: a text table (CSV)"]
+    with pytest.raises(LogError) as caught:
+        read_log([tmp_path / "no.csv", tmp_path])
+    assert (
+        str(caught.value)
+        == f"{tmp_path}/no.csv: found no such file\n{tmp_path}: found a folder, allowed: a file"
+    )
+
+
+def test_unknown_source_and_no_file(tmp_path: Path) -> None:
+    with pytest.raises(
+        OptionError, match=r"^--source: found 'vendor', allowed: coppeliasim, .*, path, table$"
+    ):
+        read_log([tmp_path / "log.csv"], ReadOptions(source="vendor"))
+    with pytest.raises(OptionError, match=r"^found no log file, allowed: one, or several"):
+        read_log([])
+
+
+def test_signs_that_are_none(wrong: Wrong) -> None:
+    assert wrong("t,q1\n0,1\n", delimiter="x") == [
+        "delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the sign itself"
+    ]
+    assert wrong("t,q1\n0,1\n", decimal=";") == [
+        "decimal sign: found ';', allowed: point, comma, or the sign itself"
+    ]
+
+
+def test_reading_loads_neither_pandas_nor_scipy(tmp_path: Path) -> None:
+    """Half a second that a command would lose before it begins."""
+    path = tmp_path / "log.csv"
+    path.write_text("t,q1,q2\n" + "".join(f"{0.005 * k:.3f},0.5,{'' if k % 7 else 1}\n" for k in range(5000)))
+    code = (
+        "import sys; from pathlib import Path; from urmpipe_pipeline.sources import read_log;"
+        f"log = read_log([Path({str(path)!r})]); assert log.rows == 5000;"
+        "print([name for name in ('pandas', 'scipy', 'pyarrow.compute') if name in sys.modules])"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "[]\n"

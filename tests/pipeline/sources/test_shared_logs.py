@@ -1,0 +1,153 @@
+"""Real logs from public repositories, held beside this one: read right, or refused in one line."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import LogError
+from urmpipe_pipeline.sources import ReadOptions, read_log
+
+Arm = Callable[..., Chain]
+
+LOGS = Path(__file__).resolve().parents[3].parent / "shared" / "logs"
+pytestmark = pytest.mark.skipif(not LOGS.is_dir(), reason="the real logs in ../shared/logs are not here")
+
+
+def kinds(warnings: tuple[object, ...]) -> list[str]:
+    return [warning.kind for warning in warnings]  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize(
+    ("folder", "rows", "period"), [("ur5e-rtde-static", 256, 0.1), ("ur-rtde-10rows", 10, 0.008)]
+)
+def test_ur_rtde(folder: str, rows: int, period: float, arm: Arm) -> None:
+    path = LOGS / folder / "robot_data.csv"
+    log = read_log([path], robot=arm(6))
+    with path.open(newline="") as file:
+        table = [line for line in csv.reader((line.strip("\r\n") for line in file), delimiter=" ") if line]
+    names, last = table[0], table[-1]
+    assert (log.source, log.rows, log.period, log.first_line) == ("ur-rtde", rows, period, 2)
+    assert log.joints == tuple(f"actual_q_{k}" for k in range(6))
+    assert log.q[-1].tolist() == [float(last[names.index(f"actual_q_{k}")]) for k in range(6)]
+    assert log.qd is not None
+    assert log.qd[-1].tolist() == [float(last[names.index(f"actual_qd_{k}")]) for k in range(6)]
+    assert log.tcp_position is not None
+    assert log.tcp_position[-1].tolist() == [
+        float(last[names.index(f"actual_TCP_pose_{k}")]) for k in range(3)
+    ]
+    assert log.tcp_quat_xyzw is not None
+    assert not log.warnings
+
+
+def test_epoch_of_ur_rtde_is_exact() -> None:
+    """4029.5389999999998 and 4029.6389999999997 are 100 ms apart."""
+    log = read_log([LOGS / "ur5e-rtde-static" / "robot_data.csv"])
+    assert log.t_ns[:3].tolist() == [0, 100_000_000, 200_000_000]
+    assert log.clock_start == 4029.539
+
+
+def test_rostopic_echo(arm: Arm) -> None:
+    log = read_log([LOGS / "plotjuggler" / "fake_joints.csv"], robot=arm(6))
+    assert (log.source, log.rows, log.clock_start) == ("ros", 2725, 1486559106139796569 / 10**9)
+    assert log.t_ns[:3].tolist() == [0, 564_113, 1_633_048]
+    assert log.joints == tuple(f"field.position{k}" for k in range(6))
+    assert log.q[1, 0] - log.q[0, 0] == pytest.approx(-3.99473, abs=1e-5)  # the jump that is no wrap
+    assert log.q[-1].tolist() == [0.576058272031] * 6
+    assert log.qd is not None
+    assert not log.qd.any()
+    assert kinds(log.warnings) == ["gap", "gap"]
+
+
+def test_plotjuggler_with_empty_cells() -> None:
+    path = LOGS / "plotjuggler" / "turtle.csv"
+    with pytest.raises(
+        LogError, match=r"found no joint columns in /turtle1/cmd_vel/angular/x, .*--joints A,B,C$"
+    ):
+        read_log([path])
+    column = "/turtle2/cmd_vel/angular/z"
+    log = read_log([path], ReadOptions(joints=("/turtle1/cmd_vel/linear/x", column)))
+    assert (log.source, log.rows, log.joints[1]) == ("plotjuggler", 563, column)
+    assert log.clock_start == 1396293888.886
+    assert np.isnan(log.q[0, 0])
+    assert log.q[0, 1] == -1.286809
+    assert log.q[6, 0] == 2.0
+    assert [w.message for w in log.warnings if w.kind == "missing"] == [
+        f"{name} has no value in {np.isnan(log.q[:, j]).sum()} of 563 rows, first in row {first}"
+        for j, (name, first) in enumerate(zip(log.joints, (1, 7), strict=True))
+    ]
+
+
+def test_dates_are_refused() -> None:
+    path = LOGS / "plotjuggler" / "simple_parse_timestamp.csv"
+    with pytest.raises(LogError) as caught:
+        read_log([path])
+    said = "found '01/20/2021 10:11:32.332', allowed: times as numbers in s, ms, us or ns"
+    assert str(caught.value) == f"{path}:2, column timestamp: {said}"
+
+
+def test_epoch_in_seconds(arm: Arm) -> None:
+    path = LOGS / "nurds-2joint" / "joint_states.csv"
+    log = read_log([path], robot=arm(2))
+    assert (log.rows, log.joints) == (986, ("joint1", "joint2"))
+    assert log.t_ns[1] == 10_108_700  # 1740416404.0571585 - 1740416404.0470498, which floats cannot hold
+    assert log.q[0].tolist() == [0.7116998434066772, 0.006745942402631044]
+    assert kinds(log.warnings) == ["assumed-unit"]
+    with pytest.raises(
+        LogError, match=r"found 2 joint columns \(joint1, joint2\), allowed: 6, as robot arm has$"
+    ):
+        read_log([path], robot=arm(6))
+
+
+def test_no_header_and_more_columns_than_joints(arm: Arm) -> None:
+    path = LOGS / "unitree-z1-noheader" / "joint_states.csv"
+    log = read_log([path], robot=arm(6))
+    assert log.q.shape == (2099, 6)
+    assert log.q[0, 1] == 0.7844660375193842
+    assert (log.first_line, log.period) == (1, 0.005)
+    assert kinds(log.warnings) == ["assumed-period", "assumed-unit"]
+    assert read_log([path]).q.shape == (2099, 12)
+
+
+@pytest.mark.parametrize(
+    ("name", "first"), [("q_Traj1_PI.txt", 0.76916151), ("q_Traj1_Grad.txt", -0.16159558)]
+)
+def test_matlab_save_ascii(name: str, first: float, arm: Arm) -> None:
+    log = read_log([LOGS / "panda-matlab-ascii" / name], ReadOptions(period=0.01), arm(7))
+    assert log.q.shape == (1001, 7)
+    assert log.q[0, 0] == first
+    np.testing.assert_array_equal(log.q, np.loadtxt(LOGS / "panda-matlab-ascii" / name))
+    assert log.period == 0.01
+    assert log.digits is None  # eight digits are not coarse
+
+
+def test_joints_and_matrices_without_header(arm: Arm) -> None:
+    path = LOGS / "pybotics-ur10-fk" / "ur10-joints-poses.csv"
+    with pytest.raises(
+        LogError, match=r"found values up to 179 in phi1, .* and no unit, allowed: rad or deg"
+    ):
+        read_log([path], robot=arm(6))
+    log = read_log([path], ReadOptions(units={"": "deg"}), arm(6))
+    np.testing.assert_array_equal(log.q[0], np.array([-45, 147, -39, 96, 49, 67]) * (np.pi / 180))
+    assert (log.rows, log.first_line) == (20, 2)
+
+
+@pytest.mark.parametrize("name", ["iiwa-dmp-text/iiwa_example1.txt", "iiwa14-fri-text/pour1.txt",
+                                  "iiwa14-fri-text/iiwa14_singularity_change_config.txt"])  # fmt: skip
+def test_fri_text_is_refused_in_one_line(name: str, arm: Arm) -> None:
+    with pytest.raises(LogError) as caught:
+        read_log([LOGS / name], robot=arm(7))
+    (finding,) = caught.value.findings
+    assert (finding.line, finding.column) == (1, "1")
+    assert finding.message.startswith("found 'Time: ")
+
+
+@pytest.mark.parametrize("name", ["README.md", "panda-matlab-ascii/frankaEmikaPanda.urdf"])
+def test_text_that_is_no_log(name: str) -> None:
+    with pytest.raises(LogError, match=r"cells, allowed: a table$"):
+        read_log([LOGS / name])

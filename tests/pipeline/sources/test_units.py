@@ -1,0 +1,197 @@
+"""Units: in the name, given, known of the source, told by the data, or assumed with a warning."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from urmpipe_models.chain import Chain
+from urmpipe_pipeline.joint_log import FloatArray, JointLog
+
+Read = Callable[..., JointLog]
+Wrong = Callable[..., list[str]]
+Arm = Callable[..., Chain]
+
+DEG = np.pi / 180
+
+
+def csv_of(values: FloatArray, period: float = 0.01, names: tuple[str, ...] = ("q1",)) -> str:
+    rows = [f"{k * period:.6f}," + ",".join(map(repr, row)) for k, row in enumerate(values.tolist())]
+    return "\n".join([",".join(("t", *names)), *rows, ""])
+
+
+def evidence(log: JointLog, what: str) -> str:
+    return next(i.evidence for i in log.inferences if i.what == what)
+
+
+@pytest.mark.parametrize(
+    ("name", "unit"),
+    [
+        ("q1 [deg]", "deg"), ("q1 (rad)", "rad"), ("q1 (°)", "deg"), ("q1[Grad]", "deg"), ("q1_deg", "deg"),
+        ("q1_rad", "rad"), ("q1 [degrees]", "deg"), ("q1 (Radians)", "rad"), ("q1 [deg sign]", "deg"),
+        ("q1 (grd)", "deg"),
+    ],
+)  # fmt: skip
+def test_units_in_names(read: Read, name: str, unit: str) -> None:
+    log = read(f"t,{name}\n0,30\n0.1,31\n")
+    assert log.q[0, 0] == 30 * (DEG if unit == "deg" else 1.0)
+    assert list(log.units.values()) == ["s", unit]
+    assert not log.warnings
+
+
+def test_mixed_units_of_slides_and_turns(read: Read, arm: Arm) -> None:
+    text = ",time,lift_mm,c_arm_lateral_m,c_arm_wigwag_deg\n0,0.0,100,0.1,90\n1,0.1,110,0.2,91\n"
+    for robot in (None, arm(3, "prismatic", "prismatic", "revolute")):
+        log = read(text, robot)
+        assert log.joints == ("lift_mm", "c_arm_lateral_m", "c_arm_wigwag_deg")
+        assert log.q[0].tolist() == [0.1, 0.1, 90 * DEG]
+        assert log.units == {"time": "s", "lift_mm": "mm", "c_arm_lateral_m": "m", "c_arm_wigwag_deg": "deg"}
+
+
+def test_a_slide_without_unit_is_taken_as_m(read: Read, arm: Arm) -> None:
+    log = read("t,q1,q2\n0,0.5,0.5\n0.1,0.6,0.6\n", arm(2, "prismatic", "revolute"))
+    assert log.units == {"t": "s", "q1": "m", "q2": "rad"}
+    assert [warning.message for warning in log.warnings] == [
+        "no unit is given for q1: the prismatic joints are taken as m; --unit says otherwise",
+        "no unit is given for q2: the joints are taken as rad; --unit says otherwise",
+    ]
+
+
+def test_rates_follow_their_joints_unless_they_say_their_own_unit(read: Read) -> None:
+    log = read("t,q1 [deg],q2 [deg],qd1,qd2\n0,30,30,60,60\n0.1,31,31,60,60\n")
+    assert log.qd is not None
+    assert log.qd[0, 0] == 60 * DEG
+    assert log.units["qd1"] == "deg/s"
+    log = read("t,q1 [deg],qd1 [rad/s]\n0,30,60\n0.1,31,60\n")
+    assert log.qd is not None
+    assert log.qd[0, 0] == 60
+    assert log.units["qd1"] == "rad/s"
+
+
+def test_units_given_by_the_user(read: Read, wrong: Wrong, arm: Arm) -> None:
+    text = "t,q1,q2,q3\n0,30,0.5,5\n600,31,0.5,5\n"
+    log = read(
+        text,
+        arm(3, "revolute", "revolute", "prismatic"),
+        units={"": "deg", "t": "ms", "2": "rad", "q3": "mm"},
+    )
+    assert log.q[0].tolist() == [30.0, 0.5 * DEG, 0.005]
+    assert log.period == 0.6
+    assert not log.warnings
+    assert wrong(text, units={"": "mm"}) == ["--unit: found 'mm', allowed: rad, deg"]
+    assert wrong(text, units={"q1": "inch"}) == [
+        "--unit: found 'inch', allowed: rad, deg, m, mm, cm, s, ms, us, ns"
+    ]
+    assert wrong(text, units={"q9": "deg"}) == ["--unit: found no column 'q9', allowed: t, q1, q2, q3"]
+    assert wrong(text, units={"q1": "s", "t": "s"}) == [
+        "--unit q1: found the unit s (given as an option), allowed: rad, deg, m, mm, cm"
+    ]
+    assert wrong(text, units={"t": "deg"}) == ["--unit: found deg for the time 't', allowed: s, ms, us, ns"]
+
+
+def test_a_unit_that_does_not_fit_the_robot(wrong: Wrong, arm: Arm) -> None:
+    assert wrong("t,q1 [mm]\n0,30\n0.1,31\n", arm(1)) == [
+        "log.csv, column q1 [mm]: found the unit mm (its name), allowed: rad, deg"
+    ]
+
+
+def test_a_unit_that_is_not_known(wrong: Wrong, read: Read) -> None:
+    text = "t,J1 [counts]\n0,30\n0.1,31\n"
+    assert wrong(text) == [
+        "log.csv, column J1 [counts]: found the unit 'counts', allowed: rad, deg, m, mm, cm; say which with"
+        " --unit J1=deg"
+    ]
+    assert read(text, units={"J1": "deg"}).q[0, 0] == 30 * DEG
+
+
+def test_radians_are_assumed_and_said(read: Read) -> None:
+    log = read(csv_of(np.linspace(-3, 3, 50)[:, np.newaxis]))
+    assert log.units["q1"] == "rad"
+    assert [(w.kind, w.message) for w in log.warnings] == [
+        ("assumed-unit", "no unit is given for q1: the joints are taken as rad; --unit says otherwise")
+    ]
+
+
+def test_wraps_of_360_tell_degrees(read: Read) -> None:
+    turning = (np.arange(0, 800, 0.05) + 180) % 360 - 180
+    log = read(csv_of(turning[:, np.newaxis]))
+    assert log.units["q1"] == "deg"
+    assert evidence(log, "unit of q1") == "2 steps of about 360 from one row to the next"
+    assert not log.warnings
+
+
+def test_speeds_that_no_joint_reaches_tell_degrees(read: Read) -> None:
+    swinging = 40 * np.sin(2 * np.pi * 0.5 * np.arange(400) * 0.01)  # up to 126 a second
+    log = read(csv_of(swinging[:, np.newaxis]))
+    assert log.units["q1"] == "deg"
+    assert evidence(log, "unit of q1") == "as rad it would turn at 124 rad/s for a tenth of the time"
+
+
+def test_the_robots_limits_tell_degrees(read: Read, arm: Arm, wrong: Wrong) -> None:
+    text = "10,-20,170\n-120,80,90\n"
+    assert wrong(text, arm(3))[0].startswith(
+        "log.csv: found values up to 170 in phi1, phi2, phi3 and no unit"
+    )
+    limited = arm(3)
+    limited = replace(limited, joints=tuple(replace(j, lower=-6.3, upper=6.3) for j in limited.joints))
+    log = read(text, limited)
+    assert log.units == {"phi1": "deg", "phi2": "deg", "phi3": "deg"}
+    said = "values up to 170 are beyond the robot's limits as rad and within them as deg"
+    assert evidence(log, "unit of phi1, phi2, phi3") == said
+
+
+def test_slow_large_values_may_be_either(wrong: Wrong) -> None:
+    assert wrong(csv_of(np.linspace(0, 60, 1000)[:, np.newaxis])) == [
+        "log.csv: found values up to 60 in q1 and no unit, allowed: rad or deg; say which with --unit"
+    ]
+
+
+def test_a_few_turns_stay_radians(read: Read) -> None:
+    log = read(csv_of(np.linspace(-20, 20, 2000)[:, np.newaxis]))
+    assert log.units["q1"] == "rad"
+
+
+def test_outliers_and_noise_do_not_tell_degrees(read: Read) -> None:
+    values = np.linspace(-3, 3, 500)
+    values[[100, 200, 300]] = [20.0, -20.0, 15.0]
+    assert read(csv_of(values[:, np.newaxis])).units["q1"] == "rad"
+    noise = np.random.default_rng(1).normal(0, 5, (500, 1))  # too fast for rad, and for deg as well
+    assert read(csv_of(noise, 0.001)).units["q1"] == "rad"
+
+
+def test_a_joint_without_unit_is_like_the_others(read: Read) -> None:
+    log = read("t,q1 [deg],q2\n0,30,40\n0.1,31,41\n")
+    assert log.units == {"t": "s", "q1": "deg", "q2": "deg"}
+    assert evidence(log, "unit of q2") == "as the other joint columns"
+
+
+def test_positions_in_mm(read: Read) -> None:
+    log = read("x,y,z\n350,-659,625\n351,-658,625\n")
+    assert log.tcp_position is not None
+    np.testing.assert_array_equal(log.tcp_position[0], np.array([350, -659, 625]) * 1e-3)
+    assert evidence(log, "unit of x, y, z") == "values up to 659 reach further than any arm in m"
+    log = read("t;X_Act[mm];Y_Act[mm];Z_Act[mm]\n0;1;2;3\n0,1;1;2;3\n")
+    assert log.tcp_position is not None
+    np.testing.assert_array_equal(log.tcp_position[0], np.array([1, 2, 3]) * 1e-3)
+
+
+def test_positions_without_unit_are_taken_as_m(read: Read) -> None:
+    log = read("t,x,y,z\n0,0.1,0.2,0.3\n0.1,0.1,0.2,0.3\n")
+    assert [w.message for w in log.warnings] == [
+        "no unit is given for x, y, z: the positions are taken as m; --unit says otherwise"
+    ]
+
+
+def test_digits_of_a_coarse_format(read: Read) -> None:
+    def digits(*cells: str) -> int | None:
+        return read("t,q1\n" + "".join(f"{0.1 * k:.1f},{cell}\n" for k, cell in enumerate(cells))).digits
+
+    assert digits("+1.571e+00", "0.0", "-3.142e-05", "Null") == 4
+    assert digits("1.57e0", "2.00e0") == 3
+    assert digits("7.6916151e-01", "2.4290446e-01") is None  # fine enough
+    assert digits("1.571e+00", "1.57e+00") is None
+    assert digits("1.571", "1.572") is None  # a short number need not be a coarse one
+    assert digits("0.0", "0.0") is None
