@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain
-from urmpipe_models.errors import Finding, LogError, RecordingError
+from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import Method
@@ -192,22 +192,37 @@ def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> 
     return Report(write_report(shown, Path(output), inputs=files), shown)
 
 
-def place_robot(robot: Robot | None, base: Transform | None, tool: Transform | None) -> Chain | None:
+def place_robot(
+    robot: Robot | None,
+    base: Transform | None = None,
+    tool: Transform | None = None,
+    *,
+    base_link: str | None = None,
+    tip_link: str | None = None,
+) -> Chain | None:
     """Return the arm on its base and with its tool; None without a robot.
 
-    Raises:
-        RobotError: If the robot is unknown, or a base or tool is given without one.
-    """
-    if robot is None:
-        if base is not None or tool is not None:
-            from urmpipe_models.errors import OptionError
+    Args:
+        robot: Name, file (TOML, URDF) or chain of the arm.
+        base: Where the arm stands in the world.
+        tool: The tool centre point in the frame of the arm's tip.
+        base_link: Link of a URDF where the arm begins.
+        tip_link: Link of a URDF where it ends.
 
-            raise OptionError(
-                "--base and --tool place a robot, but none is given; allowed: --robot NAME|FILE"
-            )
-        return None
-    chain = robot if isinstance(robot, Chain) else load_robot(robot)
-    return chain.placed(base, tool)
+    Raises:
+        RobotError: If the robot is unknown, or with everything that is wrong with its file.
+        OptionError: If the arm is placed or cut, but there is none.
+    """
+    if robot is not None:
+        chain = (
+            robot if isinstance(robot, Chain) else load_robot(robot, base_link=base_link, tip_link=tip_link)
+        )
+        return chain.placed(base, tool)
+    if any(value is not None for value in (base, tool, base_link, tip_link)):
+        raise OptionError(
+            "found --base, --tool, --base-link or --tip without a robot; allowed: with --robot NAME|FILE"
+        )
+    return None
 
 
 def _refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable
-from typing import Any, TypeVar
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 from click.shell_completion import CompletionItem
+
+if TYPE_CHECKING:
+    from urmpipe_models.chain import Chain
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -75,15 +78,40 @@ def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
     return {column: unit for column, _, unit in pairs} or None
 
 
-def robot_options(command: Command) -> Command:
-    """Add --robot, --base and --tool."""
+def placing_options(command: Command) -> Command:
+    """Add what places and cuts an arm: --base, --tool, --base-link, --tip."""
     for option in (
+        click.option("--tip", metavar="LINK", help="Link of a URDF where the arm ends [default: its end]."),
+        click.option(
+            "--base-link", metavar="LINK", help="Link of a URDF where it begins [default: the root]."
+        ),
         click.option("--tool", type=OffsetType(), help="Tool centre point in the tip's frame (m, rad)."),
         click.option("--base", type=OffsetType(), help="Where the arm stands in the world (m, rad)."),
-        click.option("--robot", type=RobotType(), help="The arm: a name of the catalogue, a TOML or a URDF."),
     ):
         command = option(command)
     return command
+
+
+def robot_options(command: Command) -> Command:
+    """Add --robot and what places and cuts it."""
+    robot = click.option(
+        "--robot", type=RobotType(), help="The arm: a name of the catalogue, a TOML or a URDF."
+    )
+    return robot(placing_options(command))
+
+
+def take_robot(options: dict[str, Any]) -> Chain | None:
+    """Take the options of `robot_options` out of some others; return the arm they stand for.
+
+    Raises:
+        RobotError: If there is no such robot, or with everything that is wrong with its file.
+        OptionError: If an option needs a robot and none is given.
+    """
+    from urmpipe.api import place_robot
+
+    names = ("robot", "base", "tool", "base_link", "tip")
+    robot, base, tool, base_link, tip = (options.pop(name) for name in names)
+    return place_robot(robot, base, tool, base_link=base_link, tip_link=tip)
 
 
 def log_options(command: Command) -> Command:

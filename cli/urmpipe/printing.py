@@ -43,9 +43,9 @@ def print_warnings(warnings: Sequence[LogWarning]) -> None:
 
 def print_run(run: Run) -> None:
     """Print what ingest inferred and what it changed."""
-    console = _console()
+    console = new_console()
     log = run.log
-    table = _table("What", "Found", "Because", title=f"{log.name}: {log.rows} rows, {run.duration:.6g} s")
+    table = new_table("What", "Found", "Because", title=f"{log.name}: {log.rows} rows, {run.duration:.6g} s")
     for inference in log.inferences:
         table.add_row(inference.what, inference.value, inference.evidence)
     grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
@@ -60,7 +60,7 @@ def print_run(run: Run) -> None:
     if not run.repolarizations:
         console.print("No repolarization.")
         return
-    audit = _table(
+    audit = new_table(
         "Joint", "Row", "t_r [s]", "Step [rad]", "Turns", title=f"{len(run.repolarizations)} repolarizations"
     )
     for one in run.repolarizations[:LISTED]:
@@ -75,9 +75,9 @@ def print_run(run: Run) -> None:
 
 def print_comparison(result: Comparison) -> None:
     """Print the statistics, the verdict of each log and the verdict of all."""
-    console = _console()
+    console = new_console()
     tolerance = result.tolerance["axis"] * 1e3
-    table = _table(
+    table = new_table(
         "Log", "Axis", "max |Δ| [mm]", "rms", "mean", "std", "p95", "at t [s]", "Verdict",
         title=f"Deviation from {result.reference.name}, tolerance ±{tolerance:.4g} mm an axis",
     )  # fmt: skip
@@ -126,7 +126,7 @@ def _verdict(verdict: str | None) -> Text:
     return Text("-") if verdict is None else Text(verdict.upper(), style=style[verdict])
 
 
-def _console() -> Console:
+def new_console() -> Console:
     """Return a console that takes text as it is: names from files may hold brackets."""
     from rich.console import Console
 
@@ -134,7 +134,8 @@ def _console() -> Console:
     return Console(width=width, markup=False, emoji=False, highlight=False)
 
 
-def _table(*columns: str, title: str) -> Table:
+def new_table(*columns: str, title: str) -> Table:
+    """Return an empty table with these column heads."""
     from rich import box
     from rich.table import Table
 

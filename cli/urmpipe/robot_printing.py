@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe.chain_drawing import chain_text
-from urmpipe.printing import _console, _table
+from urmpipe.printing import new_console, new_table
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.kinematics import forward, points_over_log
 from urmpipe_models.robot_file import chain_to_dict
@@ -41,6 +41,11 @@ class PosedChain:
     poses: tuple[Transform, ...]
     skeleton: NDArray[np.float64]
 
+    @property
+    def title(self) -> str:
+        """The robot's name, and what it is if that is known."""
+        return ": ".join(filter(None, (self.chain.name, self.chain.description)))
+
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe robot show --json` prints."""
         names = self.chain.point_names
@@ -63,18 +68,18 @@ def chain_at(chain: Chain, q: Sequence[float]) -> PosedChain:
 
 def print_robots(robots: Sequence[Chain]) -> None:
     """Print the catalogue."""
-    table = _table("Name", "Joints", "Length [m]", "Description", title=f"{len(robots)} robots")
+    table = new_table("Name", "Joints", "Length [m]", "Description", title=f"{len(robots)} robots")
     for chain in robots:
         ways = np.diff(chain_at(chain, chain.start).skeleton, axis=0)
         length = float(np.linalg.norm(ways, axis=1).sum())
         table.add_row(chain.name, str(len(chain.coordinates)), f"{length:.3f}", chain.description)
-    _console().print(table)
+    new_console().print(table)
 
 
 def print_chain(posed: PosedChain) -> None:
     """Print an arm's parameters, where its points are, and two views of it."""
-    console, chain = _console(), posed.chain
-    console.print(f"{chain.name}: {chain.description}", soft_wrap=True)
+    console, chain = new_console(), posed.chain
+    console.print(posed.title, soft_wrap=True)
     if chain.source:
         console.print(f"Source: {chain.source}", soft_wrap=True)
     console.print(_parameters(posed))
@@ -85,7 +90,7 @@ def print_chain(posed: PosedChain) -> None:
 
 
 def _parameters(posed: PosedChain) -> Table:
-    table = _table(
+    table = new_table(
         "Joint", "Kind", "x, y, z [m]", "rx, ry, rz [deg]", "Axis", "Limits", "Speed", "q",
         title="Joints: each frame in the one before it",
     )  # fmt: skip
@@ -100,7 +105,7 @@ def _parameters(posed: PosedChain) -> Table:
 
 
 def _points(posed: PosedChain) -> Table:
-    table = _table("Point", "x, y, z [m]", "rz, ry, rx [deg]", title="Points in this pose")
+    table = new_table("Point", "x, y, z [m]", "rz, ry, rx [deg]", title="Points in this pose")
     for name, pose in zip(posed.chain.point_names, posed.poses, strict=True):
         angles = (math.degrees(angle) for angle in euler_zyx(pose.rotation)[:3])
         table.add_row(name, _figures(pose.translation), _figures(angles))

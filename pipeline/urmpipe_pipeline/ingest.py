@@ -55,15 +55,11 @@ def ingest_log(
     options = read or ReadOptions()
     log = read_log(files, options, robot)
     warnings = list(log.warnings)
-    revolute = _revolute(log, robot)
-    fixed = repolarize(log.q[:, revolute], _periods(log), max_speed=_speed_limits(robot, revolute))
-    repolarized = log.q.copy()
-    repolarized[:, revolute] = fixed.q
-    names = [log.joints[j] for j in revolute]
-    warnings += _unexplained(log, fixed, names)
+    fixed, audit = _repolarized(log, robot)
+    warnings += _unexplained(log, fixed)
     grid = make_grid(log, tsp)
     warnings += grid.warnings
-    q = grid.resample(repolarized)
+    q = grid.resample(fixed.q)
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, warnings)
     tcp, noticed = kinematics(robot, q, qd, qdd)
@@ -85,7 +81,7 @@ def ingest_log(
         qdd=qdd,
         tcp=tcp,
         tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
-        repolarizations=tuple(_audit(log, fixed, names)),
+        repolarizations=tuple(audit),
         warnings=tuple(warnings),
         provenance=provenance("ingest", given, log.files),
     )
@@ -97,40 +93,45 @@ def _given(options: ReadOptions) -> dict[str, Any] | None:
     return {name: value for name, value in asdict(options).items() if value != default[name]} or None
 
 
-def _revolute(log: JointLog, robot: Chain | None) -> list[int]:
-    """Return the indices of the joints that turn: the robot says so, or else the column's unit."""
-    if robot is not None and log.joints:
-        return [j for j, joint in enumerate(robot.moving) if joint.kind == "revolute"]
-    return [j for j, name in enumerate(log.joints) if log.units.get(name) in ("rad", "deg")]
+def _repolarized(log: JointLog, robot: Chain | None) -> tuple[Repolarized, list[Repolarization]]:
+    """Repolarize the joints that turn, on the file's own rows; joint indices are those of the log."""
+    turning = np.array([_turns(log, robot, j) for j in range(len(log.joints))], dtype=np.bool_)
+    dt = seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
+    limits = np.inf if robot is None else np.array([joint.velocity for joint in robot.moving])[turning]
+    if turning.all():
+        fixed = repolarize(log.q, dt, max_speed=limits)
+    else:
+        which = np.flatnonzero(turning)
+        part = repolarize(log.q[:, which], dt, max_speed=limits)
+        q, unexplained = log.q.copy(), part.unexplained.copy()
+        q[:, which], unexplained[:, 1] = part.q, which[part.unexplained[:, 1]]
+        fixed = part._replace(q=q, joints=which[part.joints], unexplained=unexplained)
+    return fixed, _audit(log, fixed)
 
 
-def _periods(log: JointLog) -> FloatArray:
-    """Return the time from the row before in [s], shape (n,), 0 for the first."""
-    return seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
+def _turns(log: JointLog, robot: Chain | None, joint: int) -> bool:
+    """Tell whether a joint turns: the robot says so, or else the column's unit."""
+    if robot is not None:
+        return robot.moving[joint].kind == "revolute"
+    return log.units.get(log.joints[joint]) in ("rad", "deg")
 
 
-def _speed_limits(robot: Chain | None, revolute: Sequence[int]) -> FloatArray | float:
-    return np.inf if robot is None else np.array([robot.moving[j].velocity for j in revolute])
-
-
-def _audit(log: JointLog, fixed: Repolarized, names: Sequence[str]) -> list[Repolarization]:
+def _audit(log: JointLog, fixed: Repolarized) -> list[Repolarization]:
     """List every repolarization with its place, its instant and its turns."""
-    turns = [0] * len(names)
-    original = {name: log.q[:, log.joints.index(name)] for name in names}
+    turns = [0] * len(log.joints)
     audit = []
     for row, j, change in zip(fixed.rows.tolist(), fixed.joints.tolist(), fixed.change.tolist(), strict=True):
-        column = original[names[j]]
         previous = row - 1
-        while np.isnan(column[previous]):
+        while np.isnan(log.q[previous, j]):
             previous -= 1
         start, end = int(log.t_ns[previous]), int(log.t_ns[row])
         audit.append(
             Repolarization(
-                joint=names[j],
+                joint=log.joints[j],
                 row=row + 1,
                 t=(start + end) / 2e9,
                 half_period=(end - start) / 2e9,
-                step=float(column[row] - column[previous]),
+                step=float(log.q[row, j] - log.q[previous, j]),
                 before=turns[j],
                 after=turns[j] + change,
             )
@@ -139,15 +140,16 @@ def _audit(log: JointLog, fixed: Repolarized, names: Sequence[str]) -> list[Repo
     return audit
 
 
-def _unexplained(log: JointLog, fixed: Repolarized, names: Sequence[str]) -> list[LogWarning]:
+def _unexplained(log: JointLog, fixed: Repolarized) -> list[LogWarning]:
     """Warn of steps above a quarter turn that are no repolarization."""
-    places = fixed.unexplained
+    places = fixed.unexplained.tolist()
+    limit = np.degrees(FULL_TURN / 4)
     warnings = [
         LogWarning(
             "large-step",
-            f"{names[j]} steps by more than {np.degrees(FULL_TURN / 4):.0f} deg from the value before, to"
-            f" {log.q[row, log.joints.index(names[j])]:.6g} rad, which is no wrap: it stays",
-            int(row) + 1,
+            f"{log.joints[j]} steps by more than {limit:.0f} deg from the value before, to"
+            f" {log.q[row, j]:.6g} rad, which is no wrap: it stays",
+            row + 1,
         )
         for row, j in places[:LISTED_STEPS]
     ]

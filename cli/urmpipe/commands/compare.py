@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from urmpipe.options import log_options, output_options
+from urmpipe.options import log_options, output_options, take_robot
 
 TOLERANCE = 0.0035
 
@@ -78,12 +78,19 @@ def compare(
     warm_up()
     from urmpipe import api
 
-    names = ("robot", "base", "tool", "tsp", "derivative", "strict", "tolerance", "tcp", "sync_offset")
+    robot = take_robot(options)
+    names = ("tsp", "derivative", "strict", "tolerance", "tcp", "sync_offset")
     shared = {name: options.pop(name) for name in names}
     target = output or Path(default_name(reference, logs))
     with progress_bar(f"Writing {target}", quiet=quiet) as progress:
         result = api.compare(
-            reference, logs, read=api.read_options(options), output=target, progress=progress, **shared
+            reference,
+            logs,
+            robot=robot,
+            read=api.read_options(options),
+            output=target,
+            progress=progress,
+            **shared,
         )
     if not quiet:
         for one in result.runs:

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from urmpipe.options import log_options, output_options
+from urmpipe.options import log_options, output_options, take_robot
 
 
 @click.command(short_help="Turn one log into a recording.")
@@ -36,9 +36,12 @@ def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bo
     from urmpipe import api
 
     target = output or Path(f"{logs[0].stem if len(logs) == 1 else logs[0].resolve().parent.name}.rrd")
-    shared = {name: options.pop(name) for name in ("robot", "base", "tool", "tsp", "derivative", "strict")}
+    robot = take_robot(options)
+    shared = {name: options.pop(name) for name in ("tsp", "derivative", "strict")}
     with progress_bar(f"Writing {target}", quiet=quiet) as progress:
-        run = api.ingest(logs, read=api.read_options(options), output=target, progress=progress, **shared)
+        run = api.ingest(
+            logs, robot=robot, read=api.read_options(options), output=target, progress=progress, **shared
+        )
     print_warnings(() if quiet else run.warnings)
     if as_json:
         print_json(run.to_dict())

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
-from urmpipe.options import OffsetType, RobotType, output_options
+from urmpipe.options import RobotType, output_options, placing_options
 
 if TYPE_CHECKING:
     from urmpipe_models.chain import Chain
@@ -29,20 +29,6 @@ def _joint_values(ctx: click.Context, param: click.Parameter, value: str | None)
     if not values or not all(map(math.isfinite, values)):
         raise click.BadParameter(f"found {value!r}, allowed: numbers in rad and m, such as 0,3.14,0.5")
     return values
-
-
-def chain_options(command: Command) -> Command:
-    """Add what places and cuts an arm: --base, --tool, --base-link, --tip."""
-    for option in (
-        click.option("--tip", metavar="LINK", help="Link of a URDF where the arm ends [default: its end]."),
-        click.option(
-            "--base-link", metavar="LINK", help="Link of a URDF where it begins [default: the root]."
-        ),
-        click.option("--tool", type=OffsetType(), help="Tool centre point in the tip's frame (m, rad)."),
-        click.option("--base", type=OffsetType(), help="Where the arm stands in the world (m, rad)."),
-    ):
-        command = option(command)
-    return command
 
 
 @click.group(short_help="List, show and export robots.")
@@ -93,7 +79,7 @@ def list_(as_json: bool, quiet: bool) -> int:
     help="Pose to draw, in rad and m [default: the start pose].",
 )
 @click.option("--picture", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw into a file, too.")
-@chain_options
+@placing_options
 @output_options
 def show(
     name: str,
@@ -126,7 +112,7 @@ def show(
         raise OptionError(f"--q: found {len(q)} values, allowed: {allowed}")
     posed = chain_at(chain, q)
     if picture is not None:
-        write_export(picture, chain_svg(posed.skeleton, f"{chain.name}: {chain.description}"), Path(name))
+        write_export(picture, chain_svg(posed.skeleton, posed.title), Path(name))
     if as_json:
         print_json(posed.to_dict())
     elif not quiet:
@@ -139,7 +125,7 @@ def show(
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="A .urdf or .toml file [default: NAME.urdf here]."
 )
-@chain_options
+@placing_options
 @output_options
 def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> int:
     """Write a robot as URDF (cylinders for its links) or as a TOML robot file.
