@@ -18,6 +18,7 @@ from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.content import Content, read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
+from urmpipe_pipeline.sources.table import release_memory
 from urmpipe_pipeline.sources.tables import PATH, TABLE, open_tables
 from urmpipe_pipeline.sources.text import fingerprint
 from urmpipe_pipeline.sources.units import UnitFinder
@@ -45,7 +46,9 @@ def read_log(
         hashed = [beside.submit(fingerprint, file) for file in files]
         plan = make_plan(tables, options, robot)
         content = read_content(plan)
-        return _joint_log(plan, content, options, robot, files, [future.result() for future in hashed])
+        log = _joint_log(plan, content, options, robot, files, [future.result() for future in hashed])
+    release_memory()
+    return log
 
 
 def _joint_log(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ctypes
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -67,16 +68,24 @@ def read_fast(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColum
     """
     import pyarrow as pa
 
-    pool = pa.system_memory_pool()
     narrow, wide = ([_scale(layout, part, exact) for part in clock] for exact in (False, True))
     for scales in (narrow,) if narrow == wide else (narrow, wide):
         try:
-            return _numbers(_parse(layout, columns, clock, scales, pool), columns, clock, scales)
+            return _numbers(_parse(layout, columns, clock, scales), columns, clock, scales)
         except (pa.ArrowInvalid, OverflowError):
             continue
-        finally:
-            pool.release_unused()  # the table's memory goes back before the arrays to come need as much
     return None
+
+
+def release_memory() -> None:
+    """Give what the parser needed back to the system, before the arrays to come need as much.
+
+    glibc keeps what threads have freed, here some 80 MB of a million rows; elsewhere nothing is done.
+    """
+    try:
+        ctypes.CDLL("libc.so.6").malloc_trim(0)
+    except (OSError, AttributeError):
+        return
 
 
 @lru_cache
@@ -104,11 +113,7 @@ def _numbers(
 
 
 def _parse(
-    layout: Layout,
-    columns: Sequence[int],
-    clock: Sequence[ClockColumn],
-    scales: Sequence[int],
-    pool: pa.MemoryPool,
+    layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn], scales: Sequence[int]
 ) -> pa.Table:
     import pyarrow as pa
     from pyarrow import csv
@@ -129,7 +134,7 @@ def _parse(
                 null_values=_nulls(),
                 decimal_point=layout.decimal if quoted_commas else ".",
             ),
-            memory_pool=pool,
+            memory_pool=pa.system_memory_pool(),  # the default one keeps what it once had
         )
 
 
