@@ -1,0 +1,93 @@
+"""Writing a file so that it is whole or not there: beside its place first, then renamed.
+
+An output replaces only a recording or a report that urmpipe wrote, and never an input.
+"""
+
+from __future__ import annotations
+
+import re
+import uuid
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Literal
+
+from urmpipe_models.errors import Finding, OutputError
+
+OutputKind = Literal["recording", "report"]
+
+GENERATOR = re.compile(rb"<meta\s+name=\"generator\"\s+content=\"urmpipe\b", re.IGNORECASE)
+"""How a report of ours tells where it comes from."""
+
+HEAD = 4096
+"""The mark of a report stands within so many bytes of its start."""
+
+
+@contextmanager
+def guarded_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> Iterator[Path]:
+    """Give a place to write an output to, and put it in its own place once it is written.
+
+    The place is a new name with the suffix .part in the same folder. It is renamed to `path` if the
+    body succeeds, and removed if it fails; an existing output is untouched until the rename.
+
+    Args:
+        path: Where the output should stand.
+        inputs: The files it is made from; those that are no files are passed over.
+        kind: What it is: only another one of the same kind is replaced.
+
+    Yields:
+        The path to write to; nothing is there yet.
+
+    Raises:
+        OutputError: If it may not be written there, or could not be.
+    """
+    _refuse(path, inputs, kind)
+    part = path.with_name(f"{path.stem[:40]}.{uuid.uuid4().hex[:12]}.part")
+    try:
+        yield part
+        part.replace(path)
+    except OSError as error:
+        raise OutputError(Finding(f"cannot be written: {error.strerror or error}", str(path))) from error
+    finally:
+        part.unlink(missing_ok=True)
+
+
+def is_report(path: Path) -> bool:
+    """Tell whether a file is a report that urmpipe wrote: its head names urmpipe as the generator."""
+    with path.open("rb") as file:
+        return GENERATOR.search(file.read(HEAD)) is not None
+
+
+def _refuse(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
+    """Raise an `OutputError` if the output may not be written there."""
+    try:
+        trouble = _trouble(path, inputs, kind)
+    except OSError as error:
+        trouble = f"cannot be written: {error.strerror or error}"
+    if trouble:
+        raise OutputError(Finding(trouble, str(path)))
+
+
+def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None:
+    """Return what speaks against writing there, or None."""
+    if path.is_dir():
+        return f"found a folder, allowed: the name of a file for the {kind}"
+    if not path.parent.is_dir():
+        return f"found no folder {path.parent}, allowed: a folder that exists"
+    if not path.exists():
+        return None
+    if any(one.exists() and path.samefile(one) for one in inputs):
+        return f"found an input of this command, allowed: any other name for the {kind}"
+    if not path.is_file() or not _is_ours(path, kind):
+        return (
+            f"found a file that is no {kind} of urmpipe's, allowed: a new name, or such a {kind} to replace"
+        )
+    return None
+
+
+def _is_ours(path: Path, kind: OutputKind) -> bool:
+    if kind == "report":
+        return is_report(path)
+    from urmpipe_pipeline.recording.identity import is_ours
+
+    return is_ours(path)

@@ -1,0 +1,191 @@
+"""Send what the viewer draws: series with names and colours, tolerance lines, events, arm and paths."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from urmpipe_pipeline.joint_log import IntArray
+from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, rgb
+from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, entity_path, places_of, printable
+from urmpipe_pipeline.recording.scene import Arm, Scene, Way
+from urmpipe_pipeline.recording.summary import summary
+from urmpipe_pipeline.results import Comparison, Deviation, Run
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream, TimeColumn
+
+LINK_RADIUS, JOINT_RADIUS, POINT_RADIUS = 0.012, 0.022, 0.018
+WANTED_RADIUS, DONE_RADIUS = 0.0065, 0.0035
+"""Sizes in the 3D view, as shares of the radius of everything in it."""
+
+STRIPS = 256
+"""Poses of the skeleton sent at a time: decoding a chunk of strips takes time by the square of its rows."""
+
+LINE_WIDTH, LIMIT_WIDTH = 2.0, 1.5
+"""Width of a series, and of a tolerance, in points of the screen."""
+
+LINK_COLOUR = "#c8d0d4"
+"""The links of the arm: neutral, so that the joints stand out in their own colours."""
+
+
+def time_columns(
+    t_ns: IntArray, name: str | None = None, numbers: IntArray | None = None
+) -> list[TimeColumn]:
+    """Return the time columns: t in integer [ns], and a sequence if one is named.
+
+    Rerun truncates seconds given as floats, which puts some times off by a nanosecond; integers are exact.
+    """
+    import rerun as rr
+
+    columns = [rr.TimeColumn("t", duration=t_ns.astype("timedelta64[ns]"))]
+    if name is not None and numbers is not None:
+        columns.append(rr.TimeColumn(name, sequence=numbers))
+    return columns
+
+
+def draw(stream: RecordingStream, result: Run | Comparison, every: Sequence[Block], scene: Scene) -> None:
+    """Send everything that is there to be looked at."""
+    import rerun as rr
+
+    stream.log(SUMMARY, rr.TextDocument(summary(result), media_type="text/markdown"), static=True)
+    _draw_styles(stream, every)
+    standing = places_of(result)
+    if isinstance(result, Run):
+        _draw_events(stream, standing[0], result)
+    else:
+        _draw_tolerance(stream, result)
+        for place, one in zip(standing, result.runs, strict=True):
+            _draw_events(stream, place, one.run, f"{printable(one.name)}: " if len(standing) > 1 else "")
+            _draw_worst(stream, place, one)
+    _draw_scene(stream, scene)
+
+
+def _draw_styles(stream: RecordingStream, every: Sequence[Block]) -> None:
+    """Give every series its name and its colour."""
+    import rerun as rr
+
+    for block in every:
+        if block.names:
+            style = rr.SeriesLines(
+                colors=[rgb(colour) for colour in block.colours],
+                names=list(block.names),
+                widths=[LINE_WIDTH] * len(block.names),
+                # Where samples are closer than pixels, the default draws their mean: peaks would vanish.
+                aggregation_policy=rr.components.AggregationPolicy.MinMax,
+            )
+            stream.log(block.entity, style, static=True)
+
+
+def _draw_tolerance(stream: RecordingStream, result: Comparison) -> None:
+    """Draw what is allowed as lines over the compared times: both signs for an axis, one for the norm."""
+    import rerun as rr
+
+    ends = _ends([one.t_ns for one in result.runs])
+    numbers = _ends([one.sample for one in result.runs])
+    for quantity, limit in result.tolerance.items():
+        signs = (1, -1) if quantity != "norm" else (1,)
+        colour = rgb(AXIS_COLOURS.get(quantity, REFERENCE_COLOUR))
+        what = "tolerance" if quantity == "axis" else f"tolerance of {quantity}"
+        names = [f"{'+' if sign > 0 else '-'}{what}" for sign in signs]
+        entity = entity_path("delta", "tolerance", quantity)
+        style = rr.SeriesLines(colors=[colour] * len(signs), names=names, widths=[LIMIT_WIDTH] * len(signs))
+        stream.log(entity, style, static=True)
+        values = np.array([[sign * limit for sign in signs]] * len(ends))
+        stream.send_columns(entity, time_columns(ends, "sample", numbers), rr.Scalars.columns(scalars=values))
+
+
+def _ends(ranges: Sequence[IntArray]) -> IntArray:
+    """Return the least and the largest number in all of the ranges."""
+    return np.array([min(int(one[0]) for one in ranges), max(int(one[-1]) for one in ranges)], dtype=np.int64)
+
+
+def _draw_events(stream: RecordingStream, place: Place, run: Run, label: str = "") -> None:
+    """List the repolarizations at their instants and the warnings at their rows, or at the first."""
+    turns = [
+        f"{label}{printable(one.joint)} repolarized in row {one.row}: step {one.step:+.4f} rad,"
+        f" {one.before:+d} to {one.after:+d} turns, +-{1e3 * one.half_period:.3g} ms"
+        for one in run.repolarizations
+    ]
+    t_ns = np.array([round(one.t * 1e9) for one in run.repolarizations], dtype=np.int64)
+    _draw_text(stream, f"{place.prefix}events/repolarization", t_ns, turns, "INFO")
+    said = [
+        f"{label}{printable(one.kind)}{f' in row {one.row}' if one.row else ''}: {printable(one.message)}"
+        for one in run.warnings
+    ]
+    rows = np.clip([(one.row or 1) - 1 for one in run.warnings], 0, run.log.rows - 1).astype(np.int64)
+    _draw_text(stream, f"{place.prefix}events/warning", run.log.t_ns[rows], said, "WARN")
+
+
+def _draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
+    """List where the deviation is largest: a click on it brings the viewer there."""
+    worst = one.worst
+    x, y, z, norm = (1e3 * float(value) for value in one.delta[worst])
+    said = f"largest deviation of {printable(one.name)}: {norm:.3f} mm (x {x:.3f}, y {y:.3f}, z {z:.3f})"
+    level = "INFO" if one.verdict == "pass" else "ERROR"
+    _draw_text(stream, f"{place.prefix}events/deviation", one.t_ns[worst : worst + 1], [said], level)
+
+
+def _draw_text(
+    stream: RecordingStream, entity: str, t_ns: IntArray, texts: Sequence[str], level: str
+) -> None:
+    """Send lines of the list of events, each beginning with its time: the list's own column is too narrow."""
+    import rerun as rr
+
+    if not texts:
+        return
+    lines = [f"{at / 1e9:.4f} s  {text}" for at, text in zip(t_ns.tolist(), texts, strict=True)]
+    columns = rr.TextLog.columns(text=lines, level=[level] * len(lines))
+    stream.send_columns(entity, time_columns(t_ns), columns)
+
+
+def _draw_scene(stream: RecordingStream, scene: Scene) -> None:
+    import rerun as rr
+
+    if scene.empty:
+        return
+    stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    size = scene.ball()[1]
+    for way in scene.ways:
+        _draw_way(stream, way, size)
+    if scene.arm is not None:
+        _draw_arm(stream, scene.arm, size)
+
+
+def _draw_arm(stream: RecordingStream, arm: Arm, size: float) -> None:
+    """Draw the skeleton: a line through the points, a ball at each in the colour of its joint."""
+    import rerun as rr
+
+    skeleton = arm.skeleton.astype(np.float32)
+    count, points = skeleton.shape[:2]
+    links = rr.LineStrips3D.from_fields(colors=[rgb(LINK_COLOUR)], radii=[LINK_RADIUS * size])
+    stream.log("/robot/links", links, static=True)
+    for start in range(0, count, STRIPS):
+        rows = slice(start, start + STRIPS)
+        times = time_columns(arm.t_ns[rows], "sample", arm.sample[rows])
+        stream.send_columns("/robot/links", times, rr.LineStrips3D.columns(strips=skeleton[rows]))
+    joints = rr.Points3D.from_fields(
+        colors=[rgb(colour) for colour in arm.colours], radii=[JOINT_RADIUS * size]
+    )
+    stream.log("/robot/joints", joints, static=True)
+    columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3)).partition(np.full(count, points))
+    stream.send_columns("/robot/joints", time_columns(arm.t_ns, "sample", arm.sample), columns)
+
+
+def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:
+    """Draw a path as lines, broad if it is what was asked for, and the point that moves on it."""
+    import rerun as rr
+
+    colour = rgb(way.colour)
+    radius = (WANTED_RADIUS if way.wanted else DONE_RADIUS) * size
+    lines = rr.LineStrips3D(
+        [strip.astype(np.float32) for strip in way.strips], colors=[colour], radii=[radius]
+    )
+    stream.log(way.path, lines, static=True)
+    style = rr.Points3D.from_fields(colors=[colour], radii=[POINT_RADIUS * size])
+    stream.log(way.point, style, static=True)
+    track = way.track
+    columns = rr.Points3D.columns(positions=track.position.astype(np.float32))
+    stream.send_columns(way.point, time_columns(track.t_ns, "sample", track.sample), columns)

@@ -1,0 +1,215 @@
+"""What stands where in a recording: one table for the writer and the reader.
+
+A run stands at the root; of a comparison the first run does, and each further one below runs/<key>/.
+
+    joints/raw, raw_velocity, raw_acceleration                  the file's own rows: timelines t and row
+    tcp/raw_position, raw_quat_xyzw
+    joints/repolarized, velocity, acceleration                  the grid: timelines t and sample
+    tcp/recorded, position, velocity, acceleration, euler_zyx, singular
+    delta/<key>, matched/<key>/reference, actual, outside       the compared samples: t and sample
+    reference/position                                          the reference on its own times: t
+
+Everything is in SI: [rad] or [m] and their derivatives, times in integer [ns]. joints/raw and
+joints/repolarized always stand, with no value a row for a log without joints: they carry the times.
+Flags (tcp/singular, matched/<key>/outside) stand only at the samples where they are true.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
+from urmpipe_pipeline.results import AXES, Comparison, Deviation, Run, Trajectory
+
+LAYOUT_VERSION = 1
+"""Raised when an older reader would misunderstand a newer recording."""
+
+Series = Literal["joints", "xyz", "quat", "euler", "delta", "flag"]
+"""What the columns of an entity are."""
+
+LOG_ARRAYS: dict[str, tuple[str, Series]] = {
+    "joints/raw": ("q", "joints"),
+    "joints/raw_velocity": ("qd", "joints"),
+    "joints/raw_acceleration": ("qdd", "joints"),
+    "tcp/raw_position": ("tcp_position", "xyz"),
+    "tcp/raw_quat_xyzw": ("tcp_quat_xyzw", "quat"),
+}
+"""Entity: attribute of `JointLog`, and what its columns are."""
+
+GRID_ARRAYS: dict[str, tuple[str, Series]] = {
+    "joints/repolarized": ("q", "joints"),
+    "joints/velocity": ("qd", "joints"),
+    "joints/acceleration": ("qdd", "joints"),
+    "tcp/recorded": ("tcp_recorded", "xyz"),
+}
+"""Entity: attribute of `Run`."""
+
+TCP_ARRAYS: dict[str, tuple[str, Series]] = {
+    "tcp/position": ("position", "xyz"),
+    "tcp/velocity": ("velocity", "xyz"),
+    "tcp/acceleration": ("acceleration", "xyz"),
+    "tcp/euler_zyx": ("euler_zyx", "euler"),
+}
+"""Entity: attribute of `PointLog`."""
+
+SINGULAR = "tcp/singular"
+REFERENCE = "reference/position"
+SUMMARY = "/summary"
+
+RESERVED = ("reference", "recorded", "tolerance")
+"""Names below path/, point/ and delta/ that are no run's."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Block:
+    """One array with its times: what one entity holds.
+
+    Attributes:
+        entity: Its path, escaped, from the root.
+        t_ns: Time of each row in integer [ns], shape (n,).
+        values: In SI, shape (n, k).
+        series: What the columns are.
+        names: Name of each column.
+        numbers: Name of the second timeline and its values, shape (n,); None without one.
+        worst: Row that is verified besides the first and the last, or None.
+    """
+
+    entity: str
+    t_ns: IntArray
+    values: FloatArray
+    series: Series
+    names: tuple[str, ...]
+    numbers: tuple[str, IntArray] | None = None
+    worst: int | None = None
+
+    @property
+    def verified(self) -> tuple[int, ...]:
+        """The rows that are read back: the first, the last, and the worst where there is one."""
+        ends = (0, len(self.t_ns) - 1) if len(self.t_ns) else ()
+        return ends if self.worst is None else (*ends, self.worst)
+
+    @property
+    def colours(self) -> list[str]:
+        """The colour of each column as #rrggbb."""
+        if self.series == "joints":
+            return [joint_colour(j) for j in range(len(self.names))]
+        palette = [*AXIS_COLOURS.values(), *JOINT_COLOURS]
+        return palette[: len(self.names)]
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """Where a run stands in a recording.
+
+    Attributes:
+        key: Its name as part of an entity path, unescaped, unique in the recording.
+        prefix: What stands before the entities of its log and grid: "/" or "/runs/<key>/".
+    """
+
+    key: str
+    prefix: str
+
+    def named(self, root: str, leaf: str | None = None) -> str:
+        """Return the entity of this run below a common root, such as /delta/<key>."""
+        return entity_path(root, self.key, *([leaf] if leaf else []))
+
+
+def entity_path(*parts: str) -> str:
+    """Return the path of an entity from the root, each part escaped as Rerun wants it."""
+    import rerun as rr
+
+    return rr.new_entity_path(list(parts))
+
+
+def places(names: Sequence[str]) -> list[Place]:
+    """Return where the runs with these names stand: the first at the root."""
+    keys: list[str] = []
+    for name in names:
+        plain = printable(name) or "unnamed"
+        key, number = plain, 2
+        while key in keys or key in RESERVED:
+            key, number = f"{plain} ({number})", number + 1
+        keys.append(key)
+    return [Place(key, "/" if i == 0 else entity_path("runs", key) + "/") for i, key in enumerate(keys)]
+
+
+def places_of(result: Run | Comparison) -> list[Place]:
+    """Return where the runs of a result stand."""
+    return places([result.name] if isinstance(result, Run) else [one.name for one in result.runs])
+
+
+def printable(text: str) -> str:
+    """Return a text without the lone surrogates that stand for undecodable bytes of a file name."""
+    return text.encode("utf-8", "replace").decode("utf-8")
+
+
+def blocks(result: Run | Comparison) -> list[Block]:
+    """Return every array of a result with its place, in the order of writing."""
+    standing = places_of(result)
+    if isinstance(result, Run):
+        return list(_run_blocks(result, standing[0]))
+    found = [_reference_block(result.reference)]
+    for place, deviation in zip(standing, result.runs, strict=True):
+        found += _run_blocks(deviation.run, place)
+        found += _deviation_blocks(deviation, place)
+    return found
+
+
+def _run_blocks(run: Run, place: Place) -> Iterator[Block]:
+    log, joints = run.log, tuple(printable(name) for name in run.log.joints)
+    count = np.arange(max(log.rows, len(run.t_ns)) + 1)  # for both: a million numbers are 8 MB
+    rows, samples = ("row", count[1 : log.rows + 1]), ("sample", count[: len(run.t_ns)])
+    for entity, (attribute, series) in LOG_ARRAYS.items():
+        if (values := getattr(log, attribute)) is not None:
+            yield _block(place.prefix + entity, log.t_ns, values, series, joints, rows)
+    for entity, (attribute, series) in GRID_ARRAYS.items():
+        if (values := getattr(run, attribute)) is not None:
+            yield _block(place.prefix + entity, run.t_ns, values, series, joints, samples)
+    if run.tcp is not None:
+        for entity, (attribute, series) in TCP_ARRAYS.items():
+            values = getattr(run.tcp, attribute)
+            yield _block(place.prefix + entity, run.t_ns, values, series, joints, samples)
+        yield from _flags(place.prefix + SINGULAR, run.tcp.singular, run.t_ns, samples[1])
+
+
+def _deviation_blocks(one: Deviation, place: Place) -> Iterator[Block]:
+    samples = ("sample", one.sample)
+    yield Block(place.named("delta"), one.t_ns, one.delta, "delta", AXES, samples, one.worst)
+    for leaf, values in (("reference", one.reference), ("actual", one.actual)):
+        yield Block(place.named("matched", leaf), one.t_ns, values, "xyz", AXES[:3], samples, one.worst)
+    yield from _flags(place.named("matched", "outside"), one.outside, one.t_ns, one.sample)
+
+
+def _reference_block(reference: Trajectory) -> Block:
+    return Block("/" + REFERENCE, reference.t_ns, reference.position, "xyz", AXES[:3])
+
+
+def _block(
+    entity: str,
+    t_ns: IntArray,
+    values: FloatArray,
+    series: Series,
+    joints: tuple[str, ...],
+    numbers: tuple[str, IntArray],
+) -> Block:
+    names = {
+        "joints": joints,
+        "xyz": ("x", "y", "z"),
+        "quat": ("x", "y", "z", "w"),
+        "euler": ("rz", "ry", "rx"),
+    }
+    return Block(entity, t_ns, values, series, names[series], numbers)
+
+
+def _flags(
+    entity: str, flags: np.ndarray[tuple[int], np.dtype[np.bool_]], t_ns: IntArray, sample: IntArray
+) -> Iterator[Block]:
+    """Yield a block of ones at the samples where a flag is true, if it is anywhere."""
+    true = np.flatnonzero(flags)
+    if len(true):
+        yield Block(entity, t_ns[true], np.ones((len(true), 1)), "flag", ("true",), ("sample", sample[true]))

@@ -1,0 +1,201 @@
+"""Everything of a result that is not an array, as JSON and back.
+
+The JSON is what Python's json module writes: floats survive bit for bit, and the few values that JSON
+itself lacks stand as NaN and Infinity. Options come back as JSON has them: a tuple as a list.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from urmpipe_models.chain import Chain
+from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, SourceFile
+from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, Block, Place, places_of
+from urmpipe_pipeline.results import (
+    Comparison,
+    Deviation,
+    Provenance,
+    Repolarization,
+    Run,
+    Statistics,
+    Trajectory,
+)
+
+if TYPE_CHECKING:
+    from _typeshed import DataclassInstance
+
+
+def to_json(result: Run | Comparison, blocks: list[Block]) -> str:
+    """Return the metadata of a result as JSON, with the shape of every array that belongs to it."""
+    standing = places_of(result)
+    document = {
+        "layout_version": LAYOUT_VERSION,
+        "kind": "run" if isinstance(result, Run) else "comparison",
+        "arrays": {block.entity: list(block.values.shape) for block in blocks},
+        "result": _run(result, standing[0]) if isinstance(result, Run) else _comparison(result, standing),
+    }
+    return json.dumps(document, default=_plain)
+
+
+def provenance_from(data: Mapping[str, Any]) -> Provenance:
+    """Return the provenance that a JSON object tells of."""
+    return Provenance(**{**data, "inputs": _files(data["inputs"])})
+
+
+def log_fields(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a `JointLog` that are no arrays."""
+    return {
+        **data,
+        "files": _files(data["files"]),
+        "joints": tuple(data["joints"]),
+        "inferences": tuple(Inference(**one) for one in data["inferences"]),
+        "warnings": _warnings(data["warnings"]),
+    }
+
+
+def run_fields(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a `Run` that are no arrays, its log apart."""
+    return {
+        "name": data["name"],
+        "tsp": data["tsp"],
+        "robot": _robot(data["robot"]),
+        "repolarizations": tuple(Repolarization(**one) for one in data["repolarizations"]),
+        "warnings": _warnings(data["warnings"]),
+        "provenance": provenance_from(data["provenance"]),
+    }
+
+
+def deviation_fields(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a `Deviation` that are no arrays, its run apart."""
+    return {
+        "name": data["name"],
+        "sync_offset": data["sync_offset"],
+        "left_out": data["left_out"],
+        "statistics": {name: Statistics(**one) for name, one in data["statistics"].items()},
+        "start": tuple(data["start"]),
+        "verdict": data["verdict"],
+    }
+
+
+def comparison_fields(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a `Comparison` that are no arrays, its reference and runs apart."""
+    return {
+        "name": data["name"],
+        "tolerance": data["tolerance"],
+        "warnings": _warnings(data["warnings"]),
+        "provenance": provenance_from(data["provenance"]),
+    }
+
+
+def reference_fields(data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of the reference `Trajectory` that are no arrays."""
+    return {"name": data["name"], "files": _files(data["files"])}
+
+
+def _run(run: Run, place: Place) -> dict[str, Any]:
+    return {
+        "place": _flat(place),
+        "name": run.name,
+        "tsp": run.tsp,
+        "robot": _robot_data(run.robot),
+        "repolarizations": [_flat(one) for one in run.repolarizations],
+        "warnings": [_flat(one) for one in run.warnings],
+        "provenance": _provenance(run.provenance),
+        "log": _log(run.log),
+    }
+
+
+def _log(log: JointLog) -> dict[str, Any]:
+    return {
+        "name": log.name,
+        "source": log.source,
+        "files": [_flat(one) for one in log.files],
+        "joints": list(log.joints),
+        "clock_start": log.clock_start,
+        "first_line": log.first_line,
+        "units": dict(log.units),
+        "digits": log.digits,
+        "inferences": [_flat(one) for one in log.inferences],
+        "warnings": [_flat(one) for one in log.warnings],
+    }
+
+
+def _comparison(result: Comparison, standing: list[Place]) -> dict[str, Any]:
+    return {
+        "name": result.name,
+        "reference": _reference(result.reference),
+        "runs": [_deviation(one, place) for one, place in zip(result.runs, standing, strict=True)],
+        "tolerance": dict(result.tolerance),
+        "warnings": [_flat(one) for one in result.warnings],
+        "provenance": _provenance(result.provenance),
+    }
+
+
+def _reference(reference: Trajectory) -> dict[str, Any]:
+    return {"name": reference.name, "files": [_flat(one) for one in reference.files]}
+
+
+def _deviation(one: Deviation, place: Place) -> dict[str, Any]:
+    return {
+        "name": one.name,
+        "sync_offset": one.sync_offset,
+        "left_out": one.left_out,
+        "statistics": {name: _flat(values) for name, values in one.statistics.items()},
+        "start": list(one.start),
+        "verdict": one.verdict,
+        "run": _run(one.run, place),
+    }
+
+
+def _provenance(provenance: Provenance) -> dict[str, Any]:
+    return {
+        "command": provenance.command,
+        "options": dict(provenance.options),
+        "inputs": [_flat(one) for one in provenance.inputs],
+        "versions": dict(provenance.versions),
+        "created": provenance.created,
+    }
+
+
+def _robot_data(robot: Chain | None) -> dict[str, Any] | None:
+    if robot is None:
+        return None
+    from urmpipe_models.robot_file import chain_to_dict
+
+    return chain_to_dict(robot)
+
+
+def _robot(data: Mapping[str, Any] | None) -> Chain | None:
+    if data is None:
+        return None
+    from urmpipe_models.robot_file import chain_from_dict
+
+    return chain_from_dict(data)
+
+
+def _files(data: list[dict[str, Any]]) -> tuple[SourceFile, ...]:
+    return tuple(SourceFile(**one) for one in data)
+
+
+def _warnings(data: list[dict[str, Any]]) -> tuple[LogWarning, ...]:
+    return tuple(LogWarning(**one) for one in data)
+
+
+def _flat(item: DataclassInstance) -> dict[str, Any]:
+    """Return a dataclass of plain values as a dictionary, without the deep copies of `asdict`."""
+    return {field.name: getattr(item, field.name) for field in fields(item)}
+
+
+def _plain(value: Any) -> Any:
+    """Return what JSON can hold of a path, a mapping or a NumPy number or array."""
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, Mapping):
+        return dict(value)
+    if hasattr(value, "tolist"):
+        return value.tolist()
+    raise TypeError(f"found {type(value).__name__} in the metadata, allowed: what JSON can hold")

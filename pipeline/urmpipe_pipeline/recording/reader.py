@@ -1,0 +1,146 @@
+"""Read a recording back: every array bit for bit, and all metadata."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.errors import RecordingError
+from urmpipe_models.kinematics import PointLog
+from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
+from urmpipe_pipeline.recording import metadata
+from urmpipe_pipeline.recording.entities import (
+    GRID_ARRAYS,
+    LAYOUT_VERSION,
+    LOG_ARRAYS,
+    REFERENCE,
+    SINGULAR,
+    TCP_ARRAYS,
+    Place,
+)
+from urmpipe_pipeline.recording.store import Chunk, Store
+from urmpipe_pipeline.results import Comparison, Deviation, Run, Trajectory
+
+Data: TypeAlias = Mapping[str, Any]
+
+
+def read_recording(path: Path) -> Run | Comparison:
+    """Return the run or the comparison that a recording holds.
+
+    The runs inside a comparison come back without the file that they once stood in.
+
+    Args:
+        path: A recording (.rrd) that urmpipe wrote.
+
+    Raises:
+        RecordingError: If it is no recording, was cut off, is not of urmpipe, or of a newer layout.
+    """
+    store = Store(path)
+    document = _document(store)
+    try:
+        arrays = _Arrays(store, document["arrays"])
+        if document["kind"] == "run":
+            return _run(arrays, document["result"], path)
+        return _comparison(arrays, document["result"], path)
+    except (KeyError, TypeError, AttributeError) as error:
+        raise _damaged(store, error) from error
+
+
+class _Arrays:
+    """The arrays of a recording, each with the shape that the metadata tell."""
+
+    def __init__(self, store: Store, shapes: Data) -> None:
+        self._store = store
+        self._shapes = shapes
+
+    def chunk(self, entity: str) -> Chunk:
+        """Return an array with its times."""
+        rows, width = self._shapes[entity]
+        chunk = self._store.read(entity, width)
+        if chunk.values.shape != (rows, width):
+            found = " x ".join(map(str, chunk.values.shape))
+            raise self._store.error(
+                f"found {found} values in {entity}, allowed: {rows} x {width}, as were written"
+            )
+        return chunk
+
+    def table(self, prefix: str, places: Mapping[str, tuple[str, Any]]) -> dict[str, FloatArray | None]:
+        """Return the arrays of a table of `entities` by attribute, None for those that are not there."""
+        return {
+            attribute: self.chunk(prefix + entity).values if prefix + entity in self._shapes else None
+            for entity, (attribute, _) in places.items()
+        }
+
+    def flags(self, entity: str, sample: IntArray) -> NDArray[np.bool_]:
+        """Return flags at the samples given: those that stand are true."""
+        true = self.chunk(entity).numbers if entity in self._shapes else None
+        return np.zeros(len(sample), np.bool_) if true is None else np.isin(sample, true)
+
+
+def _run(arrays: _Arrays, data: Data, path: Path | None) -> Run:
+    place = Place(**data["place"])
+    rows = arrays.chunk(f"{place.prefix}joints/raw")
+    grid = arrays.chunk(f"{place.prefix}joints/repolarized")
+    log: dict[str, Any] = {**metadata.log_fields(data["log"]), **arrays.table(place.prefix, LOG_ARRAYS)}
+    run: dict[str, Any] = {**metadata.run_fields(data), **arrays.table(place.prefix, GRID_ARRAYS)}
+    tcp: dict[str, Any] = arrays.table(place.prefix, TCP_ARRAYS)
+    singular = arrays.flags(place.prefix + SINGULAR, np.arange(len(grid.t_ns)))
+    return Run(
+        **run,
+        log=JointLog(**log, t_ns=rows.t_ns),
+        t_ns=grid.t_ns,
+        tcp=None if tcp["position"] is None else PointLog(**tcp, singular=singular),
+        recording=path,
+    )
+
+
+def _comparison(arrays: _Arrays, data: Data, path: Path) -> Comparison:
+    wanted = arrays.chunk(f"/{REFERENCE}")
+    return Comparison(
+        **metadata.comparison_fields(data),
+        reference=Trajectory(
+            **metadata.reference_fields(data["reference"]), t_ns=wanted.t_ns, position=wanted.values
+        ),
+        runs=tuple(_deviation(arrays, one) for one in data["runs"]),
+        recording=path,
+    )
+
+
+def _deviation(arrays: _Arrays, data: Data) -> Deviation:
+    place = Place(**data["run"]["place"])
+    delta = arrays.chunk(place.named("delta"))
+    sample = np.empty(0, np.int64) if delta.numbers is None else delta.numbers
+    return Deviation(
+        **metadata.deviation_fields(data),
+        run=_run(arrays, data["run"], None),
+        sample=sample,
+        t_ns=delta.t_ns,
+        reference=arrays.chunk(place.named("matched", "reference")).values,
+        actual=arrays.chunk(place.named("matched", "actual")).values,
+        delta=delta.values,
+        outside=arrays.flags(place.named("matched", "outside"), sample),
+    )
+
+
+def _document(store: Store) -> dict[str, Any]:
+    """Return the metadata, of a layout that is known."""
+    try:
+        document: dict[str, Any] = json.loads(store.metadata)
+        version = document["layout_version"]
+        newer = version > LAYOUT_VERSION
+    except (ValueError, KeyError, TypeError) as error:
+        raise _damaged(store, error) from error
+    if newer:
+        raise store.error(
+            f"found layout version {version}, allowed: up to {LAYOUT_VERSION}; a newer urmpipe wrote it"
+        )
+    return document
+
+
+def _damaged(store: Store, error: Exception) -> RecordingError:
+    return store.error(f"found damaged metadata ({error!r}), allowed: what urmpipe wrote")

@@ -1,0 +1,303 @@
+"""What is written is read back: every array bit for bit, and all metadata."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from urmpipe_models.errors import OutputError
+from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
+from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.results import Comparison, Provenance, Run
+
+MakeRun = Callable[..., Run]
+MakeComparison = Callable[..., Comparison]
+
+
+def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
+    """Hold two results against each other: arrays by dtype, shape and bits, the rest by value."""
+    if isinstance(wanted, np.ndarray):
+        assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape), place
+        assert found.tobytes() == wanted.tobytes(), place
+    elif is_dataclass(wanted) and not isinstance(wanted, type):
+        assert type(found) is type(wanted), place
+        for field in fields(wanted):
+            if field.name != "recording":  # where it stands: not a part of what is recorded
+                assert_same(getattr(found, field.name), getattr(wanted, field.name), f"{place}.{field.name}")
+    elif isinstance(wanted, Mapping):
+        assert list(found) == list(wanted), place
+        for key, value in wanted.items():
+            assert_same(found[key], value, f"{place}[{key!r}]")
+    elif isinstance(wanted, tuple):
+        assert isinstance(found, tuple), place
+        assert len(found) == len(wanted), place
+        for i, (one, other) in enumerate(zip(found, wanted, strict=True)):
+            assert_same(one, other, f"{place}[{i}]")
+    else:
+        assert found == wanted, place
+
+
+def round_trip(result: Run | Comparison, folder: Path) -> Run | Comparison:
+    path = folder / "result.rrd"
+    assert write_recording(result, path) == path
+    back = read_recording(path)
+    assert back.recording == path
+    assert [one.name for one in folder.iterdir()] == ["result.rrd"]
+    return back
+
+
+def full(run: Run) -> Run:
+    """Return a run with every array that a log can have, with missing and odd values in them."""
+    rng = np.random.default_rng(7)
+    count = run.log.rows
+    q = run.log.q.copy()
+    q[3, 2], q[4, 0] = np.nan, -0.0
+    assert run.tcp is not None
+    recorded = run.tcp.position + rng.normal(0.0, 1e-3, (count, 3))
+    recorded[count // 2] = np.nan
+    singular = np.zeros(count, dtype=np.bool_)
+    singular[[0, count // 3, count - 1]] = True
+    log = replace(
+        run.log, q=q, qd=run.qd * 1.001, qdd=run.qdd * 0.999, tcp_position=recorded,
+        tcp_quat_xyzw=rng.normal(size=(count, 4)),
+    )  # fmt: skip
+    return replace(run, log=log, tcp_recorded=recorded, tcp=replace(run.tcp, singular=singular))
+
+
+def test_a_run_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run()
+    assert len(run.repolarizations) >= 2
+    assert_same(round_trip(run, tmp_path), run)
+
+
+def test_a_run_with_every_array_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    run = full(make_run())
+    assert_same(round_trip(run, tmp_path), run)
+
+
+def test_a_long_run_comes_back_in_the_order_of_time(make_run: MakeRun, tmp_path: Path) -> None:
+    run = full(make_run(rows=140_000))  # three slices: the first and the last are sent before the other
+    assert_same(round_trip(run, tmp_path), run)
+
+
+def test_a_run_without_a_robot_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    run = replace(make_run(), robot=None, tcp=None)
+    assert_same(round_trip(run, tmp_path), run)
+
+
+def test_a_run_on_another_grid_than_its_rows_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=1000)
+    rows = np.r_[0:400, 401:1000:3]
+    log = replace(run.log, t_ns=run.log.t_ns[rows] + np.arange(len(rows)) % 7, q=run.log.q[rows])
+    run = replace(run, log=log)
+    assert_same(round_trip(run, tmp_path), run)
+
+
+def test_a_run_of_one_row_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=1)
+    assert_same(round_trip(run, tmp_path), run)
+
+
+def path_run(run: Run) -> Run:
+    """Return a path: the positions of a run, without joints."""
+    assert run.tcp is not None
+    none = np.empty((run.log.rows, 0))
+    log = replace(run.log, joints=(), q=none, units={}, tcp_position=run.tcp.position)
+    return replace(
+        run, log=log, robot=None, q=none, qd=none, qdd=none, tcp=None, tcp_recorded=run.tcp.position,
+        repolarizations=(),
+    )  # fmt: skip
+
+
+def test_a_path_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    run = path_run(make_run())
+    assert_same(round_trip(run, tmp_path), run)
+
+
+def test_a_log_of_times_alone_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    run = path_run(make_run(rows=20))
+    run = replace(run, log=replace(run.log, tcp_position=None), tcp_recorded=None)
+    assert_same(round_trip(run, tmp_path), run)
+
+
+def test_a_grid_without_any_value_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=30)
+    assert run.tcp is not None
+    nothing = {field.name: np.full((30, 3), np.nan) for field in fields(run.tcp) if field.name != "singular"}
+    run = replace(run, q=np.full_like(run.q, np.nan), tcp=replace(run.tcp, **nothing))
+    assert_same(round_trip(run, tmp_path), run)
+
+
+def test_a_comparison_comes_back_as_it_was(make_comparison: MakeComparison, tmp_path: Path) -> None:
+    comparison = make_comparison(("coppeliasim", "matlab", "solidworks"))
+    assert [one.verdict for one in comparison.runs] == ["pass", "pass", "fail"]
+    assert comparison.runs[2].outside.any()
+    assert_same(round_trip(comparison, tmp_path), comparison)
+
+
+def test_a_comparison_with_samples_left_out_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run()
+    assert run.tcp is not None
+    position = run.tcp.position.copy()
+    position[[0, 5, 6, 700]] = np.nan
+    run = replace(run, tcp=replace(run.tcp, position=position))
+    comparison = compare_runs(path_run(make_run(rows=1400)), [run], CompareOptions(sync_offset=-0.1))
+    assert comparison.runs[0].left_out == 101  # 20 before and 80 after the path, one NaN
+    assert_same(round_trip(comparison, tmp_path), comparison)
+
+
+def test_a_log_against_itself_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
+    comparison = compare_recorded(full(make_run()))
+    assert_same(round_trip(comparison, tmp_path), comparison)
+
+
+NAMES = (
+    "a b/c.d",
+    "reference",
+    "tolerance",
+    "recorded",
+    "",
+    "",
+    "Straße 7 Ω",
+    "x\udc80y",
+    "x?y",
+    "+ /**",
+    "..",
+    "a\n\\b",
+)
+
+
+def test_runs_may_have_any_names(make_run: MakeRun, tmp_path: Path) -> None:
+    wanted = compare_runs(make_run("reference", 40), [make_run(f"run {i}", 40) for i in range(len(NAMES))])
+    named = tuple(
+        replace(one, name=name, run=replace(one.run, name=name))
+        for one, name in zip(wanted.runs, NAMES, strict=True)
+    )
+    comparison = replace(wanted, name="x\udc80y", runs=named)
+    assert_same(round_trip(comparison, tmp_path), comparison)
+
+
+ODD = st.text(st.characters(exclude_categories=[]), max_size=12)
+NUMBERS = st.floats(allow_nan=False)
+OPTIONS = st.recursive(
+    st.none() | st.booleans() | st.integers() | NUMBERS | ODD,
+    lambda inner: st.lists(inner, max_size=3) | st.dictionaries(ODD, inner, max_size=3),
+    max_leaves=5,
+)
+
+
+@settings(max_examples=30, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    texts=st.lists(ODD, min_size=10, max_size=10),
+    joints=st.lists(ODD, min_size=6, max_size=6, unique=True),
+    options=st.dictionaries(ODD, OPTIONS, max_size=3),
+    number=NUMBERS,
+    row=st.none() | st.integers(-3, 10**12),
+)
+def test_metadata_of_any_text_come_back(
+    make_run: MakeRun,
+    tmp_path: Path,
+    texts: list[str],
+    joints: list[str],
+    options: dict[str, Any],
+    number: float,
+    row: int | None,
+) -> None:
+    name, source, kind, message, file, what, value, unit, command, created = texts
+    run = make_run(rows=3)
+    log = replace(
+        run.log, name=name, source=source, files=(SourceFile(file, what, 2**40),), joints=tuple(joints),
+        clock_start=number, first_line=9, units=dict.fromkeys(joints, unit), digits=None,
+        inferences=(Inference(what, value, message),), warnings=(LogWarning(kind, message, row),),
+    )  # fmt: skip
+    run = replace(
+        run, name=name, log=log, tsp=abs(number), warnings=log.warnings,
+        provenance=Provenance(command, options, log.files, {unit: value}, created),
+    )  # fmt: skip
+    path = tmp_path / "odd.rrd"
+    assert_same(read_recording(write_recording(run, path)), run)
+
+
+def test_options_come_back_as_json_has_them(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=3)
+    options = {"file": Path("a/b.toml"), "range": (1, 2.5), "n": np.int64(3), "tool": np.array([0.0, 0.1])}
+    run = replace(run, provenance=replace(run.provenance, options=options))
+    back = round_trip(run, tmp_path)
+    assert back.provenance.options == {
+        "file": str(Path("a/b.toml")),
+        "range": [1, 2.5],
+        "n": 3,
+        "tool": [0.0, 0.1],
+    }
+
+
+def test_a_mended_recording_is_the_same(make_comparison: MakeComparison, tmp_path: Path) -> None:
+    """Rerun's own tool cuts and orders the chunks anew."""
+    comparison = make_comparison(("coppeliasim",), rows=70_000)
+    path = write_recording(comparison, tmp_path / "whole.rrd")
+    rerun_tool("rrd", "optimize", str(path), "-o", str(tmp_path / "mended.rrd"))
+    assert_same(read_recording(tmp_path / "mended.rrd"), comparison)
+
+
+def test_rerun_finds_nothing_wrong(make_comparison: MakeComparison, tmp_path: Path) -> None:
+    path = write_recording(make_comparison(NAMES[:3]), tmp_path / "odd.rrd")
+    assert "1 file verified without error" in rerun_tool("rrd", "verify", str(path))
+
+
+def rerun_tool(*arguments: str) -> str:
+    done = subprocess.run(
+        [sys.executable, "-m", "rerun", *arguments], capture_output=True, text=True, check=False, timeout=120
+    )
+    assert done.returncode == 0, done.stderr
+    return done.stdout + done.stderr
+
+
+def test_progress_is_told_up_to_one(make_run: MakeRun, tmp_path: Path) -> None:
+    shares: list[float] = []
+    write_recording(make_run(rows=70_000), tmp_path / "run.rrd", progress=shares.append)
+    assert shares == sorted(shares)
+    assert len(shares) > 8
+    assert (shares[0] > 0.0, shares[-1]) == (True, 1.0)
+
+
+def test_a_recording_is_replaced_by_a_new_one(
+    make_run: MakeRun, make_comparison: MakeComparison, tmp_path: Path
+) -> None:
+    path = write_recording(make_run(), tmp_path / "one.rrd")
+    comparison = make_comparison()
+    assert_same(read_recording(write_recording(comparison, path)), comparison)
+
+
+def test_an_input_is_never_replaced(make_run: MakeRun, tmp_path: Path) -> None:
+    path = write_recording(make_run(rows=5), tmp_path / "one.rrd")
+    before = path.read_bytes()
+    with pytest.raises(OutputError) as caught:
+        write_recording(make_run(rows=6), path, inputs=[tmp_path / "log.csv", path])
+    assert (
+        str(caught.value)
+        == f"{path}: found an input of this command, allowed: any other name for the recording"
+    )
+    assert path.read_bytes() == before
+
+
+def test_a_stopped_writer_leaves_the_old_output(make_run: MakeRun, tmp_path: Path) -> None:
+    path = write_recording(make_run(rows=5), tmp_path / "one.rrd")
+    before = path.read_bytes()
+
+    def stop(share: float) -> None:
+        if share > 0.5:
+            raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        write_recording(make_run(), path, progress=stop)
+    assert [(one, one.read_bytes()) for one in tmp_path.iterdir()] == [(path, before)]

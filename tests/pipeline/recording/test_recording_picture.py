@@ -1,0 +1,127 @@
+"""What a user sees: recordings opened in the viewer itself, without a window, and looked at."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
+from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.results import Comparison, Run
+
+MakeRun = Callable[..., Run]
+MakeComparison = Callable[..., Comparison]
+Picture = NDArray[np.uint8]
+
+DRIVERS = sorted(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
+PATIENCE = 40.0
+"""Time in [s] that the viewer has to load and draw: a software rasterizer on a busy machine is slow."""
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not DRIVERS,
+        reason="no software Vulkan to draw with: apt-get install mesa-vulkan-drivers libvulkan1",
+    ),
+]
+
+
+@pytest.fixture
+def viewer(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """Return Rerun's viewer, headless, on a port of its own."""
+    import rerun_cli  # type: ignore[import-untyped]
+    from rerun.experimental import ViewerClient
+
+    monkeypatch.setenv("VK_ICD_FILENAMES", str(DRIVERS[0]))
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        port = free.getsockname()[1]
+    binary = Path(rerun_cli.__file__).parent / "rerun"
+    with ViewerClient.spawn(
+        headless=True, port=port, hide_welcome_screen=True, executable_path=str(binary)
+    ) as client:
+        yield client
+
+
+def pixels(picture: Picture, colour: str) -> int:
+    """Return how many pixels have a colour, whatever its brightness: balls are shaded, lines are smoothed."""
+    bright = picture[picture.max(axis=2) >= 60].astype(float)
+    hues = bright / bright.max(axis=1, keepdims=True)
+    wanted = np.array(rgb(colour)) / max(rgb(colour))
+    return int((np.abs(hues - wanted).max(axis=1) <= 0.06).sum())
+
+
+def look(viewer: Any, recording: Path, at: float, right: Sequence[str]) -> Picture:
+    """Open a recording, go to a time in [s], and return the picture once the right half has all the colours.
+
+    Data load bit by bit: an early picture shows less and no error.
+    """
+    from PIL import Image
+
+    viewer.open(str(recording))
+    end, target = time.monotonic() + PATIENCE, recording.with_suffix(".png")
+    while not viewer.get_state().views and time.monotonic() < end:
+        time.sleep(0.1)
+    viewer.set_time(timeline="t", duration=at)
+    while True:
+        time.sleep(0.5)
+        viewer.save_screenshot(str(target))
+        picture = np.asarray(Image.open(target).convert("RGB"))
+        half = picture[:, picture.shape[1] // 2 :]
+        if all(pixels(half, colour) for colour in right) or time.monotonic() > end:
+            return picture
+
+
+def complaints(viewer: Any) -> list[str]:
+    """Return what the viewer has to say against what it shows."""
+    said = [f"{view.name}: {report}" for view in viewer.get_state().views for report in view.reports]
+    logged = [entry for entry in viewer.get_logs() if entry.level not in ("INFO", "DEBUG", "TRACE")]
+    return said + [entry.message for entry in logged if "Software rasterizer" not in entry.message]
+
+
+def view_names(viewer: Any) -> set[str]:
+    return {view.name for view in viewer.get_state().views}
+
+
+def assert_drawn(picture: Picture, left: Sequence[str], right: Sequence[str]) -> None:
+    """Hold a picture against the colours that it must have in its halves."""
+    middle = picture.shape[1] // 2
+    for name, half, colours in (("left", picture[:, :middle], left), ("right", picture[:, middle:], right)):
+        few = {colour: pixels(half, colour) for colour in colours if pixels(half, colour) < 20}
+        assert not few, f"hardly to be seen in the {name} half: {few}"
+
+
+def test_a_run_in_the_viewer(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:
+    path = write_recording(make_run(rows=4000), tmp_path / "run.rrd")
+    picture = look(viewer, path, 12.0, JOINT_COLOURS[:6])
+    assert complaints(viewer) == []
+    # The arm's joints are balls in the colours of the series; the path is in the run's colour.
+    assert_drawn(picture, left=[*JOINT_COLOURS[:5], run_colour(0)], right=JOINT_COLOURS[:6])
+    assert {"Arm and paths [m]", "Joints in the file [rad]", "Joints repolarized [rad]"} <= view_names(viewer)
+
+
+def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison, tmp_path: Path) -> None:
+    """The first run's name has everything that an entity's path must escape."""
+    comparison = make_comparison(("a b/c.d [x] Ω", "reference"), rows=4000)
+    path = write_recording(comparison, tmp_path / "comparison.rrd")
+    right = [*JOINT_COLOURS[:6], *AXIS_COLOURS.values(), REFERENCE_COLOUR]
+    picture = look(viewer, path, 12.0, right)
+    assert complaints(viewer) == []
+    assert_drawn(picture, left=[*JOINT_COLOURS[:5], REFERENCE_COLOUR], right=right)
+    assert "delta of a b/c.d [x] Ω [m]" in view_names(viewer)
+
+
+def test_a_log_without_a_robot_in_the_viewer(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:
+    run = replace(make_run(rows=1000), robot=None, tcp=None)
+    picture = look(viewer, write_recording(run, tmp_path / "bare.rrd"), 2.0, JOINT_COLOURS[:6])
+    assert complaints(viewer) == []
+    assert_drawn(picture, left=[], right=JOINT_COLOURS[:6])
+    assert "Arm and paths [m]" not in view_names(viewer)
