@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -14,9 +14,9 @@ from urmpipe_models.transform import Transform
 from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import ingest_log
-from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.operands import load_run, log_files
-from urmpipe_pipeline.recording import is_recording, read_recording, write_recording
+from urmpipe_pipeline.recording import is_recording, read_recording, record
 from urmpipe_pipeline.report import write_report
 from urmpipe_pipeline.results import Comparison, Run
 from urmpipe_pipeline.sources import ReadOptions
@@ -96,11 +96,13 @@ def ingest(
     files = [file for path in given for file in log_files(path)]
     arm = place_robot(robot, base, tool)
     name = given[0].resolve().name if given[0].is_dir() else None
-    run = ingest_log(files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name)
-    _refuse_warnings(strict, run.warnings)
-    if output is None:
+
+    def make(early: Callable[[JointLog | Run], None] | None) -> Run:
+        run = ingest_log(files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name, early=early)
+        _refuse_warnings(strict, run.warnings)
         return run
-    return replace(run, recording=write_recording(run, Path(output), inputs=files, progress=progress))
+
+    return make(None) if output is None else record(make, Path(output), files, progress)
 
 
 def compare(
@@ -163,7 +165,7 @@ def compare(
     if output is None:
         return result
     inputs = [Path(operand) for operand in (reference, *logs) if not isinstance(operand, Run)]
-    return replace(result, recording=write_recording(result, Path(output), inputs=inputs, progress=progress))
+    return record(lambda early: result, Path(output), inputs, progress)
 
 
 def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> Report:

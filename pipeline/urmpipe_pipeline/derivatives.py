@@ -6,6 +6,7 @@ from typing import Literal
 
 import numpy as np
 
+from urmpipe_models.kinematics import row_blocks
 from urmpipe_pipeline.joint_log import FloatArray
 
 Method = Literal["central", "savgol"]
@@ -45,15 +46,18 @@ def derivatives(q: FloatArray, tsp: float, method: Method = "central") -> tuple[
     if method == "savgol" and count > POLYNOMIAL + 1:
         return _smoothed(q, tsp)
     qd, qdd = np.empty_like(q), np.empty_like(q)
-    np.subtract(q[2:], q[:-2], out=qd[1:-1])
-    qd[0] = -3.0 * q[0] + 4.0 * q[1] - q[2]
-    qd[-1] = 3.0 * q[-1] - 4.0 * q[-2] + q[-3]
-    qd /= 2.0 * tsp
-    np.add(q[2:], q[:-2], out=qdd[1:-1])
-    qdd[1:-1] -= q[1:-1]
-    qdd[1:-1] -= q[1:-1]
+    for block in row_blocks(count - 2):  # in blocks, so that what is read again is still in the cache
+        before, here, after = q[:-2][block], q[1:-1][block], q[2:][block]
+        first, second = qd[1:-1][block], qdd[1:-1][block]
+        np.subtract(after, before, out=first)
+        first *= 0.5 / tsp
+        np.subtract(after, here, out=second)
+        second -= here
+        second += before
+        second *= 1.0 / (tsp * tsp)
+    qd[0] = (-3.0 * q[0] + 4.0 * q[1] - q[2]) * (0.5 / tsp)
+    qd[-1] = (3.0 * q[-1] - 4.0 * q[-2] + q[-3]) * (0.5 / tsp)
     qdd[0], qdd[-1] = qdd[1], qdd[-2]
-    qdd /= tsp * tsp
     return qd, qdd
 
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any
 
@@ -35,6 +35,7 @@ def ingest_log(
     tsp: float | None = None,
     derivative: Method | None = None,
     name: str | None = None,
+    early: Callable[[JointLog | Run], None] | None = None,
 ) -> Run:
     """Return the run of one log.
 
@@ -48,12 +49,16 @@ def ingest_log(
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
         name: What to call it; default: the file's stem.
+        early: Told the log when it is read and the run before its kinematics are computed, so that they
+            can be written meanwhile.
 
     Raises:
         LogError: With everything that is wrong with the files.
     """
     options = read or ReadOptions()
     log = read_log(files, options, robot)
+    if early:
+        early(log)
     warnings = list(log.warnings)
     fixed, audit = _repolarized(log, robot)
     warnings += _unexplained(log, fixed)
@@ -62,15 +67,13 @@ def ingest_log(
     q = grid.resample(fixed.q)
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, warnings)
-    tcp, noticed = kinematics(robot, q, qd, qdd)
-    warnings += noticed
     given = {
         "robot": robot.name if robot else None,
         "tsp": tsp,
         "derivative": derivative,
         "read": _given(options),
     }
-    return Run(
+    run = Run(
         name=name or log.name,
         log=log,
         robot=robot,
@@ -79,12 +82,16 @@ def ingest_log(
         q=q,
         qd=qd,
         qdd=qdd,
-        tcp=tcp,
+        tcp=None,
         tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
         repolarizations=tuple(audit),
         warnings=tuple(warnings),
         provenance=provenance("ingest", given, log.files),
     )
+    if early:
+        early(run)
+    tcp, noticed = kinematics(robot, q, qd, qdd)
+    return replace(run, tcp=tcp, warnings=(*warnings, *noticed))
 
 
 def _given(options: ReadOptions) -> dict[str, Any] | None:

@@ -75,7 +75,7 @@ def compare(
     from urmpipe.printing import print_comparison, print_json, print_warnings, progress_bar
     from urmpipe_pipeline.recording import warm_up
 
-    warm_up()
+    warm_up(without_pandas=True)
     from urmpipe import api
 
     robot = take_robot(options)

@@ -32,7 +32,7 @@ def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bo
     from urmpipe.printing import print_json, print_run, print_warnings, progress_bar
     from urmpipe_pipeline.recording import warm_up
 
-    warm_up()
+    warm_up(without_pandas=True)
     from urmpipe import api
 
     target = output or Path(f"{logs[0].stem if len(logs) == 1 else logs[0].resolve().parent.name}.rrd")

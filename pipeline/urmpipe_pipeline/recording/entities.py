@@ -22,7 +22,7 @@ from typing import Literal
 
 import numpy as np
 
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.results import AXES, Comparison, Deviation, Run, Trajectory
 
@@ -148,8 +148,10 @@ def printable(text: str) -> str:
     return text.encode("utf-8", "replace").decode("utf-8")
 
 
-def blocks(result: Run | Comparison) -> list[Block]:
-    """Return every array of a result with its place, in the order of writing."""
+def blocks(result: JointLog | Run | Comparison) -> list[Block]:
+    """Return every array of a result with its place, in the order of writing; of a log, as part of a run."""
+    if isinstance(result, JointLog):
+        return list(_log_blocks(result, "/"))
     standing = places_of(result)
     if isinstance(result, Run):
         return list(_run_blocks(result, standing[0]))
@@ -160,13 +162,18 @@ def blocks(result: Run | Comparison) -> list[Block]:
     return found
 
 
-def _run_blocks(run: Run, place: Place) -> Iterator[Block]:
-    log, joints = run.log, tuple(printable(name) for name in run.log.joints)
-    count = np.arange(max(log.rows, len(run.t_ns)) + 1)  # for both: a million numbers are 8 MB
-    rows, samples = ("row", count[1 : log.rows + 1]), ("sample", count[: len(run.t_ns)])
+def _log_blocks(log: JointLog, prefix: str) -> Iterator[Block]:
+    joints = tuple(printable(name) for name in log.joints)
+    rows = ("row", np.arange(1, log.rows + 1))
     for entity, (attribute, series) in LOG_ARRAYS.items():
         if (values := getattr(log, attribute)) is not None:
-            yield _block(place.prefix + entity, log.t_ns, values, series, joints, rows)
+            yield _block(prefix + entity, log.t_ns, values, series, joints, rows)
+
+
+def _run_blocks(run: Run, place: Place) -> Iterator[Block]:
+    yield from _log_blocks(run.log, place.prefix)
+    joints = tuple(printable(name) for name in run.log.joints)
+    samples = ("sample", np.arange(len(run.t_ns)))
     for entity, (attribute, series) in GRID_ARRAYS.items():
         if (values := getattr(run, attribute)) is not None:
             yield _block(place.prefix + entity, run.t_ns, values, series, joints, samples)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 import threading
 import warnings
 from pathlib import Path
@@ -17,16 +18,19 @@ MAGIC = b"RRF"
 """Every .rrd starts so."""
 
 
-def warm_up() -> threading.Thread:
+def warm_up(*, without_pandas: bool = False) -> threading.Thread:
     """Start to import Rerun in the background, so that it is there when it is needed.
 
-    Importing it, and what it imports when it is first used, takes long enough to do it while a command
-    reads its input.
+    Importing it takes about half a second, which a command can spend on reading its input.
+
+    Args:
+        without_pandas: Keep pandas out of this process, which takes as long again. Only for a process
+            that is a command of its own: pyarrow converts nothing to pandas in it any more.
 
     Returns:
         The thread at work; nobody needs to wait for it.
     """
-    thread = threading.Thread(target=_import_rerun, name="import rerun")
+    thread = threading.Thread(target=_import_rerun, args=(without_pandas,), name="import rerun")
     thread.start()
     return thread
 
@@ -66,7 +70,34 @@ def our_entries(reader: RrdReader) -> list[StoreEntry]:
     return [entry for entry in reader.recordings() if entry.application_id == APPLICATION_ID]
 
 
-def _import_rerun() -> None:
-    import pandas  # noqa: F401  pyarrow does so itself with the first list that Rerun hands to it
+def _import_rerun(without_pandas: bool) -> None:
+    if without_pandas:
+        _keep_pandas_out()
     import rerun.blueprint
     import rerun.chunk  # noqa: F401
+
+
+class _NoPandas:
+    """An import finder that does not find pandas."""
+
+    @staticmethod
+    def find_spec(name: str, path: object = None, target: object = None) -> None:
+        """Raise for pandas, and leave all else to the other finders."""
+        if name == "pandas":
+            raise ModuleNotFoundError("pandas is kept out of this process", name=name)
+
+
+def _keep_pandas_out() -> None:
+    """Let pyarrow find that pandas is not there, once and for all.
+
+    Otherwise it imports pandas (0.4 s, 32 MB) to see whether the first list that it converts is a Series.
+    """
+    if "pandas" in sys.modules:
+        return
+    import pyarrow as pa
+
+    sys.meta_path.insert(0, _NoPandas)
+    try:
+        pa.array([0])
+    finally:
+        sys.meta_path.remove(_NoPandas)

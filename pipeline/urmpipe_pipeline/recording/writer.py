@@ -1,23 +1,25 @@
-"""Write a recording: metadata, style, scene and arrays; verified before it gets its name."""
+"""Write a recording: arrays, metadata, layout and drawing; verified before it gets its name."""
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import Future, ThreadPoolExecutor
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 import numpy as np
 
-from urmpipe_models.errors import OutputError
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.joint_log import FloatArray, JointLog
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.recording.drawing import draw, time_columns
 from urmpipe_pipeline.recording.entities import Block, blocks, printable
 from urmpipe_pipeline.recording.identity import APPLICATION_ID
 from urmpipe_pipeline.recording.layout import viewer_layout
 from urmpipe_pipeline.recording.metadata import to_json
-from urmpipe_pipeline.recording.pipe import piped
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import PROPERTY
 from urmpipe_pipeline.recording.verify import verify
@@ -26,8 +28,16 @@ from urmpipe_pipeline.results import Comparison, Run
 if TYPE_CHECKING:
     from rerun import ComponentColumn, RecordingStream, TimeColumn
 
+Result = TypeVar("Result", Run, Comparison)
+
+Early: TypeAlias = Callable[[JointLog | Run], None]
+"""Takes a log that was read, or a run that lacks its kinematics, to be written meanwhile."""
+
 SLICE = 65_536
 """Rows sent at a time: few enough to keep memory low, many enough to keep the overhead low."""
+
+SPARE = 64 * 2**20
+"""Bytes that must be free on the disk before a slice is sent: it, what is on its way, and the footer."""
 
 
 def write_recording(
@@ -50,13 +60,115 @@ def write_recording(
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
-    with guarded_output(path, inputs, "recording") as part:
-        every = blocks(result)
-        metadata = to_json(result, every)
-        with _strict():
-            _write(part, result, every, metadata, progress or (lambda share: None))
-        verify(part, path, every, metadata)
+    if isinstance(result, Run):
+        record(lambda early: result, path, inputs, progress)
+    else:
+        record(lambda early: result, path, inputs, progress)
     return path
+
+
+def record(
+    make: Callable[[Early], Result],
+    path: Path,
+    inputs: Sequence[Path] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Result:
+    """Make a result and write its recording, some of it while the rest is still being computed.
+
+    Rerun takes longer to write a log than urmpipe to compute its kinematics: so the joints are on their
+    way meanwhile.
+
+    Args:
+        make: Returns the result. It is given a function that it may call with the log once it is read, and
+            with the run before its kinematics are computed: what they have is written beside.
+        path: The file (.rrd); replaced if it is a recording of urmpipe's.
+        inputs: The files the result is made from: none of them is replaced.
+        progress: Told the share of the data that is written, 0..1.
+
+    Returns:
+        The result, with the recording's path in it.
+
+    Raises:
+        OutputError: If the file may not be written there, or did not read back as it was written.
+    """
+    with guarded_output(path, inputs, "recording") as part:
+        with _Sender(part) as sender, ThreadPoolExecutor(1) as beside:
+            under_way: list[Future[RecordingStream]] = []
+            result = make(lambda part: under_way.append(beside.submit(sender.send, blocks(part))))
+            every = blocks(result)
+            metadata = to_json(result, every)
+            for sending in under_way:
+                sending.result()
+            stream = sender.send(every, progress)
+            _describe(stream, result, every, metadata)
+        verify(part, path, every, metadata)
+    return replace(result, recording=path)
+
+
+class _Sender:
+    """Sends arrays to a recording file, each once; the file is opened when the first is there."""
+
+    def __init__(self, part: Path) -> None:
+        self._part = part
+        self._stream: RecordingStream | None = None
+        self._sent: set[str] = set()
+
+    def __enter__(self) -> _Sender:
+        return self
+
+    def __exit__(self, *exception: object) -> None:
+        """Write the footer and let go of the file."""
+        if self._stream is not None:
+            self._stream.flush()
+            self._stream.disconnect()
+
+    def _open(self) -> RecordingStream:
+        """Return the stream into the file, which is opened once."""
+        import rerun as rr
+
+        if self._stream is None:
+            stream = rr.RecordingStream(APPLICATION_ID, send_properties=False)
+            if not rr.is_enabled(stream):
+                raise OutputError(
+                    "Rerun is switched off by the environment variable RERUN; allowed: unset or on"
+                )
+            stream.save(self._part)
+            stream.set_log_time_enabled(False)
+            stream.set_log_tick_enabled(False)
+            self._stream = stream
+        return self._stream
+
+    def send(
+        self, every: Sequence[Block], progress: Callable[[float], None] | None = None
+    ) -> RecordingStream:
+        """Send the arrays that were not sent yet, in slices; return the stream.
+
+        Slices with a row to verify go first: reading back then need not read all.
+        """
+        stream = self._open()
+        due = [block for block in every if block.entity not in self._sent]
+        total = sum(block.values.nbytes for block in every) or 1
+        done = total - sum(block.values.nbytes for block in due)
+        with _strict():
+            for block in due:
+                for rows in _slices(block):
+                    values = block.values[rows]
+                    times, column = _times(block, rows), _scalars(values)
+                    stream.flush()  # the slice before: it was being written while this one was made
+                    self._refuse_full_disk()
+                    stream.send_columns(block.entity, times, [column])
+                    done += values.nbytes
+                    if progress:
+                        progress(done / total)
+        self._sent |= {block.entity for block in due}
+        return stream
+
+    def _refuse_full_disk(self) -> None:
+        """Raise before the disk is full: Rerun's file thread would wait forever then."""
+        if shutil.disk_usage(self._part.parent).free < SPARE:
+            raise OutputError(
+                Finding(f"found less than {SPARE >> 20} MB free on the disk", str(self._part.parent))
+            )
 
 
 @contextmanager
@@ -72,38 +184,16 @@ def _strict() -> Iterator[None]:
         rr.set_strict_mode(before)
 
 
-def _write(
-    part: Path, result: Run | Comparison, every: list[Block], metadata: str, tell: Callable[[float], None]
-) -> None:
-    """Write everything; the end of the stream's context writes the footer."""
+def _describe(stream: RecordingStream, result: Run | Comparison, every: list[Block], metadata: str) -> None:
+    """Send what is no array: the metadata, the viewer's layout, and what is there to be looked at."""
     import rerun as rr
 
-    scene = scene_of(result)
-    with piped(part) as place, rr.RecordingStream(APPLICATION_ID, send_properties=False) as stream:
-        if not rr.is_enabled(stream):
-            raise OutputError("Rerun is switched off by the environment variable RERUN; allowed: unset or on")
-        stream.save(place, default_blueprint=viewer_layout(result, scene))
-        stream.set_log_time_enabled(False)
-        stream.set_log_tick_enabled(False)
+    with _strict():
+        scene = scene_of(result)
         stream.send_recording_name(printable(result.name))
         stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata))
+        stream.send_blueprint(viewer_layout(result, scene))
         draw(stream, result, every, scene)
-        _send(stream, every, tell)
-
-
-def _send(stream: RecordingStream, every: list[Block], tell: Callable[[float], None]) -> None:
-    """Send the arrays in slices, those with a row to verify first: reading back then need not read all."""
-    total = sum(block.values.nbytes for block in every) or 1
-    sent = 0
-    for block in every:
-        for rows in _slices(block):
-            values = block.values[rows]
-            times, column = _times(block, rows), _scalars(values)
-            stream.flush()  # the slice before: it was being written while this one was made
-            stream.send_columns(block.entity, times, [column])
-            sent += values.nbytes
-            tell(sent / total)
-    tell(1.0)
 
 
 def _slices(block: Block) -> list[slice]:
