@@ -32,7 +32,8 @@ def of_recording(source: Path, target: Path, at: float | None, settle: float = 1
     from rerun.experimental import ViewerClient
 
     complaints = []
-    with _viewer(source) as url, ViewerClient.connect(url) as viewer:
+    with headless_viewer() as url, ViewerClient.connect(url) as viewer:
+        viewer.open(str(source.resolve()))
         deadline = time.monotonic() + 60.0
         while not (state := viewer.get_state()).recordings or not state.views:
             if time.monotonic() > deadline:
@@ -72,7 +73,7 @@ def of_page(source: Path, target: Path, width: int, height: int = 1000) -> list[
 
 
 @contextmanager
-def _viewer(source: Path) -> Iterator[str]:
+def headless_viewer() -> Iterator[str]:
     """Run the viewer without a window, on the loopback interface only; yield where it listens."""
     import rerun_cli
 
@@ -82,20 +83,22 @@ def _viewer(source: Path) -> Iterator[str]:
         free.bind(("127.0.0.1", 0))
         port = free.getsockname()[1]
     binary = Path(rerun_cli.__file__).parent / "rerun"
-    command = [str(binary), str(source), "--headless", "--bind", "127.0.0.1", "--port", str(port)]
+    command = [str(binary), "--headless", "--bind", "127.0.0.1", "--port", str(port), "--hide-welcome-screen"]
     with subprocess.Popen(
-        [*command, "--hide-welcome-screen"],
-        env=environment,
-        stdout=subprocess.DEVNULL,
-        stderr=subprocess.DEVNULL,
+        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
     ) as process:
         try:
             deadline = time.monotonic() + 30.0
-            while socket.socket().connect_ex(("127.0.0.1", port)) and time.monotonic() < deadline:
+            while not _listens(port) and time.monotonic() < deadline:
                 time.sleep(0.2)
             yield f"rerun+http://127.0.0.1:{port}/proxy"
         finally:
             process.terminate()
+
+
+def _listens(port: int) -> bool:
+    with socket.socket() as probe:
+        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def of_readme() -> list[str]:

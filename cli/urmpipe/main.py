@@ -5,6 +5,7 @@ Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
 
 from __future__ import annotations
 
+import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -83,7 +84,7 @@ def run(arguments: Sequence[str]) -> int:
     try:
         return int(cli.main(list(arguments), prog_name="urmpipe", standalone_mode=False) or 0)
     except BrokenPipeError:  # the reader of our output left, as head does
-        sys.stderr.close()
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
     except (Exception, KeyboardInterrupt) as error:
         if "--debug" in arguments:
             import traceback

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any, TypeVar
@@ -52,24 +53,32 @@ class NamesType(click.ParamType[Any]):
         return tuple(part.strip() for part in value.split(",")) if isinstance(value, str) else value
 
 
-class DurationType(click.ParamType[float]):
-    """A time in seconds, or with its unit: 0.005, 5ms."""
+class QuantityType(click.ParamType[float]):
+    """A positive number in the SI unit, or with its unit behind it: 0.005 or 5ms."""
 
-    name = "SECONDS"
-    FACTOR = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}  # noqa: RUF012 - a constant
+    def __init__(self, name: str, units: dict[str, float], example: str) -> None:
+        self.name = name
+        self.units = {"": 1.0} | units
+        self.example = example
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the time in [s]."""
+        """Return the quantity in SI."""
         if isinstance(value, float):
             return value
-        match = re.fullmatch(r"([0-9.eE+-]+?)\s*(s|ms|us)?", str(value).strip())
+        match = re.fullmatch(r"(.*?)\s*([a-z]*)", str(value).strip())
         try:
-            seconds = float(match[1]) * self.FACTOR[match[2] or ""] if match else float("nan")
-        except ValueError:
-            seconds = float("nan")
-        if not 0.0 < seconds < float("inf"):
-            self.fail(f"found {value!r}, allowed: a positive time in s, such as 0.005 or 5ms", param, ctx)
-        return seconds
+            number = float(match[1]) * self.units[match[2]] if match else math.nan
+        except (ValueError, KeyError):
+            number = math.nan
+        if not 0.0 < number < math.inf:
+            self.fail(f"found {value!r}, allowed: {self.example}", param, ctx)
+        return number
+
+
+DURATION = QuantityType(
+    "SECONDS", {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "a positive time in s, such as 0.005 or 5ms"
+)
+LENGTH = QuantityType("M", {"m": 1.0, "mm": 1e-3}, "a positive length in m, such as 0.0035 or 3.5mm")
 
 
 def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str] | None:
@@ -123,10 +132,8 @@ def log_options(command: Command) -> Command:
             type=click.Choice(["central", "savgol"]),
             help="How joints are differentiated [default: by the digits].",
         ),
-        click.option("--tsp", type=DurationType(), help="Period of the grid [default: the log's own]."),
-        click.option(
-            "--period", type=DurationType(), help="Period of a log without a time column [default: 5ms]."
-        ),
+        click.option("--tsp", type=DURATION, help="Period of the grid [default: the log's own]."),
+        click.option("--period", type=DURATION, help="Period of a log without a time column [default: 5ms]."),
         click.option(
             "--unit",
             "units",

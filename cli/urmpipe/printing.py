@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -30,6 +32,15 @@ def print_json(value: Any) -> None:
     from urmpipe_pipeline.results import json_ready
 
     click.echo(json.dumps(json_ready(value), ensure_ascii=False, indent=2))
+
+
+def print_recording(recording: Path | None) -> None:
+    """Print where a recording is and how to open it, with the viewer that was installed with urmpipe."""
+    viewer = "rerun"
+    if shutil.which(viewer) is None:  # not on the path, as in an environment that was not activated
+        installed = Path(sys.executable).parent / viewer
+        viewer = str(installed.relative_to(Path.cwd()) if installed.is_relative_to(Path.cwd()) else installed)
+    click.echo(f"Recording: {recording}  (open it: {viewer} {recording})")
 
 
 def print_warnings(warnings: Sequence[LogWarning]) -> None:
@@ -130,8 +141,14 @@ def new_console() -> Console:
     """Return a console that takes text as it is: names from files may hold brackets."""
     from rich.console import Console
 
+    class PlainConsole(Console):
+        """Leaves a closed pipe to the error boundary: rich itself exits with 1, which is a verdict."""
+
+        def on_broken_pipe(self) -> None:
+            raise BrokenPipeError
+
     width = None if sys.stdout.isatty() else PIPE_WIDTH
-    return Console(width=width, markup=False, emoji=False, highlight=False)
+    return PlainConsole(width=width, markup=False, emoji=False, highlight=False)
 
 
 def new_table(*columns: str, title: str) -> Table:

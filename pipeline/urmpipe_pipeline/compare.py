@@ -96,6 +96,8 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     """
     chosen = options or CompareOptions()
     log = run.log
+    if not log.joints:
+        raise LogError(_lacking(run, "a path alone, which has no joints; allowed: a log to hold against it"))
     if run.robot is None:
         raise LogError(_lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
     if log.tcp_position is None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import hashlib
 import json
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -201,3 +203,37 @@ def test_the_demo_goes_the_whole_way(urmpipe: RunCommand, tmp_path: Path) -> Non
     assert again.code == 0
     assert "Report:" in again.out
     assert "Recording:" in again.out
+
+
+def test_a_tolerance_may_have_its_unit_and_decides(urmpipe: RunCommand) -> None:
+    passing = urmpipe(
+        "compare", PATH, MATLAB, "--robot", "urm6", "--tolerance", "2.4mm", "--json", "-o", "a.rrd"
+    )
+    assert passing.code == 0
+    assert json.loads(passing.out)["tolerance"] == {"axis": 0.0024}
+    assert (
+        urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "--tolerance", "0.0023", "-o", "b.rrd").code == 1
+    )
+    wrong = urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "--tolerance", "3 inch")
+    assert wrong.code == 2
+    assert "found '3 inch', allowed: a positive length in m, such as 0.0035 or 3.5mm" in wrong.err
+
+
+def test_a_path_alone_is_nothing_to_judge(urmpipe: RunCommand) -> None:
+    ran = urmpipe("compare", PATH, "--robot", "urm6")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.splitlines()[-1] == (
+        "error: path.csv: a path alone, which has no joints; allowed: a log to hold against it"
+    )
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows has no closed pipes of this kind")
+def test_a_reader_that_leaves_does_not_turn_a_pass_into_a_fail(tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "urmpipe", "compare", str(PATH), str(MATLAB), "--robot", "urm6"]
+    process = subprocess.Popen(command, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+    assert process.stdout is not None and process.stderr is not None
+    process.stdout.close()
+    said = process.stderr.read().decode()
+    process.stderr.close()
+    assert process.wait() == 2
+    assert "Traceback" not in said

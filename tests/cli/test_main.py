@@ -91,6 +91,7 @@ def test_debug_adds_the_traceback(urmpipe: RunCommand) -> None:
     [
         (["--tsp", "never"], "found 'never', allowed: a positive time in s, such as 0.005 or 5ms"),
         (["--tsp", "-1"], "found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
+        (["--tsp", "5 m"], "found '5 m', allowed: a positive time in s, such as 0.005 or 5ms"),
         (["--derivative", "magic"], "'magic' is not one of 'central', 'savgol'."),
     ],
 )

@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from urmpipe.options import log_options, output_options, take_robot
+from urmpipe.options import LENGTH, log_options, output_options, take_robot
 
 TOLERANCE = 0.0035
 
@@ -31,10 +31,9 @@ def _sync(ctx: click.Context, param: click.Parameter, value: str) -> float:
 )
 @click.option(
     "--tolerance",
-    type=float,
+    type=LENGTH,
     default=TOLERANCE,
     show_default=True,
-    metavar="M",
     help="Largest deviation allowed on an axis, in m.",
 )
 @click.option(
@@ -72,7 +71,7 @@ def compare(
 
     Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
     """
-    from urmpipe.printing import print_comparison, print_json, print_warnings, progress_bar
+    from urmpipe.printing import print_comparison, print_json, print_recording, print_warnings, progress_bar
     from urmpipe_pipeline.recording import warm_up
 
     warm_up(without_pandas=True)
@@ -100,7 +99,7 @@ def compare(
         print_json(result.to_dict())
     elif not quiet:
         print_comparison(result)
-        click.echo(f"Recording: {result.recording}  (open it: rerun {result.recording})")
+        print_recording(result.recording)
     return 0 if result.verdict == "pass" else 1
 
 

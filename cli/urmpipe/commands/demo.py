@@ -12,6 +12,9 @@ EXPECTED = {"coppeliasim": "pass", "matlab": "pass", "solidworks": "pass", "coun
 """The bundled logs and the verdict each should get: the last comes from an arm with one module the wrong
 way round."""
 
+AS_EXPECTED = """The verdicts are as they should be: the three environments agree with the path, the arm with
+the counter-rotating module does not."""
+
 
 @click.command(short_help="Run the whole way on bundled logs.")
 @click.option(
@@ -34,8 +37,11 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
       urmpipe demo
       urmpipe demo -o somewhere --json
     """
+    from urmpipe_pipeline.recording import warm_up
+
+    warm_up(without_pandas=True)
     from urmpipe import api
-    from urmpipe.printing import print_comparison, print_json, progress_bar
+    from urmpipe.printing import print_comparison, print_json, print_recording, progress_bar
     from urmpipe_datasets import LOGS
 
     output.mkdir(parents=True, exist_ok=True)
@@ -57,10 +63,7 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
         print_json(result.to_dict() | {"as_expected": as_expected, "report": str(report.path)})
     elif not quiet:
         print_comparison(result)
-        click.echo("The verdicts are as they should be: three environments agree, the arm with the")
-        click.echo("counter-rotating module does not.") if as_expected else click.echo(
-            f"Expected: {EXPECTED}"
-        )
+        click.echo(AS_EXPECTED if as_expected else f"These are not the verdicts expected: {EXPECTED}")
         click.echo(f"Report:    {report.path}  (open it in any browser)")
-        click.echo(f"Recording: {result.recording}  (open it: rerun {result.recording})")
+        print_recording(result.recording)
     return 0 if as_expected else 1

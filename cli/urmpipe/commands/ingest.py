@@ -29,13 +29,13 @@ def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bo
       urmpipe ingest phi1.csv phi2.csv phi3.csv -o run.rrd
       urmpipe ingest table.txt --robot ur5e --unit deg --period 8ms --json
     """
-    from urmpipe.printing import print_json, print_run, print_warnings, progress_bar
+    from urmpipe.printing import print_json, print_recording, print_run, print_warnings, progress_bar
     from urmpipe_pipeline.recording import warm_up
 
     warm_up(without_pandas=True)
     from urmpipe import api
 
-    target = output or Path(f"{logs[0].stem if len(logs) == 1 else logs[0].resolve().parent.name}.rrd")
+    target = output or Path(default_name(logs))
     robot = take_robot(options)
     shared = {name: options.pop(name) for name in ("tsp", "derivative", "strict")}
     with progress_bar(f"Writing {target}", quiet=quiet) as progress:
@@ -47,5 +47,11 @@ def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bo
         print_json(run.to_dict())
     elif not quiet:
         print_run(run)
-        click.echo(f"Recording: {run.recording}  (open it: rerun {run.recording})")
+        print_recording(run.recording)
     return 0
+
+
+def default_name(logs: tuple[Path, ...]) -> str:
+    """Return LOG.rrd; several files that are one log go by the name of their folder."""
+    first = logs[0].resolve()
+    return f"{first.parent.name if len(logs) > 1 else first.stem}.rrd"

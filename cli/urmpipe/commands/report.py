@@ -24,6 +24,9 @@ def report(recordings: tuple[Path, ...], output: Path | None, as_json: bool, qui
       urmpipe report log-against-path.rrd
       urmpipe report monday.rrd tuesday.rrd -o week.html
     """
+    from urmpipe_pipeline.recording import warm_up
+
+    warm_up(without_pandas=True)
     from urmpipe import api
     from urmpipe.printing import print_json
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-import socket
+import importlib.util
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -35,19 +35,16 @@ pytestmark = [
 
 
 @pytest.fixture
-def viewer(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
-    """Return Rerun's viewer, headless, on a port of its own."""
-    import rerun_cli  # type: ignore[import-untyped]
+def viewer() -> Iterator[Any]:
+    """Return Rerun's viewer, headless, on the loopback interface only, as the README's pictures are taken."""
     from rerun.experimental import ViewerClient
 
-    monkeypatch.setenv("VK_ICD_FILENAMES", str(DRIVERS[0]))
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    binary = Path(rerun_cli.__file__).parent / "rerun"
-    with ViewerClient.spawn(
-        headless=True, port=port, hide_welcome_screen=True, executable_path=str(binary)
-    ) as client:
+    place = Path(__file__).resolve().parents[3] / "docs" / "take_pictures.py"
+    spec = importlib.util.spec_from_file_location("take_pictures", place)
+    assert spec is not None and spec.loader is not None
+    take_pictures = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(take_pictures)
+    with take_pictures.headless_viewer() as url, ViewerClient.connect(url) as client:
         yield client
 
 
