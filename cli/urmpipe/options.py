@@ -10,6 +10,8 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 from click.shell_completion import CompletionItem
 
+from urmpipe import __version__
+
 if TYPE_CHECKING:
     from urmpipe_models.chain import Chain
 
@@ -153,8 +155,9 @@ def log_options(command: Command) -> Command:
 
 
 def output_options(command: Command) -> Command:
-    """Add --json, -q and --debug."""
+    """Add --json, -q, --debug and --version."""
     for option in (
+        click.version_option(__version__, prog_name="urmpipe"),
         click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error."),
         click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output."),

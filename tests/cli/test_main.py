@@ -55,8 +55,9 @@ def test_every_command_has_help_with_examples_and_every_option_says_what_it_does
 
 
 def test_version(urmpipe: RunCommand) -> None:
-    ran = urmpipe("--version")
-    assert (ran.code, ran.out) == (0, f"urmpipe, version {version('urmpipe')}\n")
+    for words in ((), ("ingest",), ("robot", "list")):
+        ran = urmpipe(*words, "--version")
+        assert (ran.code, ran.out) == (0, f"urmpipe, version {version('urmpipe')}\n")
 
 
 def test_an_unknown_command_is_usage_and_exits_with_2(urmpipe: RunCommand) -> None:

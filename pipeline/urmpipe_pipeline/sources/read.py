@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from urmpipe_models.chain import Chain
-from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, SourceFile
+from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, JointLog, LogWarning, SourceFile
 from urmpipe_pipeline.sources.cells import is_number, plain, significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
 from urmpipe_pipeline.sources.clock import even_clock
@@ -62,12 +62,7 @@ def _joint_log(
     """Return the log of what was read: units found, values in SI."""
     roles, layout, clock = content.roles, plan.tables.layouts[plan.main], plan.clocks[plan.main]
     file = str(layout.segment.path)
-    if content.clock is None:
-        t_ns, timed, noticed = even_clock(content.rows, options.period)
-        start = 0.0
-    else:
-        t_ns, timed, noticed = content.clock - content.clock[0], (), []
-        start = int(content.clock[0]) / 10**9  # integers divide exactly
+    t_ns, start, timed, noticed = _times(content, options)
     q, qd, qdd = (content.values(group) for group in (roles.joints, roles.rates, roles.accelerations))
     tcp, rotation = content.values(roles.position), content.values(roles.rotation)
     refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], file)
@@ -77,16 +72,15 @@ def _joint_log(
     rate_units = finder.derivatives(roles.rates, joint_units, 1)
     second_units = finder.derivatives(roles.accelerations, joint_units, 2)
     tcp_units = finder.positions(roles.position, tcp) if roles.position else []
-    used = [*roles.joints, *roles.rates, *roles.accelerations, *roles.position]
     units = [*joint_units, *rate_units, *second_units, *tcp_units]
     digits = _digits(plan, roles.joints)
+    groups = (roles.joints, roles.rates, roles.accelerations, roles.position)
     missing = [
         warning
-        for group, values in zip(
-            (roles.joints, roles.rates, roles.accelerations, roles.position), (q, qd, qdd, tcp), strict=True
-        )
+        for group, values in zip(groups, (q, qd, qdd, tcp), strict=True)
         for warning in missing_samples(values, [column.name for column in group])
     ]
+    used = [column for group in groups for column in group]
     return JointLog(
         name=_name(files),
         source=PATH if not roles.joints and plan.tables.source == TABLE else plan.tables.source,
@@ -100,7 +94,7 @@ def _joint_log(
         qdd=_recorded(qdd, second_units),
         tcp_position=_recorded(tcp, tcp_units),
         tcp_quat_xyzw=quaternions(rotation) if roles.rotation else None,
-        units=clock.units | {column.name: unit.name for column, unit in zip(used, units, strict=True)},
+        units=clock.units | {c.name: unit.name for c, unit in zip(used, units, strict=True)},
         digits=digits,
         inferences=(
             *plan.tables.inferences,
@@ -114,6 +108,17 @@ def _joint_log(
         ),
         warnings=(*clock.warnings, *noticed, *finder.warnings, *missing, *gaps(t_ns)),
     )
+
+
+def _times(
+    content: Content, options: ReadOptions
+) -> tuple[IntArray, float, tuple[Inference, ...], Sequence[LogWarning]]:
+    """Return the rows' times in [ns] from the first, the clock there in [s], and what there is to say."""
+    if content.clock is None:
+        t_ns, said, noticed = even_clock(content.rows, options.period)
+        return t_ns, 0.0, said, noticed
+    start = int(content.clock[0])
+    return content.clock - start, start / 10**9, (), ()  # integers divide exactly
 
 
 def quaternions(rotation: FloatArray) -> FloatArray:
