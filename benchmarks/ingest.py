@@ -50,6 +50,7 @@ def main() -> None:
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder) / "log.csv"
         write_log(log, options.rows)
+        ours, theirs = Path(folder) / "ours.rrd", Path(folder) / "theirs.rrd"
         urmpipe = str(Path(sys.executable).parent / "urmpipe")
         read = f"import pandas; pandas.read_csv({str(log)!r})"
         commands = {
@@ -62,11 +63,11 @@ def main() -> None:
                 "urm6",
                 "-q",
                 "-o",
-                f"{folder}/ours.rrd",
+                str(ours),
             ],
-            "user's script": [options.peer, str(HERE / "users_script.py"), str(log), f"{folder}/theirs.rrd"],
+            "user's script": [options.peer, str(HERE / "users_script.py"), str(log), str(theirs)],
         }
-        taken = rounds(commands, options.rounds)
+        taken = rounds(commands, options.rounds, outputs=(ours, theirs))
         size = log.stat().st_size / 1e6
     lines = [
         f"# Ingest of {options.rows} rows x 6 joints ({size:.0f} MB CSV): {options.rounds} rounds in turn",

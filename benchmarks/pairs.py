@@ -39,11 +39,15 @@ def measure(command: Sequence[str], env: Mapping[str, str] | None = None) -> Usa
     return Usage(wall, usage.ru_utime + usage.ru_stime, usage.ru_maxrss / 1024)
 
 
-def rounds(commands: Mapping[str, Sequence[str]], count: int) -> dict[str, list[Usage]]:
-    """Run all commands in turn, one warm-up round first."""
+def rounds(
+    commands: Mapping[str, Sequence[str]], count: int, outputs: Sequence[Path] = ()
+) -> dict[str, list[Usage]]:
+    """Run all commands in turn, one warm-up round first; their outputs are removed before each run."""
     taken: dict[str, list[Usage]] = {name: [] for name in commands}
     for number in range(count + 1):
         for name, command in commands.items():
+            for output in outputs:
+                output.unlink(missing_ok=True)
             usage = measure(command)
             if number:
                 taken[name].append(usage)

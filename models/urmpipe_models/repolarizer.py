@@ -161,7 +161,8 @@ def repolarize(
     """
     count, joints = q.shape
     speeds = np.broadcast_to(np.asarray(max_speed, dtype=np.float64), (joints,))
-    complete = ~np.isnan(q.sum(axis=0))
+    missing = np.isnan(q.sum())  # one pass over all says whether to look column by column
+    complete = ~np.isnan(q.sum(axis=0)) if missing else np.ones(joints, dtype=np.bool_)
     found = [_steps_of_complete(q, dt, period, speeds, complete)]
     found += [_steps_of_sparse(q, dt, period, speeds, j) for j in map(int, np.flatnonzero(~complete))]
     rows, columns, change, odd = (np.concatenate(parts) for parts in zip(*found, strict=True))
@@ -186,8 +187,10 @@ def _steps_of_complete(
     """Find the steps of the columns that miss no sample; only steps above P / 4 need to be judged."""
     candidates = [_nothing()[:2]]
     for block in row_blocks(len(q) - 1):
-        at_row, at_column = np.nonzero(np.abs(q[1:][block] - q[:-1][block]) > period / 4.0)
-        candidates.append((at_row + block.start + 1, at_column))
+        large = np.abs(q[1:][block] - q[:-1][block]) > period / 4.0
+        if large.any():
+            at_row, at_column = np.nonzero(large)
+            candidates.append((at_row + block.start + 1, at_column))
     rows, columns = (np.concatenate(parts) for parts in zip(*candidates, strict=True))
     rows, columns = rows[complete[columns]], columns[complete[columns]]
     allowed = max_step(dt[rows], period, speeds[columns])

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import shutil
-from collections.abc import Callable, Iterator, Sequence
+import threading
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
@@ -93,14 +93,14 @@ def record(
     """
     with guarded_output(path, inputs, "recording") as part:
         with _Sender(part) as sender, ThreadPoolExecutor(1) as beside:
-            under_way: list[Future[RecordingStream]] = []
+            under_way: list[Future[None]] = []
             result = make(lambda part: under_way.append(beside.submit(sender.send, blocks(part))))
             every = blocks(result)
             metadata = to_json(result, every)
+            under_way.append(beside.submit(sender.send, every, progress))
+            _describe(sender.stream(), result, every, metadata)
             for sending in under_way:
                 sending.result()
-            stream = sender.send(every, progress)
-            _describe(stream, result, every, metadata)
         verify(part, path, every, metadata)
     return replace(result, recording=path)
 
@@ -111,6 +111,8 @@ class _Sender:
     def __init__(self, part: Path) -> None:
         self._part = part
         self._stream: RecordingStream | None = None
+        self._strict_before = False
+        self._opening = threading.Lock()
         self._sent: set[str] = set()
 
     def __enter__(self) -> _Sender:
@@ -119,49 +121,52 @@ class _Sender:
     def __exit__(self, *exception: object) -> None:
         """Write the footer and let go of the file."""
         if self._stream is not None:
+            import rerun as rr
+
             self._stream.flush()
             self._stream.disconnect()
+            rr.set_strict_mode(self._strict_before)
+
+    def stream(self) -> RecordingStream:
+        """Return the stream into the file, which is opened by the first who asks."""
+        with self._opening:
+            return self._stream or self._open()
 
     def _open(self) -> RecordingStream:
-        """Return the stream into the file, which is opened once."""
         import rerun as rr
 
-        if self._stream is None:
-            stream = rr.RecordingStream(APPLICATION_ID, send_properties=False)
-            if not rr.is_enabled(stream):
-                raise OutputError(
-                    "Rerun is switched off by the environment variable RERUN; allowed: unset or on"
-                )
-            stream.save(self._part)
-            stream.set_log_time_enabled(False)
-            stream.set_log_tick_enabled(False)
-            self._stream = stream
-        return self._stream
+        stream = rr.RecordingStream(APPLICATION_ID, send_properties=False)
+        if not rr.is_enabled(stream):
+            raise OutputError("Rerun is switched off by the environment variable RERUN; allowed: unset or on")
+        stream.save(self._part)
+        stream.set_log_time_enabled(False)
+        stream.set_log_tick_enabled(False)
+        # Strict: Rerun raises where it would warn and drop data, such as for a column of the wrong length.
+        self._strict_before = rr.strict_mode()
+        rr.set_strict_mode(True)
+        self._stream = stream
+        return stream
 
-    def send(
-        self, every: Sequence[Block], progress: Callable[[float], None] | None = None
-    ) -> RecordingStream:
-        """Send the arrays that were not sent yet, in slices; return the stream.
+    def send(self, every: Sequence[Block], progress: Callable[[float], None] | None = None) -> None:
+        """Send the arrays that were not sent yet, in slices.
 
         Slices with a row to verify go first: reading back then need not read all.
         """
-        stream = self._open()
+        stream = self.stream()
         due = [block for block in every if block.entity not in self._sent]
         total = sum(block.values.nbytes for block in every) or 1
         done = total - sum(block.values.nbytes for block in due)
-        with _strict():
-            for block in due:
-                for rows in _slices(block):
-                    values = block.values[rows]
-                    times, column = _times(block, rows), _scalars(values)
-                    stream.flush()  # the slice before: it was being written while this one was made
-                    self._refuse_full_disk()
-                    stream.send_columns(block.entity, times, [column])
-                    done += values.nbytes
-                    if progress:
-                        progress(done / total)
+        for block in due:
+            for rows in _slices(block):
+                values = block.values[rows]
+                times, column = _times(block, rows), _scalars(values)
+                stream.flush()  # the slice before: it was being written while this one was made
+                self._refuse_full_disk()
+                stream.send_columns(block.entity, times, [column])
+                done += values.nbytes
+                if progress:
+                    progress(done / total)
         self._sent |= {block.entity for block in due}
-        return stream
 
     def _refuse_full_disk(self) -> None:
         """Raise before the disk is full: Rerun's file thread would wait forever then."""
@@ -171,29 +176,15 @@ class _Sender:
             )
 
 
-@contextmanager
-def _strict() -> Iterator[None]:
-    """Make Rerun raise where it would warn and drop data, such as for a column of the wrong length."""
-    import rerun as rr
-
-    before = rr.strict_mode()
-    rr.set_strict_mode(True)
-    try:
-        yield
-    finally:
-        rr.set_strict_mode(before)
-
-
 def _describe(stream: RecordingStream, result: Run | Comparison, every: list[Block], metadata: str) -> None:
     """Send what is no array: the metadata, the viewer's layout, and what is there to be looked at."""
     import rerun as rr
 
-    with _strict():
-        scene = scene_of(result)
-        stream.send_recording_name(printable(result.name))
-        stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata))
-        stream.send_blueprint(viewer_layout(result, scene))
-        draw(stream, result, every, scene)
+    scene = scene_of(result)
+    stream.send_recording_name(printable(result.name))
+    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata))
+    stream.send_blueprint(viewer_layout(result, scene))
+    draw(stream, result, every, scene)
 
 
 def _slices(block: Block) -> list[slice]:
