@@ -20,7 +20,7 @@ from urmpipe_models.transform import Transform, euler_zyx
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-BLOCK = 16384
+BLOCK = 8192
 """Rows worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
 
 THREADS = min(4, os.cpu_count() or 1)
