@@ -23,6 +23,9 @@ FloatArray: TypeAlias = NDArray[np.float64]
 BLOCK = 8192
 """Rows worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
 
+POSE_BLOCK = 32768
+"""The same for poses alone, which have few arrays under way."""
+
 THREADS = min(4, os.cpu_count() or 1)
 """Blocks worked on side by side: beyond some, Python's own work, which runs alone, sets the pace."""
 
@@ -183,7 +186,7 @@ def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     def work(block: slice) -> None:
         _fill(position[:, block], tip_pose(chain, _columns(q[block])).translation)
 
-    _each_block(work, len(q))
+    _each_block(work, len(q), POSE_BLOCK)
     return position.T
 
 
@@ -202,7 +205,7 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
         for row in range(3):
             _fill(rotation[row, :, block], pose.rotation[row])
 
-    _each_block(work, len(q))
+    _each_block(work, len(q), POSE_BLOCK)
     return position.T, rotation.transpose(2, 0, 1)
 
 
@@ -287,8 +290,9 @@ def _carried(state: Motion, origin: Transform) -> Motion:
     """Return the motion of a frame fixed to a moving body."""
     d = state.pose.rotate(origin.translation)
     spin = cross(state.omega, d)
+    turned = Transform(state.pose.rotation) @ Transform(origin.rotation)
     return Motion(
-        state.pose @ origin,
+        Transform(turned.rotation, add(state.pose.translation, d)),
         add(state.velocity, spin),
         add(state.acceleration, add(cross(state.alpha, d), cross(state.omega, spin))),
         state.omega,
@@ -321,20 +325,20 @@ def _driven(state: Motion, joint: Joint, value: Element, rate: Element, second: 
     )
 
 
-def row_blocks(count: int) -> Iterator[slice]:
+def row_blocks(count: int, rows: int = BLOCK) -> Iterator[slice]:
     """Yield the slices that part `count` rows into blocks."""
-    return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
+    return (slice(start, start + rows) for start in range(0, count, rows))
 
 
-def _each_block(work: Callable[[slice], None], count: int) -> None:
+def _each_block(work: Callable[[slice], None], count: int, rows: int = BLOCK) -> None:
     """Run work on every block of rows, several at a time: NumPy computes without Python's lock."""
-    if count <= BLOCK:
+    if count <= rows:
         work(slice(0, count))
         return
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(THREADS) as pool:
-        list(pool.map(work, row_blocks(count)))  # taking the results raises what went wrong in a block
+        list(pool.map(work, row_blocks(count, rows)))  # taking the results raises what went wrong in a block
 
 
 def _columns(rows: FloatArray) -> list[FloatArray]:
