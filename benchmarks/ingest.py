@@ -76,6 +76,7 @@ def main() -> None:
         "The user's script is `users_script.py`: pandas.read_csv, numpy.unwrap, roboticstoolbox ETS.fkine",
         "and send_columns; it writes joints and positions. urmpipe also checks the log, lists the wraps, and",
         "writes velocities, accelerations, Euler angles and the moving arm.",
+        "No output stands there when a run begins: replacing one of this size takes longer.",
         "",
     ]
     write_results(

@@ -161,27 +161,6 @@ def from_offset(values: Sequence[float]) -> Transform:
     return Transform(turned.rotation, (x, y, z))
 
 
-def from_rotation_vector(vector: Vector) -> Transform:
-    """Return the rotation by |v| about v / |v|, v in [rad], any elements.
-
-    R = cos(a) I + sinc(a) [v]x + (1 - cos(a)) / a^2 v v^T, with the limits 1 and 1/2 at a = 0.
-    """
-    x, y, z = vector
-    angle = np.sqrt(x * x + y * y + z * z)
-    safe = np.where(angle > 0.0, angle, 1.0)
-    small = angle < 1e-8  # below, the series' first terms are exact to double precision
-    a = np.where(small, 1.0, np.sin(safe) / safe)
-    b = np.where(small, 0.5, (1.0 - np.cos(safe)) / (safe * safe))
-    c = np.cos(angle)
-    return Transform(
-        (
-            (c + b * x * x, b * x * y - a * z, b * x * z + a * y),
-            (b * x * y + a * z, c + b * y * y, b * y * z - a * x),
-            (b * x * z - a * y, b * y * z + a * x, c + b * z * z),
-        )
-    )
-
-
 def euler_zyx(rotation: tuple[Vector, Vector, Vector]) -> tuple[Element, Element, Element, Element]:
     """Return the moving Z-Y-X Euler angles of R = Rz(rz) Ry(ry) Rx(rx), and where they are singular.
 
@@ -223,14 +202,6 @@ def offset_of(frame: Transform) -> tuple[float, float, float, float, float, floa
     """Return x, y, z in [m] and rx, ry, rz in [rad] of a constant frame: `from_offset`'s inverse."""
     x, y, z = frame.translation
     return (float(x), float(y), float(z), *rpy_of(frame.rotation))
-
-
-def rotation_angle(a: tuple[Vector, Vector, Vector], b: tuple[Vector, Vector, Vector]) -> Element:
-    """Return the angle in [rad] between two orientations: that of A^T B, well-conditioned from 0 to pi."""
-    first, second = Transform(a).inverse(), Transform(b)
-    (m11, m12, m13), (m21, m22, m23), (m31, m32, m33) = (first @ second).rotation
-    sine = np.sqrt((m32 - m23) ** 2 + (m13 - m31) ** 2 + (m21 - m12) ** 2)
-    return np.arctan2(sine, m11 + m22 + m33 - 1.0)
 
 
 def _cosine_sine(angle: Element) -> tuple[Element, Element]:

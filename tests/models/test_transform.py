@@ -17,11 +17,9 @@ from urmpipe_models.transform import (
     Transform,
     euler_zyx,
     from_offset,
-    from_rotation_vector,
     from_rpy,
     offset_of,
     rotation_about,
-    rotation_angle,
     rotation_x,
     rotation_y,
     rotation_z,
@@ -169,30 +167,3 @@ def test_offsets_come_back(values: list[float]) -> None:
     assert back[:3] == tuple(values[:3])
     np.testing.assert_allclose(back[3:], values[3:], atol=2 * ROUNDING)  # 1 / cos(1) < 2
     assert offset_of(from_offset(values[:3])) == (*values[:3], 0.0, 0.0, 0.0)
-
-
-@given(st.integers(0, 2**32 - 1), st.floats(-12.0, 0.0), st.booleans())
-def test_rotation_angle_is_scipys_from_zero_to_pi(seed: int, power: float, near_pi: bool) -> None:
-    rng = np.random.default_rng(seed)
-    axis = rng.normal(size=3)
-    angle = math.pi - 10.0**power if near_pi else 10.0**power
-    first = Rotation.random(rng=rng)
-    second = first * Rotation.from_rotvec(angle * axis / np.linalg.norm(axis))
-    got = rotation_angle(rows(first.as_matrix()), rows(second.as_matrix()))
-    assert got == pytest.approx((first.inv() * second).magnitude(), abs=4e-15)  # the matrices' own rounding
-
-
-@given(st.integers(0, 2**32 - 1), st.floats(-20.0, 0.4))
-def test_rotation_vectors_are_scipys(seed: int, power: float) -> None:
-    axis = np.random.default_rng(seed).normal(size=3)
-    vector = axis / np.linalg.norm(axis) * 10.0**power
-    expected = Rotation.from_rotvec(vector).as_matrix()
-    got = from_rotation_vector(tuple(vector.tolist())).rotation
-    np.testing.assert_allclose(matrix(got), expected, atol=ROUNDING)
-
-
-def test_rotation_vectors_of_zero_and_pi_in_one_column() -> None:
-    vectors = np.array([[0.0, 0.0, 0.0], [math.pi, 0.0, 0.0], [0.0, -math.pi, 0.0], [1e-9, 2e-9, 0.0]])
-    got = from_rotation_vector(tuple(vectors.T)).rotation
-    expected = np.moveaxis(Rotation.from_rotvec(vectors).as_matrix(), 0, -1)
-    np.testing.assert_allclose(np.array([list(row) for row in got]), expected, atol=ROUNDING)

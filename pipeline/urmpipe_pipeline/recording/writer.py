@@ -28,7 +28,7 @@ from urmpipe_pipeline.results import Comparison, Run
 if TYPE_CHECKING:
     from rerun import ComponentColumn, RecordingStream, TimeColumn
 
-Result = TypeVar("Result", Run, Comparison)
+Result = TypeVar("Result", bound=Run | Comparison)
 
 Early: TypeAlias = Callable[[JointLog | Run], None]
 """Takes a log that was read, or a run that lacks its kinematics, to be written meanwhile."""
@@ -60,10 +60,7 @@ def write_recording(
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
-    if isinstance(result, Run):
-        record(lambda early: result, path, inputs, progress)
-    else:
-        record(lambda early: result, path, inputs, progress)
+    record(lambda early: result, path, inputs, progress)
     return path
 
 
