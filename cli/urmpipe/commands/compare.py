@@ -72,9 +72,9 @@ def compare(
     Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
     """
     from urmpipe.printing import print_comparison, print_json, print_recording, print_warnings, progress_bar
-    from urmpipe_pipeline.recording import warm_up
+    from urmpipe_pipeline.recording import load_rerun
 
-    warm_up(without_pandas=True)
+    load_rerun(without_pandas=True)
     from urmpipe import api
 
     robot = take_robot(options)

@@ -37,9 +37,9 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
       urmpipe demo
       urmpipe demo -o somewhere --json
     """
-    from urmpipe_pipeline.recording import warm_up
+    from urmpipe_pipeline.recording import load_rerun
 
-    warm_up(without_pandas=True)
+    load_rerun(without_pandas=True)
     from urmpipe import api
     from urmpipe.printing import print_comparison, print_json, print_recording, progress_bar
     from urmpipe_datasets import LOGS

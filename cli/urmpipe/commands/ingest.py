@@ -30,9 +30,9 @@ def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bo
       urmpipe ingest table.txt --robot ur5e --unit deg --period 8ms --json
     """
     from urmpipe.printing import print_json, print_recording, print_run, print_warnings, progress_bar
-    from urmpipe_pipeline.recording import warm_up
+    from urmpipe_pipeline.recording import load_rerun
 
-    warm_up(without_pandas=True)
+    load_rerun(without_pandas=True)
     from urmpipe import api
 
     target = output or Path(default_name(logs))

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import sys
-import threading
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,21 +17,20 @@ MAGIC = b"RRF"
 """Every .rrd starts so."""
 
 
-def warm_up(*, without_pandas: bool = False) -> threading.Thread:
-    """Start to import Rerun in the background, so that it is there when it is needed.
+def load_rerun(*, without_pandas: bool = False) -> None:
+    """Import all of Rerun that is used, in the thread of the caller.
 
-    Importing it takes about half a second, which a command can spend on reading its input.
+    It must be there before other threads work: two threads that import at once can see each other's
+    packages half initialized.
 
     Args:
-        without_pandas: Keep pandas out of this process, which takes as long again. Only for a process
-            that is a command of its own: pyarrow converts nothing to pandas in it any more.
-
-    Returns:
-        The thread at work; nobody needs to wait for it.
+        without_pandas: Keep pandas out of this process, which takes as long again to import. Only for a
+            process that is a command of its own: pyarrow converts nothing to pandas in it any more.
     """
-    thread = threading.Thread(target=_import_rerun, args=(without_pandas,), name="import rerun")
-    thread.start()
-    return thread
+    if without_pandas:
+        _keep_pandas_out()
+    import rerun.blueprint
+    import rerun.chunk  # noqa: F401
 
 
 def is_recording(path: Path) -> bool:
@@ -68,13 +66,6 @@ def open_reader(path: Path) -> RrdReader:
 def our_entries(reader: RrdReader) -> list[StoreEntry]:
     """Return the recordings in a file that urmpipe wrote."""
     return [entry for entry in reader.recordings() if entry.application_id == APPLICATION_ID]
-
-
-def _import_rerun(without_pandas: bool) -> None:
-    if without_pandas:
-        _keep_pandas_out()
-    import rerun.blueprint
-    import rerun.chunk  # noqa: F401
 
 
 class _NoPandas:

@@ -17,7 +17,7 @@ from urmpipe_pipeline.joint_log import FloatArray, JointLog
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.recording.drawing import draw, time_columns
 from urmpipe_pipeline.recording.entities import Block, blocks, printable
-from urmpipe_pipeline.recording.identity import APPLICATION_ID
+from urmpipe_pipeline.recording.identity import APPLICATION_ID, load_rerun
 from urmpipe_pipeline.recording.layout import viewer_layout
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.scene import scene_of
@@ -89,6 +89,7 @@ def record(
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
     with guarded_output(path, inputs, "recording") as part:
+        load_rerun()
         with _Sender(part) as sender, ThreadPoolExecutor(1) as beside:
             under_way: list[Future[None]] = []
             result = make(lambda part: under_way.append(beside.submit(sender.send, blocks(part))))
