@@ -17,7 +17,6 @@ from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.operands import load_run, log_files
 from urmpipe_pipeline.recording import is_recording, read_recording, record
-from urmpipe_pipeline.report import write_report
 from urmpipe_pipeline.results import Comparison, Run
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE
@@ -178,6 +177,8 @@ def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> 
     Raises:
         UrmpipeError: With everything that is wrong with the recordings or the output.
     """
+    from urmpipe_pipeline.report import write_report
+
     files = [Path(one) for one in results if isinstance(one, (str, Path))]
     foreign = [path for path in files if path.exists() and not is_recording(path)]
     if foreign:

@@ -5,6 +5,7 @@ Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
 
 from __future__ import annotations
 
+import gc
 import os
 import sys
 from collections.abc import Sequence
@@ -26,6 +27,14 @@ COMMANDS = {
     "robot": "List, show and export robots.",
 }
 """Each command and its short help: --help must not import them all (a test holds both together)."""
+
+COLLECT_AT = 100_000
+"""Objects made before Python looks for cycles among them. Python's own 700 cost a command, which
+first of all imports thousands of them, a tenth of a second."""
+
+SWITCH_AFTER = 2e-4
+"""Time in [s] after which a thread that computes lets another have Python's lock. With Python's own 5 ms a
+thread that gives it up for each array waits longer for it than it works, while another one imports."""
 
 SHOWN_FINDINGS = 20
 """Errors printed line by line; the others are counted."""
@@ -75,7 +84,11 @@ def cli() -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: errors become lines on standard error and the exit code 2."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    sys.exit(run(given))
+    gc.set_threshold(COLLECT_AT)
+    sys.setswitchinterval(SWITCH_AFTER)
+    code = run(given)
+    gc.freeze()  # else Python looks for cycles among all modules before it exits
+    sys.exit(code)
 
 
 def run(arguments: Sequence[str]) -> int:

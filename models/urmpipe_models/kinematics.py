@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 from typing import TypeAlias
 
 import numpy as np
@@ -20,7 +21,7 @@ from urmpipe_models.transform import Transform, euler_zyx
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
-BLOCK = 8192
+BLOCK = 16384
 """Rows worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
 
 POSE_BLOCK = 32768
@@ -105,16 +106,22 @@ def motions(
 
     Source: [UrmArm2021]_ section 3, Figure 10 b and c (v7 of q', a7 of q'' and q'^2).
     """
+    return tuple(_motions(chain, q, qd, qdd))
+
+
+def _motions(
+    chain: Chain, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
+) -> Iterator[Motion]:
+    """Yield the motions of p1..pn; who wants one of them need not keep the arrays of all."""
     values, rates, second = joint_values(chain, q), _joint_rates(chain, qd), _joint_rates(chain, qdd)
-    points: list[Motion] = []
     body = Motion(chain.base, ZERO, ZERO, ZERO, ZERO)
     for k, joint in enumerate(chain.joints):
         at_joint = _carried(body, joint.origin)
         if k > 0:
             end = Transform(body.pose.rotation, at_joint.pose.translation)
-            points.append(replace(at_joint, pose=end))
+            yield replace(at_joint, pose=end)
         body = _driven(at_joint, joint, values[k], rates[k], second[k])
-    return (*points, _carried(body, chain.tip @ chain.tool))
+    yield _carried(body, chain.tip @ chain.tool)
 
 
 def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple[Element, ...], ...]:
@@ -209,7 +216,15 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
     return position.T, rotation.transpose(2, 0, 1)
 
 
-def point_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray, point: int = -1) -> PointLog:
+def point_over_log(
+    chain: Chain,
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    point: int = -1,
+    *,
+    threads: int = THREADS,
+) -> PointLog:
     """Return the motion of one point p1..pn over a log.
 
     Args:
@@ -218,20 +233,22 @@ def point_over_log(chain: Chain, q: FloatArray, qd: FloatArray, qdd: FloatArray,
         qd: Their rates in [rad/s] or [m/s], shape (n, joints).
         qdd: Their second derivatives in [rad/s2] or [m/s2], shape (n, joints).
         point: Index of the point, -1 for the tool centre point.
+        threads: Blocks worked on side by side; 1 leaves the other cores to whoever needs them meanwhile.
     """
-    count = len(q)
+    count, place = len(q), range(len(chain.joints))[point]
     position, velocity, acceleration, euler = (np.empty((3, count)) for _ in range(4))
     singular = np.empty(count, dtype=np.bool_)
 
     def work(block: slice) -> None:
-        motion = motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))[point]
+        every = _motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))
+        motion = next(islice(every, place, None))
         rz, ry, rx, singular[block] = euler_zyx(motion.pose.rotation)
         _fill(position[:, block], motion.pose.translation)
         _fill(velocity[:, block], motion.velocity)
         _fill(acceleration[:, block], motion.acceleration)
         _fill(euler[:, block], (rz, ry, rx))
 
-    _each_block(work, count)
+    _each_block(work, count, threads=threads)
     return PointLog(position.T, velocity.T, acceleration.T, euler.T, singular)
 
 
@@ -330,14 +347,15 @@ def row_blocks(count: int, rows: int = BLOCK) -> Iterator[slice]:
     return (slice(start, start + rows) for start in range(0, count, rows))
 
 
-def _each_block(work: Callable[[slice], None], count: int, rows: int = BLOCK) -> None:
+def _each_block(work: Callable[[slice], None], count: int, rows: int = BLOCK, threads: int = THREADS) -> None:
     """Run work on every block of rows, several at a time: NumPy computes without Python's lock."""
-    if count <= rows:
-        work(slice(0, count))
+    if count <= rows or threads == 1:
+        for block in row_blocks(count, rows):
+            work(block)
         return
     from concurrent.futures import ThreadPoolExecutor
 
-    with ThreadPoolExecutor(THREADS) as pool:
+    with ThreadPoolExecutor(threads) as pool:
         list(pool.map(work, row_blocks(count, rows)))  # taking the results raises what went wrong in a block
 
 

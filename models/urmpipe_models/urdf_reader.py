@@ -10,8 +10,16 @@ from pathlib import Path
 from urmpipe_models.chain import Chain, Joint, Mimic
 from urmpipe_models.errors import RobotError
 from urmpipe_models.transform import Transform
-from urmpipe_models.urdf_tree import KINDS, OTHER_TYPES, Edge, UrdfTree, read_tree
-from urmpipe_models.urdf_writer import BASE_JOINT, TIP_JOINT, TOOL_JOINT
+from urmpipe_models.urdf_tree import (
+    BASE_JOINT,
+    KINDS,
+    OTHER_TYPES,
+    TIP_JOINT,
+    TOOL_JOINT,
+    Edge,
+    UrdfTree,
+    read_tree,
+)
 
 
 def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str | None = None) -> Chain:

@@ -25,6 +25,9 @@ OTHER_TYPES = ("floating", "planar")
 UNLIMITED = 1.7976931348623157e308
 """The largest double: stands for infinity where URDF wants a number."""
 
+BASE_JOINT, TIP_JOINT, TOOL_JOINT = "urmpipe_base", "urmpipe_tip", "urmpipe_tool"
+"""Names of the fixed joints that stand for a chain's base, tip and tool."""
+
 COUNTS = {1: "a number", 3: "three numbers"}
 
 

@@ -12,10 +12,7 @@ from urmpipe_models.elementwise import ZERO, Vector
 from urmpipe_models.errors import RobotError
 from urmpipe_models.export import EXPORT_MARK, replace_text
 from urmpipe_models.transform import rpy_of
-from urmpipe_models.urdf_tree import UNLIMITED
-
-BASE_JOINT, TIP_JOINT, TOOL_JOINT = "urmpipe_base", "urmpipe_tip", "urmpipe_tool"
-"""Names of the fixed joints that stand for a chain's base, tip and tool."""
+from urmpipe_models.urdf_tree import BASE_JOINT, TIP_JOINT, TOOL_JOINT, UNLIMITED
 
 SLENDERNESS = 40.0
 """The arm's stretched length by the cylinders' radius: a choice for the eye."""

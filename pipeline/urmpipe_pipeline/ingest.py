@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import LogError
-from urmpipe_models.kinematics import PointLog, point_over_log
+from urmpipe_models.kinematics import THREADS, PointLog, point_over_log
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
 from urmpipe_pipeline.derivatives import Method, derivatives, recorded_agree
 from urmpipe_pipeline.grid import Grid, make_grid
@@ -90,7 +90,8 @@ def ingest_log(
     )
     if early:
         early(run)
-    tcp, noticed = kinematics(robot, q, qd, qdd)
+    # The joints are being written meanwhile: that takes a core of its own.
+    tcp, noticed = kinematics(robot, q, qd, qdd, threads=1 if early else THREADS)
     return replace(run, tcp=tcp, warnings=(*warnings, *noticed))
 
 
@@ -191,7 +192,7 @@ def _rates(
 
 
 def kinematics(
-    robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray
+    robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray, *, threads: int = THREADS
 ) -> tuple[PointLog | None, list[LogWarning]]:
     """Return the motion of the tool centre point, if there is a robot, and what there is to say about it.
 
@@ -200,6 +201,7 @@ def kinematics(
         q: Joint values in [rad] or [m], shape (g, joints).
         qd: Their rates in [rad/s] or [m/s], shape (g, joints).
         qdd: Their second derivatives in [rad/s2] or [m/s2], shape (g, joints).
+        threads: Blocks of samples worked on side by side.
 
     Raises:
         LogError: If the log has another number of joints than the robot.
@@ -210,7 +212,7 @@ def kinematics(
         raise LogError(
             f"found {q.shape[1]} joints, allowed: {len(robot.coordinates)}, as robot {robot.name} has"
         )
-    tcp = point_over_log(robot, q, qd, qdd)
+    tcp = point_over_log(robot, q, qd, qdd, threads=threads)
     if not tcp.singular.any():
         return tcp, []
     count, first = int(tcp.singular.sum()), int(np.argmax(tcp.singular))

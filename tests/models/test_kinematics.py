@@ -15,7 +15,6 @@ from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 from numpy.typing import NDArray
 
-from urmpipe_models import kinematics
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint, Mimic
 from urmpipe_models.dh import DHRow, modified_dh_chain
@@ -368,16 +367,13 @@ def same(got: Any, expected: Any) -> None:
     np.testing.assert_allclose(got, np.array(expected, dtype=float), rtol=1e-13, atol=1e-13)
 
 
-def test_blocks_side_by_side_give_the_very_bits_of_one_after_the_other(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_blocks_side_by_side_give_the_very_bits_of_one_after_the_other() -> None:
     chain = load_robot("ur5e")
-    q = random_poses(chain, 2 * BLOCK + 100)
-    side_by_side = poses_over_log(chain, q)
-    monkeypatch.setattr(kinematics, "THREADS", 1)
-    alone = poses_over_log(chain, q)
-    for a, b in zip(side_by_side, alone, strict=True):
-        np.testing.assert_array_equal(a, b)
+    q, qd, qdd = np.random.default_rng(5).uniform(-4.0, 4.0, (3, 2 * BLOCK + 100, 6))
+    side_by_side = point_over_log(chain, q, qd, qdd, threads=3)
+    alone = point_over_log(chain, q, qd, qdd, threads=1)
+    for name in ("position", "velocity", "acceleration", "euler_zyx", "singular"):
+        np.testing.assert_array_equal(getattr(side_by_side, name), getattr(alone, name))
 
 
 def test_missing_samples_are_missing_and_touch_no_other_row() -> None:

@@ -72,9 +72,9 @@ def compare(
     Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
     """
     from urmpipe.printing import print_comparison, print_json, print_recording, print_warnings, progress_bar
-    from urmpipe_pipeline.recording import load_rerun
+    from urmpipe_pipeline.recording import keep_pandas_out
 
-    load_rerun(without_pandas=True)
+    keep_pandas_out()
     from urmpipe import api
 
     robot = take_robot(options)

@@ -37,9 +37,9 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
       urmpipe demo
       urmpipe demo -o somewhere --json
     """
-    from urmpipe_pipeline.recording import load_rerun
+    from urmpipe_pipeline.recording import keep_pandas_out
 
-    load_rerun(without_pandas=True)
+    keep_pandas_out()
     from urmpipe import api
     from urmpipe.printing import print_comparison, print_json, print_recording, progress_bar
     from urmpipe_datasets import LOGS

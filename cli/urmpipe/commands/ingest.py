@@ -30,9 +30,9 @@ def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bo
       urmpipe ingest table.txt --robot ur5e --unit deg --period 8ms --json
     """
     from urmpipe.printing import print_json, print_recording, print_run, print_warnings, progress_bar
-    from urmpipe_pipeline.recording import load_rerun
+    from urmpipe_pipeline.recording import keep_pandas_out
 
-    load_rerun(without_pandas=True)
+    keep_pandas_out()
     from urmpipe import api
 
     target = output or Path(default_name(logs))

@@ -24,9 +24,9 @@ def report(recordings: tuple[Path, ...], output: Path | None, as_json: bool, qui
       urmpipe report log-against-path.rrd
       urmpipe report monday.rrd tuesday.rrd -o week.html
     """
-    from urmpipe_pipeline.recording import load_rerun
+    from urmpipe_pipeline.recording import keep_pandas_out
 
-    load_rerun(without_pandas=True)
+    keep_pandas_out()
     from urmpipe import api
     from urmpipe.printing import print_json
 

@@ -17,20 +17,38 @@ MAGIC = b"RRF"
 """Every .rrd starts so."""
 
 
-def load_rerun(*, without_pandas: bool = False) -> None:
-    """Import all of Rerun that is used, in the thread of the caller.
+def load_rerun() -> None:
+    """Import all of Rerun that is used.
 
-    It must be there before other threads work: two threads that import at once can see each other's
-    packages half initialized.
-
-    Args:
-        without_pandas: Keep pandas out of this process, which takes as long again to import. Only for a
-            process that is a command of its own: pyarrow converts nothing to pandas in it any more.
+    No other thread may import meanwhile what Rerun imports too: of two threads that import the same
+    packages at once, one can see them half initialized.
     """
-    if without_pandas:
-        _keep_pandas_out()
     import rerun.blueprint
     import rerun.chunk  # noqa: F401
+
+
+def look_for_pandas() -> None:
+    """Let pyarrow look for pandas, as it does when it converts a list for the first time.
+
+    It imports pandas (0.4 s, 32 MB) to see whether the list is a Series: better here than in some thread.
+    """
+    import pyarrow as pa
+
+    pa.array([0])
+
+
+def keep_pandas_out() -> None:
+    """Keep pandas out of this process: only for one that is a command of its own.
+
+    pyarrow finds once and for all that pandas is not there, and converts nothing to pandas any more.
+    """
+    if "pandas" in sys.modules:
+        return
+    sys.meta_path.insert(0, _NoPandas)
+    try:
+        look_for_pandas()
+    finally:
+        sys.meta_path.remove(_NoPandas)
 
 
 def is_recording(path: Path) -> bool:
@@ -76,19 +94,3 @@ class _NoPandas:
         """Raise for pandas, and leave all else to the other finders."""
         if name == "pandas":
             raise ModuleNotFoundError("pandas is kept out of this process", name=name)
-
-
-def _keep_pandas_out() -> None:
-    """Let pyarrow find that pandas is not there, once and for all.
-
-    Otherwise it imports pandas (0.4 s, 32 MB) to see whether the first list that it converts is a Series.
-    """
-    if "pandas" in sys.modules:
-        return
-    import pyarrow as pa
-
-    sys.meta_path.insert(0, _NoPandas)
-    try:
-        pa.array([0])
-    finally:
-        sys.meta_path.remove(_NoPandas)

@@ -127,7 +127,8 @@ class Store:
 def _decoded(batch: RecordBatch) -> Chunk:
     names = set(batch.schema.names)
     column = batch.column(SCALARS)
-    values = column.flatten().to_numpy().reshape(len(column), len(column.flatten()) // len(column))
+    first, last = column.offsets[0].as_py(), column.offsets[-1].as_py()  # flatten() loads pyarrow.compute
+    values = column.values[first:last].to_numpy().reshape(len(column), -1)
     other = next((name for name in ("row", "sample") if name in names), None)
     return Chunk(
         batch.column("t").to_numpy(zero_copy_only=False).astype(np.int64),

@@ -17,7 +17,7 @@ from urmpipe_pipeline.joint_log import FloatArray, JointLog
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.recording.drawing import draw, time_columns
 from urmpipe_pipeline.recording.entities import Block, blocks, printable
-from urmpipe_pipeline.recording.identity import APPLICATION_ID, load_rerun
+from urmpipe_pipeline.recording.identity import APPLICATION_ID, load_rerun, look_for_pandas
 from urmpipe_pipeline.recording.layout import viewer_layout
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.scene import scene_of
@@ -35,6 +35,9 @@ Early: TypeAlias = Callable[[JointLog | Run], None]
 
 SLICE = 65_536
 """Rows sent at a time: few enough to keep memory low, many enough to keep the overhead low."""
+
+AHEAD = 3
+"""Slices under way at a time: there is always one to be written, and memory stays low."""
 
 SPARE = 64 * 2**20
 """Bytes that must be free on the disk before a slice is sent: it, what is on its way, and the footer."""
@@ -72,12 +75,13 @@ def record(
 ) -> Result:
     """Make a result and write its recording, some of it while the rest is still being computed.
 
-    Rerun takes longer to write a log than urmpipe to compute its kinematics: so the joints are on their
-    way meanwhile.
+    Rerun takes long to import, and longer to write a log than urmpipe to compute its kinematics: so it is
+    imported while the log is read, and the joints are on their way while the rest is computed.
 
     Args:
         make: Returns the result. It is given a function that it may call with the log once it is read, and
-            with the run before its kinematics are computed: what they have is written beside.
+            with the run before its kinematics are computed: what they have is written beside. Until it
+            calls that function, or returns, it must not import what Rerun imports too (see `load_rerun`).
         path: The file (.rrd); replaced if it is a recording of urmpipe's.
         inputs: The files the result is made from: none of them is replaced.
         progress: Told the share of the data that is written, 0..1.
@@ -89,10 +93,20 @@ def record(
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
     with guarded_output(path, inputs, "recording") as part:
-        load_rerun()
         with _Sender(part) as sender, ThreadPoolExecutor(1) as beside:
+            loading = beside.submit(load_rerun)
             under_way: list[Future[None]] = []
-            result = make(lambda part: under_way.append(beside.submit(sender.send, blocks(part))))
+
+            def ready() -> None:
+                loading.result()
+                look_for_pandas()
+
+            def early(part: JointLog | Run) -> None:
+                ready()
+                under_way.append(beside.submit(sender.send, blocks(part)))
+
+            result = make(early)
+            ready()
             every = blocks(result)
             metadata = to_json(result, every)
             under_way.append(beside.submit(sender.send, every, progress))
@@ -154,16 +168,17 @@ class _Sender:
         due = [block for block in every if block.entity not in self._sent]
         total = sum(block.values.nbytes for block in every) or 1
         done = total - sum(block.values.nbytes for block in due)
-        for block in due:
-            for rows in _slices(block):
-                values = block.values[rows]
-                times, column = _times(block, rows), _scalars(values)
-                stream.flush()  # the slice before: it was being written while this one was made
-                self._refuse_full_disk()
-                stream.send_columns(block.entity, times, [column])
-                done += values.nbytes
-                if progress:
-                    progress(done / total)
+        slices = [(block, rows) for block in due for rows in _slices(block)]
+        for number, (block, rows) in enumerate(slices):
+            values = block.values[rows]
+            times, column = _times(block, rows), _scalars(values)
+            if number % AHEAD == 0:
+                stream.flush()  # waits until all that was sent is in the file
+            self._refuse_full_disk()
+            stream.send_columns(block.entity, times, [column])
+            done += values.nbytes
+            if progress:
+                progress(done / total)
         self._sent |= {block.entity for block in due}
 
     def _refuse_full_disk(self) -> None:

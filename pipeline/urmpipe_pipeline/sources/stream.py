@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import codecs
+import os
 from pathlib import Path
 from types import TracebackType
 
 import numpy as np
 from numpy.typing import NDArray
+from pyarrow import NativeFile, OSFile
 
 from urmpipe_pipeline.sources.cells import SPACE
 from urmpipe_pipeline.sources.sniff import Layout
@@ -16,6 +18,21 @@ Bytes = NDArray[np.uint8]
 
 _NEWLINES = b"\n\r"
 _TO_POINTS = bytes.maketrans(b",.", b".~")
+
+
+def open_table(layout: Layout) -> TableStream | NativeFile:
+    """Return the rows of a table as a file to read from, header excluded.
+
+    Where nothing is to be converted it is pyarrow's own, which needs no Python while it is read.
+    """
+    stream = TableStream(layout)
+    path = layout.segment.path
+    if stream.converts or layout.segment.end != path.stat().st_size:
+        return stream
+    stream.close()
+    file = OSFile(os.fsencode(path))
+    file.seek(layout.offset)
+    return file
 
 
 class TableStream:
@@ -37,6 +54,11 @@ class TableStream:
         self._signs = _TO_POINTS if layout.decimal == "," != layout.delimiter else None
         self._cut_line = b""
         self._ready = b""
+
+    @property
+    def converts(self) -> bool:
+        """Whether the bytes read are others than the file's own."""
+        return self._decoder is not None or self._signs is not None or self._squeezed
 
     def read(self, size: int = -1) -> bytes:
         """Return up to so many bytes of the table, none at its end."""

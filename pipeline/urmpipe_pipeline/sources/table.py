@@ -7,20 +7,19 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
+import pyarrow as pa
 from numpy.typing import NDArray
+from pyarrow import csv
 
 from urmpipe_models.errors import Finding
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.sources.cells import is_number, plain
 from urmpipe_pipeline.sources.sniff import Layout
-from urmpipe_pipeline.sources.stream import TableStream
+from urmpipe_pipeline.sources.stream import open_table
 from urmpipe_pipeline.sources.vocabulary import vocabulary
-
-if TYPE_CHECKING:
-    import pyarrow as pa
 
 BLOCK_BYTES = 1 << 20
 NO_TIME = np.iinfo(np.int64).min
@@ -66,8 +65,6 @@ def read_fast(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColum
         columns: Which columns hold numbers.
         clock: The columns of its clock; their values in [ns] are added.
     """
-    import pyarrow as pa
-
     narrow, wide = ([_scale(layout, part, exact) for part in clock] for exact in (False, True))
     for scales in (narrow,) if narrow == wide else (narrow, wide):
         try:
@@ -115,15 +112,12 @@ def _numbers(
 def _parse(
     layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn], scales: Sequence[int]
 ) -> pa.Table:
-    import pyarrow as pa
-    from pyarrow import csv
-
     types: dict[str, Any] = {str(column): pa.float64() for column in columns}
     for part, scale in zip(clock, scales, strict=True):
         types[str(part.column)] = pa.decimal128(_PRECISION, scale)
     names = [str(column) for column in range(len(layout.names))]
     quoted_commas = layout.delimiter == layout.decimal  # "0,5","1,5": the stream leaves them
-    with TableStream(layout) as stream:
+    with open_table(layout) as stream:
         return csv.read_csv(
             stream,
             csv.ReadOptions(column_names=names, block_size=BLOCK_BYTES, use_threads=not quoted_commas),
@@ -156,7 +150,6 @@ def _add_time(target: IntArray, chunk: pa.Array, exponent: int, scale: int) -> N
     """
     missing = (target == NO_TIME) | (_missing(chunk) if chunk.null_count else False)
     if scale > exponent:
-        import pyarrow as pa
         from pyarrow import compute
 
         rounded = compute.round(chunk, ndigits=exponent, round_mode="half_to_even")
