@@ -7,6 +7,8 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 if TYPE_CHECKING:
     from rerun.chunk import RrdReader, StoreEntry
 
@@ -27,14 +29,15 @@ def load_rerun() -> None:
     import rerun.chunk  # noqa: F401
 
 
-def look_for_pandas() -> None:
-    """Let pyarrow look for pandas, as it does when it converts a list for the first time.
+def settle_pyarrow() -> None:
+    """Let pyarrow import here and now what it imports when it first converts a list and an array.
 
-    It imports pandas (0.4 s, 32 MB) to see whether the list is a Series: better here than in some thread.
+    That is pandas (0.4 s, 32 MB), to see whether the list is a Series, and numpy.ma.
     """
     import pyarrow as pa
 
     pa.array([0])
+    pa.array(np.zeros(1))
 
 
 def keep_pandas_out() -> None:
@@ -46,7 +49,7 @@ def keep_pandas_out() -> None:
         return
     sys.meta_path.insert(0, _NoPandas)
     try:
-        look_for_pandas()
+        settle_pyarrow()
     finally:
         sys.meta_path.remove(_NoPandas)
 

@@ -17,7 +17,7 @@ from urmpipe_pipeline.joint_log import FloatArray, JointLog
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.recording.drawing import draw, time_columns
 from urmpipe_pipeline.recording.entities import Block, blocks, printable
-from urmpipe_pipeline.recording.identity import APPLICATION_ID, load_rerun, look_for_pandas
+from urmpipe_pipeline.recording.identity import APPLICATION_ID, load_rerun, settle_pyarrow
 from urmpipe_pipeline.recording.layout import viewer_layout
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.scene import scene_of
@@ -99,7 +99,7 @@ def record(
 
             def ready() -> None:
                 loading.result()
-                look_for_pandas()
+                settle_pyarrow()
 
             def early(part: JointLog | Run) -> None:
                 ready()

@@ -61,6 +61,26 @@ def imported(*arguments: str) -> set[str]:
     return set(json.loads(done.stdout))
 
 
+SENT = """
+import json, sys, threading
+from urmpipe import api
+from urmpipe_pipeline.recording import keep_pandas_out
+
+keep_pandas_out()
+threads = []
+
+class Finder:
+    @staticmethod
+    def find_spec(name, path=None, target=None):
+        if threading.current_thread() is not threading.main_thread():
+            threads.append(name)
+
+sys.meta_path.insert(0, Finder)
+api.ingest(sys.argv[1], robot="urm6", output=sys.argv[2])
+print(json.dumps([name for name in threads if name in sys.modules]))
+"""
+
+
 @pytest.mark.slow
 @pytest.mark.parametrize("process", ["command", "python"])
 def test_reading_a_log_imports_nothing_that_rerun_imports_too(process: str, tmp_path: Path) -> None:
@@ -72,3 +92,16 @@ def test_reading_a_log_imports_nothing_that_rerun_imports_too(process: str, tmp_
     assert {"rerun", "rerun.blueprint", "rerun.chunk"} <= for_rerun
     assert not for_rerun & for_logs
     assert not {name for name in for_logs if name.startswith(("rerun", "pandas", "numpy"))}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("log", ["coppeliasim.csv", "matlab.csv"])
+def test_a_thread_beside_imports_rerun_and_nothing_else(log: str, tmp_path: Path) -> None:
+    """What is sent while the kinematics are computed (SciPy is imported for some) imports nothing."""
+    done = subprocess.run(
+        [sys.executable, "-c", SENT, str(LOGS / log), str(tmp_path / "run.rrd")],
+        capture_output=True, text=True, check=True, timeout=300,
+    )  # fmt: skip
+    beside = set(json.loads(done.stdout))
+    assert {"rerun", "rerun.chunk"} <= beside
+    assert beside <= imported("command", "rerun")
