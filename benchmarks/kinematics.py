@@ -22,6 +22,8 @@ from urmpipe_models.transform import Transform
 
 FloatArray = NDArray[np.float64]
 
+TRIES = 3
+
 
 def placement(frame: Transform) -> pin.SE3:
     """Return a constant frame as Pinocchio's."""
@@ -39,6 +41,13 @@ def peer_model(chain: Chain) -> tuple[pin.Model, int]:
             frame = pin.SE3.Identity()
     tip = pin.Frame("tip", parent, 0, frame * placement(chain.tip), pin.FrameType.OP_FRAME)
     return model, model.addFrame(tip)
+
+
+def timed(job: Callable[[], object]) -> float:
+    """Return how long a job takes in [s]."""
+    start = time.perf_counter()
+    job()
+    return time.perf_counter() - start
 
 
 def main() -> None:
@@ -63,20 +72,15 @@ def main() -> None:
             pose = pin.updateFramePlacement(model, data, tip)
             position[i], rotation[i] = pose.translation, pose.rotation
 
-    ours: list[tuple[FloatArray, FloatArray]] = []
     jobs: dict[str, Callable[[], object]] = {
-        "urmpipe poses_over_log": lambda: ours.append(poses_over_log(chain, q)),
+        "urmpipe poses_over_log": lambda: poses_over_log(chain, q),
         "Pinocchio loop, poses stored": stored,
         "Pinocchio loop, poses computed and dropped": bare,
     }
     taken: dict[str, list[float]] = {name: [] for name in jobs}
-    for number in range(options.rounds + 1):
+    for _ in range(options.rounds):
         for name, job in jobs.items():
-            ours.clear()
-            start = time.perf_counter()
-            job()
-            if number:
-                taken[name].append(time.perf_counter() - start)
+            taken[name].append(min(timed(job) for _ in range(TRIES)))
     mine = poses_over_log(chain, q)
     error = max(np.abs(mine[0] - position).max(), np.abs(mine[1] - rotation).max())
     base = taken["urmpipe poses_over_log"]
@@ -84,6 +88,8 @@ def main() -> None:
         f"# Forward kinematics of {options.poses} urm6 poses: {options.rounds} rounds in turn, one process",
         "",
         *machine("pin"),
+        f"Of each job the shortest of {TRIES} runs in a row counts in a round: memory that was not in use",
+        "for a while is slow at first here, and only one of the jobs needs much of it.",
         f"Largest difference between the two, position [m] and rotation: {error:.1e}.",
         "",
         "| job | s, median (min-max) | thousand poses a second | times urmpipe's, median of pairs |",

@@ -24,9 +24,6 @@ FloatArray: TypeAlias = NDArray[np.float64]
 BLOCK = 16384
 """Rows worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
 
-POSE_BLOCK = 32768
-"""The same for poses alone, which have few arrays under way."""
-
 THREADS = min(4, os.cpu_count() or 1)
 """Blocks worked on side by side: beyond some, Python's own work, which runs alone, sets the pace."""
 
@@ -193,7 +190,7 @@ def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     def work(block: slice) -> None:
         _fill(position[:, block], tip_pose(chain, _columns(q[block])).translation)
 
-    _each_block(work, len(q), POSE_BLOCK)
+    _each_block(work, len(q))
     return position.T
 
 
@@ -212,7 +209,7 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
         for row in range(3):
             _fill(rotation[row, :, block], pose.rotation[row])
 
-    _each_block(work, len(q), POSE_BLOCK)
+    _each_block(work, len(q))
     return position.T, rotation.transpose(2, 0, 1)
 
 
@@ -342,21 +339,21 @@ def _driven(state: Motion, joint: Joint, value: Element, rate: Element, second: 
     )
 
 
-def row_blocks(count: int, rows: int = BLOCK) -> Iterator[slice]:
+def row_blocks(count: int) -> Iterator[slice]:
     """Yield the slices that part `count` rows into blocks."""
-    return (slice(start, start + rows) for start in range(0, count, rows))
+    return (slice(start, start + BLOCK) for start in range(0, count, BLOCK))
 
 
-def _each_block(work: Callable[[slice], None], count: int, rows: int = BLOCK, threads: int = THREADS) -> None:
+def _each_block(work: Callable[[slice], None], count: int, threads: int = THREADS) -> None:
     """Run work on every block of rows, several at a time: NumPy computes without Python's lock."""
-    if count <= rows or threads == 1:
-        for block in row_blocks(count, rows):
+    if count <= BLOCK or threads == 1:
+        for block in row_blocks(count):
             work(block)
         return
     from concurrent.futures import ThreadPoolExecutor
 
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(work, row_blocks(count, rows)))  # taking the results raises what went wrong in a block
+        list(pool.map(work, row_blocks(count)))  # taking the results raises what went wrong in a block
 
 
 def _columns(rows: FloatArray) -> list[FloatArray]:
