@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urmpipe import __version__
+from urmpipe.process import tune_python
 
 if TYPE_CHECKING:
     from urmpipe_models.errors import Finding
@@ -27,14 +28,6 @@ COMMANDS = {
     "robot": "List, show and export robots.",
 }
 """Each command and its short help: --help must not import them all (a test holds both together)."""
-
-COLLECT_AT = 100_000
-"""Objects made before Python looks for cycles among them. Python's own 700 cost a command, which
-first of all imports thousands of them, a tenth of a second."""
-
-SWITCH_AFTER = 2e-4
-"""Time in [s] after which a thread that computes lets another have Python's lock. With Python's own 5 ms a
-thread that gives it up for each array waits longer for it than it works, while another one imports."""
 
 SHOWN_FINDINGS = 20
 """Errors printed line by line; the others are counted."""
@@ -84,8 +77,7 @@ def cli() -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: errors become lines on standard error and the exit code 2."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    gc.set_threshold(COLLECT_AT)
-    sys.setswitchinterval(SWITCH_AFTER)
+    tune_python()
     code = run(given)
     gc.freeze()  # else Python looks for cycles among all modules before it exits
     sys.exit(code)

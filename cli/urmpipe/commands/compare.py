@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from urmpipe.options import LENGTH, log_options, output_options, take_robot
+from urmpipe.process import tune_pyarrow
 
 TOLERANCE = 0.0035
 
@@ -71,11 +72,9 @@ def compare(
 
     Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
     """
-    from urmpipe.printing import print_comparison, print_json, print_recording, print_warnings, progress_bar
-    from urmpipe_pipeline.recording import keep_pandas_out
-
-    keep_pandas_out()
+    tune_pyarrow()
     from urmpipe import api
+    from urmpipe.printing import print_comparison, print_json, print_recording, print_warnings, progress_bar
 
     robot = take_robot(options)
     names = ("tsp", "derivative", "strict", "tolerance", "tcp", "sync_offset")

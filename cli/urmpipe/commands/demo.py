@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from urmpipe.options import output_options
+from urmpipe.process import tune_pyarrow
 
 EXPECTED = {"coppeliasim": "pass", "matlab": "pass", "solidworks": "pass", "counter_rotating": "fail"}
 """The bundled logs and the verdict each should get: the last comes from an arm with one module the wrong
@@ -37,9 +38,7 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
       urmpipe demo
       urmpipe demo -o somewhere --json
     """
-    from urmpipe_pipeline.recording import keep_pandas_out
-
-    keep_pandas_out()
+    tune_pyarrow()
     from urmpipe import api
     from urmpipe.printing import print_comparison, print_json, print_recording, progress_bar
     from urmpipe_datasets import LOGS

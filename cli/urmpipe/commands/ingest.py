@@ -8,6 +8,7 @@ from typing import Any
 import click
 
 from urmpipe.options import log_options, output_options, take_robot
+from urmpipe.process import tune_pyarrow
 
 
 @click.command(short_help="Turn one log into a recording.")
@@ -29,11 +30,9 @@ def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bo
       urmpipe ingest phi1.csv phi2.csv phi3.csv -o run.rrd
       urmpipe ingest table.txt --robot ur5e --unit deg --period 8ms --json
     """
-    from urmpipe.printing import print_json, print_recording, print_run, print_warnings, progress_bar
-    from urmpipe_pipeline.recording import keep_pandas_out
-
-    keep_pandas_out()
+    tune_pyarrow()
     from urmpipe import api
+    from urmpipe.printing import print_json, print_recording, print_run, print_warnings, progress_bar
 
     target = output or Path(default_name(logs))
     robot = take_robot(options)

@@ -7,6 +7,7 @@ from pathlib import Path
 import click
 
 from urmpipe.options import output_options
+from urmpipe.process import tune_pyarrow
 
 
 @click.command(short_help="Write the HTML report of recordings.")
@@ -24,9 +25,7 @@ def report(recordings: tuple[Path, ...], output: Path | None, as_json: bool, qui
       urmpipe report log-against-path.rrd
       urmpipe report monday.rrd tuesday.rrd -o week.html
     """
-    from urmpipe_pipeline.recording import keep_pandas_out
-
-    keep_pandas_out()
+    tune_pyarrow()
     from urmpipe import api
     from urmpipe.printing import print_json
 

@@ -3,8 +3,8 @@
 The only part of urmpipe that knows Rerun. What stands where is told in `entities`.
 """
 
-from urmpipe_pipeline.recording.identity import is_ours, is_recording, keep_pandas_out
+from urmpipe_pipeline.recording.identity import is_ours, is_recording
 from urmpipe_pipeline.recording.reader import read_recording
 from urmpipe_pipeline.recording.writer import record, write_recording
 
-__all__ = ["is_ours", "is_recording", "keep_pandas_out", "read_recording", "record", "write_recording"]
+__all__ = ["is_ours", "is_recording", "read_recording", "record", "write_recording"]

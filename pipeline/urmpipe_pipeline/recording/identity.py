@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -40,20 +39,6 @@ def settle_pyarrow() -> None:
     pa.array(np.zeros(1))
 
 
-def keep_pandas_out() -> None:
-    """Keep pandas out of this process: only for one that is a command of its own.
-
-    pyarrow finds once and for all that pandas is not there, and converts nothing to pandas any more.
-    """
-    if "pandas" in sys.modules:
-        return
-    sys.meta_path.insert(0, _NoPandas)
-    try:
-        settle_pyarrow()
-    finally:
-        sys.meta_path.remove(_NoPandas)
-
-
 def is_recording(path: Path) -> bool:
     """Tell whether a file is a Rerun recording, whoever wrote it and whether it is whole or not."""
     with path.open("rb") as file:
@@ -87,13 +72,3 @@ def open_reader(path: Path) -> RrdReader:
 def our_entries(reader: RrdReader) -> list[StoreEntry]:
     """Return the recordings in a file that urmpipe wrote."""
     return [entry for entry in reader.recordings() if entry.application_id == APPLICATION_ID]
-
-
-class _NoPandas:
-    """An import finder that does not find pandas."""
-
-    @staticmethod
-    def find_spec(name: str, path: object = None, target: object = None) -> None:
-        """Raise for pandas, and leave all else to the other finders."""
-        if name == "pandas":
-            raise ModuleNotFoundError("pandas is kept out of this process", name=name)

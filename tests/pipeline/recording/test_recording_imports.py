@@ -32,6 +32,7 @@ IMPORTS = """
 import json, sys
 from pathlib import Path
 from urmpipe import api
+from urmpipe.process import tune_pyarrow
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.operands import log_files
@@ -39,7 +40,7 @@ from urmpipe_pipeline.recording import identity
 from urmpipe_pipeline.sources import read_log
 
 if sys.argv[1] == "command":
-    identity.keep_pandas_out()
+    tune_pyarrow()
 before = set(sys.modules)
 if sys.argv[2] == "rerun":
     identity.load_rerun()
@@ -64,9 +65,9 @@ def imported(*arguments: str) -> set[str]:
 SENT = """
 import json, sys, threading
 from urmpipe import api
-from urmpipe_pipeline.recording import keep_pandas_out
+from urmpipe.process import tune_pyarrow
 
-keep_pandas_out()
+tune_pyarrow()
 threads = []
 
 class Finder:
