@@ -13,7 +13,7 @@ import tempfile
 from pathlib import Path
 
 import numpy as np
-from pairs import machine, rounds, table, write_results
+from pairs import Bound, machine, median, ratio, rounds, table, write_results
 
 HERE = Path(__file__).parent
 
@@ -79,9 +79,14 @@ def main() -> None:
         "No output stands there when a run begins: replacing one of this size takes longer.",
         "",
     ]
-    write_results(
-        "ingest", [*lines, *table(taken, "pandas.read_csv alone"), "", *table(taken, "user's script")]
-    )
+    pandas, mine, users = taken.values()
+    bounds = [
+        Bound("urmpipe ingest / pandas.read_csv alone", ratio(mine, pandas), under=5.0),
+        Bound("urmpipe ingest / user's script", ratio(mine, users), under=0.5),
+        Bound("peak of urmpipe ingest, MB", median(mine, "rss"), under=600.0),
+    ]
+    tables = [*table(taken, "pandas.read_csv alone"), "", *table(taken, "user's script")]
+    write_results("ingest", [*lines, *tables], bounds)
 
 
 main()

@@ -13,7 +13,7 @@ from collections.abc import Callable
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from pairs import machine, write_results
+from pairs import Bound, machine, write_results
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain
@@ -95,12 +95,16 @@ def main() -> None:
         "| job | s, median (min-max) | thousand poses a second | times urmpipe's, median of pairs |",
         "|---|---|---|---|",
     ]
+    ratios: dict[str, float] = {}
     for name, seconds in taken.items():
         middle = statistics.median(seconds)
-        ratio = statistics.median(a / b for a, b in zip(seconds, base, strict=True))
+        ratios[name] = statistics.median(a / b for a, b in zip(seconds, base, strict=True))
         span = f"{middle:.3f} ({min(seconds):.3f}-{max(seconds):.3f})"
-        lines.append(f"| {name} | {span} | {options.poses / middle / 1e3:.0f} | {ratio:.2f} |")
-    write_results("kinematics", lines)
+        lines.append(f"| {name} | {span} | {options.poses / middle / 1e3:.0f} | {ratios[name]:.2f} |")
+    peers = list(ratios.items())[1:]
+    write_results(
+        "kinematics", lines, [Bound(f"{name} / urmpipe", found, least=2.5) for name, found in peers]
+    )
 
 
 main()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import platform
 import statistics
@@ -25,10 +26,30 @@ class Usage:
     rss: float
 
 
-def measure(command: Sequence[str], env: Mapping[str, str] | None = None) -> Usage:
+@dataclass(frozen=True, slots=True)
+class Bound:
+    """What a figure may be: below `under`, or at least `least`."""
+
+    what: str
+    found: float
+    under: float = math.inf
+    least: float = -math.inf
+
+    @property
+    def held(self) -> bool:
+        """Whether the figure is within the bound."""
+        return self.least <= self.found < self.under
+
+    def __str__(self) -> str:
+        """Return the line of the table."""
+        allowed = f"under {self.under:g}" if self.under < math.inf else f"at least {self.least:g}"
+        return f"| {self.what} | {self.found:.2f} | {allowed} | {'held' if self.held else 'MISSED'} |"
+
+
+def measure(command: Sequence[str]) -> Usage:
     """Run a command to its end; a failing one stops the benchmark."""
     start = time.perf_counter()
-    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, env=env)
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE)
     assert process.stderr is not None
     complaint = process.stderr.read()
     _, status, usage = os.wait4(process.pid, 0)
@@ -54,6 +75,16 @@ def rounds(
     return taken
 
 
+def median(usages: Sequence[Usage], what: str) -> float:
+    """Return the median of one of the figures."""
+    return float(statistics.median(getattr(usage, what) for usage in usages))
+
+
+def ratio(usages: Sequence[Usage], base: Sequence[Usage]) -> float:
+    """Return the median of the ratios of wall times, pair by pair."""
+    return statistics.median(a.wall / b.wall for a, b in zip(usages, base, strict=True))
+
+
 def table(taken: Mapping[str, Sequence[Usage]], base: str) -> list[str]:
     """Return a Markdown table: medians, and the ratio of wall times pair by pair against `base`."""
     lines = [
@@ -62,11 +93,9 @@ def table(taken: Mapping[str, Sequence[Usage]], base: str) -> list[str]:
     ]
     for name, usages in taken.items():
         walls = [usage.wall for usage in usages]
-        ratio = statistics.median(a.wall / b.wall for a, b in zip(usages, taken[base], strict=True))
-        cpu, rss = (statistics.median(getattr(usage, what) for usage in usages) for what in ("cpu", "rss"))
         lines.append(
-            f"| {name} | {statistics.median(walls):.3f} ({min(walls):.3f}-{max(walls):.3f}) | {cpu:.3f} |"
-            f" {rss:.0f} | {ratio:.2f} |"
+            f"| {name} | {median(usages, 'wall'):.3f} ({min(walls):.3f}-{max(walls):.3f}) |"
+            f" {median(usages, 'cpu'):.3f} | {median(usages, 'rss'):.0f} | {ratio(usages, taken[base]):.2f} |"
         )
     return lines
 
@@ -94,9 +123,12 @@ def machine(*distributions: str) -> list[str]:
     ]
 
 
-def write_results(name: str, lines: Sequence[str]) -> None:
-    """Print the results and keep them."""
-    text = "\n".join(lines) + "\n"
+def write_results(name: str, lines: Sequence[str], bounds: Sequence[Bound]) -> None:
+    """Print the results, keep them, and exit with 1 if a bound was missed."""
+    held = ["", "| what is held | found | allowed | |", "|---|---|---|---|", *map(str, bounds)]
+    text = "\n".join([*lines, *held]) + "\n"
     print(text)
     RESULTS.mkdir(exist_ok=True)
     (RESULTS / f"{name}.md").write_text(text, encoding="utf-8")
+    if not all(bound.held for bound in bounds):
+        raise SystemExit(1)

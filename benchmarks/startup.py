@@ -5,7 +5,7 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from pairs import machine, rounds, table, write_results
+from pairs import Bound, machine, ratio, rounds, table, write_results
 
 ROUNDS = 30
 
@@ -18,7 +18,10 @@ def main() -> None:
         "urmpipe --help": [str(Path(python).parent / "urmpipe"), "--help"],
     }
     lines = [f"# Start-up: {ROUNDS} rounds in pairs", "", *machine("click")]
-    write_results("startup", [*lines, *table(rounds(commands, ROUNDS), "import click")])
+    taken = rounds(commands, ROUNDS)
+    found = ratio(taken["urmpipe --help"], taken["import click"])
+    bound = Bound("urmpipe --help / import click", found, under=1.5)
+    write_results("startup", [*lines, *table(taken, "import click")], [bound])
 
 
 main()

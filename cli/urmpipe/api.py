@@ -90,8 +90,9 @@ def ingest(
         UrmpipeError: With everything that is wrong with the input or the output.
     """
     given = [Path(log)] if isinstance(log, (str, Path)) else [Path(one) for one in log]
-    if any(is_recording(path) for path in given if path.is_file()):
-        raise LogError(Finding("found a recording, allowed: a log (CSV)", file=str(given[0])))
+    recordings = [str(path) for path in given if path.is_file() and is_recording(path)]
+    if recordings:
+        raise LogError(*(Finding("found a recording, allowed: a log (CSV)", file) for file in recordings))
     files = [file for path in given for file in log_files(path)]
     arm = place_robot(robot, base, tool)
     name = given[0].resolve().name if given[0].is_dir() else None

@@ -7,7 +7,6 @@ allowed. The command line prints these lines and exits with 2.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 
@@ -50,11 +49,6 @@ class UrmpipeError(Exception):
             Finding(finding) if isinstance(finding, str) else finding for finding in findings
         )
         super().__init__("\n".join(str(finding) for finding in self.findings))
-
-    @classmethod
-    def from_findings(cls, findings: Sequence[Finding]) -> UrmpipeError:
-        """Return an error of this class that holds all the findings."""
-        return cls(*findings)
 
 
 class RobotError(UrmpipeError):

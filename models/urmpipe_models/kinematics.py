@@ -188,6 +188,7 @@ def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     position = np.empty((3, len(q)))
 
     def work(block: slice) -> None:
+        """Fill the rows of a block."""
         _fill(position[:, block], tip_pose(chain, _columns(q[block])).translation)
 
     _each_block(work, len(q))
@@ -204,6 +205,7 @@ def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]
     position, rotation = np.empty((3, len(q))), np.empty((3, 3, len(q)))
 
     def work(block: slice) -> None:
+        """Fill the rows of a block."""
         pose = tip_pose(chain, _columns(q[block]))
         _fill(position[:, block], pose.translation)
         for row in range(3):
@@ -237,6 +239,7 @@ def point_over_log(
     singular = np.empty(count, dtype=np.bool_)
 
     def work(block: slice) -> None:
+        """Fill the rows of a block."""
         every = _motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))
         motion = next(islice(every, place, None))
         rz, ry, rx, singular[block] = euler_zyx(motion.pose.rotation)
@@ -255,6 +258,7 @@ def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     _fill(skeleton[0], chain.base.translation)
 
     def work(block: slice) -> None:
+        """Fill the rows of a block."""
         for k, pose in enumerate(forward(chain, _columns(q[block])), start=1):
             _fill(skeleton[k, :, block], pose.translation)
 
@@ -267,6 +271,7 @@ def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArra
     result = np.empty((len(chain.coordinates), 6, len(q)))
 
     def work(block: slice) -> None:
+        """Fill the rows of a block."""
         for i, column in enumerate(jacobian(chain, _columns(q[block]), point)):
             _fill(result[i, :, block], column)
 

@@ -44,13 +44,15 @@ class _Units:
     degrees: bool = False
 
     def length(self, value: float) -> float:
-        # by decimals: 243.215 mm is then the very double that 0.243215 is
+        """Return a length of the file in [m]; by decimals: 243.215 mm is the very double that 0.243215 is."""
         return float(Decimal(repr(value)).scaleb(-3)) if self.millimetres else value
 
     def angle(self, value: float) -> float:
+        """Return an angle of the file in [rad]."""
         return math.radians(value) if self.degrees else value
 
     def of_joint(self, kind: str, value: float) -> float:
+        """Return a joint's value in [m] if it slides, else in [rad]."""
         return self.length(value) if kind == "prismatic" else self.angle(value)
 
 
@@ -180,6 +182,7 @@ def _read_urm(table: Table, units: _Units, folder: Path) -> Build:
     limits = _limits(table.table("limits"), ["revolute"] * len(tilts), units)
 
     def build(name: str) -> Chain:
+        """Return the arm; its last joint, the effector, is fixed and has no limits."""
         chain = urm_chain(name, lengths, tilts, directions=directions)
         *modules, effector = chain.joints
         limited = [replace(joint, **limit._asdict()) for joint, limit in zip(modules, limits, strict=True)]
@@ -302,7 +305,6 @@ def _frame_to_dict(frame: Transform) -> dict[str, Any]:
 
 
 def _joint_to_dict(joint: Joint) -> dict[str, Any]:
-    mimic = joint.mimic
     return {
         "name": joint.name,
         "kind": joint.kind,
@@ -311,12 +313,16 @@ def _joint_to_dict(joint: Joint) -> dict[str, Any]:
         "lower": _finite_or_none(joint.lower),
         "upper": _finite_or_none(joint.upper),
         "velocity": _finite_or_none(joint.velocity),
-        "mimic": mimic and {"joint": mimic.joint, "multiplier": mimic.multiplier, "offset": mimic.offset},
+        "mimic": joint.mimic and _mimic_to_dict(joint.mimic),
     }
 
 
+def _mimic_to_dict(mimic: Mimic) -> dict[str, Any]:
+    return {"joint": mimic.joint, "multiplier": float(mimic.multiplier), "offset": float(mimic.offset)}
+
+
 def _finite_or_none(value: float) -> float | None:
-    return value if math.isfinite(value) else None
+    return float(value) if math.isfinite(value) else None
 
 
 def _toml_lines(table: Mapping[str, Any]) -> list[str]:

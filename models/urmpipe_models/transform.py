@@ -198,12 +198,6 @@ def rpy_of(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float, float
     return rx, ry, rz
 
 
-def offset_of(frame: Transform) -> tuple[float, float, float, float, float, float]:
-    """Return x, y, z in [m] and rx, ry, rz in [rad] of a constant frame: `from_offset`'s inverse."""
-    x, y, z = frame.translation
-    return (float(x), float(y), float(z), *rpy_of(frame.rotation))
-
-
 def _cosine_sine(angle: Element) -> tuple[Element, Element]:
     """Return cos and sin; of the constants 0, +-pi/2, +-pi, ... +-2 pi exactly, as 0 and +-1 fold away.
 

@@ -61,14 +61,17 @@ def read_xml(path: Path) -> Node:
     ancestors = [document]
 
     def start(tag: str, attributes: dict[str, str]) -> None:
+        """Hang a new node below the open one."""
         node = Node(tag, attributes, parser.CurrentLineNumber)
         ancestors[-1].children.append(node)
         ancestors.append(node)
 
     def end(_: str) -> None:
+        """Close the open node."""
         ancestors.pop()
 
     def doctype(*_: object) -> None:
+        """Refuse what could define entities."""
         message = "found a document type (<!DOCTYPE ...>); allowed: XML without document type and entities"
         raise RobotError(Finding(message, str(path), line=parser.CurrentLineNumber))
 
@@ -80,4 +83,6 @@ def read_xml(path: Path) -> Node:
     except expat.ExpatError as error:
         reason = expat.ErrorString(error.code)
         raise RobotError(Finding(f"not well-formed XML: {reason}", str(path), line=error.lineno)) from error
+    except (LookupError, ValueError) as error:  # an encoding that expat does not know, or cannot use
+        raise RobotError(Finding(f"cannot be decoded: {error}; allowed: UTF-8", str(path))) from error
     return document.children[0]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -38,6 +38,8 @@ class CompareOptions:
     def __post_init__(self) -> None:
         if not (np.isfinite(self.tolerance) and self.tolerance > 0):
             raise OptionError(f"--tolerance: found {self.tolerance}, allowed: a positive length in m")
+        if self.tcp not in get_args(Tcp):
+            raise OptionError(f"--tcp: found {self.tcp}, allowed: {', '.join(get_args(Tcp))}")
         if not np.isfinite(self.sync_offset):
             raise OptionError(f"--sync: found {self.sync_offset}, allowed: start, or a time in s")
 

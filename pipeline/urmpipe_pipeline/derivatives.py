@@ -77,8 +77,20 @@ def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
 
 
 def _smoothed(q: FloatArray, tsp: float) -> tuple[FloatArray, FloatArray]:
+    """Return the derivatives of the fitted cubic, NaN where the samples it is fitted to are not all there.
+
+    The first and the last half window share the cubic of the first and the last whole one.
+    """
+    from scipy.ndimage import maximum_filter1d
     from scipy.signal import savgol_filter
 
     window = min(WINDOW, len(q) - 1 + len(q) % 2)
-    qd, qdd = (savgol_filter(q, window, POLYNOMIAL, deriv=order, delta=tsp, axis=0) for order in (1, 2))
-    return np.asarray(qd), np.asarray(qdd)
+    missing, half = np.isnan(q), window // 2
+    incomplete = maximum_filter1d(missing.astype(np.uint8), window, axis=0) > 0
+    incomplete[:half], incomplete[-half:] = missing[:window].any(axis=0), missing[-window:].any(axis=0)
+    whole = np.where(missing, 0.0, q)  # the fit at the ends refuses NaN
+    qd, qdd = (
+        np.where(incomplete, np.nan, savgol_filter(whole, window, POLYNOMIAL, deriv=k, delta=tsp, axis=0))
+        for k in (1, 2)
+    )
+    return qd, qdd

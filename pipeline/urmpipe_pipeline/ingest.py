@@ -5,12 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 
 from urmpipe_models.chain import Chain
-from urmpipe_models.errors import LogError
+from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics import THREADS, PointLog, point_over_log
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
 from urmpipe_pipeline.derivatives import Method, derivatives, recorded_agree
@@ -22,6 +22,9 @@ from urmpipe_pipeline.sources import ReadOptions, read_log
 
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
+
+EULER_SINGULAR = "euler-singular"
+"""The kind of the only warning that rests on the robot."""
 
 LISTED_STEPS = 20
 """Unexplained steps named one by one; the others are counted."""
@@ -54,8 +57,13 @@ def ingest_log(
 
     Raises:
         LogError: With everything that is wrong with the files.
+        OptionError: If an option's value makes no sense.
     """
     options = read or ReadOptions()
+    if tsp is not None and not (np.isfinite(tsp) and tsp > 0):
+        raise OptionError(f"--tsp: found {tsp:g} s, allowed: a positive time")
+    if derivative is not None and derivative not in get_args(Method):
+        raise OptionError(f"--derivative: found {derivative}, allowed: {', '.join(get_args(Method))}")
     log = read_log(files, options, robot)
     if early:
         early(log)
@@ -217,4 +225,4 @@ def kinematics(
         return tcp, []
     count, first = int(tcp.singular.sum()), int(np.argmax(tcp.singular))
     said = "ry is +-90 deg: rz and rx are not separately defined, rx = 0 by convention"
-    return tcp, [LogWarning("euler-singular", f"at {count} samples from {first} on {said}")]
+    return tcp, [LogWarning(EULER_SINGULAR, f"at {count} samples from {first} on {said}")]

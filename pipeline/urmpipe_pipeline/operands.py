@@ -8,7 +8,7 @@ from pathlib import Path
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError
 from urmpipe_pipeline.derivatives import Method
-from urmpipe_pipeline.ingest import ingest_log, kinematics
+from urmpipe_pipeline.ingest import EULER_SINGULAR, ingest_log, kinematics
 from urmpipe_pipeline.recording import is_recording, read_recording
 from urmpipe_pipeline.results import Comparison, Run
 from urmpipe_pipeline.sources import ReadOptions
@@ -47,7 +47,9 @@ def load_run(
         )
     if robot is not None and robot != result.robot:
         tcp, warnings = kinematics(robot, result.q, result.qd, result.qdd)
-        return replace(result, robot=robot, tcp=tcp, warnings=(*result.warnings, *warnings))
+        others = [warning for warning in result.warnings if warning.kind != EULER_SINGULAR]
+        made = replace(result.provenance, options={**result.provenance.options, "robot": robot.name})
+        return replace(result, robot=robot, tcp=tcp, warnings=(*others, *warnings), provenance=made)
     return result
 
 

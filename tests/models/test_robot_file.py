@@ -332,3 +332,14 @@ def test_a_dictionary_that_is_wrong_names_its_origin() -> None:
     assert str(caught.value) == (
         "run.rrd: key joints[0].kind: found 'helical', allowed: one of revolute, prismatic, fixed"
     )
+
+
+def test_numbers_of_numpy_are_written_as_numbers(tmp_path: Path) -> None:
+    joints = (
+        Joint("a", lower=np.deg2rad(-170), upper=np.float64(1.0)),
+        Joint("b", mimic=Mimic("a", np.float64(2.0), np.float64(0.5))),
+    )
+    chain = Chain("arm", joints)
+    path = tmp_path / "arm.toml"
+    path.write_text(robot_toml(chain), encoding="utf-8")
+    assert read_robot_file(path) == chain

@@ -18,7 +18,6 @@ from urmpipe_models.transform import (
     euler_zyx,
     from_offset,
     from_rpy,
-    offset_of,
     rotation_about,
     rotation_x,
     rotation_y,
@@ -163,7 +162,8 @@ def test_rpy_gives_the_rotation_back_everywhere(rx: float, ry: float, rz: float)
 
 @given(st.lists(units, min_size=6, max_size=6))
 def test_offsets_come_back(values: list[float]) -> None:
-    back = offset_of(from_offset(values))
-    assert back[:3] == tuple(values[:3])
-    np.testing.assert_allclose(back[3:], values[3:], atol=2 * ROUNDING)  # 1 / cos(1) < 2
-    assert offset_of(from_offset(values[:3])) == (*values[:3], 0.0, 0.0, 0.0)
+    frame = from_offset(values)
+    assert frame.translation == tuple(values[:3])
+    np.testing.assert_allclose(rpy_of(frame.rotation), values[3:], atol=2 * ROUNDING)  # 1 / cos(1) < 2
+    shift = from_offset(values[:3])
+    assert (shift.translation, rpy_of(shift.rotation)) == (tuple(values[:3]), (0.0, 0.0, 0.0))

@@ -394,3 +394,13 @@ def test_a_written_file_is_whole_and_alone(tmp_path: Path) -> None:
     write_urdf(Chain("a", (Joint("j"),)), tmp_path / "a.urdf")
     assert [path.name for path in tmp_path.iterdir()] == ["a.urdf"]
     assert (tmp_path / "a.urdf").read_text(encoding="utf-8").endswith("</robot>\n")
+
+
+@pytest.mark.parametrize("encoding", ["gb2312", "no-such"])
+def test_an_encoding_that_cannot_be_read_is_one_line(tmp_path: Path, encoding: str) -> None:
+    path = tmp_path / "arm.urdf"
+    path.write_text(f'<?xml version="1.0" encoding="{encoding}"?><robot name="a"/>', encoding="ascii")
+    with pytest.raises(RobotError) as error:
+        read_urdf(path)
+    assert str(error.value).startswith(f"{path}: cannot be decoded: ")
+    assert str(error.value).endswith("; allowed: UTF-8")

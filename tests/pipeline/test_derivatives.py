@@ -61,3 +61,16 @@ def test_recorded_rates_are_trusted_only_where_they_are_rates() -> None:
     assert not recorded_agree(np.degrees(qd), qd)
     assert recorded_agree(np.zeros_like(qd), 1e-3 * qd)  # a robot at rest
     assert not recorded_agree(np.full_like(qd, np.nan), qd)
+
+
+@pytest.mark.parametrize("row", [0, 5, 20, 200, 394, 399])
+def test_smoothing_leaves_a_gap_around_a_missing_sample_and_nothing_else(row: int) -> None:
+    q = np.column_stack([np.sin(T), T])
+    whole = derivatives(q, TSP, "savgol")
+    q[row, 0] = np.nan
+    half = WINDOW // 2
+    fitted = np.clip(np.arange(len(T)), half, len(T) - 1 - half)  # the middle of the window that is fitted
+    lost = np.abs(fitted - row) <= half
+    for got, expected in zip(derivatives(q, TSP, "savgol"), whole, strict=True):
+        np.testing.assert_array_equal(np.isnan(got), np.column_stack([lost, np.zeros_like(lost)]))
+        np.testing.assert_array_equal(got[~lost], expected[~lost])

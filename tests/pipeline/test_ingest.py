@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -12,7 +14,7 @@ from hypothesis.extra import numpy as st_np
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
-from urmpipe_models.errors import LogError
+from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics import positions_over_log
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.ingest import ingest_log
@@ -136,3 +138,24 @@ def test_a_real_controller_log_agrees_with_the_catalogue() -> None:
     result = compare_recorded(run, CompareOptions(tolerance=0.002))
     assert result.verdict == "pass"
     assert 0.001 < result.runs[0].statistics["norm"].max < 0.002  # nominal geometry: within 1.6 mm
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"tsp": 0.0}, "--tsp: found 0 s, allowed: a positive time"),
+        ({"tsp": -0.005}, "--tsp: found -0.005 s, allowed: a positive time"),
+        ({"tsp": math.nan}, "--tsp: found nan s, allowed: a positive time"),
+        ({"derivative": "savgo"}, "--derivative: found savgo, allowed: central, savgol"),
+        (
+            {"read": ReadOptions(period=1e300)},
+            "--period: found 1e+300 s, allowed: less than 2.30584e+09 s for 2 rows",
+        ),
+    ],
+)  # fmt: skip
+def test_options_that_make_no_sense_are_refused(tmp_path: Path, options: dict[str, Any], said: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("q1,q2\n0,1\n1,2\n")
+    with pytest.raises(OptionError) as error:
+        ingest_log([path], **options)
+    assert str(error.value) == said

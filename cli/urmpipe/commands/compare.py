@@ -104,7 +104,8 @@ def compare(
 
 def default_name(reference: Path, logs: tuple[Path, ...]) -> str:
     """Return LOG-against-REFERENCE.rrd; of several logs the first names it."""
+    against = reference.resolve().stem
     if not logs:
-        return f"{reference.stem}-against-itself.rrd"
+        return f"{against}-against-itself.rrd"
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
-    return f"{logs[0].stem}{more}-against-{reference.stem}.rrd"
+    return f"{logs[0].resolve().stem}{more}-against-{against}.rrd"

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TypeVar
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -14,8 +13,6 @@ from urmpipe.options import RobotType, output_options, placing_options
 if TYPE_CHECKING:
     from urmpipe_models.chain import Chain
     from urmpipe_models.transform import Transform
-
-Command = TypeVar("Command", bound=Callable[..., Any])
 
 
 def _joint_values(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[float, ...] | None:

@@ -98,12 +98,14 @@ def record(
             under_way: list[Future[None]] = []
 
             def ready() -> None:
+                """Wait until Rerun is there and pyarrow is settled: what is sent imports nothing then."""
                 loading.result()
                 settle_pyarrow()
 
-            def early(part: JointLog | Run) -> None:
+            def early(known: JointLog | Run) -> None:
+                """Write what is known already, beside."""
                 ready()
-                under_way.append(beside.submit(sender.send, blocks(part)))
+                under_way.append(beside.submit(sender.send, blocks(known)))
 
             result = make(early)
             ready()
@@ -168,6 +170,8 @@ class _Sender:
         due = [block for block in every if block.entity not in self._sent]
         total = sum(block.values.nbytes for block in every) or 1
         done = total - sum(block.values.nbytes for block in due)
+        if progress and done:  # what was sent early counts
+            progress(done / total)
         slices = [(block, rows) for block in due for rows in _slices(block)]
         for number, (block, rows) in enumerate(slices):
             values = block.values[rows]

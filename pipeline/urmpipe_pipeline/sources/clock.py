@@ -121,6 +121,9 @@ def even_clock(rows: int, period: float | None) -> tuple[IntArray, tuple[Inferen
     if period is not None and not (math.isfinite(period) and period >= 1e-9):
         raise OptionError(f"--period: found {period:g} s, allowed: a positive time of 1e-9 s or more")
     step = PAPER_PERIOD if period is None else period
+    if rows * step * 1e9 >= LONGEST_NS:
+        longest = LONGEST_NS / 1e9 / rows
+        raise OptionError(f"--period: found {step:g} s, allowed: less than {longest:g} s for {rows} rows")
     times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
     if period is not None:
         return times, (Inference("period", f"{step:g} s", "given as an option"),), []

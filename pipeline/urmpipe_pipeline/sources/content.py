@@ -73,6 +73,9 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column]) -> Numbers:
     places = [column.index for column in columns]
     numbers = read_fast(layout, places, clock.parts) or read_carefully(layout, places, clock.parts)
     numbers = trimmed(numbers)
+    if not len(numbers.values):
+        message = "found no row with a time or a number in the columns that are used, allowed: at least one"
+        raise LogError(Finding(message, str(layout.segment.path)))
     findings = find_errors(layout, numbers, [column.header for column in columns], clock)
     if findings:
         raise LogError(*findings)
@@ -87,7 +90,8 @@ def _joined(plan: Plan, numbers: Mapping[int, Numbers]) -> tuple[Roles, tuple[In
         difference = _difference(plan, numbers, table)
         if difference is None:
             continue
-        if any(column.table == table for column in roles.joints) or len(set(plan.tables.paths)) > 1:
+        needed = roles.joints or roles.position
+        if any(column.table == table for column in needed) or len(set(plan.tables.paths)) > 1:
             findings.append(difference)
             continue
         roles = _without(roles, table)
@@ -102,6 +106,7 @@ def _without(roles: Roles, table: int) -> Roles:
     """Return the roles without the groups that have a column in a table."""
 
     def kept(group: tuple[Column, ...]) -> tuple[Column, ...]:
+        """Return a group, or none of it: half a group has no meaning."""
         return () if any(column.table == table for column in group) else group
 
     return replace(

@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.errors import Finding
 from urmpipe_pipeline.sources.cells import is_missing, is_text, split_line, to_float, to_nanoseconds
-from urmpipe_pipeline.sources.sniff import Layout
+from urmpipe_pipeline.sources.sniff import COMMENTS, Layout
 from urmpipe_pipeline.sources.table import NO_TIME, REPORTED, ClockColumn, Numbers
 
 SHOWN_FINDINGS = 20
@@ -60,7 +60,7 @@ def data_lines(layout: Layout) -> Iterator[tuple[int, str]]:
     """Yield number and text of each line with a data row, not of blank lines and comments."""
     for number, line in layout.segment.lines():
         text = line.strip()
-        if number >= layout.first_line and text and not text.startswith("#"):
+        if number >= layout.first_line and text and not text.startswith(COMMENTS):
             yield number, line
 
 

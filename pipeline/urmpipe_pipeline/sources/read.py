@@ -72,12 +72,13 @@ def _joint_log(
     rate_units = finder.derivatives(roles.rates, joint_units, 1)
     second_units = finder.derivatives(roles.accelerations, joint_units, 2)
     tcp_units = finder.positions(roles.position, tcp) if roles.position else []
-    units = [*joint_units, *rate_units, *second_units, *tcp_units]
+    rotation_units = finder.rotations(roles.rotation)
+    units = [*joint_units, *rate_units, *second_units, *tcp_units, *rotation_units]
     digits = _digits(plan, roles.joints)
-    groups = (roles.joints, roles.rates, roles.accelerations, roles.position)
+    groups = (roles.joints, roles.rates, roles.accelerations, roles.position, roles.rotation)
     missing = [
         warning
-        for group, values in zip(groups, (q, qd, qdd, tcp), strict=True)
+        for group, values in zip(groups, (q, qd, qdd, tcp, rotation), strict=True)
         for warning in missing_samples(values, [column.name for column in group])
     ]
     used = [column for group in groups for column in group]
@@ -93,7 +94,7 @@ def _joint_log(
         qd=_recorded(qd, rate_units),
         qdd=_recorded(qdd, second_units),
         tcp_position=_recorded(tcp, tcp_units),
-        tcp_quat_xyzw=quaternions(rotation) if roles.rotation else None,
+        tcp_quat_xyzw=quaternions(_in_si(rotation, rotation_units)) if roles.rotation else None,
         units=clock.units | {c.name: unit.name for c, unit in zip(used, units, strict=True)},
         digits=digits,
         inferences=(

@@ -41,7 +41,7 @@ def with_names(layout: Layout) -> Layout:
 def _joints(layout: Layout) -> tuple[str, ...]:
     """Return the names of the joints, if each row begins with a stamp and has the same names."""
     row = layout.sample[0]
-    if len(row) < _FIRST_NAME + 4 or not (row[0].isdigit() and row[1].isdigit() and int(row[1]) < 10**9):
+    if len(row) < _FIRST_NAME + 4 or not (row[0].isdecimal() and row[1].isdecimal() and int(row[1]) < 10**9):
         return ()
     end = _FIRST_NAME
     while end < len(row) and is_text(row[end], layout.decimal):

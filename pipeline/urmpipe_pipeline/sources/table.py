@@ -16,7 +16,7 @@ from pyarrow import csv
 
 from urmpipe_models.errors import Finding
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
-from urmpipe_pipeline.sources.cells import is_number, plain
+from urmpipe_pipeline.sources.cells import is_number, plain, to_float
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.stream import open_table
 from urmpipe_pipeline.sources.vocabulary import vocabulary
@@ -183,6 +183,6 @@ def _scale(layout: Layout, part: ClockColumn, exact: bool) -> int:
     decimals = max((len(cell.partition("e")[0].partition(".")[2]) for cell in cells), default=0)
     if not exact and decimals <= part.exponent:
         return part.exponent
-    values = [abs(float(cell)) for cell in cells]
+    values = [abs(to_float(cell, ".") or 0.0) for cell in cells]
     before = max((len(str(int(value))) for value in values if math.isfinite(value)), default=1)
     return max(part.exponent, _PRECISION - before - 2)

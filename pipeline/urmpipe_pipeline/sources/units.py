@@ -113,7 +113,7 @@ class UnitFinder:
         """Return the units of recorded rates (order 1) or accelerations (2): unsaid, the joints' own."""
         units = []
         for column, joint in zip(columns, joints, strict=False):
-            own = self.given.get(column.number) or column.unit
+            own = self._own(column)
             if own is None or own.quantity != joint.quantity:
                 units.append(joint.per_second(order))
             else:
@@ -128,15 +128,28 @@ class UnitFinder:
             values: Their values as the file has them, shape (n, 3).
         """
         found = [self._told(column, "prismatic") for column in columns]
-        if all(unit is not None for unit in found):
-            return [unit for unit in found if unit is not None]
-        furthest = peak(values)
-        if furthest > LONGEST_REACH:
-            evidence = f"values up to {furthest:.6g} reach further than any arm in m"
-            self._note(columns, "mm", evidence)
-            return [vocabulary().units["mm"]] * len(columns)
-        self._assume("m", "positions", columns)
-        return [vocabulary().units["m"]] * len(columns)
+        told = [unit for unit in found if unit is not None]
+        unsaid = [k for k, unit in enumerate(found) if unit is None]
+        if not unsaid:
+            return told
+        rest = self._length([columns[k] for k in unsaid], values[:, unsaid], set(told))
+        return [rest if unit is None else unit for unit in found]
+
+    def rotations(self, columns: Sequence[Column]) -> list[Unit]:
+        """Return the units of a recorded rotation vector: rad, unless its columns tell.
+
+        Raises:
+            LogError: If a unit is not known or is none of an angle.
+        """
+        units = []
+        for column in columns:
+            own = self._own(column) or vocabulary().units["rad"]
+            if own.quantity != "angle" or own.order:
+                names = ", ".join(vocabulary().spelled("angle"))
+                message = f"found the unit {own.name}, allowed: {names}"
+                raise LogError(Finding(message, self.file, column=column.header))
+            units.append(own)
+        return units
 
     def _told(self, column: Column, kind: JointKind | None) -> Unit | None:
         """Return the unit that the user, the column's name or the source tells."""
@@ -159,14 +172,34 @@ class UnitFinder:
             return self.given[column.number], "given as an option"
         if 0 in self.given and kind != "prismatic":
             return self.given[0], "given as an option"
+        own = self._own(column)
+        if own is not None and own.quantity != "time":
+            return own, "its name"
+        default = (self.source.units if self.source else {}).get("length" if kind == "prismatic" else "angle")
+        return default, f"{self.source.name} writes {default.name}" if self.source and default else ""
+
+    def _own(self, column: Column) -> Unit | None:
+        """Return the unit that the user or the name gives this very column; raise if it is not known."""
+        if column.number in self.given:
+            return self.given[column.number]
         if column.unit_text and column.unit is None:
             message = f"found the unit {column.unit_text!r}, allowed: rad, deg, m, mm, cm"
             hint = f"say which with --unit {column.name}=deg"
             raise LogError(Finding(f"{message}; {hint}", self.file, column=column.header))
-        if column.unit is not None and column.unit.quantity != "time":
-            return column.unit, "its name"
-        default = (self.source.units if self.source else {}).get("length" if kind == "prismatic" else "angle")
-        return default, f"{self.source.name} writes {default.name}" if self.source and default else ""
+        return column.unit
+
+    def _length(self, columns: Sequence[Column], values: FloatArray, told: set[Unit]) -> Unit:
+        """Return the unit of positions that say none: the others', mm if m cannot be, or m."""
+        if len(told) == 1:
+            unit = told.pop()
+            self._note(columns, unit.name, "as the other position columns")
+            return unit
+        furthest = peak(values)
+        if furthest > LONGEST_REACH:
+            self._note(columns, "mm", f"values up to {furthest:.6g} reach further than any arm in m")
+            return vocabulary().units["mm"]
+        self._assume("m", "positions", columns)
+        return vocabulary().units["m"]
 
     def _angle(
         self,

@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
-from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, SourceFile
+from urmpipe_pipeline.recording import read_recording, record, write_recording
 from urmpipe_pipeline.results import Comparison, Provenance, Run
 
 MakeRun = Callable[..., Run]
@@ -268,6 +268,19 @@ def test_progress_is_told_up_to_one(make_run: MakeRun, tmp_path: Path) -> None:
     assert shares == sorted(shares)
     assert len(shares) > 8
     assert (shares[0] > 0.0, shares[-1]) == (True, 1.0)
+
+
+def test_what_is_written_early_counts_as_progress(make_run: MakeRun, tmp_path: Path) -> None:
+    run = replace(make_run(rows=10), robot=None, tcp=None)
+    shares: list[float] = []
+
+    def make(early: Callable[[JointLog | Run], None]) -> Run:
+        early(run.log)
+        early(run)
+        return run
+
+    record(make, tmp_path / "run.rrd", progress=shares.append)
+    assert shares == [1.0]
 
 
 def test_a_recording_is_replaced_by_a_new_one(

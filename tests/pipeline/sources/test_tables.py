@@ -15,6 +15,7 @@ from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log, source_names
 
 Read = Callable[..., JointLog]
+Wrong = Callable[..., list[str]]
 Arm = Callable[..., Chain]
 
 T = [0.0, 0.005, 0.01]
@@ -254,3 +255,14 @@ def test_decimal_commas_over_many_blocks(tmp_path: Path) -> None:
     log = read_log([path])
     np.testing.assert_array_equal(log.t_ns, rows * 1_000_000)
     np.testing.assert_array_equal(log.q[:, 0], rows % 5 + 0.5)
+
+
+def test_a_table_whose_used_columns_are_all_empty_is_refused(wrong: Wrong) -> None:
+    said = "found no row with a time or a number in the columns that are used, allowed: at least one"
+    assert wrong("t,q1,x\n,,1\n,,2\n,,3\n") == [f"log.csv: {said}"]
+
+
+@pytest.mark.parametrize("comment", ["# note", "% note", "// note"])
+def test_comments_between_rows_are_left_out_alike(read: Read, comment: str) -> None:
+    log = read(f"t,q1\n0,1\n{comment}\n1,2\n")
+    np.testing.assert_array_equal(log.q[:, 0], [1.0, 2.0])

@@ -195,3 +195,28 @@ def test_digits_of_a_coarse_format(read: Read) -> None:
     assert digits("1.571e+00", "1.57e+00") is None
     assert digits("1.571", "1.572") is None  # a short number need not be a coarse one
     assert digits("0.0", "0.0") is None
+
+
+def test_a_position_without_unit_is_like_the_others(read: Read) -> None:
+    log = read("t,x [mm],y,z\n0,1,2,3\n0.1,4,5,6\n")
+    assert log.tcp_position is not None
+    np.testing.assert_allclose(log.tcp_position, [[1e-3, 2e-3, 3e-3], [4e-3, 5e-3, 6e-3]], rtol=1e-15)
+    assert not log.warnings
+
+
+def test_a_rate_in_an_unknown_unit_is_refused_as_a_joint_is(wrong: Wrong) -> None:
+    said = "found the unit 'rpm', allowed: rad, deg, m, mm, cm; say which with --unit qd1=deg"
+    assert wrong("t,q1 [rad],qd1 [rpm]\n0,1,2\n1,2,3\n") == [f"log.csv, column qd1 [rpm]: {said}"]
+
+
+def test_recorded_rotation_vectors_follow_their_unit(read: Read, wrong: Wrong) -> None:
+    header = ",".join(f"actual_TCP_pose_{k}{{}}" if k > 2 else f"actual_TCP_pose_{k}" for k in range(6))
+    rows = "0,0.1,0,0,0,90,0,0\n0.1,0.1,0,0,0,,0,0\n"
+    log = read("timestamp,actual_q_0," + header.replace("{}", " [deg]") + "\n" + rows)
+    half = np.sqrt(0.5)
+    assert log.tcp_quat_xyzw is not None
+    np.testing.assert_allclose(log.tcp_quat_xyzw[0], [half, 0, 0, half], atol=1e-15)
+    assert np.isnan(log.tcp_quat_xyzw[1, 0])
+    assert [warning.kind for warning in log.warnings].count("missing") == 1
+    said = wrong("timestamp,actual_q_0," + header.replace("{}", " [mm]") + "\n" + rows)
+    assert said == ["log.csv, column actual_TCP_pose_3 [mm]: found the unit mm, allowed: rad, deg"]
