@@ -160,3 +160,9 @@ def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
                         "out_of_tolerance", "share_out", "verdict"}  # fmt: skip
     assert set(one["delta"]["x"]) == {"max", "rms", "mean", "std", "p95", "t_max", "sample_max", "verdict"}
     assert one["share_out"] == 1.0
+
+
+def test_an_unknown_tool_centre_point_is_refused() -> None:
+    with pytest.raises(OptionError) as error:
+        CompareOptions(tcp="x")  # type: ignore[arg-type]
+    assert str(error.value) == "--tcp: found x, allowed: fk, recorded"

@@ -132,3 +132,13 @@ def test_a_large_export_is_read_in_blocks(write: Callable[..., object]) -> None:
     assert log.rows == rows
     np.testing.assert_array_equal(log.q[:, 0], np.arange(rows) % 300 * DEG)
     np.testing.assert_array_equal(log.t_ns, np.arange(rows) * 50_000_000)
+
+
+def test_a_path_whose_graphs_differ_in_their_times_is_refused(wrong: Callable[..., list[str]]) -> None:
+    graphs = [
+        f"/{axis}\nTime (s),{axis} (m)\n0.0,1\n{step},2\n"
+        for axis, step in zip("xyz", (1, 2, 3), strict=True)
+    ]
+    said = wrong("\n".join(graphs))
+    assert len(said) == 2
+    assert all(line.startswith("log.csv:") for line in said)

@@ -266,3 +266,9 @@ def test_a_table_whose_used_columns_are_all_empty_is_refused(wrong: Wrong) -> No
 def test_comments_between_rows_are_left_out_alike(read: Read, comment: str) -> None:
     log = read(f"t,q1\n0,1\n{comment}\n1,2\n")
     np.testing.assert_array_equal(log.q[:, 0], [1.0, 2.0])
+
+
+def test_an_infinite_time_among_the_first_rows_is_named(wrong: Wrong) -> None:
+    said = wrong("t,q1\n0,1\n1.#INF,2\n0.2,3\n")
+    assert len(said) == 1
+    assert said[0].startswith("log.csv:3, column t: found '1.#INF', allowed: ")
