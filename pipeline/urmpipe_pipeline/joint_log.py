@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
-from typing import TypeAlias
+from dataclasses import dataclass
+from typing import Literal, TypeAlias, get_args
 
 import numpy as np
 from numpy.typing import NDArray
+
+from urmpipe_models.orientation import RotationForm, quaternions
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
@@ -62,6 +64,37 @@ class LogWarning:
     row: int | None = None
 
 
+Role = Literal["time", "joint", "rate", "acceleration", "position", "rotation"]
+ROLES: tuple[Role, ...] = get_args(Role)
+
+
+@dataclass(frozen=True, slots=True)
+class LogColumn:
+    """A column of the file that was used, so that what was read can be written as it was.
+
+    value in SI = factor (sign value + offset), with the value as the file has it.
+
+    Attributes:
+        name: What it is called: its header without the unit, unique in the log.
+        header: Its name as the file has it; empty in a file without a header.
+        role: What it holds.
+        index: Its place among the columns of this role, from 0.
+        unit: The file's unit: rad, deg/s, mm, ns, ...
+        factor: To SI.
+        sign: 1, or -1 where the file counts the other way.
+        offset: Added before the factor, in the file's unit.
+    """
+
+    name: str
+    header: str
+    role: Role
+    index: int
+    unit: str
+    factor: float = 1.0
+    sign: int = 1
+    offset: float = 0.0
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class JointLog:
     """A log as its file has it: the file's own rows, in SI, neither repolarized nor resampled.
@@ -73,15 +106,16 @@ class JointLog:
         source: Which reader read it, such as "coppeliasim" or "table".
         files: The files it came from.
         t_ns: Time of each row in integer [ns] from the first row, shape (n,), strictly increasing.
-        clock_start: The file's own clock at the first row, in [s].
+        clock_start_ns: The file's own clock at the first row in integer [ns].
         joints: Names of the joint columns, in the robot's order.
         q: Joint values in [rad] or [m], shape (n, joints); NaN where a sample is missing.
         first_line: Line of the file that holds row 1 (row r of a plain table is line first_line + r - 1).
         qd: Recorded rates in [rad/s] or [m/s], shape (n, joints).
         qdd: Recorded second derivatives in [rad/s2] or [m/s2], shape (n, joints).
         tcp_position: Recorded tool centre point in [m], shape (n, 3).
-        tcp_quat_xyzw: Recorded orientation [-], shape (n, 4).
-        units: The file's unit of every column used: rad, deg, m, mm, s, ...
+        tcp_rotation: Recorded orientation as the file has it, in [rad] or [-], shape (n, k).
+        rotation_form: What its columns are, such as "vector"; None without one.
+        columns: The columns of the file that were used.
         digits: Significant digits of the joint values where the file was seen to be quantised.
         inferences: What the reader found out.
         warnings: What a person should know.
@@ -93,13 +127,14 @@ class JointLog:
     t_ns: IntArray
     joints: tuple[str, ...]
     q: FloatArray
-    clock_start: float = 0.0
+    clock_start_ns: int = 0
     first_line: int = 2
     qd: FloatArray | None = None
     qdd: FloatArray | None = None
     tcp_position: FloatArray | None = None
-    tcp_quat_xyzw: FloatArray | None = None
-    units: dict[str, str] = field(default_factory=dict)
+    tcp_rotation: FloatArray | None = None
+    rotation_form: RotationForm | None = None
+    columns: tuple[LogColumn, ...] = ()
     digits: int | None = None
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
@@ -108,6 +143,23 @@ class JointLog:
     def t(self) -> FloatArray:
         """Time from the first row in [s], shape (n,)."""
         return seconds(self.t_ns)
+
+    @property
+    def clock_start(self) -> float:
+        """The file's own clock at the first row in [s]."""
+        return self.clock_start_ns / 10**9  # integers divide exactly
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The file's unit of every column used, by its name: rad, deg, m, mm, s, ..."""
+        return {column.name: column.unit for column in self.columns}
+
+    @property
+    def tcp_quat_xyzw(self) -> FloatArray | None:
+        """Recorded orientation as unit quaternions x, y, z, w [-], shape (n, 4); None without one."""
+        if self.tcp_rotation is None or self.rotation_form is None:
+            return None
+        return quaternions(self.tcp_rotation, self.rotation_form)
 
     @property
     def rows(self) -> int:

@@ -3,7 +3,7 @@
 A run stands at the root; of a comparison the first run does, and each further one below runs/<key>/.
 
     joints/raw, raw_velocity, raw_acceleration                  the file's own rows: timelines t and row
-    tcp/raw_position, raw_quat_xyzw
+    tcp/raw_position, raw_rotation
     joints/repolarized, velocity, acceleration                  the grid: timelines t and sample
     tcp/recorded, position, velocity, acceleration, euler_zyx, singular
     delta/<key>, matched/<key>/reference, actual, outside       the compared samples: t and sample
@@ -26,10 +26,10 @@ from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.results import AXES, Comparison, Deviation, Run, Trajectory
 
-LAYOUT_VERSION = 1
+LAYOUT_VERSION = 2
 """Raised when an older reader would misunderstand a newer recording."""
 
-Series = Literal["joints", "xyz", "quat", "euler", "delta", "flag"]
+Series = Literal["joints", "xyz", "rotation", "euler", "delta", "flag"]
 """What the columns of an entity are."""
 
 LOG_ARRAYS: dict[str, tuple[str, Series]] = {
@@ -37,7 +37,7 @@ LOG_ARRAYS: dict[str, tuple[str, Series]] = {
     "joints/raw_velocity": ("qd", "joints"),
     "joints/raw_acceleration": ("qdd", "joints"),
     "tcp/raw_position": ("tcp_position", "xyz"),
-    "tcp/raw_quat_xyzw": ("tcp_quat_xyzw", "quat"),
+    "tcp/raw_rotation": ("tcp_rotation", "rotation"),
 }
 """Entity: attribute of `JointLog`, and what its columns are."""
 
@@ -207,7 +207,7 @@ def _block(
     names = {
         "joints": joints,
         "xyz": ("x", "y", "z"),
-        "quat": ("x", "y", "z", "w"),
+        "rotation": tuple(f"r{k + 1}" for k in range(values.shape[1])),
         "euler": ("rz", "ry", "rx"),
     }
     return Block(entity, t_ns, values, series, names[series], numbers)

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.chain import Chain
-from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, Block, Place, places_of
 from urmpipe_pipeline.results import (
     Comparison,
@@ -52,6 +52,7 @@ def log_fields(data: Mapping[str, Any]) -> dict[str, Any]:
         **data,
         "files": _files(data["files"]),
         "joints": tuple(data["joints"]),
+        "columns": tuple(LogColumn(**one) for one in data["columns"]),
         "inferences": tuple(Inference(**one) for one in data["inferences"]),
         "warnings": _warnings(data["warnings"]),
     }
@@ -115,9 +116,10 @@ def _log(log: JointLog) -> dict[str, Any]:
         "source": log.source,
         "files": [_flat(one) for one in log.files],
         "joints": list(log.joints),
-        "clock_start": log.clock_start,
+        "clock_start_ns": log.clock_start_ns,
         "first_line": log.first_line,
-        "units": dict(log.units),
+        "rotation_form": log.rotation_form,
+        "columns": [_flat(one) for one in log.columns],
         "digits": log.digits,
         "inferences": [_flat(one) for one in log.inferences],
         "warnings": [_flat(one) for one in log.warnings],

@@ -132,12 +132,17 @@ def _document(store: Store) -> dict[str, Any]:
     try:
         document: dict[str, Any] = json.loads(store.metadata)
         version = document["layout_version"]
-        newer = version > LAYOUT_VERSION
+        newer, older = version > LAYOUT_VERSION, version < LAYOUT_VERSION
     except (ValueError, KeyError, TypeError) as error:
         raise _damaged(store, error) from error
     if newer:
         raise store.error(
             f"found layout version {version}, allowed: up to {LAYOUT_VERSION}; a newer urmpipe wrote it"
+        )
+    if older:
+        raise store.error(
+            f"found layout version {version}, allowed: {LAYOUT_VERSION}; an older urmpipe wrote it:"
+            " make it again from its log"
         )
     return document
 

@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 import os.path
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
 
 from urmpipe_models.chain import Chain
-from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, JointLog, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import (
+    ROLES,
+    FloatArray,
+    Inference,
+    IntArray,
+    JointLog,
+    LogColumn,
+    LogWarning,
+    SourceFile,
+)
 from urmpipe_pipeline.sources.cells import is_number, plain, significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
-from urmpipe_pipeline.sources.clock import even_clock
+from urmpipe_pipeline.sources.clock import EXPONENTS, Clock, even_clock
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.content import Content, read_content
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -73,29 +82,29 @@ def _joint_log(
     second_units = finder.derivatives(roles.accelerations, joint_units, 2)
     tcp_units = finder.positions(roles.position, tcp) if roles.position else []
     rotation_units = finder.rotations(roles.rotation)
-    units = [*joint_units, *rate_units, *second_units, *tcp_units, *rotation_units]
     digits = _digits(plan, roles.joints)
     groups = (roles.joints, roles.rates, roles.accelerations, roles.position, roles.rotation)
+    units = (joint_units, rate_units, second_units, tcp_units, rotation_units)
     missing = [
         warning
         for group, values in zip(groups, (q, qd, qdd, tcp, rotation), strict=True)
         for warning in missing_samples(values, [column.name for column in group])
     ]
-    used = [column for group in groups for column in group]
     return JointLog(
         name=_name(files),
         source=PATH if not roles.joints and plan.tables.source == TABLE else plan.tables.source,
         files=tuple(sources),
         t_ns=t_ns,
-        clock_start=start,
+        clock_start_ns=start,
         joints=tuple(column.name for column in roles.joints),
         q=_in_si(q, joint_units),
         first_line=layout.first_line,
         qd=_recorded(qd, rate_units),
         qdd=_recorded(qdd, second_units),
         tcp_position=_recorded(tcp, tcp_units),
-        tcp_quat_xyzw=quaternions(_in_si(rotation, rotation_units)) if roles.rotation else None,
-        units=clock.units | {c.name: unit.name for c, unit in zip(used, units, strict=True)},
+        tcp_rotation=_recorded(rotation, rotation_units),
+        rotation_form="vector" if roles.rotation else None,
+        columns=(*_time_columns(clock), *_used_columns(groups, units)),
         digits=digits,
         inferences=(
             *plan.tables.inferences,
@@ -113,29 +122,28 @@ def _joint_log(
 
 def _times(
     content: Content, options: ReadOptions
-) -> tuple[IntArray, float, tuple[Inference, ...], Sequence[LogWarning]]:
-    """Return the rows' times in [ns] from the first, the clock there in [s], and what there is to say."""
+) -> tuple[IntArray, int, tuple[Inference, ...], Sequence[LogWarning]]:
+    """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say."""
     if content.clock is None:
         t_ns, said, noticed = even_clock(content.rows, options.period)
-        return t_ns, 0.0, said, noticed
+        return t_ns, 0, said, noticed
     start = int(content.clock[0])
-    return content.clock - start, start / 10**9, (), ()  # integers divide exactly
+    return content.clock - start, start, (), ()
 
 
-def quaternions(rotation: FloatArray) -> FloatArray:
-    """Return unit quaternions x, y, z, w of rotation vectors.
+def _time_columns(clock: Clock) -> list[LogColumn]:
+    """Return the columns of the clock with their units."""
+    return [
+        LogColumn(column.name, column.header, "time", i, unit, 10.0 ** (EXPONENTS[unit] - 9))
+        for i, (column, unit) in enumerate(zip(clock.columns, clock.units.values(), strict=True))
+    ]
 
-    q = [v sin(a / 2) / a, cos(a / 2)] with the angle a = |v|.
 
-    Args:
-        rotation: Rotation vectors v in [rad], shape (n, 3).
-
-    Returns:
-        Shape (n, 4) [-].
-    """
-    angle = np.linalg.norm(rotation, axis=1)
-    imaginary = rotation * (0.5 * np.sinc(angle / (2 * np.pi)))[:, np.newaxis]
-    return np.column_stack((imaginary, np.cos(0.5 * angle)))
+def _used_columns(groups: Sequence[Sequence[Column]], units: Sequence[Sequence[Unit]]) -> Iterator[LogColumn]:
+    """Yield the columns of each group with their units."""
+    for role, group, group_units in zip(ROLES[1:], groups, units, strict=True):
+        for i, (column, unit) in enumerate(zip(group, group_units, strict=True)):
+            yield LogColumn(column.name, column.header, role, i, unit.name, unit.factor)
 
 
 def _in_si(values: FloatArray, units: Sequence[Unit]) -> FloatArray:

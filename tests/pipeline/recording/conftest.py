@@ -13,7 +13,7 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import point_over_log
 from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.results import Comparison, Repolarization, Run
 
@@ -75,8 +75,8 @@ def build_run(
     file = SourceFile(f"{name}.csv", "0" * 64, 12345)
     joints = tuple(f"phi{k}" for k in range(1, 7))
     log = JointLog(
-        name=name, source="table", files=(file,), t_ns=t_ns, joints=joints, q=raw, clock_start=0.05,
-        units=dict.fromkeys(joints, "rad"), digits=4,
+        name=name, source="table", files=(file,), t_ns=t_ns, joints=joints, q=raw, clock_start_ns=50_000_000,
+        columns=tuple(LogColumn(n, n, "joint", j, "rad") for j, n in enumerate(joints)), digits=4,
         inferences=(Inference("delimiter", ",", "found in line 1"),),
         warnings=(LogWarning("gap", "two rows lie far apart", 7),),
     )  # fmt: skip

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
-from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.recording import read_recording, record, write_recording
 from urmpipe_pipeline.results import Comparison, Provenance, Run
 
@@ -69,7 +69,8 @@ def full(run: Run) -> Run:
     singular[[0, count // 3, count - 1]] = True
     log = replace(
         run.log, q=q, qd=run.qd * 1.001, qdd=run.qdd * 0.999, tcp_position=recorded,
-        tcp_quat_xyzw=rng.normal(size=(count, 4)),
+        tcp_rotation=rng.normal(size=(count, 3)),
+        rotation_form="vector",
     )  # fmt: skip
     return replace(run, log=log, tcp_recorded=recorded, tcp=replace(run.tcp, singular=singular))
 
@@ -112,7 +113,7 @@ def path_run(run: Run) -> Run:
     """Return a path: the positions of a run, without joints."""
     assert run.tcp is not None
     none = np.empty((run.log.rows, 0))
-    log = replace(run.log, joints=(), q=none, units={}, tcp_position=run.tcp.position)
+    log = replace(run.log, joints=(), q=none, columns=(), tcp_position=run.tcp.position)
     return replace(
         run, log=log, robot=None, q=none, qd=none, qdd=none, tcp=None, tcp_recorded=run.tcp.position,
         repolarizations=(),
@@ -217,7 +218,8 @@ def test_metadata_of_any_text_come_back(
     run = make_run(rows=3)
     log = replace(
         run.log, name=name, source=source, files=(SourceFile(file, what, 2**40),), joints=tuple(joints),
-        clock_start=number, first_line=9, units=dict.fromkeys(joints, unit), digits=None,
+        clock_start_ns=int(number), first_line=9, digits=None,
+        columns=tuple(LogColumn(n, n, "joint", j, unit, number) for j, n in enumerate(joints)),
         inferences=(Inference(what, value, message),), warnings=(LogWarning(kind, message, row),),
     )  # fmt: skip
     run = replace(

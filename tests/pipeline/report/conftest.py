@@ -13,7 +13,7 @@ from urmpipe_models.repolarizer import repolarize
 from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.compare import compare_runs
 from urmpipe_pipeline.derivatives import derivatives
-from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.results import Comparison, Provenance, Repolarization, Run
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
@@ -52,7 +52,10 @@ def ingested(name: str, q: FloatArray, robot: Chain | None, warnings: tuple[LogW
         t_ns,
         JOINTS,
         raw,
-        units={"t": "s"} | dict.fromkeys(JOINTS, "rad"),
+        columns=(
+            LogColumn("t", "t", "time", 0, "s"),
+            *(LogColumn(name, name, "joint", j, "rad") for j, name in enumerate(JOINTS)),
+        ),
         inferences=(Inference("delimiter", ";", "every line has 7 fields with it"),),
     )
     turns = dict.fromkeys(range(6), 0)
@@ -114,7 +117,7 @@ def hostile() -> Comparison:
         source=HOSTILE,
         joints=joints,
         files=(SourceFile(HOSTILE, HOSTILE, 1),),
-        units=dict.fromkeys(joints, HOSTILE),
+        columns=tuple(LogColumn(n, n, "joint", j, HOSTILE) for j, n in enumerate(joints)),
         inferences=(Inference(HOSTILE, HOSTILE, HOSTILE),),
     )
     audit = tuple(replace(item, joint=joints[JOINTS.index(item.joint)]) for item in run.repolarizations)
