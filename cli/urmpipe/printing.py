@@ -62,11 +62,9 @@ def print_run(run: Run) -> None:
     grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
     own = len(run.t_ns) == log.rows and bool((run.t_ns == log.t_ns).all())
     table.add_row("grid", grid, "the log's own rows" if own else "resampled")
-    table.add_row(
-        "robot",
-        run.robot.name if run.robot else "none",
-        run.robot.description if run.robot else "not given: no kinematics (--robot NAME|FILE)",
-    )
+    if not any(inference.what == "robot" for inference in log.inferences):
+        because = run.robot.description if run.robot else "not given: no kinematics (--robot NAME|FILE)"
+        table.add_row("robot", run.robot.name if run.robot else "none", because)
     console.print(table)
     if not run.repolarizations:
         console.print("No repolarization.")

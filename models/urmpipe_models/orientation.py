@@ -1,29 +1,121 @@
-"""Orientations as logs record them, as unit quaternions."""
+"""Orientations in the forms in which logs record them, as unit quaternions and rotation matrices."""
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
 from urmpipe_models.kinematics import FloatArray
 
-RotationForm = Literal["vector"]
-"""vector: x, y, z of the axis times the angle, in [rad]."""
+RotationForm = Literal["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", "matrix"]
+"""vector     x, y, z of the axis times the angle (UR's RX, RY, RZ)
+rpy        roll, pitch, yaw about the fixed x, y, z: R = Rz(yaw) Ry(pitch) Rx(roll)
+zyx        the same three angles, that about z first (KUKA's A, B, C)
+xyz, ...   angles about the moving axes named, in turn: R = Rx(a) Ry(b) Rz(c)
+quat_...   a quaternion, its letters in the order of the columns
+matrix     the nine entries of R, row by row
+"""
+
+FORMS: tuple[RotationForm, ...] = get_args(RotationForm)
+
+EULER: dict[RotationForm, str] = {"zyx": "zyx", "xyz": "xyz", "zyz": "zyz", "zxz": "zxz"}
+"""The forms that are three angles about moving axes, and these axes."""
+
+
+def width(form: RotationForm) -> int:
+    """Return how many columns a form has."""
+    return 9 if form == "matrix" else 4 if form.startswith("quat") else 3
+
+
+def angles(form: RotationForm) -> bool:
+    """Return whether the columns of a form are in [rad]; the others are in [-]."""
+    return width(form) == 3
 
 
 def quaternions(rotation: FloatArray, form: RotationForm) -> FloatArray:
     """Return unit quaternions x, y, z, w of recorded orientations.
 
-    Of a rotation vector v with the angle a = |v|: [v sin(a / 2) / a, cos(a / 2)].
+    Of a rotation vector v with the angle a = |v|: [v sin(a / 2) / a, cos(a / 2)]. Of Euler angles: the
+    product of the quaternions of the three rotations. Of a matrix: its largest entry of
+    (1 + trace R, 1 + 2 R_ii - trace R) first, so that nothing is divided by a small number.
 
     Args:
-        rotation: As recorded, in [rad], shape (n, 3).
+        rotation: As recorded, in [rad] or [-], shape (n, width).
         form: What its columns are.
 
     Returns:
-        Shape (n, 4) [-]; NaN where a sample is missing.
+        Shape (n, 4) [-]; NaN where a sample is missing. Their sign is not fixed: q and -q are one orientation.
     """
-    angle = np.linalg.norm(rotation, axis=1)
-    imaginary = rotation * (0.5 * np.sinc(angle / (2 * np.pi)))[:, np.newaxis]
-    return np.column_stack((imaginary, np.cos(0.5 * angle)))
+    if form == "vector":
+        angle = np.linalg.norm(rotation, axis=1)
+        imaginary = rotation * (0.5 * np.sinc(angle / (2 * np.pi)))[:, np.newaxis]
+        return np.column_stack((imaginary, np.cos(0.5 * angle)))
+    if form == "matrix":
+        return _of_matrix(rotation.reshape(-1, 3, 3))
+    if form in {"quat_xyzw", "quat_wxyz"}:
+        ordered = rotation if form == "quat_xyzw" else rotation[:, [1, 2, 3, 0]]
+        with np.errstate(invalid="ignore", divide="ignore"):
+            unit: FloatArray = ordered / np.linalg.norm(ordered, axis=1, keepdims=True)
+        return unit
+    axes, turns = (EULER[form], rotation) if form in EULER else ("zyx", rotation[:, ::-1])
+    result = _about(axes[0], turns[:, 0])
+    for axis, turn in zip(axes[1:], turns.T[1:], strict=True):
+        result = product(result, _about(axis, turn))
+    return result
+
+
+def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the angle of the rotation from one orientation to another, 0 to pi: 2 atan2(|v|, |w|).
+
+    Args:
+        first: Unit quaternions x, y, z, w [-], shape (n, 4).
+        second: The same.
+
+    Returns:
+        In [rad], shape (n,).
+    """
+    conjugate = first * np.array([-1.0, -1.0, -1.0, 1.0])
+    between = product(conjugate, second)
+    angle: FloatArray = 2 * np.arctan2(np.linalg.norm(between[:, :3], axis=1), np.abs(between[:, 3]))
+    return angle
+
+
+def _about(axis: str, angle: FloatArray) -> FloatArray:
+    """Return the quaternions of rotations about a coordinate axis."""
+    result = np.zeros((len(angle), 4))
+    result[:, "xyz".index(axis)] = np.sin(0.5 * angle)
+    result[:, 3] = np.cos(0.5 * angle)
+    result[np.isnan(angle)] = np.nan
+    return result
+
+
+def product(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the product of quaternions x, y, z, w: the second rotation followed by the first.
+
+    Args:
+        first: Shape (n, 4) [-].
+        second: The same.
+    """
+    v, w = first[:, :3], first[:, 3:]
+    u, s = second[:, :3], second[:, 3:]
+    real = w * s - (v * u).sum(axis=1, keepdims=True)
+    return np.hstack((w * u + s * v + np.cross(v, u), real))
+
+
+def _of_matrix(r: FloatArray) -> FloatArray:
+    trace = np.trace(r, axis1=1, axis2=2)
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = r.transpose(1, 2, 0)
+    candidates = np.array(
+        [
+            [1 + 2 * xx - trace, xy + yx, zx + xz, zy - yz],
+            [xy + yx, 1 + 2 * yy - trace, yz + zy, xz - zx],
+            [zx + xz, yz + zy, 1 + 2 * zz - trace, yx - xy],
+            [zy - yz, xz - zx, yx - xy, 1 + trace],
+        ]
+    )  # four times a component times the quaternion, one row a component
+    sizes = np.array([candidates[k, k] for k in range(4)])
+    best = np.where(np.isnan(sizes).any(axis=0), 0, np.argmax(sizes, axis=0))
+    chosen: FloatArray = candidates[best, :, np.arange(len(r))]
+    unit: FloatArray = chosen / np.linalg.norm(chosen, axis=1, keepdims=True)
+    return unit

@@ -18,6 +18,7 @@ from urmpipe_pipeline.grid import Grid, make_grid
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning, seconds
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.results import Repolarization, Run
+from urmpipe_pipeline.robot_inference import infer_robot
 from urmpipe_pipeline.sources import ReadOptions, read_log
 
 QUANTISED_DIGITS = 5
@@ -47,7 +48,7 @@ def ingest_log(
 
     Args:
         files: The log's file, or its files if its source writes one a plot.
-        robot: The arm, with base and tool; None for a log without kinematics.
+        robot: The arm, with base and tool; None for the one that the log singles out, if it does.
         read: How to read the file where it cannot tell by itself.
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
@@ -65,6 +66,10 @@ def ingest_log(
     if derivative is not None and derivative not in get_args(Method):
         raise OptionError(f"--derivative: found {derivative}, allowed: {', '.join(get_args(Method))}")
     log = read_log(files, options, robot)
+    inferred = infer_robot(log) if robot is None else None
+    if inferred:
+        robot, because = inferred
+        log = replace(log, inferences=(*log.inferences, because))
     if early:
         early(log)
     warnings = list(log.warnings)

@@ -39,6 +39,11 @@ class Content:
     roles: Roles
     inferences: tuple[Inference, ...]
 
+    @property
+    def timed(self) -> bool:
+        """Whether the log recorded its times."""
+        return self.clock is not None
+
     def values(self, group: Sequence[Column]) -> FloatArray:
         """Return the numbers of some columns, shape (n, columns), C-contiguous; no copy if they are all."""
         if not group:

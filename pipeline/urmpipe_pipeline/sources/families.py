@@ -12,6 +12,8 @@ from urmpipe_pipeline.sources.vocabulary import Patterns, vocabulary
 
 T = TypeVar("T")
 
+_AXES = {name: k for names in ("xyzw", "abc", ("roll", "pitch", "yaw")) for k, name in enumerate(names)}
+
 
 @dataclass(slots=True)
 class Family:
@@ -44,7 +46,8 @@ def families(columns: Iterable[Column], patterns: Patterns, order: int) -> list[
 
     Args:
         columns: Candidates.
-        patterns: Patterns with a group n (number), axis (x, y, z) or k (entry of a vector).
+        patterns: Patterns with a group n (number), axis (x, y, z, w, roll, ...), k (entry of a vector), or
+            i and j (row and column of a matrix).
         order: Derivative in time that their units may not contradict: 0 for positions.
     """
     found: dict[tuple[int, str], Family] = {}
@@ -82,7 +85,9 @@ def _first_match(column: Column, patterns: Patterns) -> tuple[int, re.Match[str]
 def _number(match: re.Match[str]) -> tuple[int, int, int]:
     """Return the number that a match tells, and where it stands."""
     groups = match.groupdict()
+    if "i" in groups:
+        return 10 * int(groups["i"]) + int(groups["j"]), match.start("i"), match.end("j")
     group = next(name for name in ("n", "axis", "k") if name in groups)
     text = groups[group]
-    number = "xyz".index(text) if group == "axis" else int(text or 0)
+    number = _AXES[text] if group == "axis" else int(text or 0)
     return number, match.start(group), match.end(group)

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+from urmpipe_models.orientation import RotationForm
+
 
 @dataclass(frozen=True)
 class ReadOptions:
@@ -16,6 +18,12 @@ class ReadOptions:
         decimal: Decimal sign, or point, comma.
         time: Name or number (from 1) of the time column; "none" if there is none.
         joints: Names or numbers (from 1) of the joint columns, in the robot's order.
+        names: What to call the joints, in the same order; by default as their columns.
+        signs: 1 or -1 for each joint: -1 where the file counts against the robot's axis.
+        offsets: Added to each joint after its sign, in the unit of its column.
+        position: Names or numbers of the recorded x, y, z.
+        orientation: Names or numbers of the columns of the recorded orientation, in the order of its form.
+        rotation: Form of the recorded orientation, as `RotationForm` lists them.
         units: Unit of a column by its name or number; by "" that of all joint columns that turn.
         period: Time between rows in [s], of a log without a time column.
     """
@@ -25,5 +33,11 @@ class ReadOptions:
     decimal: str | None = None
     time: str | None = None
     joints: tuple[str, ...] = ()
+    names: tuple[str, ...] = ()
+    signs: tuple[int, ...] = ()
+    offsets: tuple[float, ...] = ()
+    position: tuple[str, ...] = ()
+    orientation: tuple[str, ...] = ()
+    rotation: RotationForm | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     period: float | None = None

@@ -11,19 +11,23 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.columns import Column, find_column, listed
-from urmpipe_pipeline.sources.roles import OPTION, Roles, check_count
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.pose import Pose, chosen_pose, trailing_matrix
+from urmpipe_pipeline.sources.roles import OPTION, Roles, about_pose, check_count
 from urmpipe_pipeline.sources.sniff import Layout
 
 
 def without_header(
-    columns: Sequence[Column], layout: Layout, chosen: Sequence[str], robot: Chain | None, *, path: bool
+    columns: Sequence[Column], layout: Layout, options: ReadOptions, robot: Chain | None, *, path: bool
 ) -> Roles:
     """Return the roles of the columns of a table without a header: joints in order, as many as the robot has.
+
+    The last 16 or 12 columns may be a pose: that they are a homogeneous transform shows in their numbers.
 
     Args:
         columns: The columns, without the clock.
         layout: The table.
-        chosen: The user's joint columns.
+        options: What the user says: joint columns, position, orientation.
         robot: The arm; without one every column is a joint.
         path: The user says that it is a path: the columns are x, y, z.
 
@@ -32,10 +36,11 @@ def without_header(
     """
     file = str(layout.segment.path)
     columns = [column for column in columns if column.header]
-    if chosen:
-        joints = tuple(find_column(columns, text, "--joints") for text in chosen)
+    pose = chosen_pose(columns, options)
+    if options.joints:
+        joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
         check_count(joints, file, robot)
-        return _by_place(joints, columns, robot, "given as an option")
+        return _by_place(joints, columns, robot, "given as an option", pose)
     for column in columns:
         if column.text:
             shown = layout.cells(column.index)[0]
@@ -48,11 +53,14 @@ def without_header(
         return Roles(position=tuple(columns[:3]), inferences=(said,))
     if not columns:
         raise LogError(Finding("found no column beside the time, allowed: the joints", file=file))
-    count = len(robot.coordinates) if robot else len(columns)
-    joints = tuple(columns[:count])
+    matrix = None if pose else trailing_matrix(columns, (layout,))
+    pose = pose or matrix or Pose()
+    free = columns[: columns.index(matrix.rotation[0])] if matrix else columns
+    free = [column for column in free if column not in (*pose.position, *pose.rotation)]
+    joints = tuple(free[: len(robot.coordinates)] if robot else free)
     check_count(joints, file, robot)
     many = ", as many as the robot has" if robot else ""
-    return _by_place(joints, columns, robot, f"no header: joints in order{many}")
+    return _by_place(joints, columns, robot, f"no header: joints in order{many}", pose)
 
 
 def one_plot_a_file(
@@ -92,13 +100,25 @@ def _only_numbers_differ(names: Sequence[str]) -> list[int] | None:
 
 
 def _by_place(
-    joints: Sequence[Column], columns: Sequence[Column], robot: Chain | None, evidence: str
+    joints: Sequence[Column],
+    columns: Sequence[Column],
+    robot: Chain | None,
+    evidence: str,
+    pose: Pose | None,
 ) -> Roles:
-    """Return joints that are named by the robot, or q1, q2, ..."""
+    """Return joints that are named by the robot, or q1, q2, ..., and the pose beside them."""
+    pose = pose or Pose()
     said = [Inference("joint columns", ", ".join(column.name for column in joints), evidence)]
-    rest = [column for column in columns if column not in joints]
+    said += about_pose(pose)
+    rest = [column for column in columns if column not in (*joints, *pose.position, *pose.rotation)]
     if rest:
         said.append(Inference("columns not used", listed(rest, most=8), "no header tells what they are"))
     names = robot.coordinates if robot else [f"q{k + 1}" for k in range(len(joints))]
     named = tuple(replace(column, name=name) for column, name in zip(joints, names, strict=True))
-    return Roles(joints=named, inferences=tuple(said))
+    return Roles(
+        joints=named,
+        position=pose.position,
+        rotation=pose.rotation,
+        forms=pose.forms,
+        inferences=tuple(said),
+    )

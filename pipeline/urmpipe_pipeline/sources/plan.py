@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_models.chain import Chain
+from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.clock import Clock, find_clock
 from urmpipe_pipeline.sources.columns import (
@@ -72,19 +73,34 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
         refuse_twins(clock.columns, own, tables.layouts, "give the number of the right one with --time")
     times = {column for clock in clocks for column in clock.columns}
     rest = [column for column in columns if column not in times]
-    return Plan(tables, clocks, _roles(rest, tables, options, robot), units)
+    roles = _renamed(_roles(rest, tables, options, robot), options.names)
+    return Plan(tables, clocks, roles, units)
+
+
+def _renamed(roles: Roles, names: Sequence[str]) -> Roles:
+    """Return the roles with the joints called as the user says.
+
+    Raises:
+        OptionError: If there are others than one name a joint, each once.
+    """
+    if not names:
+        return roles
+    if len(names) != len(roles.joints) or len(set(names)) < len(names):
+        allowed = f"a name for each of the {len(roles.joints)} joints, each once"
+        raise OptionError(f"names: found {', '.join(names)}, allowed: {allowed}")
+    joints = tuple(replace(column, name=name) for column, name in zip(roles.joints, names, strict=True))
+    return replace(roles, joints=joints)
 
 
 def _roles(columns: Sequence[Column], tables: Tables, options: ReadOptions, robot: Chain | None) -> Roles:
     main = tables.layouts[0]
     several = len(set(tables.paths)) > 1
     if main.header is None and not several:
-        return without_header(columns, main, options.joints, robot, path=options.source == PATH)
+        return without_header(columns, main, options, robot, path=options.source == PATH)
     plots = one_plot_a_file(columns, tables.paths, robot) if several and not options.joints else None
     if plots is not None:
         return _plots(plots, tables)
-    file = str(main.segment.path)
-    roles = assign(columns, file, options.joints, robot, path=options.source == PATH)
+    roles = assign(columns, tables.layouts, options, robot, path=options.source == PATH)
     if not options.joints:
         refuse_twins(
             roles.joints, columns, tables.layouts, "give the numbers of the right ones with --joints"

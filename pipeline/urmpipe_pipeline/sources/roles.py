@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.orientation import RotationForm
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.columns import Column, find_column, listed
-from urmpipe_pipeline.sources.families import Family, families, measured
-from urmpipe_pipeline.sources.vocabulary import Patterns, key, vocabulary
+from urmpipe_pipeline.sources.families import families, measured
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.pose import Pose, chosen_pose, find_pose, with_form
+from urmpipe_pipeline.sources.sniff import Layout
+from urmpipe_pipeline.sources.vocabulary import key, vocabulary
 
 OPTION = "name them in the robot's order with --joints A,B,C"
 
@@ -24,7 +28,8 @@ class Roles:
         rates: Recorded rates of the same joints, or none.
         accelerations: Recorded second derivatives of the same joints, or none.
         position: Recorded x, y, z of the tool centre point, or none.
-        rotation: Recorded rotation vector of the tool, or none.
+        rotation: Recorded orientation of the tool, or none.
+        forms: The forms that the orientation may have; one if it is known.
         inferences: What was found out.
     """
 
@@ -33,6 +38,7 @@ class Roles:
     accelerations: tuple[Column, ...] = ()
     position: tuple[Column, ...] = ()
     rotation: tuple[Column, ...] = ()
+    forms: tuple[RotationForm, ...] = ()
     inferences: tuple[Inference, ...] = ()
 
     @property
@@ -42,7 +48,12 @@ class Roles:
 
 
 def assign(
-    columns: Sequence[Column], file: str, chosen: Sequence[str], robot: Chain | None, *, path: bool = False
+    columns: Sequence[Column],
+    layouts: Sequence[Layout],
+    options: ReadOptions,
+    robot: Chain | None,
+    *,
+    path: bool = False,
 ) -> Roles:
     """Return the roles of the columns of a table with a header.
 
@@ -52,33 +63,36 @@ def assign(
 
     Args:
         columns: The columns, without the clock.
-        file: The file, for errors.
-        chosen: The user's joint columns.
+        layouts: The tables.
+        options: What the user says: joint columns, position, orientation.
         robot: The arm, or None.
         path: The user says that it is a path: joints are not looked for.
 
     Raises:
         LogError: If the joints cannot be told, or are too few or too many for the robot.
     """
+    file = str(layouts[0].segment.path)
     numeric = [column for column in columns if not column.text and not column.counts_rows]
-    if chosen:
-        joints = tuple(find_column(columns, text, "--joints") for text in chosen)
+    if options.joints:
+        joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
         found = _Joints(joints, "given as an option")
-        position, rotation = _tcp([column for column in numeric if column not in joints], None)
+        pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
     else:
-        position, rotation = _tcp(numeric, None)
-        free = [column for column in numeric if column not in (*position, *rotation)]
+        pose = chosen_pose(columns, options) or find_pose(numeric, layouts)
+        free = [column for column in numeric if column not in (*pose.position, *pose.rotation)]
         found = _Joints(()) if path else _find_joints(free, file, robot)
+    pose = with_form(pose, options.rotation)
     if not found.columns:
-        return _path(columns, numeric, position, file, robot)
+        return _path(columns, numeric, pose, layouts, robot)
     check_count(found.columns, file, robot)
     rates = _derivative("rate", numeric, found)
     accelerations = _derivative("acceleration", numeric, found)
-    roles = Roles(found.columns, rates, accelerations, position, rotation)
+    roles = Roles(found.columns, rates, accelerations, pose.position, pose.rotation, pose.forms)
     said = [Inference("joint columns", ", ".join(c.name for c in found.columns), found.evidence)]
-    for what, group in (("rates", rates), ("accelerations", accelerations), ("recorded TCP", position)):
+    for what, group in (("rates", rates), ("accelerations", accelerations)):
         if group:
             said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
+    said += about_pose(pose)
     return _with_rest(roles, said, numeric)
 
 
@@ -226,45 +240,31 @@ def _derivative(role: str, numeric: Sequence[Column], joints: _Joints) -> tuple[
     return best[0].ordered() if len(best) == 1 else ()
 
 
-def _tcp(numeric: Sequence[Column], file: str | None) -> tuple[tuple[Column, ...], tuple[Column, ...]]:
-    """Return the columns of the recorded position and rotation vector.
-
-    Args:
-        numeric: Candidates.
-        file: The file, if it is an error that several positions are recorded; else they are left.
-    """
-    poses = [
-        f for f in families(numeric, vocabulary().tcp_pose_vector, order=0) if set(f.columns) == set(range(6))
+def about_pose(pose: Pose) -> list[Inference]:
+    """Say which columns hold the recorded tool centre point."""
+    groups = (("recorded TCP", pose.position), ("recorded orientation", pose.rotation))
+    return [
+        Inference(what, ", ".join(column.name for column in group), pose.evidence)
+        for what, group in groups
+        if group
     ]
-    if len(poses) == 1:
-        ordered = poses[0].ordered()
-        return ordered[:3], ordered[3:]
-    found = _triples(numeric, vocabulary().tcp_position)
-    best = [family for family in found if family.rank == found[0].rank]
-    if len(best) > 1 and file is not None:
-        groups = "; ".join(listed(family.ordered()) for family in best)
-        raise LogError(Finding(f"found several positions: {groups}; allowed: one x, y, z", file=file))
-    return (best[0].ordered(), ()) if len(best) == 1 else ((), ())
-
-
-def _triples(numeric: Sequence[Column], patterns: Patterns) -> list[Family]:
-    return [family for family in families(numeric, patterns, order=0) if set(family.columns) == {0, 1, 2}]
 
 
 def _path(
     columns: Sequence[Column],
     numeric: Sequence[Column],
-    position: tuple[Column, ...],
-    file: str,
+    pose: Pose,
+    layouts: Sequence[Layout],
     robot: Chain | None,
 ) -> Roles:
     """Return the roles of a path; raise if it is none either."""
-    position = position or _tcp(numeric, file)[0]
-    if position:
-        said = Inference(
-            "path", ", ".join(column.name for column in position), "x, y, z and no joint columns"
-        )
-        return _with_rest(Roles(position=position), [said], numeric)
+    file = str(layouts[0].segment.path)
+    pose = pose if pose.position else find_pose(numeric, layouts, file)
+    if pose.position:
+        names = ", ".join(column.name for column in pose.position)
+        said = [Inference("path", names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
+        roles = Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms)
+        return _with_rest(roles, said, numeric)
     need = (
         f"{len(robot.coordinates)} for robot {robot.name}" if robot else "such as q1, q2, ... or J1, J2, ..."
     )
@@ -276,4 +276,4 @@ def _with_rest(roles: Roles, said: list[Inference], numeric: Sequence[Column]) -
     rest = [column for column in numeric if column not in roles.columns]
     if rest:
         said.append(Inference("columns not used", listed(rest, most=8), "no role is known for them"))
-    return Roles(roles.joints, roles.rates, roles.accelerations, roles.position, roles.rotation, tuple(said))
+    return replace(roles, inferences=tuple(said))

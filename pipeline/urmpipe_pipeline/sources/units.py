@@ -1,57 +1,29 @@
-"""Units of the columns: given, in the name, known of the source, told by the data, or assumed and said so."""
+"""Units of the columns: given, in the name, known of the source, told by the data, or assumed and said so.
+
+Where the log recorded its tool centre point the arm's kinematics decide, whatever the name says.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-
-import numpy as np
 
 from urmpipe_models.chain import Chain, JointKind
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
 from urmpipe_pipeline.sources.columns import Column
+from urmpipe_pipeline.sources.kinematic_units import KinematicUnits
+from urmpipe_pipeline.sources.unit_evidence import Bounds, degrees_evidence, peak, radians_evidence
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Quantity, Unit, vocabulary
 
-FULL_TURN_DEG = 360.0
-WRAP_SLACK_DEG = 20.0
-"""A step this near to 360 is a wrap in degrees: in radians it would be 57 turns between two rows."""
-
-FASTEST = 20.0
-"""Speed in [rad/s] that no joint of an arm keeps up (1146 deg/s)."""
+GIVEN = "given as an option"
 
 MOST_TURNS = 4
 """A joint value of more turns than this is not taken as rad without being told."""
 
 LONGEST_REACH = 10.0
 """A coordinate above this in [m] is in mm: no arm reaches so far."""
-
-
-BEYOND = 3.0
-"""Values this many times beyond a joint's limit are no overshoot."""
-
-
-@dataclass(frozen=True, slots=True)
-class Bounds:
-    """What joints can do.
-
-    Attributes:
-        speed: No joint is faster for long, in [rad/s].
-        reach: Largest absolute value that each joint's limits allow, in [rad]; inf without limits.
-    """
-
-    speed: float = FASTEST
-    reach: tuple[float, ...] | float = math.inf
-
-    @classmethod
-    def of(cls, robot: Chain | None, turns: Sequence[int]) -> Bounds:
-        """Return the bounds of some joints of a robot, by their index among those that move."""
-        if robot is None:
-            return cls()
-        joints = [robot.moving[j] for j in turns]
-        speed = min(FASTEST, 2 * max(joint.velocity for joint in joints))
-        return cls(speed, tuple(max(abs(joint.lower), abs(joint.upper)) for joint in joints))
 
 
 @dataclass(slots=True)
@@ -62,13 +34,15 @@ class UnitFinder:
         given: Units given by the user, by the column's number; by 0 that of all joints that turn.
         source: The source, if it is known.
         file: The file, for errors.
-        warnings: What was assumed.
+        kinematic: The units that the kinematics single out, if they do.
     """
 
     given: Mapping[int, Unit]
     source: KnownSource | None
     file: str
-    warnings: list[LogWarning] = field(default_factory=list)
+    kinematic: KinematicUnits | None = None
+    _assumed: list[LogWarning] = field(default_factory=list)
+    _doubted: dict[tuple[Unit, Unit, str], list[str]] = field(default_factory=dict)
     _noted: dict[tuple[str, str], list[str]] = field(default_factory=dict)
 
     @property
@@ -78,6 +52,11 @@ class UnitFinder:
             Inference(f"unit of {', '.join(names)}", unit, evidence)
             for (unit, evidence), names in self._noted.items()
         ]
+
+    @property
+    def warnings(self) -> list[LogWarning]:
+        """What was assumed, and what contradicts the kinematics."""
+        return [*self._assumed, *self._contradictions()]
 
     def joints(
         self, columns: Sequence[Column], values: FloatArray, t_ns: IntArray | None, robot: Chain | None
@@ -94,7 +73,8 @@ class UnitFinder:
             LogError: If a unit is not known, does not fit the robot, or cannot be told.
         """
         kinds: list[JointKind | None] = [j.kind for j in robot.moving] if robot else [None] * len(columns)
-        found = [self._told(column, kind) for column, kind in zip(columns, kinds, strict=True)]
+        told_units = [self._told(column, kind) for column, kind in zip(columns, kinds, strict=True)]
+        found = told_units
         unknown = [j for j, unit in enumerate(found) if unit is None]
         slides = [j for j in unknown if kinds[j] == "prismatic"]
         turns = [j for j in unknown if kinds[j] != "prismatic"]
@@ -106,6 +86,8 @@ class UnitFinder:
             turning = values if len(turns) == len(columns) else values[:, turns]
             unit = self._angle([columns[j] for j in turns], turning, t_ns, bounds, told)
             found = [unit if j in turns else other for j, other in enumerate(found)]
+        if self.kinematic is None:
+            self._refuse_contradictions(columns, told_units, values, t_ns, robot)
         metre = vocabulary().units["m"]
         return [metre if unit is None else unit for unit in found]
 
@@ -135,16 +117,17 @@ class UnitFinder:
         rest = self._length([columns[k] for k in unsaid], values[:, unsaid], set(told))
         return [rest if unit is None else unit for unit in found]
 
-    def rotations(self, columns: Sequence[Column]) -> list[Unit]:
-        """Return the units of a recorded rotation vector: rad, unless its columns tell.
+    def rotations(self, columns: Sequence[Column]) -> list[Unit | None]:
+        """Return the units that the columns of a recorded orientation tell, None where they do not.
 
         Raises:
             LogError: If a unit is not known or is none of an angle.
         """
+        default = self.source.units.get("angle") if self.source else None
         units = []
         for column in columns:
-            own = self._own(column) or vocabulary().units["rad"]
-            if own.quantity != "angle" or own.order:
+            own = self._own(column) or default
+            if own is not None and (own.quantity != "angle" or own.order):
                 names = ", ".join(vocabulary().spelled("angle"))
                 message = f"found the unit {own.name}, allowed: {names}"
                 raise LogError(Finding(message, self.file, column=column.header))
@@ -164,14 +147,36 @@ class UnitFinder:
             if column.number in self.given:
                 raise OptionError(f"--unit {column.name}: {message}")
             raise LogError(Finding(message, self.file, column=column.header))
-        self._note([column], unit.name, evidence)
-        return unit
+        return self._held_against_kinematics(column, unit, evidence)
+
+    def _held_against_kinematics(self, column: Column, unit: Unit, evidence: str) -> Unit:
+        """Return the unit that is told, or the one that the kinematics single out if the user gave none."""
+        better = self.kinematic.of(unit.quantity) if self.kinematic else unit
+        if self.kinematic is None or better == unit:
+            self._note([column], unit.name, evidence)
+            return unit
+        by_how_much = self.kinematic.evidence(unit.quantity, unit)
+        self._doubted.setdefault((unit, better, evidence), []).append(column.name)
+        given = evidence == GIVEN
+        self._note([column], unit.name if given else better.name, evidence if given else by_how_much)
+        return unit if given else better
+
+    def _contradictions(self) -> Iterator[LogWarning]:
+        """Yield what the kinematics say against the units that were told."""
+        for (unit, better, evidence), names in self._doubted.items():
+            told = f"{', '.join(names)}: {unit.name} ({evidence}) contradicts the kinematics: taken as"
+            by_how_much = self.kinematic.evidence(unit.quantity, unit) if self.kinematic else ""
+            if evidence == GIVEN:
+                said = f"{told} {unit.name}, though as {better.name} it would fit: {by_how_much}"
+            else:
+                said = f"{told} {better.name}: {by_how_much}; --unit {names[0]}={unit.name} says otherwise"
+            yield LogWarning("unit-contradiction", said)
 
     def _first_told(self, column: Column, kind: JointKind | None) -> tuple[Unit | None, str]:
         if column.number in self.given:
-            return self.given[column.number], "given as an option"
+            return self.given[column.number], GIVEN
         if 0 in self.given and kind != "prismatic":
-            return self.given[0], "given as an option"
+            return self.given[0], GIVEN
         own = self._own(column)
         if own is not None and own.quantity != "time":
             return own, "its name"
@@ -194,6 +199,9 @@ class UnitFinder:
             unit = told.pop()
             self._note(columns, unit.name, "as the other position columns")
             return unit
+        if self.kinematic is not None:
+            self._note(columns, self.kinematic.length.name, self.kinematic.evidence("length"))
+            return self.kinematic.length
         furthest = peak(values)
         if furthest > LONGEST_REACH:
             self._note(columns, "mm", f"values up to {furthest:.6g} reach further than any arm in m")
@@ -215,6 +223,9 @@ class UnitFinder:
             unit = told.pop()
             self._note(columns, unit.name, "as the other joint columns")
             return unit
+        if self.kinematic is not None:
+            self._note(columns, self.kinematic.angle.name, self.kinematic.evidence("angle"))
+            return self.kinematic.angle
         evidence = degrees_evidence(values, t_ns, bounds)
         if evidence:
             self._note(columns, "deg", evidence)
@@ -226,6 +237,33 @@ class UnitFinder:
         self._assume("rad", "joints", columns)
         return vocabulary().units["rad"]
 
+    def _refuse_contradictions(
+        self,
+        columns: Sequence[Column],
+        units: Sequence[Unit | None],
+        values: FloatArray,
+        t_ns: IntArray | None,
+        robot: Chain | None,
+    ) -> None:
+        """Raise if the data contradict the unit that names or source tell of joints that turn.
+
+        Raises:
+            LogError: With the evidence, and the option that decides.
+        """
+        for name, other in (("rad", "deg"), ("deg", "rad")):
+            which = [j for j, unit in enumerate(units) if unit and unit.name == name]
+            which = [j for j in which if not {0, columns[j].number} & set(self.given)]
+            if not which:
+                continue
+            bounds = Bounds.of(robot, which)
+            doubted = values[:, which]
+            evidence = degrees_evidence(doubted, t_ns, bounds) if name == "rad" else radians_evidence(doubted)
+            if evidence:
+                names = ", ".join(columns[j].name for j in which)
+                said = f"found {names} in {name} by name or source, but {evidence}"
+                hint = f"allowed: a unit that fits the data; say which with --unit {other} or --unit {name}"
+                raise LogError(Finding(f"{said}; {hint}", self.file))
+
     def _note(self, columns: Sequence[Column], unit: str, evidence: str) -> None:
         self._noted.setdefault((unit, evidence), []).extend(column.name for column in columns)
 
@@ -233,54 +271,4 @@ class UnitFinder:
         names = ", ".join(column.name for column in columns)
         self._note(columns, unit, "assumed")
         said = f"no unit is given for {names}: the {what} are taken as {unit}; --unit says otherwise"
-        self.warnings.append(LogWarning("assumed-unit", said))
-
-
-def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds | None = None) -> str | None:
-    """Return why joint values cannot be in rad, or None if they can.
-
-    They cannot if they wrap by about 360, or if it is in degrees only that they are no faster than a joint
-    can be for a tenth of the time, or that they keep the robot's limits. Values within one turn in rad are
-    never doubted.
-
-    Args:
-        values: Joint values, shape (n, joints).
-        t_ns: Recorded times in [ns], shape (n,), or None.
-        bounds: What the robot's joints can do, or None.
-    """
-    if peak(values) <= math.tau:
-        return None
-    bounds = bounds or Bounds()
-    wraps, speed = 0, 0.0
-    for column in values.T:
-        steps = np.abs(np.diff(column))
-        wraps += int((np.abs(steps - FULL_TURN_DEG) <= WRAP_SLACK_DEG).sum())
-        if t_ns is not None:
-            speed = max(speed, _usual_speed(steps, t_ns))
-    if wraps:
-        return f"{wraps} step{'s' if wraps > 1 else ''} of about 360 from one row to the next"
-    if np.radians(speed) <= bounds.speed < speed:
-        return f"as rad it would turn at {speed:.3g} rad/s for a tenth of the time"
-    largest, reach = np.nanmax(np.abs(values), axis=0), np.asarray(bounds.reach)
-    if (np.radians(largest) <= reach).all() and (largest > BEYOND * reach).any():
-        return f"values up to {largest.max():.6g} are beyond the robot's limits as rad and within them as deg"
-    return None
-
-
-def peak(values: FloatArray) -> float:
-    """Return the largest absolute value, missing samples left out; NaN if there is none.
-
-    Args:
-        values: Shape (n, columns), n > 0.
-    """
-    largest = max(values.max(), -values.min())
-    if np.isnan(largest):  # slower, but deaf to NaN
-        largest = max(np.fmax.reduce(values, axis=None), -np.fmin.reduce(values, axis=None))
-    return float(largest)
-
-
-def _usual_speed(steps: FloatArray, t_ns: IntArray) -> float:
-    """Return the speed that is exceeded in a tenth of the steps, per second."""
-    rates = steps / (np.diff(t_ns) * 1e-9)
-    rates = rates[np.isfinite(rates)]
-    return float(np.quantile(rates, 0.9)) if len(rates) else 0.0
+        self._assumed.append(LogWarning("assumed-unit", said))

@@ -10,7 +10,9 @@ from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal
 
-Quantity = Literal["angle", "length", "time"]
+from urmpipe_models.orientation import RotationForm
+
+Quantity = Literal["angle", "length", "time", "ratio"]
 Patterns = tuple[re.Pattern[str], ...]
 
 _BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
@@ -69,6 +71,14 @@ class Container:
 
 
 @dataclass(frozen=True, slots=True)
+class RotationWords:
+    """Names of the columns of an orientation, and the forms that such names are used for."""
+
+    patterns: Patterns
+    forms: tuple[RotationForm, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Vocabulary:
     """All words, as vocabulary.toml has them."""
 
@@ -83,6 +93,8 @@ class Vocabulary:
     commanded: frozenset[str]
     tcp_position: Patterns
     tcp_pose_vector: Patterns
+    tcp_matrix: Patterns
+    tcp_rotations: tuple[RotationWords, ...]
     units: Mapping[str, Unit]
     missing: frozenset[str]
     sources: tuple[KnownSource, ...]
@@ -128,6 +140,11 @@ def vocabulary() -> Vocabulary:
         commanded=frozenset(joint["commanded"]),
         tcp_position=_compiled(data["tcp"]["position"]),
         tcp_pose_vector=_compiled(data["tcp"]["pose_vector"]),
+        tcp_matrix=_compiled(data["tcp"]["matrix"]),
+        tcp_rotations=tuple(
+            RotationWords(_compiled(entry["patterns"]), tuple(entry["forms"]))
+            for entry in data["tcp"]["rotation"]
+        ),
         units=units,
         missing=frozenset(data["missing"]["words"]),
         sources=tuple(_source(entry, units) for entry in data["source"]),

@@ -54,12 +54,15 @@ class Written:
 
 @st.composite
 def tables(draw: st.DrawFn) -> Written:
-    """Random tables: any finite numbers, some missing, times that increase."""
+    """Random tables: numbers that their unit allows, some missing, times that increase."""
     rows, joints = draw(st.integers(3, 12)), draw(st.integers(1, 7))
-    numbers = st.floats(-1e3, 1e3, allow_nan=False) | st.just(float("nan"))
+    unit = draw(st.sampled_from(["rad", "deg", "°"]))
+    largest = 3.0 if unit == "rad" else 1e3  # a step of 360 would contradict rad
+    numbers = st.floats(-largest, largest, allow_nan=False) | st.just(float("nan"))
     row = st.lists(numbers, min_size=joints, max_size=joints)
     values = np.array(draw(st.lists(row, min_size=rows, max_size=rows)))
-    full = st.lists(st.floats(0.5, 3), min_size=joints, max_size=joints)
+    sure = st.floats(0.5, 3) if unit == "rad" else st.floats(7, 30)  # within a turn deg might be rad
+    full = st.lists(sure, min_size=joints, max_size=joints)
     values[0] = draw(full)  # no joint without any value
     steps = draw(st.lists(st.integers(1, 10**10), min_size=rows - 1, max_size=rows - 1))
     start = draw(st.integers(-(10**9), 2 * 10**18))
@@ -72,7 +75,7 @@ def tables(draw: st.DrawFn) -> Written:
         missing=draw(st.sampled_from(["", "NaN", "Null", "nan", "NA"])),
         trailing=draw(st.booleans()),
         order=tuple(draw(st.permutations(range(joints + 1)))),
-        unit=draw(st.sampled_from(["rad", "deg", "°"])),
+        unit=unit,
     )
 
 

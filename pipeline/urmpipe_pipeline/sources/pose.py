@@ -1,0 +1,183 @@
+"""The tool centre point that a log recorded: the columns of its position and orientation, and their form."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.orientation import FORMS, RotationForm, width
+from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.sources.cells import to_float
+from urmpipe_pipeline.sources.columns import Column, find_column, listed
+from urmpipe_pipeline.sources.families import Family, families
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.sniff import Layout
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+ORTHOGONAL = 1e-2
+"""Entries of R R^T may differ from those of I by this: matrices are printed with three digits or more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Columns of a recorded tool centre point.
+
+    Attributes:
+        position: x, y, z, or none.
+        rotation: The columns of its orientation, in the order of the form, or none.
+        forms: What these may be; one if it is known.
+        evidence: Why.
+    """
+
+    position: tuple[Column, ...] = ()
+    rotation: tuple[Column, ...] = ()
+    forms: tuple[RotationForm, ...] = ()
+    evidence: str = "their names"
+
+
+def find_pose(numeric: Sequence[Column], layouts: Sequence[Layout], file: str | None = None) -> Pose:
+    """Return the recorded pose among some columns with names.
+
+    Args:
+        numeric: Candidates.
+        layouts: The tables.
+        file: The file, if it is an error that several positions are recorded; else they are left.
+
+    Raises:
+        LogError: If there are several positions where one is needed.
+    """
+    vectors = [f for f in families(numeric, vocabulary().tcp_pose_vector, 0) if _numbers(f) == range(6)]
+    if len(vectors) == 1:
+        ordered = vectors[0].ordered()
+        return Pose(ordered[:3], ordered[3:], ("vector",))
+    for family in families(numeric, vocabulary().tcp_matrix, 0):
+        pose = matrix_pose(family.ordered(), layouts)
+        if pose is not None:
+            return pose
+    position = _position(numeric, file)
+    rest = [column for column in numeric if column not in position]
+    rotation, forms = _rotation(rest, layouts) if position else ((), ())
+    return Pose(position, rotation, forms)
+
+
+def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
+    """Return the pose whose columns the user named; None if none are named.
+
+    Raises:
+        LogError: If there is no such column.
+        OptionError: If there are too few or too many for a position or for the form of the orientation.
+    """
+    if not options.position:
+        return None
+    position = tuple(find_column(columns, text, "position") for text in options.position)
+    rotation = tuple(find_column(columns, text, "orientation") for text in options.orientation)
+    if len(position) != 3:
+        raise OptionError(f"position: found {len(position)} columns, allowed: x, y, z")
+    forms = tuple(form for form in FORMS if width(form) == len(rotation) and options.rotation in (None, form))
+    if rotation and not forms:
+        allowed = f"{width(options.rotation)}, as {options.rotation} has" if options.rotation else "3, 4 or 9"
+        raise OptionError(f"orientation: found {len(rotation)} columns, allowed: {allowed}")
+    return Pose(position, rotation, forms if rotation else (), "given as an option")
+
+
+def with_form(pose: Pose, form: RotationForm | None) -> Pose:
+    """Return the pose with the form of orientation that the user tells.
+
+    Raises:
+        OptionError: If it has another number of columns.
+    """
+    if form is None or not pose.rotation:
+        return pose
+    if width(form) != len(pose.rotation):
+        found = f"{form}, which has {width(form)} columns, for {listed(pose.rotation)}"
+        raise OptionError(f"--rotation: found {found}, allowed: a form of {len(pose.rotation)} columns")
+    return replace(pose, forms=(form,))
+
+
+def trailing_matrix(columns: Sequence[Column], layouts: Sequence[Layout]) -> Pose | None:
+    """Return the pose in columns without names of which the last 16 or 12 are a homogeneous transform."""
+    for count in (16, 12):
+        pose = matrix_pose(columns[-count:], layouts) if len(columns) >= count else None
+        if pose is not None:
+            return pose
+    return None
+
+
+def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout]) -> Pose | None:
+    """Return the pose that 16 or 12 columns hold as a homogeneous transform, by what their numbers are.
+
+    Row by row, or of 16 also column by column: the entries 0, 0, 0, 1 tell which, and R R^T = I that it
+    is one at all.
+
+    Args:
+        columns: The columns, in their order.
+        layouts: The tables.
+    """
+    if len(columns) not in (12, 16):
+        return None
+    values = _sampled(columns, layouts)
+    places = np.arange(16).reshape(4, 4)
+    for order, entries in (("row by row", places), ("column by column", places.T)):
+        if len(columns) == 12 and order != "row by row":
+            continue
+        if len(columns) == 16 and not (values[:, entries[3]] == (0, 0, 0, 1)).all():
+            continue
+        turned = entries[:3, :3].ravel().tolist()
+        if _orthogonal(values[:, turned].reshape(-1, 3, 3)):
+            position = tuple(columns[k] for k in entries[:3, 3].tolist())
+            return Pose(position, tuple(columns[k] for k in turned), ("matrix",), f"a transform, {order}")
+    return None
+
+
+def _sampled(columns: Sequence[Column], layouts: Sequence[Layout]) -> FloatArray:
+    """Return the sampled rows in which all of these columns have a number."""
+    cells = [layouts[c.table].cells(c.index) for c in columns]
+    decimals = [layouts[c.table].decimal for c in columns]
+    rows = [
+        [to_float(cell, decimal) for cell, decimal in zip(row, decimals, strict=True)]
+        for row in zip(*cells, strict=False)
+    ]
+    values = np.array([row for row in rows if None not in row], dtype=np.float64)
+    return values[np.isfinite(values).all(axis=1)] if len(values) else np.empty((0, len(columns)))
+
+
+def _orthogonal(r: FloatArray) -> bool:
+    """Return whether these are rotation matrices: R R^T = I and det R = 1."""
+    if not len(r):
+        return False
+    gram = r @ r.transpose(0, 2, 1)
+    return bool((np.abs(gram - np.eye(3)) < ORTHOGONAL).all() and (np.linalg.det(r) > 0).all())
+
+
+def _position(numeric: Sequence[Column], file: str | None) -> tuple[Column, ...]:
+    """Return the columns x, y, z; none if there are several and these need not be known."""
+    found = [f for f in families(numeric, vocabulary().tcp_position, 0) if _numbers(f) == range(3)]
+    best = [family for family in found if family.rank == found[0].rank]
+    if len(best) > 1 and file is not None:
+        groups = "; ".join(listed(family.ordered()) for family in best)
+        raise LogError(Finding(f"found several positions: {groups}; allowed: one x, y, z", file=file))
+    return best[0].ordered() if len(best) == 1 else ()
+
+
+def _rotation(
+    rest: Sequence[Column], layouts: Sequence[Layout]
+) -> tuple[tuple[Column, ...], tuple[RotationForm, ...]]:
+    """Return the columns of the only orientation, and the forms that their names allow."""
+    for words in vocabulary().tcp_rotations:
+        wanted = range(4) if words.forms[0].startswith("quat") else range(3)
+        found = [f for f in families(rest, words.patterns, 0) if _numbers(f) == wanted]
+        if len(found) == 1:
+            return found[0].ordered(), words.forms
+    nine = [f.ordered() for f in families(rest, vocabulary().tcp_matrix, 0) if len(f.columns) == 9]
+    if len(nine) == 1 and _orthogonal(_sampled(nine[0], layouts).reshape(-1, 3, 3)):
+        return nine[0], ("matrix",)
+    return (), ()
+
+
+def _numbers(family: Family) -> range | None:
+    """Return the numbers of a family if they count up from 0 without a gap."""
+    count = range(len(family.columns))
+    return count if sorted(family.columns) == list(count) else None

@@ -1,0 +1,198 @@
+"""The recorded tool centre point: its columns, form and unit, told by names, numbers or kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.kinematics import FloatArray, poses_over_log
+from urmpipe_models.orientation import angle_between
+from urmpipe_pipeline.joint_log import JointLog
+
+Read = Callable[..., JointLog]
+Wrong = Callable[..., list[str]]
+
+UR5E = load_robot("ur5e")
+ROWS = 40
+TOOL_TURN = Rotation.from_euler("xyz", [0.3, -0.2, 0.5])
+PRINTED = 1e-8
+"""Ten decimals, in mm or deg at the worst."""
+
+
+def motion() -> FloatArray:
+    """A motion in which each joint moves in its own way."""
+    t = np.linspace(0.0, 1.0, ROWS)[:, np.newaxis]
+    return 0.4 + np.arange(6) * 0.3 + 0.5 * np.sin(t * (1.0 + 0.4 * np.arange(6)))
+
+
+def text(names: Sequence[str], *columns: FloatArray) -> str:
+    """A table with a header, written by NumPy."""
+    from io import StringIO
+
+    target = StringIO()
+    t = np.arange(ROWS) * 0.005
+    np.savetxt(
+        target, np.column_stack((t, *columns)), "%.10f", ",", header=",".join(("t", *names)), comments=""
+    )
+    return target.getvalue()
+
+
+Q = motion()
+POSITION, MATRICES = poses_over_log(UR5E, Q)
+ROTATION = Rotation.from_matrix(MATRICES) * TOOL_TURN
+JOINTS = [f"q{k}" for k in range(1, 7)]
+JOINTS_RAD = [f"q{k} [rad]" for k in range(1, 7)]
+XYZ = ["x [mm]", "y [mm]", "z [mm]"]
+
+BY_NAME = {
+    "quat_xyzw": (["qx", "qy", "qz", "qw"], ROTATION.as_quat()),
+    "letters in another order": (["qw", "qx", "qy", "qz"], ROTATION.as_quat()[:, [3, 0, 1, 2]]),
+    "rpy": (["roll [deg]", "pitch [deg]", "yaw [deg]"], ROTATION.as_euler("xyz", degrees=True)),
+    "zyx": (["A [deg]", "B [deg]", "C [deg]"], ROTATION.as_euler("ZYX", degrees=True)),
+    "vector": (["rotvec_x", "rotvec_y", "rotvec_z"], ROTATION.as_rotvec()),
+    "matrix": ([f"r{i}{j}" for i in "123" for j in "123"], ROTATION.as_matrix().reshape(-1, 9)),
+}
+
+
+@pytest.mark.parametrize("case", BY_NAME)
+def test_forms_that_the_names_tell(case: str, read: Read) -> None:
+    names, values = BY_NAME[case]
+    log = read(text([*JOINTS_RAD, *XYZ, *names], Q, POSITION * 1e3, values))
+    assert log.rotation_form == ("quat_xyzw" if "letters" in case else case)
+    assert log.tcp_quat_xyzw is not None
+    np.testing.assert_allclose(angle_between(log.tcp_quat_xyzw, ROTATION.as_quat()), 0.0, atol=PRINTED)
+    assert log.tcp_position is not None
+    np.testing.assert_allclose(log.tcp_position, POSITION, atol=PRINTED)
+    assert log.joints == tuple(JOINTS)
+
+
+@pytest.mark.parametrize("unit", ["rad", "deg"])
+@pytest.mark.parametrize(("form", "sequence"), [("vector", ""), ("rpy", "xyz"), ("xyz", "XYZ")])
+def test_the_kinematics_tell_what_rx_ry_rz_are(form: str, sequence: str, unit: str, read: Read) -> None:
+    """No name and no unit: of six readings only one turns as the arm does."""
+    values = ROTATION.as_euler(sequence) if sequence else ROTATION.as_rotvec()  # type: ignore[call-overload]
+    written = np.degrees(values) if unit == "deg" else values
+    table = text([*JOINTS_RAD, *XYZ, "rx", "ry", "rz"], Q, POSITION * 1e3, written)
+    log = read(table, UR5E)
+    assert log.rotation_form == form
+    assert log.tcp_rotation is not None
+    np.testing.assert_allclose(log.tcp_rotation, values, atol=PRINTED)
+    (said,) = [i for i in log.inferences if i.what == "form of rx, ry, rz"]
+    assert said.value == f"{form} in {unit}"
+    assert said.evidence.startswith("with it the arm's orientation agrees within ")
+
+
+def test_rx_ry_rz_without_a_robot_are_not_guessed(read: Read) -> None:
+    log = read(text([*JOINTS_RAD, *XYZ, "rx", "ry", "rz"], Q, POSITION * 1e3, ROTATION.as_rotvec()))
+    assert (log.tcp_rotation, log.rotation_form) == (None, None)
+    assert [(w.kind, w.message) for w in log.warnings] == [
+        (
+            "orientation",
+            "rx, ry, rz may be of several forms: the recorded orientation is not used; --rotation vector or"
+            " --rotation rpy or --rotation xyz says which",
+        )
+    ]
+    assert "rx" not in log.units
+
+
+def test_the_user_tells_the_form(read: Read) -> None:
+    names = [*JOINTS_RAD, *XYZ, "rx [deg]", "ry [deg]", "rz [deg]"]
+    table = text(names, Q, POSITION * 1e3, ROTATION.as_euler("xyz", degrees=True))
+    log = read(table, rotation="rpy")
+    assert log.rotation_form == "rpy"
+    assert log.tcp_quat_xyzw is not None
+    np.testing.assert_allclose(angle_between(log.tcp_quat_xyzw, ROTATION.as_quat()), 0.0, atol=PRINTED)
+    assert not log.warnings
+
+
+def transforms() -> FloatArray:
+    """Homogeneous transforms, shape (n, 4, 4), in mm."""
+    result = np.zeros((ROWS, 4, 4))
+    result[:, :3, :3], result[:, :3, 3], result[:, 3, 3] = ROTATION.as_matrix(), POSITION * 1e3, 1.0
+    return result
+
+
+@pytest.mark.parametrize(
+    ("names", "values"),
+    [
+        ([f"T{i}{j}" for i in "1234" for j in "1234"], transforms().reshape(-1, 16)),
+        ([f"pose_{k}" for k in range(16)], transforms().reshape(-1, 16)),
+        ([f"O_T_EE[{k}]" for k in range(16)], transforms().transpose(0, 2, 1).reshape(-1, 16)),  # libfranka
+        ([f"m{k}" for k in range(12)], transforms()[:, :3].reshape(-1, 12)),  # CoppeliaSim
+    ],
+)
+def test_homogeneous_transforms_by_rows_and_by_columns(
+    names: list[str], values: FloatArray, read: Read
+) -> None:
+    log = read(text([*JOINTS_RAD, *names], Q, values), UR5E)
+    assert log.rotation_form == "matrix"
+    assert log.tcp_rotation is not None
+    np.testing.assert_allclose(log.tcp_rotation, ROTATION.as_matrix().reshape(-1, 9), atol=PRINTED)
+    assert log.tcp_position is not None
+    np.testing.assert_allclose(log.tcp_position, POSITION, atol=PRINTED)
+
+
+def test_a_transform_behind_the_joints_of_a_table_without_header(read: Read) -> None:
+    rows = np.column_stack((np.degrees(Q), transforms().reshape(-1, 16)))
+    log = read("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()), UR5E, period=0.005)
+    np.testing.assert_allclose(log.q, Q, atol=PRINTED)
+    assert log.tcp_position is not None
+    np.testing.assert_allclose(log.tcp_position, POSITION, atol=PRINTED)
+    assert log.rotation_form == "matrix"
+    without = read("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()), units={"": "deg"})
+    assert without.joints == ("q1", "q2", "q3", "q4", "q5", "q6")
+
+
+def test_sixteen_columns_that_are_no_transform_are_none(read: Read) -> None:
+    values = transforms().reshape(-1, 16)
+    values[:, 0] += 0.5
+    log = read(text([*JOINTS_RAD, *(f"pose_{k}" for k in range(16))], Q, values))
+    assert (log.tcp_position, log.rotation_form) == (None, None)
+
+
+def test_quaternions_of_another_length_are_none(read: Read) -> None:
+    log = read(text([*JOINTS_RAD, *XYZ, "qx", "qy", "qz", "qw"], Q, POSITION * 1e3, 2 * ROTATION.as_quat()))
+    assert log.rotation_form is None
+    assert [w.message for w in log.warnings] == [
+        "qx, qy, qz, qw hold no quaternion of length 1: the recorded orientation is not used"
+    ]
+
+
+def test_named_columns_of_the_pose(read: Read) -> None:
+    names = [*JOINTS_RAD, "a1", "a2", "a3", "b1", "b2", "b3"]
+    table = text(names, Q, POSITION, ROTATION.as_rotvec())
+    log = read(
+        table,
+        UR5E,
+        joints=tuple(f"q{k}" for k in range(1, 7)),
+        position=("a1", "a2", "a3"),
+        orientation=("b1", "b2", "b3"),
+        rotation="vector",
+        units={"a1": "m", "a2": "m", "a3": "m", "b1": "rad", "b2": "rad", "b3": "rad"},
+    )
+    assert log.tcp_position is not None
+    np.testing.assert_allclose(log.tcp_position, POSITION, atol=PRINTED)
+    assert log.rotation_form == "vector"
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"position": ("a1", "a2")}, "position: found 2 columns, allowed: x, y, z"),
+        (
+            {"position": ("a1", "a2", "a3"), "orientation": ("b1",)},
+            "orientation: found 1 columns, allowed: 3, 4 or 9",
+        ),
+        (
+            {"position": ("a1", "a2", "a3"), "orientation": ("b1", "b2", "b3"), "rotation": "matrix"},
+            "orientation: found 3 columns, allowed: 9, as matrix has",
+        ),
+    ],
+)
+def test_a_pose_needs_its_columns(options: dict[str, object], said: str, wrong: Wrong) -> None:
+    table = text([*JOINTS_RAD, "a1", "a2", "a3", "b1", "b2", "b3"], Q, POSITION, ROTATION.as_rotvec())
+    assert wrong(table, **options) == [said]
