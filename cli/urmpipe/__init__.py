@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from urmpipe.api import compare as compare
     from urmpipe.api import ingest as ingest
     from urmpipe.api import report as report
+    from urmpipe.api import write_map as write_map
     from urmpipe_models.catalogue import load_robot as load_robot
     from urmpipe_models.catalogue import robot_names as robot_names
     from urmpipe_models.chain import Chain as Chain
@@ -25,21 +26,26 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.recording import write_recording as write_recording
     from urmpipe_pipeline.results import Comparison as Comparison
     from urmpipe_pipeline.results import Run as Run
+    from urmpipe_pipeline.sources import ReadOptions as ReadOptions
+    from urmpipe_pipeline.sources import read_map as read_map
 
 __version__ = "0.1.0"
 
 _HOME = {
     "Chain": "urmpipe_models.chain",
     "Comparison": "urmpipe_pipeline.results",
+    "ReadOptions": "urmpipe_pipeline.sources",
     "Report": "urmpipe.api",
     "Run": "urmpipe_pipeline.results",
     "UrmpipeError": "urmpipe_models.errors",
     "compare": "urmpipe.api",
     "ingest": "urmpipe.api",
     "load_robot": "urmpipe_models.catalogue",
+    "read_map": "urmpipe_pipeline.sources",
     "read_recording": "urmpipe_pipeline.recording",
     "report": "urmpipe.api",
     "robot_names": "urmpipe_models.catalogue",
+    "write_map": "urmpipe.api",
     "write_recording": "urmpipe_pipeline.recording",
 }
 

@@ -2,23 +2,25 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.catalogue import load_robot
+from urmpipe_models.catalogue import load_robot, robot_names
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
-from urmpipe_models.transform import Transform
+from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.operands import load_run, log_files
+from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.recording import is_recording, read_recording, record
 from urmpipe_pipeline.results import Comparison, Run
-from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources import ReadOptions, map_of, read_map
 from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
@@ -196,6 +198,40 @@ def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> 
     return Report(write_report(shown, Path(output), inputs=files), shown)
 
 
+def write_map(run: Run, output: PathLike, inputs: Sequence[PathLike] = (), robot: str | None = None) -> Path:
+    """Write the map (TOML) by which further logs read as this one was read.
+
+    Args:
+        run: An ingested log.
+        output: The file to write; only another map of ours is replaced.
+        inputs: Files that may not be overwritten.
+        robot: Name or file of the arm; default: its name, if it is one of the catalogue.
+
+    Raises:
+        UrmpipeError: If it may not be written there.
+    """
+    path = Path(output)
+    arm = run.robot
+    if robot is None:
+        robot = arm.name if arm and arm.name in robot_names() else None
+    elif Path(robot).suffix:
+        robot = os.path.relpath(robot, path.parent)
+    frames = (arm.base, arm.tool) if arm else ()
+    text = map_of(run.log, robot, *(_offset(frame) for frame in frames))
+    with guarded_output(path, [Path(one) for one in inputs], "map") as part:
+        part.write_text(text, encoding="utf-8", newline="\n")
+        read_map(part)
+    return path
+
+
+def _offset(frame: Transform) -> tuple[float, ...]:
+    """Return a frame as X, Y, Z, RX, RY, RZ in [m] and [rad], nothing for one that is where it was."""
+    if frame == Transform():
+        return ()
+    x, y, z = (float(value) for value in frame.translation)
+    return (x, y, z, *rpy_of(frame.rotation))
+
+
 def place_robot(
     robot: Robot | None,
     base: Transform | None = None,
@@ -234,9 +270,18 @@ def _refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:
         raise LogError(*(Finding(f"{w.kind}: {w.message} (--strict)", row=w.row) for w in warnings))
 
 
-def read_options(values: Mapping[str, Any]) -> ReadOptions:
-    """Return the reading options among some named values; None means not given."""
-    known = asdict(ReadOptions())
-    return ReadOptions(
-        **{name: value for name, value in values.items() if name in known and value is not None}
-    )
+def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None) -> ReadOptions:
+    """Return the reading options among some named values; None means not given.
+
+    Args:
+        values: Options by name, others among them.
+        otherwise: What holds where nothing is given, such as that of a map. Units of single columns add up;
+            joints given anew leave behind what belonged to the others: names, signs and offsets.
+    """
+    base = otherwise or ReadOptions()
+    known = {field.name for field in fields(ReadOptions)}
+    given = {name: value for name, value in values.items() if name in known and value is not None}
+    given["units"] = {**base.units, **given.get("units", {})}
+    if "joints" in given:
+        given = {"names": (), "signs": (), "offsets": (), **given}
+    return replace(base, **given)

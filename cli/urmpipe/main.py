@@ -10,11 +10,13 @@ import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from urmpipe import __version__
+from urmpipe.defaults import defaults_for, find_defaults
 from urmpipe.process import tune_python
 
 if TYPE_CHECKING:
@@ -44,10 +46,26 @@ class LazyGroup(click.Group):
         """Load one command."""
         if cmd_name not in COMMANDS:
             return None
-        command = getattr(import_module(f"urmpipe.commands.{cmd_name}"), cmd_name)
-        if not isinstance(command, click.Command):
-            raise TypeError(f"urmpipe.commands.{cmd_name} defines no command of its name")
+        command = self._load(cmd_name)
+        path = None if isinstance(command, click.Group) else find_defaults()
+        if path is not None:
+            ctx.default_map = {cmd_name: self._defaults(command, path)}
         return command
+
+    def _load(self, name: str) -> click.Command:
+        """Import the module of a command."""
+        command = getattr(import_module(f"urmpipe.commands.{name}"), name)
+        if not isinstance(command, click.Command):
+            raise TypeError(f"urmpipe.commands.{name} defines no command of its name")
+        return command
+
+    def _defaults(self, command: click.Command, path: Path) -> dict[str, Any]:
+        """Return what urmpipe.toml says for a command, and tell the user that it does."""
+        values = defaults_for(command, path, {name: self._load(name) for name in COMMANDS})
+        if values:
+            shown = ", ".join(f"{name}={value}" for name, value in values.items())
+            click.echo(f"defaults of {path}: {shown}", err=True)
+        return values
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands with their short help, without loading them."""

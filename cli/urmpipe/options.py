@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable
+from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
@@ -14,6 +15,7 @@ from urmpipe import __version__
 
 if TYPE_CHECKING:
     from urmpipe_models.chain import Chain
+    from urmpipe_pipeline.sources import ReadOptions
 
 Command = TypeVar("Command", bound=Callable[..., Any])
 
@@ -125,6 +127,31 @@ def take_robot(options: dict[str, Any]) -> Chain | None:
     return place_robot(robot, base, tool, base_link=base_link, tip_link=tip)
 
 
+FORMS = ["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", "matrix"]
+"""Forms of a recorded orientation (a test holds them against those of the models)."""
+
+
+def take_log_options(options: dict[str, Any]) -> tuple[Chain | None, ReadOptions]:
+    """Take robot, map and reading options out of some others; return the arm and how to read a log.
+
+    What is given on the command line comes before what the map says.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the robot or the map.
+    """
+    from urmpipe.api import read_options
+    from urmpipe_models.transform import from_offset
+    from urmpipe_pipeline.sources import LogMap, read_map
+
+    path = options.pop("log_map")
+    log_map = read_map(path) if path else LogMap()
+    options["robot"] = options["robot"] or log_map.robot
+    for name, frame in (("base", log_map.base), ("tool", log_map.tool)):
+        if options[name] is None and frame:
+            options[name] = from_offset(frame)
+    return take_robot(options), read_options(options, log_map.read)
+
+
 def log_options(command: Command) -> Command:
     """Add the options of every command that takes a log."""
     for option in (
@@ -148,6 +175,15 @@ def log_options(command: Command) -> Command:
         click.option("--time", metavar="COLUMN", help="The time column."),
         click.option("--decimal", type=click.Choice([".", ","]), help="The decimal sign."),
         click.option("--delimiter", metavar="CHAR", help="What parts the columns: , ; tab space."),
+        click.option(
+            "--rotation", type=click.Choice(FORMS), help="Form of the recorded orientation, if it is open."
+        ),
+        click.option(
+            "--map",
+            "log_map",
+            type=click.Path(dir_okay=False, path_type=Path),
+            help="How to read these logs (TOML); options given here come first.",
+        ),
         click.option("--source", metavar="NAME", help="Who wrote the log: coppeliasim, solidworks, ..."),
     ):
         command = option(command)

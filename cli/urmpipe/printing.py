@@ -52,13 +52,17 @@ def print_warnings(warnings: Sequence[LogWarning]) -> None:
         click.echo(f"warning: and {len(warnings) - LISTED} more", err=True)
 
 
-def print_run(run: Run) -> None:
-    """Print what ingest inferred and what it changed."""
+def print_run(run: Run, *, alternatives: bool = False) -> None:
+    """Print what ingest inferred and what it changed; if asked for, how to have it otherwise."""
+    from urmpipe_pipeline.explain import otherwise
+
     console = new_console()
     log = run.log
-    table = new_table("What", "Found", "Because", title=f"{log.name}: {log.rows} rows, {run.duration:.6g} s")
+    columns = ("What", "Found", "Because", "Otherwise")[: 4 if alternatives else 3]
+    table = new_table(*columns, title=f"{log.name}: {log.rows} rows, {run.duration:.6g} s")
     for inference in log.inferences:
-        table.add_row(inference.what, inference.value, inference.evidence)
+        cells = (inference.what, inference.value, inference.evidence, otherwise(inference))
+        table.add_row(*cells[: len(columns)])
     grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
     own = len(run.t_ns) == log.rows and bool((run.t_ns == log.t_ns).all())
     table.add_row("grid", grid, "the log's own rows" if own else "resampled")

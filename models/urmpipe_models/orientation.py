@@ -45,7 +45,7 @@ def quaternions(rotation: FloatArray, form: RotationForm) -> FloatArray:
         form: What its columns are.
 
     Returns:
-        Shape (n, 4) [-]; NaN where a sample is missing. Their sign is not fixed: q and -q are one orientation.
+        Shape (n, 4) [-]; NaN where a sample is missing. Their sign is open: q and -q are one orientation.
     """
     if form == "vector":
         angle = np.linalg.norm(rotation, axis=1)

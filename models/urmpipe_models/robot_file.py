@@ -2,10 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import math
-import re
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from decimal import Decimal
@@ -19,6 +16,7 @@ from urmpipe_models.elementwise import cross, dot
 from urmpipe_models.errors import Finding, RobotError
 from urmpipe_models.export import EXPORT_MARK
 from urmpipe_models.tables import Table
+from urmpipe_models.toml_text import parse_toml, toml_lines
 from urmpipe_models.transform import Transform, from_rpy
 from urmpipe_models.urdf_reader import read_urdf
 from urmpipe_models.urm import urm_chain
@@ -77,7 +75,9 @@ def read_robot_file(path: str | Path) -> Chain:
         RobotError: With everything that is wrong: the key, what was found and what is allowed.
     """
     path = Path(path)
-    return _read(_parse(path), tuple(_READERS), file=str(path), stem=path.stem, folder=path.parent)
+    return _read(
+        parse_toml(path, RobotError), tuple(_READERS), file=str(path), stem=path.stem, folder=path.parent
+    )
 
 
 def chain_to_dict(chain: Chain) -> dict[str, Any]:
@@ -112,27 +112,12 @@ def robot_toml(chain: Chain) -> str:
     """Return a chain as a TOML robot file of kind `joints`; read back it is the same chain, bit by bit."""
     data = chain_to_dict(chain)
     joints, frames = data.pop("joints"), {key: data.pop(key) for key in ("base", "tip", "tool")}
-    lines = [f"# {EXPORT_MARK}: lengths in m, angles in rad", *_toml_lines(data)]
+    lines = [f"# {EXPORT_MARK}: lengths in m, angles in rad", *toml_lines(data)]
     for key, frame in frames.items():
-        lines += ["", f"[{key}]", *_toml_lines(frame)]
+        lines += ["", f"[{key}]", *toml_lines(frame)]
     for joint in joints:
-        lines += ["", "[[joints]]", *_toml_lines(joint)]
+        lines += ["", "[[joints]]", *toml_lines(joint)]
     return "\n".join(lines) + "\n"
-
-
-def _parse(path: Path) -> dict[str, Any]:
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except UnicodeDecodeError as error:
-        raise RobotError(
-            Finding(f"byte {error.start} is no UTF-8; allowed: TOML in UTF-8", str(path))
-        ) from error
-    except OSError as error:
-        raise RobotError(Finding(f"cannot be read: {error.strerror}", str(path))) from error
-    except tomllib.TOMLDecodeError as error:
-        place = re.search(r"\(at line (\d+), column (\d+)\)", str(error))
-        line = int(place[1]) if place else None
-        raise RobotError(Finding(f"not valid TOML: {error}", str(path), line=line)) from error
 
 
 def _read(
@@ -323,17 +308,3 @@ def _mimic_to_dict(mimic: Mimic) -> dict[str, Any]:
 
 def _finite_or_none(value: float) -> float | None:
     return float(value) if math.isfinite(value) else None
-
-
-def _toml_lines(table: Mapping[str, Any]) -> list[str]:
-    return [f"{key} = {_toml_value(value)}" for key, value in table.items() if value is not None]
-
-
-def _toml_value(value: Any) -> str:
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False).replace("\x7f", "\\u007f")
-    if isinstance(value, Mapping):
-        return f"{{ {', '.join(_toml_lines(value))} }}"
-    if isinstance(value, list):
-        return f"[{', '.join(_toml_value(item) for item in value)}]"
-    return repr(value)

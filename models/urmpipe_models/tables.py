@@ -87,6 +87,22 @@ class Table:
             self._refuse(key, value, allowed)
         return (0.0,) * (count or 0)
 
+    def texts(self, key: str) -> tuple[str, ...]:
+        """Return a list of strings; the key is required."""
+        value = self._get(key, "a list of texts", None)
+        if isinstance(value, (list, tuple)) and all(isinstance(item, str) for item in value):
+            return tuple(value)
+        self._refuse(key, value, "a list of texts")
+        return ()
+
+    def mapping(self, key: str) -> dict[str, str]:
+        """Return a table of strings under any keys, an empty one where it is missing."""
+        value = self._get(key, "a table of texts", {})
+        if isinstance(value, Mapping) and all(isinstance(item, str) for item in value.values()):
+            return dict(value)
+        self._refuse(key, value, "a table of texts")
+        return {}
+
     def spread(self, key: str, count: int, default: float) -> tuple[float, ...]:
         """Return `count` numbers, infinities included; one number in the file stands for all of them."""
         value = self._get(key, "", default)

@@ -14,10 +14,13 @@ from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
 
-OutputKind = Literal["recording", "report"]
+OutputKind = Literal["recording", "report", "map"]
 
 GENERATOR = re.compile(rb"<meta\s+name=\"generator\"\s+content=\"urmpipe\b", re.IGNORECASE)
 """How a report of ours tells where it comes from."""
+
+MAP_HEADER = "# How urmpipe reads these logs: urmpipe ingest LOG --map THIS"
+"""The first line of a map of ours."""
 
 HEAD = 4096
 """The mark of a report stands within so many bytes of its start."""
@@ -88,6 +91,9 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
 def _is_ours(path: Path, kind: OutputKind) -> bool:
     if kind == "report":
         return is_report(path)
+    if kind == "map":
+        with path.open("rb") as file:
+            return file.readline().strip() == MAP_HEADER.encode()
     from urmpipe_pipeline.recording.identity import is_ours
 
     return is_ours(path)

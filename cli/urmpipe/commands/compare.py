@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from urmpipe.options import LENGTH, log_options, output_options, take_robot
+from urmpipe.options import LENGTH, log_options, output_options, take_log_options
 from urmpipe.process import tune_pyarrow
 
 TOLERANCE = 0.0035
@@ -76,7 +76,7 @@ def compare(
     from urmpipe import api
     from urmpipe.printing import print_comparison, print_json, print_recording, print_warnings, progress_bar
 
-    robot = take_robot(options)
+    robot, read = take_log_options(options)
     names = ("tsp", "derivative", "strict", "tolerance", "tcp", "sync_offset")
     shared = {name: options.pop(name) for name in names}
     target = output or Path(default_name(reference, logs))
@@ -85,7 +85,7 @@ def compare(
             reference,
             logs,
             robot=robot,
-            read=api.read_options(options),
+            read=read,
             output=target,
             progress=progress,
             **shared,

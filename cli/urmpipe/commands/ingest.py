@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from urmpipe.options import log_options, output_options, take_robot
+from urmpipe.options import log_options, output_options, take_log_options
 from urmpipe.process import tune_pyarrow
 
 
@@ -16,9 +16,26 @@ from urmpipe.process import tune_pyarrow
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: LOG.rrd here]."
 )
+@click.option(
+    "--explain", is_flag=True, help="Print each decision with its evidence and alternative; write nothing."
+)
+@click.option(
+    "--write-map",
+    "map_output",
+    type=click.Path(path_type=Path),
+    help="Save what was inferred as a map (TOML) for --map.",
+)
 @log_options
 @output_options
-def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bool, **options: Any) -> int:
+def ingest(
+    logs: tuple[Path, ...],
+    output: Path | None,
+    explain: bool,
+    map_output: Path | None,
+    as_json: bool,
+    quiet: bool,
+    **options: Any,
+) -> int:
     """Turn one log into a recording: checked, repolarized, with the arm's kinematics.
 
     Several files are one log whose source writes one a plot (SolidWorks); a folder stands for the
@@ -29,24 +46,31 @@ def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bo
       urmpipe ingest log.csv --robot urm6
       urmpipe ingest phi1.csv phi2.csv phi3.csv -o run.rrd
       urmpipe ingest table.txt --robot ur5e --unit deg --period 8ms --json
+      urmpipe ingest log.csv --explain
+      urmpipe ingest log.csv --robot ur5e --write-map lab.toml
+      urmpipe ingest next.csv --map lab.toml
     """
     tune_pyarrow()
     from urmpipe import api
     from urmpipe.printing import print_json, print_recording, print_run, print_warnings, progress_bar
 
-    target = output or Path(default_name(logs))
-    robot = take_robot(options)
-    shared = {name: options.pop(name) for name in ("tsp", "derivative", "strict")}
-    with progress_bar(f"Writing {target}", quiet=quiet) as progress:
-        run = api.ingest(
-            logs, robot=robot, read=api.read_options(options), output=target, progress=progress, **shared
-        )
+    target = None if explain else output or Path(default_name(logs))
+    named = options["robot"]
+    robot, read = take_log_options(options)
+    shared = {name: options[name] for name in ("tsp", "derivative", "strict")}
+    with progress_bar(f"Writing {target}", quiet=quiet or explain) as progress:
+        run = api.ingest(logs, robot=robot, read=read, output=target, progress=progress, **shared)
+    if map_output:
+        api.write_map(run, map_output, inputs=logs, robot=named)
     print_warnings(() if quiet else run.warnings)
     if as_json:
         print_json(run.to_dict())
     elif not quiet:
-        print_run(run)
-        print_recording(run.recording)
+        print_run(run, alternatives=explain)
+        if run.recording:
+            print_recording(run.recording)
+        if map_output:
+            click.echo(f"Map: {map_output}  (use it: urmpipe ingest LOG --map {map_output})")
     return 0
 
 

@@ -5,8 +5,9 @@ columns?), `table` (its numbers, fast), `diagnose` (where it is wrong, with line
 `read` (SI). The words by which columns, units and sources are known are in `vocabulary.toml`.
 """
 
+from urmpipe_pipeline.sources.log_map import LogMap, map_of, read_map
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.read import read_log
 from urmpipe_pipeline.sources.tables import source_names
 
-__all__ = ["ReadOptions", "read_log", "source_names"]
+__all__ = ["LogMap", "ReadOptions", "map_of", "read_log", "read_map", "source_names"]

@@ -32,20 +32,20 @@ class KinematicUnits:
         return self.angle if quantity == "angle" else self.length
 
     def evidence(self, quantity: Quantity, other: Unit | None = None) -> str:
-        """Say by how much this unit beats another one; the best other one by default."""
+        """Say by how much this unit beats another one of its quantity; the best other one by default."""
         own = self._distance(self.fits[self.angle, self.length])
-        at = 0 if quantity == "angle" else 1
-        wrong = {
-            units: self._distance(one)
-            for units, one in self.fits.items()
-            if (units[at] == other if other else units[at] != self.of(quantity))
+        others = {
+            angle if quantity == "angle" else length: self._distance(one)
+            for (angle, length), one in self.fits.items()
+            if (length == self.length if quantity == "angle" else angle == self.angle)
         }
-        units, distance = min(wrong.items(), key=lambda item: item[1])
+        del others[self.of(quantity)]
+        second = other or min(others, key=others.__getitem__)
         x, y, z = self.fits[self.angle, self.length].tool
         tool = f" with a tool of {x:.3f},{y:.3f},{z:.3f} m" if self.needs_tool else ""
         return (
             f"with it the arm comes within {own * 1e3:.2f} mm (rms){tool} of the recorded TCP,"
-            f" as {units[at].name} within {distance * 1e3:.2f} mm"
+            f" as {second.name} within {others[second] * 1e3:.2f} mm"
         )
 
     def _distance(self, one: Fit) -> float:

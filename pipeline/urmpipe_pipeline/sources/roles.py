@@ -75,7 +75,7 @@ def assign(
     numeric = [column for column in columns if not column.text and not column.counts_rows]
     if options.joints:
         joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
-        found = _Joints(joints, "given as an option")
+        found = _Joints(joints, "given as an option", *_family_of(joints))
         pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
     else:
         pose = chosen_pose(columns, options) or find_pose(numeric, layouts)
@@ -104,6 +104,19 @@ class _Joints:
     evidence: str = ""
     numbers: tuple[int, ...] = ()
     names: tuple[str, ...] = ()
+
+
+def _family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Return the numbers, or else the names, that chosen joints share with their rates, in their order."""
+    for family in families(joints, vocabulary().joint["position"], order=0):
+        if len(family.columns) == len(joints):
+            number_of = {column: n for n, column in family.columns.items()}
+            return tuple(number_of[column] for column in joints), ()
+    for names in vocabulary().orders:
+        of_joint = [[name for name in names if _role_beside(c, name) == "position"] for c in joints]
+        if all(len(matching) == 1 for matching in of_joint):
+            return (), tuple(matching[0] for matching in of_joint)
+    return (), ()
 
 
 def _find_joints(free: Sequence[Column], file: str, robot: Chain | None) -> _Joints:
@@ -234,10 +247,10 @@ def _derivative(role: str, numeric: Sequence[Column], joints: _Joints) -> tuple[
     matching = [
         family
         for family in families(numeric, vocabulary().joint[role], order=order)
-        if tuple(sorted(family.columns)) == joints.numbers and family.commanded == asked
+        if set(family.columns) == set(joints.numbers) and family.commanded == asked
     ]
     best = [family for family in matching if family.rank == min(f.rank for f in matching)]
-    return best[0].ordered() if len(best) == 1 else ()
+    return tuple(best[0].columns[n] for n in joints.numbers) if len(best) == 1 else ()
 
 
 def about_pose(pose: Pose) -> list[Inference]:

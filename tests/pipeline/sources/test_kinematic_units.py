@@ -89,8 +89,9 @@ def test_a_unit_that_the_data_contradict_is_asked_for(
     other = "rad" if unit == "deg" else "deg"
     (said,) = wrong(table)
     assert re.fullmatch(
-        rf"log\.csv: found q1, .*, q6 in {unit} by name or source, but \d+ steps? of about {turn} from one row"
-        rf" to the next; allowed: a unit that fits the data; say which with --unit {other} or --unit {unit}",
+        rf"log\.csv: found q1, .*, q6 in {unit} by name or source, but \d+ steps? of about {turn} from one"
+        rf" row to the next; allowed: a unit that fits the data; say which with --unit {other} or"
+        rf" --unit {unit}",
         said,
     )
     assert set(read(table, units={"": other}).units.values()) == {"s", other}

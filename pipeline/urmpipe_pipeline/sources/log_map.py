@@ -1,0 +1,203 @@
+"""Maps: what a lab says once about its logs - columns, units, order, signs, offsets, clock, base, tool.
+
+source = "table"
+delimiter = "semicolon"
+decimal = "comma"
+robot = "ur5e"                  # a name of the catalogue, or a file beside the map
+base = [0, 0, 0.8]              # X, Y, Z[, RX, RY, RZ] in m and rad
+tool = [0, 0, 0.15]
+
+[clock]
+column = "Zeit"                 # or "none", with period = 0.005 in s
+unit = "ms"
+
+[[joints]]                      # in the robot's order
+column = "A1"
+name = "q1"
+unit = "deg"
+sign = -1                       # q = sign * value + offset, in the unit of the column
+offset = 90
+
+[tcp]
+position = ["X", "Y", "Z"]
+orientation = ["A", "B", "C"]
+form = "zyx"
+
+[units]                         # of any other column
+X = "mm"
+A = "deg"
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.orientation import FORMS
+from urmpipe_models.tables import Table
+from urmpipe_models.toml_text import parse_toml, toml_lines, toml_text
+from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
+from urmpipe_pipeline.outputs import MAP_HEADER
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.rotation import PURE
+
+
+@dataclass(frozen=True, slots=True)
+class LogMap:
+    """What a map says.
+
+    Attributes:
+        read: How to read a log.
+        robot: Name or file of the arm, or None.
+        base: Where it stands: X, Y, Z[, RX, RY, RZ] in [m] and [rad], or nothing.
+        tool: Its tool centre point, in the same form.
+    """
+
+    read: ReadOptions = field(default_factory=ReadOptions)
+    robot: str | None = None
+    base: tuple[float, ...] = ()
+    tool: tuple[float, ...] = ()
+
+
+def read_map(path: Path) -> LogMap:
+    """Return what a map says.
+
+    Args:
+        path: The TOML file.
+
+    Raises:
+        OptionError: With everything that is wrong with it.
+    """
+    faults: list[Finding] = []
+    table = Table(parse_toml(path, OptionError), faults, str(path))
+    clock, tcp = table.table("clock"), table.table("tcp")
+    joints = table.tables("joints") if table.has("joints") else []
+    units = table.mapping("units")
+    columns = [_joint(joint, units) for joint in joints]
+    time = _text(clock, "column")
+    _unit_of(clock, [time] if time else [], "unit", units)
+    robot = _text(table, "robot")
+    result = LogMap(
+        ReadOptions(
+            source=_text(table, "source"),
+            delimiter=_text(table, "delimiter"),
+            decimal=_text(table, "decimal"),
+            time=time,
+            period=clock.number("period") if clock.has("period") else None,
+            joints=tuple(column for column, _, _, _ in columns),
+            names=tuple(name for _, name, _, _ in columns),
+            signs=tuple(sign for _, _, sign, _ in columns),
+            offsets=tuple(offset for _, _, _, offset in columns),
+            position=_names(tcp, "position"),
+            orientation=_names(tcp, "orientation"),
+            rotation=tcp.choice("form", FORMS) if tcp.has("form") else None,  # type: ignore[arg-type]
+            units=units,
+        ),
+        robot=_beside(path, robot) if robot else None,
+        base=_frame(table, "base"),
+        tool=_frame(table, "tool"),
+    )
+    for part in (table, clock, tcp, *joints):
+        part.close()
+    if faults:
+        raise OptionError(*faults)
+    return result
+
+
+def map_of(
+    log: JointLog, robot: str | None = None, base: Sequence[float] = (), tool: Sequence[float] = ()
+) -> str:
+    """Return the map by which a log reads as it was read, as TOML.
+
+    Args:
+        log: The log.
+        robot: Name or file of the arm.
+        base: Where it stands, in [m] and [rad]; nothing for the origin.
+        tool: Its tool centre point, in the same form; nothing for the tip.
+    """
+    found = {inference.what: inference.value for inference in log.inferences}
+    top = {
+        "source": log.source,
+        "delimiter": found.get("delimiter"),
+        "decimal": {"point": ".", "comma": ","}.get(found.get("decimal sign", "")),
+        "robot": robot,
+        "base": list(base) or None,
+        "tool": list(tool) or None,
+    }
+    lines = [MAP_HEADER, "", *toml_lines(top), "", "[clock]", *toml_lines(_clock(log))]
+    for column, name in zip(_of(log, "joint"), log.joints, strict=True):
+        said: dict[str, Any] = {"column": _called(log, column), "name": name, "unit": column.unit}
+        corrected = {"sign": column.sign, "offset": column.offset}
+        said |= corrected if corrected != {"sign": 1, "offset": 0.0} else {}
+        lines += ["", "[[joints]]", *toml_lines(said)]
+    position, orientation = _of(log, "position"), _of(log, "rotation")
+    if position:
+        said = {"position": [_called(log, column) for column in position]}
+        turned = {"orientation": [_called(log, column) for column in orientation], "form": log.rotation_form}
+        lines += ["", "[tcp]", *toml_lines(said | turned if orientation else said)]
+    units = {_called(log, c): c.unit for c in (*position, *orientation) if c.unit != PURE.name}
+    if units:
+        lines += ["", "[units]", *(f"{toml_text(one)} = {toml_text(unit)}" for one, unit in units.items())]
+    return "\n".join(lines) + "\n"
+
+
+def _joint(table: Table, units: dict[str, str]) -> tuple[str, str, int, float]:
+    """Return column, name, sign and offset of a joint, and note its unit."""
+    column = table.text("column")
+    sign = table.number("sign", 1.0)
+    if sign not in (1.0, -1.0):
+        table.fault("sign", f"found {sign:g}, allowed: 1 or -1")
+    _unit_of(table, [column], "unit", units)
+    return column, table.text("name", column), int(sign), table.number("offset", 0.0)
+
+
+def _unit_of(table: Table, columns: Sequence[str], key: str, units: dict[str, str]) -> None:
+    """Note the unit of some columns, if the table has one."""
+    unit = _text(table, key)
+    if unit is not None:
+        units.update(dict.fromkeys(columns, unit))
+
+
+def _text(table: Table, key: str) -> str | None:
+    return table.text(key) if table.has(key) else None
+
+
+def _names(table: Table, key: str) -> tuple[str, ...]:
+    """Return a list of names."""
+    return table.texts(key) if table.has(key) else ()
+
+
+def _frame(table: Table, key: str) -> tuple[float, ...]:
+    """Return three or six numbers, or nothing."""
+    if not table.has(key):
+        return ()
+    values = table.numbers(key, None)
+    if len(values) not in (3, 6):
+        table.fault(key, f"found {len(values)} numbers, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad")
+    return values
+
+
+def _beside(path: Path, robot: str) -> str:
+    """Return a robot's name, or its file as seen from the map's folder."""
+    return str(path.parent / robot) if Path(robot).suffix else robot
+
+
+def _of(log: JointLog, role: Role) -> list[LogColumn]:
+    return [column for column in log.columns if column.role == role]
+
+
+def _called(log: JointLog, column: LogColumn) -> str:
+    """Return what tells a column from all others: its header, or its longer name where headers repeat."""
+    twins = [other for other in log.columns if other.header == column.header]
+    return column.header if column.header and len(twins) == 1 else column.name
+
+
+def _clock(log: JointLog) -> dict[str, Any]:
+    """Return what the table of the clock says; seconds and nanoseconds apart are found by themselves."""
+    columns = _of(log, "time")
+    if not columns:
+        return {"column": "none", "period": log.period}
+    return {"column": _called(log, columns[0]), "unit": columns[0].unit} if len(columns) == 1 else {}

@@ -1,0 +1,171 @@
+"""Maps: what is said once about a lab's logs; what was inferred of one log reads the next one."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.sources import LogMap, ReadOptions, map_of, read_log, read_map
+
+Write = Callable[..., Path]
+Read = Callable[..., JointLog]
+
+KUKA = (
+    "Zeit;X_Act;Y_Act;Z_Act;A_Act;B_Act;C_Act;A1;A2\n"
+    "0;100,5;200;300;10;20;30;-90;10,5\n"
+    "12;101;200;300;10;20;30;-89;11\n"
+    "24;102;200;300;10;20;30;-88;12\n"
+)
+
+MAP = """
+delimiter = ";"
+decimal = ","
+base = [0, 0, 0.8]
+tool = [0, 0, 0.15, 0, 0, 1.5]
+robot = "arms/arm.toml"
+
+[clock]
+column = "Zeit"
+unit = "ms"
+
+[[joints]]
+column = "A2"
+name = "shoulder"
+unit = "deg"
+
+[[joints]]
+column = "A1"
+name = "base"
+unit = "deg"
+sign = -1
+offset = 90
+
+[tcp]
+position = ["X_Act", "Y_Act", "Z_Act"]
+orientation = ["A_Act", "B_Act", "C_Act"]
+form = "zyx"
+
+[units]
+X_Act = "mm"
+Y_Act = "mm"
+Z_Act = "mm"
+A_Act = "deg"
+B_Act = "deg"
+C_Act = "deg"
+"""
+
+
+def test_everything_that_a_map_says(write: Write) -> None:
+    said = read_map(write(MAP, "lab.toml"))
+    log = read_log([write(KUKA)], said.read)
+    assert log.joints == ("shoulder", "base")
+    np.testing.assert_allclose(np.degrees(log.q), [[10.5, 180.0], [11.0, 179.0], [12.0, 178.0]], atol=1e-13)
+    assert log.t_ns.tolist() == [0, 12_000_000, 24_000_000]
+    assert log.tcp_position is not None
+    np.testing.assert_allclose(log.tcp_position[0], [0.1005, 0.2, 0.3], atol=1e-15)
+    assert log.rotation_form == "zyx"
+    assert log.tcp_rotation is not None
+    np.testing.assert_allclose(np.degrees(log.tcp_rotation[0]), [10, 20, 30], atol=1e-13)
+    assert (said.base, said.tool) == ((0, 0, 0.8), (0, 0, 0.15, 0, 0, 1.5))
+    assert Path(said.robot or "").parts[-2:] == ("arms", "arm.toml")
+    assert Path(said.robot or "").is_absolute()
+    assert not log.warnings
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        (KUKA, {"units": {"": "deg", "Zeit": "ms"}}),
+        ("0.0 0.1\n0.2 0.3\n0.4 0.6\n", {"units": {"": "rad"}, "period": 0.01}),
+        ("sec,nanosec,q1 [deg],q2 [deg]\n5,0,1,2\n5,5000000,2,3\n", {}),
+        ("t [s],q2,q1,qd2,qd1\n0,1,2,0,0\n0.1,1,2,0,0\n0.2,1,2,0,0\n", {"joints": ("q2", "q1")}),
+        ("t [s],q1 [deg],qx,qy,qz,qw,x [m],y [m],z [m]\n0,1,0,0,0,1,1,2,3\n0.1,2,0,0,0,1,1,2,3\n", {}),
+        ("Time (s),a (deg),b (mm)\n0,1,2\n0.05,2,3\n", {}),
+        ('t,"q, ""1""",Gelenk 2\n0,0.1,0.2\n0.1,0.1,0.2\n', {"joints": ('q, "1"', "Gelenk 2")}),
+    ],
+)
+def test_what_was_inferred_reads_the_log_again(text: str, options: dict[str, object], write: Write) -> None:
+    path = write(text)
+    log = read_log([path], ReadOptions(**options))  # type: ignore[arg-type]
+    said = read_map(write(map_of(log), "lab.toml"))
+    again = read_log([path], said.read)
+    assert (again.joints, again.units, again.columns) == (log.joints, log.units, log.columns)
+    for name in ("t_ns", "q", "qd", "tcp_position", "tcp_rotation"):
+        np.testing.assert_array_equal(getattr(again, name), getattr(log, name))
+    assert not [w for w in again.warnings if w.kind.startswith("assumed")]
+
+
+def test_robot_and_frames_come_back(write: Write) -> None:
+    log = read_log([write("t [s],q1 [rad]\n0,1\n1,2\n")])
+    said = read_map(write(map_of(log, "ur5e", (0.0, 0.0, 0.5), (0.1, 0.2, 0.3, 0.0, 0.5, 0.0)), "lab.toml"))
+    assert (said.robot, said.base, said.tool) == ("ur5e", (0.0, 0.0, 0.5), (0.1, 0.2, 0.3, 0.0, 0.5, 0.0))
+
+
+def test_an_empty_map_says_nothing(write: Write) -> None:
+    assert read_map(write("", "lab.toml")) == LogMap()
+
+
+def test_everything_that_is_wrong_with_a_map(write: Write, tmp_path: Path) -> None:
+    text = """
+delimeter = ";"
+tool = [1, 2]
+robot = 5
+[clock]
+colum = "t"
+[[joints]]
+name = "q1"
+sign = 2
+[tcp]
+form = "zyy"
+position = "x"
+"""
+    with pytest.raises(OptionError) as caught:
+        read_map(write(text, "lab.toml"))
+    said = str(caught.value).replace(f"{tmp_path}/", "")
+    assert said.split("\n") == [
+        "lab.toml: key joints[0].column: found nothing, allowed: a text",
+        "lab.toml: key joints[0].sign: found 2, allowed: 1 or -1",
+        "lab.toml: key robot: found 5, allowed: a text",
+        "lab.toml: key tcp.position: found 'x', allowed: a list of texts",
+        "lab.toml: key tcp.form: found 'zyy', allowed: one of vector, rpy, zyx, xyz, zyz, zxz, quat_xyzw,"
+        " quat_wxyz, matrix (did you mean zyz?)",
+        "lab.toml: key tool: found 2 numbers, allowed: X, Y, Z or X, Y, Z, RX, RY, RZ in m and rad",
+        "lab.toml: key delimeter: unknown (did you mean delimiter?); allowed: clock, tcp, joints, units,"
+        " robot, source, delimiter, decimal, base, tool",
+        "lab.toml: key clock.colum: unknown (did you mean column?); allowed: column, unit, period",
+    ]
+
+
+def test_a_map_that_is_no_toml(write: Write, tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match=r"lab.toml:2: not valid TOML: "):
+        read_map(write("a = 1\nb = \n", "lab.toml"))
+    with pytest.raises(OptionError, match=r"lab2.toml: cannot be read: No such file or directory"):
+        read_map(tmp_path / "lab2.toml")
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"signs": (1,)}, "signs: found 1, allowed: one for each of the 2 joints"),
+        ({"signs": (1, 2)}, "signs: found 2, allowed: 1 or -1"),
+        ({"offsets": (1.0,) * 3}, "offsets: found 3, allowed: one for each of the 2 joints"),
+        ({"names": ("a", "a")}, "names: found a, a, allowed: a name for each of the 2 joints, each once"),
+    ],
+)
+def test_corrections_that_do_not_fit(
+    options: dict[str, object], said: str, wrong: Callable[..., list[str]]
+) -> None:
+    assert wrong("t [s],q1 [rad],q2 [rad]\n0,1,2\n1,1,2\n", **options) == [said]
+
+
+def test_a_sign_turns_the_recorded_rates_too(read: Read) -> None:
+    text = "t [s],q1 [rad],qd1 [rad/s]\n" + "".join(f"{k / 10},{k / 10},1\n" for k in range(5))
+    log = read(text, joints=("q1",), signs=(-1,), offsets=(0.5,))
+    np.testing.assert_allclose(log.q[:, 0], 0.5 - np.arange(5) / 10, atol=1e-15)
+    assert log.qd is not None
+    assert log.qd[:, 0].tolist() == [-1.0] * 5
