@@ -256,7 +256,7 @@ class UnitFinder:
             if not which:
                 continue
             bounds = Bounds.of(robot, which)
-            doubted = values[:, which]
+            doubted = values if len(which) == len(columns) else values[:, which]
             evidence = degrees_evidence(doubted, t_ns, bounds) if name == "rad" else radians_evidence(doubted)
             if evidence:
                 names = ", ".join(columns[j].name for j in which)
