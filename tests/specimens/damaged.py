@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 from by_python import Q6, comma, savetxt, writer
@@ -82,15 +83,15 @@ def gap_with_a_possible_turn() -> Made:
     """8 s without a row before row 16: the fifth joint could have turned once or twice, -pi..pi."""
     before, after = motion(15), motion(15, begin=8.3)
     t = np.concatenate((before.t, after.t + 8.3))
-    q: FloatArray = (np.vstack((before.q, after.q)) + np.pi) % (2 * np.pi) - np.pi
-    return _log("gap_with_a_possible_turn", t, q)
+    whole = replace(before, q=np.vstack((before.q, after.q))).limited(-np.pi, np.pi)
+    return _log("gap_with_a_possible_turn", t, whole.q)
 
 
 @specimen
 def repeated_samples() -> Made:
     """A controller of 40 ms polled every 10 ms: each sample four times, the times differ."""
     truth = motion(12, 0.04)
-    return _log("repeated_samples", np.arange(48) * 0.01, np.repeat(truth.q, 4, axis=0))
+    return _log("repeated_samples", motion(48, 0.01).t, np.repeat(truth.q, 4, axis=0))
 
 
 @specimen

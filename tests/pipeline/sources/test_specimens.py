@@ -1,8 +1,8 @@
 """Every specimen gives the motion that it holds, or the reason why it cannot.
 
 The specimens are written by people's tools (`tests/specimens/make_specimens.py`); the truth comes from the
-motion and each writer's rounding, never from a reader. A mark `fails` says what the reader does not do yet; it
-is strict: whoever teaches the reader takes the mark away.
+motion and each writer's rounding, never from a reader. A mark `fails` says what the reader does not do yet.
+It is strict: whoever teaches the reader takes the mark away.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from scipy.spatial.transform import Rotation
 from specimen import SPECIMENS, Truth, motion
 
 from urmpipe_models.catalogue import load_robot
+from urmpipe_models.chain import Chain
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import JointLog
@@ -349,6 +350,11 @@ WRONG = [
 ]
 
 
+def _case(case: Any) -> Any:
+    """Return a row of a table without its mark."""
+    return case if isinstance(case, Good | Wrong) else case.values[0]
+
+
 def _name(case: Good | Wrong) -> str:
     return case.name
 
@@ -405,12 +411,50 @@ def test_what_is_wrong_with_a_specimen_is_said(case: Wrong) -> None:
 
 def outcome(case: Wrong) -> tuple[bool, list[str]]:
     """Return whether a specimen was refused, and the lines that were said about it."""
-    robot = load_robot(case.robot) if case.robot else None
+    return _ingested(case.name, load_robot(case.robot) if case.robot else None)
+
+
+def _ingested(name: str, robot: Chain | None) -> tuple[bool, list[str]]:
+    """Return whether a specimen was refused without any option, and the lines that were said about it."""
     try:
-        run = ingest_log(paths(SPECIMENS[case.name]), robot=robot)
+        run = ingest_log(paths(SPECIMENS[name]), robot=robot)
     except UrmpipeError as error:
         return True, [str(finding) for finding in error.findings]
     return False, [f"row {w.row}: {w.message}" for w in run.warnings]
+
+
+NO_PERIOD = [case for case in map(_case, GOOD) if case.options == NO_TIME]
+
+
+@pytest.mark.parametrize("case", NO_PERIOD, ids=_name)
+def test_a_specimen_without_a_clock_loads_at_5_ms_and_the_option_is_named(case: Good) -> None:
+    _, said = _ingested(case.name, load_robot(case.robot) if case.robot else None)
+    assert [line for line in said if "5 ms" in line and "--period" in line]
+
+
+@pytest.mark.xfail(strict=True, reason="a unit of the joints is asked for; no word of a path")
+def test_three_columns_without_names_may_be_a_path_and_the_option_is_named() -> None:
+    stopped, said = _ingested("cad_path_no_header", None)
+    assert stopped
+    assert [line for line in said if "--source path" in line]
+
+
+_NO_ROBOT = pytest.mark.xfail(strict=True, reason="the robot is not inferred")
+
+
+@pytest.mark.parametrize(
+    ("name", "robot"),
+    [
+        pytest.param("tcp_xyz_m", "ur5e", marks=_NO_ROBOT),
+        pytest.param("tip_and_angles", "urm6", marks=_NO_ROBOT),
+        ("csv_writer", None),  # six joints are any arm's
+        ("joint_names_any_order", None),  # the same names in ur3 to ur10e
+        ("tcp_from_another_base", None),
+    ],
+)
+def test_the_robot_is_inferred_where_the_recorded_tool_singles_it_out(name: str, robot: str | None) -> None:
+    run = ingest_log(paths(SPECIMENS[name]))
+    assert (run.robot.name if run.robot else None) == robot
 
 
 # The runs of these specimens must go on where their files wrap; the first row tells no turns.
@@ -437,10 +481,6 @@ def test_a_specimen_that_wraps_goes_on(name: str) -> None:
     run = ingest_log(paths(SPECIMENS[name]), read=ReadOptions(**case.options))
     turns = (run.q[: len(truth.t)] - truth.turned) / (2 * np.pi)
     np.testing.assert_allclose(turns, np.rint(turns[:1]).repeat(len(truth.t), axis=0), rtol=0, atol=1e-3)
-
-
-def _case(case: Any) -> Any:
-    return case if isinstance(case, tuple) and hasattr(case, "name") else case.values[0]
 
 
 def test_every_specimen_stands_in_one_table() -> None:
