@@ -177,7 +177,7 @@ def simscape_suffixes() -> Made:
 
 def _rtde(separator: str, *, timed: bool) -> tuple[str, Truth]:
     """Return the table of the RTDE client's recorder: asked for and measured joints, and the tool's pose."""
-    truth, asked = motion(robot="ur5e"), motion(begin=0.008)
+    truth, asked = motion(20, robot="ur5e"), motion(20, begin=0.008)
     pose = np.column_stack((truth.tool, np.round(truth.turn.as_rotvec(), 9)))
     groups = (("target_q", asked.q), ("actual_q", truth.q), ("actual_TCP_pose", pose))
     names = [f"{group}_{k}" for group, _ in groups for k in range(6)]

@@ -12,6 +12,8 @@ from by_python import Q6, frame, to_csv, writer
 from by_robots import EPOCH
 from specimen import Made, Truth, made, motion, specimen
 
+ROWS = 24
+
 PERIOD = 0.020461
 """No multiple of 1 ms: microseconds have leading zeros in some rows."""
 
@@ -44,13 +46,13 @@ def _seconds(moment: datetime) -> float:
 
 def _crossing() -> Truth:
     """Return a motion that goes on past a full second after 22:27:21.573641."""
-    return motion(30, PERIOD)
+    return motion(ROWS, PERIOD)
 
 
 @specimen
 def clock_ms() -> Made:
     """Time in ms, said in its name: time_ms."""
-    return clocked("clock_ms", "time_ms", lambda t: round(1000 * t), motion())
+    return clocked("clock_ms", "time_ms", lambda t: round(1000 * t), motion(ROWS))
 
 
 @specimen
@@ -62,7 +64,7 @@ def clock_us() -> Made:
 @specimen
 def clock_ms_unsaid() -> Made:
     """Time in ms, not said: t counts 0, 20, 40."""
-    return clocked("clock_ms_unsaid", "t", lambda t: round(1000 * t), motion())
+    return clocked("clock_ms_unsaid", "t", lambda t: round(1000 * t), motion(ROWS))
 
 
 @specimen
@@ -77,7 +79,7 @@ def clock_epoch_s() -> Made:
 def clock_epoch_ms() -> Made:
     """Date.now(): milliseconds since 1970, 13 digits, unit not said."""
     return clocked(
-        "clock_epoch_ms", "timestamp", lambda t: EPOCH * 1000 + round(1000 * t), motion(), start=EPOCH
+        "clock_epoch_ms", "timestamp", lambda t: EPOCH * 1000 + round(1000 * t), motion(ROWS), start=EPOCH
     )
 
 
@@ -122,7 +124,7 @@ def clock_datetime_whole_second() -> Made:
     """str(datetime) on a whole second: 2021-04-11 22:27:22 without a fraction, between rows that have one."""
     start = datetime(2021, 4, 11, 22, 27, 21, 800000)
     return clocked(
-        "clock_datetime_whole_second", "time", lambda t: at(t, start), motion(), start=_seconds(start)
+        "clock_datetime_whole_second", "time", lambda t: at(t, start), motion(ROWS), start=_seconds(start)
     )
 
 
@@ -154,7 +156,7 @@ def clock_iso_utc() -> Made:
         "clock_iso_utc",
         "timestamp",
         lambda t: at(t, start).isoformat(timespec="milliseconds") + "Z",
-        motion(),
+        motion(ROWS),
         start=_seconds(start),
     )
 
@@ -182,13 +184,13 @@ def clock_python_logging() -> Made:
         moment = at(t, start)
         return f"{moment:%Y-%m-%d %H:%M:%S},{moment.microsecond // 1000:03d}"
 
-    return clocked("clock_python_logging", "asctime", asctime, motion(), start=_seconds(start))
+    return clocked("clock_python_logging", "asctime", asctime, motion(ROWS), start=_seconds(start))
 
 
 @specimen
 def clock_german_date() -> Made:
     """A German date: 11.04.2021 22:27:21,573 between semicolons, decimal commas."""
-    truth, start = replace(motion(), qd=None), datetime(2021, 4, 11, 22, 27, 21, 573000)
+    truth, start = replace(motion(ROWS), qd=None), datetime(2021, 4, 11, 22, 27, 21, 573000)
     rows = [
         [f"{at(t, start):%d.%m.%Y %H:%M:%S},{at(t, start).microsecond // 1000:03d}", *(_comma(v) for v in q)]
         for t, q in zip(truth.t.tolist(), truth.q.tolist(), strict=True)
@@ -212,13 +214,13 @@ def clock_american_date() -> Made:
         moment = at(t, start)
         return f"{moment:%m/%d/%Y %I:%M:%S}.{moment.microsecond // 1000:03d} PM"
 
-    return clocked("clock_american_date", "DateTime", american, motion(), start=_seconds(start))
+    return clocked("clock_american_date", "DateTime", american, motion(ROWS), start=_seconds(start))
 
 
 @specimen
 def clock_date_and_time() -> Made:
     """Date and Time in two columns, to be joined: 2021-04-11,23:59:59.800000; midnight passes."""
-    truth, start = replace(motion(), qd=None), datetime(2021, 4, 11, 23, 59, 59, 800000)
+    truth, start = replace(motion(ROWS), qd=None), datetime(2021, 4, 11, 23, 59, 59, 800000)
     rows = [
         [f"{at(t, start):%Y-%m-%d}", f"{at(t, start):%H:%M:%S.%f}", *q]
         for t, q in zip(truth.t.tolist(), truth.q.tolist(), strict=True)
@@ -244,7 +246,11 @@ def clock_time_of_day_midnight() -> Made:
     """Time of day past midnight: 23:59:59.8 is followed by 00:00:00."""
     start = datetime(2021, 4, 11, 23, 59, 59, 800000)
     return clocked(
-        "clock_time_of_day_midnight", "time", lambda t: f"{at(t, start):%H:%M:%S.%f}", motion(), start=86399.8
+        "clock_time_of_day_midnight",
+        "time",
+        lambda t: f"{at(t, start):%H:%M:%S.%f}",
+        motion(ROWS),
+        start=86399.8,
     )
 
 
@@ -281,7 +287,7 @@ def clock_minutes() -> Made:
         "clock_minutes",
         "Time",
         lambda t: f"{int((59.8 + t) // 60):02d}:{(59.8 + t) % 60:06.3f}",
-        motion(),
+        motion(ROWS),
         start=59.8,
     )
 
@@ -289,5 +295,5 @@ def clock_minutes() -> Made:
 @specimen
 def clock_uneven() -> Made:
     """time.perf_counter() of a loop that is not even: steps of 16 to 24 ms."""
-    t = np.round(motion().t + 0.002 * np.sin(5.0 * np.arange(30)), 6)
-    return clocked("clock_uneven", "elapsed_time", lambda elapsed: elapsed, replace(motion(), t=t))
+    t = np.round(motion(ROWS).t + 0.002 * np.sin(5.0 * np.arange(ROWS)), 6)
+    return clocked("clock_uneven", "elapsed_time", lambda elapsed: elapsed, replace(motion(ROWS), t=t))

@@ -14,7 +14,7 @@ from urmpipe_models.catalogue import load_robot
 from urmpipe_models.kinematics import positions_over_log
 
 
-def _arm(rows: int = 24) -> tuple[Truth, FloatArray]:
+def _arm(rows: int = 16) -> tuple[Truth, FloatArray]:
     """Return the ur5e's motion, and where its tool is in [m]."""
     truth = replace(motion(rows, robot="ur5e"), qd=None)
     return truth, truth.tool
@@ -59,10 +59,10 @@ def tcp_rx_ry_rz_are_euler() -> Made:
 @specimen
 def tcp_rotation_vector_flips() -> Made:
     """UR pose vector that changes sign at an angle of pi: actual_TCP_pose_3..5 jump, the tool does not."""
-    truth, p = _arm(30)
+    truth, p = _arm(20)
     vectors = truth.turn.as_rotvec()
     angle = np.linalg.norm(vectors, axis=1, keepdims=True)
-    vectors[15:] -= (2 * np.pi / angle * vectors)[15:]  # the same turn the other way round
+    vectors[10:] -= (2 * np.pi / angle * vectors)[10:]  # the same turn the other way round
     names = [f"actual_TCP_pose_{k}" for k in range(6)]
     return beside("tcp_rotation_vector_flips", names, np.column_stack((p, vectors)), truth)
 
@@ -138,7 +138,7 @@ def tcp_ros_names() -> Made:
 @specimen
 def tcp_matrix_16() -> Made:
     """T00,T01,...,T33: a 4x4 matrix row by row, lengths in m."""
-    truth, _ = _arm(20)
+    truth, _ = _arm()
     names = [f"T{row}{column}" for row in range(4) for column in range(4)]
     return beside("tcp_matrix_16", names, poses(truth).reshape(-1, 16), truth)
 
@@ -146,7 +146,7 @@ def tcp_matrix_16() -> Made:
 @specimen
 def tcp_matrix_16_mm() -> Made:
     """T_0..T_15: a 4x4 matrix row by row, lengths in mm, not said."""
-    truth, _ = _arm(20)
+    truth, _ = _arm()
     names = [f"T_{k}" for k in range(16)]
     return beside("tcp_matrix_16_mm", names, poses(truth, 1e-3).reshape(-1, 16), truth)
 
@@ -154,7 +154,7 @@ def tcp_matrix_16_mm() -> Made:
 @specimen
 def tcp_matrix_12() -> Made:
     """r11,r12,r13,px,r21,...,r33,pz: the upper three rows of the matrix."""
-    truth, _ = _arm(20)
+    truth, _ = _arm()
     names = [name for row, a in enumerate("xyz", 1) for name in (f"r{row}1", f"r{row}2", f"r{row}3", f"p{a}")]
     return beside("tcp_matrix_12", names, poses(truth)[:, :3].reshape(-1, 12), truth)
 
@@ -162,7 +162,7 @@ def tcp_matrix_12() -> Made:
 @specimen
 def tcp_matrix_no_header() -> Made:
     """pybotics' form: `# joints[:ndof], pose[-16:]`, six joints in deg, then 4x4 in mm; no names, no time."""
-    truth, _ = _arm(16)
+    truth, _ = _arm()
     truth = truth.limited(-np.pi, np.pi)
     values = np.column_stack((degrees(truth.q), poses(truth, 1e-3).reshape(-1, 16))).tolist()
     text = "# joints[:ndof], pose[-16:]\n" + writer(values, lineterminator="\n")
