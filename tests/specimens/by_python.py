@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 import pandas as pd
+
 from specimen import DEG, FloatArray, Made, Truth, degrees, made, motion, rounding, specimen
 
 Q6 = tuple(f"q{k}" for k in range(1, 7))

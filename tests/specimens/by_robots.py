@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+
 from by_python import comma, writer
 from specimen import DEG, EXACT, FloatArray, Made, Truth, degrees, made, motion, rounding, specimen
 

@@ -6,6 +6,7 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+
 from by_python import Q6, comma, savetxt, writer
 from by_robots import krc_trace, lines
 from specimen import FloatArray, Made, Truth, degrees, made, motion, specimen
@@ -120,6 +121,14 @@ def header_with_more_names() -> Made:
 def header_with_a_name_twice() -> Made:
     """The header says q3 twice: t,q1,q2,q3,q3,q5,q6."""
     return made("header_with_a_name_twice.csv", plain(lambda log: ["t,q1,q2,q3,q3,q5,q6", *log[1:]]))
+
+
+@specimen
+def header_with_all_names_twice() -> Made:
+    """t,q1..q6,q1..q6: positions, then rates, called the same."""
+    truth = motion(20)
+    rows = np.column_stack((truth.t, truth.q, truth.rates)).tolist()
+    return made("header_with_all_names_twice.csv", writer([["t", *Q6, *Q6], *rows]))
 
 
 @specimen

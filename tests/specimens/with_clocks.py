@@ -8,6 +8,7 @@ from datetime import UTC, datetime, timedelta, timezone
 
 import numpy as np
 import pandas as pd
+
 from by_python import Q6, frame, to_csv, writer
 from by_robots import EPOCH
 from specimen import Made, Truth, made, motion, specimen

@@ -6,10 +6,10 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+
 from by_python import Q6, writer
 from by_robots import poses
 from specimen import DEG, FloatArray, Made, Truth, degrees, made, motion, rounding, specimen
-
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.kinematics import positions_over_log
 
