@@ -244,18 +244,46 @@ def rostopic_pose() -> Made:
     return made("rostopic_pose.csv", text, replace(truth, start=float(EPOCH), q=none, turned=none, qd=None))
 
 
+def ros2_row(t: float, names: Sequence[str], q: Sequence[float]) -> str:
+    """Return a JointState as ros2 topic echo --csv writes it, at 0.9 s past a second and t; rates are 0."""
+    stamp = round(t * 1e9) + 900_000_000
+    cells = [EPOCH + stamp // 10**9, stamp % 10**9, "", *names, *q, *[0.0] * len(q), *[0.0] * len(q)]
+    return ",".join(map(str, cells))
+
+
 @specimen
 def ros2_echo_joint_states() -> Made:
     """ros2 topic echo --csv /joint_states: no header, s and ns apart, names in the rows by the alphabet."""
-    truth = replace(motion(20), qd=None)
-    stamps = np.rint(truth.t * 1e9).astype(int) + 900_000_000
+    truth = replace(motion(20), qd=None, start=EPOCH + 0.9)
     names = [UR[j] for j in BY_ALPHABET]
+    rows = [ros2_row(t, names, q[list(BY_ALPHABET)].tolist()) for t, q in zip(truth.t, truth.q, strict=True)]
+    return made("ros2_echo_joint_states.csv", lines(*rows), truth)
+
+
+@specimen
+def ros2_echo_with_gripper() -> Made:
+    """ros2 topic echo --csv: the gripper's finger_joint stands among the arm's six (ur5e)."""
+    truth = replace(motion(20), qd=None, start=EPOCH + 0.9)
+    names = ["elbow_joint", "finger_joint", *(UR[j] for j in BY_ALPHABET[1:])]
+    order = list(BY_ALPHABET[1:])
     rows = [
-        [EPOCH + stamp // 10**9, stamp % 10**9, "", *names, *q[list(BY_ALPHABET)], *[0.0] * 6, *[0.0] * 6]
-        for stamp, q in zip(stamps.tolist(), truth.q, strict=True)
+        ros2_row(t, names, [q[2], 0.4, *(q[j] for j in order)])
+        for t, q in zip(truth.t, truth.q.tolist(), strict=True)
     ]
-    text = lines(*(",".join(map(str, row)) for row in rows))
-    return made("ros2_echo_joint_states.csv", text, replace(truth, start=EPOCH + 0.9))
+    return made("ros2_echo_with_gripper.csv", lines(*rows), truth)
+
+
+@specimen
+def ur_short_names() -> Made:
+    """csv.DictWriter with sorted keys: base,elbow,shoulder,wrist1,wrist2,wrist3 in deg (UR)."""
+    truth = replace(motion(24), q_within=rounding(6, DEG))
+    order = [0, 2, 1, 3, 4, 5]
+    rows = np.column_stack((truth.t, degrees(truth.q[:, order]))).tolist()
+    header = [
+        "time",
+        *(f"{joint} [deg]" for joint in ("base", "elbow", "shoulder", "wrist1", "wrist2", "wrist3")),
+    ]
+    return made("ur_short_names.csv", writer([header, *rows]), truth)
 
 
 @specimen

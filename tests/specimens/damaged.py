@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from by_python import Q6, comma, savetxt, writer
-from by_robots import krc_trace, lines
+from by_robots import UR, krc_trace, lines, ros2_row
 from specimen import FloatArray, Made, Truth, degrees, made, motion, specimen
 
 HEADER = ",".join(["t", *Q6])
@@ -220,6 +220,17 @@ def two_logs_with_headers() -> Made:
     """cat a.csv b.csv: the header again in line 17, the time starts again."""
     a, b = motion(15), motion(15, begin=0.7)
     return made("two_logs_with_headers.csv", lines(HEADER, *rows_of(a.t, a.q), HEADER, *rows_of(b.t, b.q)))
+
+
+@specimen
+def two_publishers() -> Made:
+    """ros2 topic echo --csv /joint_states where arm and gripper publish in turn: rows of two kinds."""
+    truth = motion(20)
+    arm = [ros2_row(t, UR, q) for t, q in zip(truth.t, truth.q.tolist(), strict=True)]
+    gripper = [ros2_row(t + 0.003, ["finger_joint"], [0.4]) for t in truth.t]
+    return made(
+        "two_publishers.csv", lines(*(row for both in zip(arm, gripper, strict=True) for row in both))
+    )
 
 
 @specimen

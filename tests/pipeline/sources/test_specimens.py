@@ -128,6 +128,13 @@ GOOD = [
     ),
     fails(Good("rostopic_pose"), "orientation of this form is left out in silence"),
     Good("ros2_echo_joint_states", joints=UR),
+    Good("ros2_echo_with_gripper", "ur5e", joints=UR),
+    fails(
+        Good(
+            "ur_short_names", unit="deg", joints=("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
+        ),
+        "WRONG IN SILENCE: wrist1 is not known, so elbow and shoulder stay exchanged",
+    ),
     Good("plotjuggler_topics", joints=UR),
     fails(Good("plotjuggler_padded_dates", joints=Q[:6]), "a date is refused"),
     fails(
@@ -317,6 +324,10 @@ WRONG = [
     fails(
         Wrong("two_logs_with_headers", [r"^log:17.*found.*(header|two|another|second)"]),
         "the second header is called a row without numbers, not another log",
+    ),
+    fails(
+        Wrong("two_publishers", [r"finger_joint"], "ur5e", None),
+        "the names are called text, the other publisher is not named",
     ),
     Wrong("decimal_commas_between_commas", [r"found .*(14 cells|decimal).*allowed: "]),
     Wrong("seven_joints_for_six", [r"found 7 joint columns .*allowed: 6, as robot ur5e has"], "ur5e"),
