@@ -21,7 +21,7 @@ def rows_of(t: FloatArray, q: FloatArray) -> list[str]:
 
 def plain(change: Callable[[list[str]], list[str]]) -> str:
     """Return a plain log of 30 rows, its lines (header first) changed by a function."""
-    truth = motion()
+    truth = motion(30)
     return lines(*change([HEADER, *rows_of(truth.t, truth.q)]))
 
 
@@ -32,7 +32,7 @@ def _log(name: str, t: FloatArray, q: FloatArray, header: str = HEADER) -> Made:
 @specimen
 def time_backwards() -> Made:
     """The clock was set back by 0.1 s before row 12 (line 13)."""
-    truth = motion()
+    truth = motion(30)
     t = truth.t.copy()
     t[11:] -= 0.1
     return _log("time_backwards", t, truth.q)
@@ -41,7 +41,7 @@ def time_backwards() -> Made:
 @specimen
 def time_repeated() -> Made:
     """Row 9 (line 10) has the time of row 8, with other values."""
-    truth = motion()
+    truth = motion(30)
     t = truth.t.copy()
     t[8] = t[7]
     return _log("time_repeated", t, truth.q)
@@ -98,7 +98,7 @@ def repeated_samples() -> Made:
 @specimen
 def outlier_first_sample() -> Made:
     """q1 starts with 0.711700 and is near -2 from row 2 on: what the buffer held before."""
-    truth = motion()
+    truth = motion(30)
     q = truth.q.copy()
     q[:, 0] -= 2.5
     q[0, 0] = 0.7117
@@ -158,7 +158,7 @@ def rows_too_short() -> Made:
 @specimen
 def row_cut_off() -> Made:
     """The recorder was killed while it wrote line 31: `0.580,0.6` without a line end."""
-    truth = motion()
+    truth = motion(30)
     text = lines(HEADER, *rows_of(truth.t[:-1], truth.q[:-1]))
     return made("row_cut_off.csv", text + rows_of(truth.t, truth.q)[-1][:9])
 
@@ -243,7 +243,7 @@ def header_says_deg_krc() -> Made:
 @specimen
 def header_says_rad() -> Made:
     """J1 [rad].. over values in deg that wrap at 180."""
-    truth = motion().limited(-np.pi, np.pi)
+    truth = motion(30).limited(-np.pi, np.pi)
     header = ",".join(["t", *(f"J{k} [rad]" for k in range(1, 7))])
     return _log("header_says_rad", truth.t, degrees(truth.q), header)
 
@@ -251,7 +251,7 @@ def header_says_rad() -> Made:
 @specimen
 def header_says_mm() -> Made:
     """x [mm],y [mm],z [mm] over values in m, beside the joints in rad (ur5e): the joints tell."""
-    truth = motion(robot="ur5e")
+    truth = motion(30, robot="ur5e")
     rows = np.column_stack((truth.t, truth.q, truth.tool)).tolist()
     return made("header_says_mm.csv", writer([["t", *Q6, "x [mm]", "y [mm]", "z [mm]"], *rows]))
 
@@ -259,7 +259,7 @@ def header_says_mm() -> Made:
 @specimen
 def tcp_of_another_order() -> Made:
     """The columns of q2 and q3 are exchanged in the header, as the recorded tool shows (ur5e, m)."""
-    truth = motion(robot="ur5e")
+    truth = motion(30, robot="ur5e")
     rows = np.column_stack((truth.t, truth.q, truth.tool)).tolist()
     return made(
         "tcp_of_another_order.csv", writer([["t", "q1", "q3", "q2", "q4", "q5", "q6", *"xyz"], *rows])
@@ -269,7 +269,7 @@ def tcp_of_another_order() -> Made:
 @specimen
 def empty_column() -> Made:
     """q4 has no value in any row."""
-    truth = motion()
+    truth = motion(30)
     rows = [
         ",".join("" if k == 4 else cell for k, cell in enumerate(row.split(",")))
         for row in rows_of(truth.t, truth.q)
@@ -292,7 +292,7 @@ def no_bytes() -> Made:
 @specimen
 def decimal_commas_between_commas() -> Made:
     """A German printf with commas between: 0,020,0,413 - nothing tells them from delimiters."""
-    truth = motion()
+    truth = motion(30)
     rows = [",".join([comma(t, 3), *(comma(v, 6) for v in q)]) for t, q in zip(truth.t, truth.q, strict=True)]
     return made("decimal_commas_between_commas.csv", lines(HEADER, *rows))
 
@@ -300,7 +300,7 @@ def decimal_commas_between_commas() -> Made:
 @specimen
 def impossible_speed() -> Made:
     """A spike: q2 is 1.2 rad off in row 14 alone, at 60 rad/s there and back (ur5e: 3.14 rad/s)."""
-    truth = motion()
+    truth = motion(30)
     q = truth.q.copy()
     q[13, 1] += 1.2
     return _log("impossible_speed", truth.t, q)
@@ -309,7 +309,7 @@ def impossible_speed() -> Made:
 @specimen
 def beyond_limits() -> Made:
     """q3 rises to 7.5 rad, steadily: a ur5e ends at 6.2832."""
-    truth = motion()
+    truth = motion(30)
     q = truth.q.copy()
     q[:, 2] = np.linspace(6.0, 7.5, 30)
     return _log("beyond_limits", truth.t, q)
@@ -318,7 +318,7 @@ def beyond_limits() -> Made:
 @specimen
 def in_between_on_wrap() -> Made:
     """Linear resampling of -pi..pi: one sample half way down between the two rows of q5's wrap."""
-    truth = motion().limited(-np.pi, np.pi)
+    truth = motion(30).limited(-np.pi, np.pi)
     q = truth.q.copy()
     at = int(np.argmin(np.diff(q[:, 4]))) + 1
     q[at, 4] = 0.5 * (q[at - 1, 4] + q[at + 1, 4])
@@ -336,7 +336,7 @@ def angles_of_unknown_unit() -> Made:
 @specimen
 def quaternion_of_no_length() -> Made:
     """qx,qy,qz,qw of length 0.5: no rotation, whatever the names say."""
-    truth = motion(robot="ur5e")
+    truth = motion(30, robot="ur5e")
     quat = np.round(0.5 * truth.turn.as_quat(), 9)
     rows = np.column_stack((truth.t, truth.q, truth.tool, quat)).tolist()
     return made("quaternion_of_no_length.csv", writer([["t", *Q6, *"xyz", "qx", "qy", "qz", "qw"], *rows]))
@@ -345,7 +345,7 @@ def quaternion_of_no_length() -> Made:
 @specimen
 def infinite_value() -> Made:
     """numpy.savetxt of a division by zero: q6 is inf in row 10 (line 11)."""
-    truth = motion()
+    truth = motion(30)
     q = truth.q.copy()
     q[9, 5] = np.inf
     text = savetxt(np.column_stack((truth.t, q)), fmt="%.6f", delimiter=",", header=HEADER, comments="")
@@ -355,6 +355,6 @@ def infinite_value() -> Made:
 @specimen
 def seven_joints_for_six() -> Made:
     """joint_1..joint_7 for a robot of six joints (ur5e)."""
-    truth: Truth = motion(joints=7)
+    truth: Truth = motion(30, joints=7)
     rows = np.column_stack((truth.t, truth.q)).tolist()
     return made("seven_joints_for_six.csv", writer([["t", *(f"joint_{k}" for k in range(1, 8))], *rows]))

@@ -81,7 +81,7 @@ class Truth:
 
 
 def motion(
-    rows: int = 30, period: float = 0.02, joints: int = 6, robot: str | None = None, begin: float = 0.0
+    rows: int = 24, period: float = 0.02, joints: int = 6, robot: str | None = None, begin: float = 0.0
 ) -> Truth:
     """Return the motion on even times; with a robot also where its tool is.
 
