@@ -214,14 +214,14 @@ def ur_rtde_no_time() -> Made:
 @specimen
 def rostopic_joint_states() -> Made:
     """rostopic echo -p /joint_states: %time in ns, names as cells, by the alphabet, positions likewise."""
-    truth = replace(motion(20), qd=None)
+    truth, order = motion(20), list(BY_ALPHABET)
     stamps = np.rint(truth.t * 1e9).astype(int) + EPOCH * 10**9 + 123_456_789
     header = ["%time", "field.header.seq", "field.header.stamp", "field.header.frame_id"]
     header += [f"field.{group}{k}" for group in ("name", "position", "velocity") for k in range(6)]
     names = [UR[j] for j in BY_ALPHABET]
     rows = [
-        [stamp, 40 + i, stamp - 5000, "", *names, *q[list(BY_ALPHABET)], *[0.0] * 6]
-        for i, (stamp, q) in enumerate(zip(stamps.tolist(), truth.q, strict=True))
+        [stamp, 40 + i, stamp - 5000, "", *names, *q[order], *qd[order]]
+        for i, (stamp, q, qd) in enumerate(zip(stamps.tolist(), truth.q, truth.rates, strict=True))
     ]
     text = lines(",".join(header), *(",".join(map(str, row)) for row in rows))
     return made("rostopic_joint_states.csv", text, replace(truth, start=EPOCH + 0.123456789))

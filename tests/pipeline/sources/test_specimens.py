@@ -123,7 +123,7 @@ GOOD = [
     Good("ur_rtde_commas", "ur5e", joints=[f"actual_q_{k}" for k in range(6)]),
     Good("ur_rtde_no_time", "ur5e", NO_TIME, joints=[f"actual_q_{k}" for k in range(6)]),
     fails(
-        Good("rostopic_joint_states", joints=UR),
+        Good("rostopic_joint_states", joints=UR, rates=True),
         "WRONG IN SILENCE: the names in the cells are not used, elbow is taken as pan",
     ),
     fails(Good("rostopic_pose"), "orientation of this form is left out in silence"),
@@ -486,7 +486,7 @@ TURNED: list[Any] = [
     "wrap_pi",
     pytest.param(
         "wrap_two_turns",
-        marks=pytest.mark.xfail(strict=True, reason="WRONG IN SILENCE: a step of 4 pi leaves two turns"),
+        marks=pytest.mark.xfail(strict=True, reason="WRONG: a step of 4 pi is no wrap"),
     ),
 ]
 
