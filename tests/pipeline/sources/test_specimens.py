@@ -1,0 +1,533 @@
+"""Every specimen gives the motion that it holds, or the reason why it cannot.
+
+The specimens are written by people's tools (`tests/specimens/make_specimens.py`); the truth comes from the
+motion and each writer's rounding, never from a reader. A mark `fails` says what the reader does not do yet.
+It is strict: whoever teaches the reader takes the mark away.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from make_specimens import FOLDER, files, paths
+from specimen import SPECIMENS, Truth, motion
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import UrmpipeError
+from urmpipe_pipeline.ingest import ingest_log
+from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.sources import ReadOptions, read_log
+
+UR = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")
+NO_TIME = {"period": 0.02}
+
+
+class Good(NamedTuple):
+    """A specimen that loads: with which robot and option, and what its joints are called and measured in."""
+
+    name: str
+    robot: str | None = None
+    options: Mapping[str, Any] = {}
+    unit: str | Sequence[str] = "rad"
+    joints: Sequence[
+        str
+    ] = ()  # what each joint's name contains, in order; empty: the file does not name them
+    rates: bool = False
+
+
+class Wrong(NamedTuple):
+    """A specimen that is refused, or loads with a warning: what the lines must hold, each some line."""
+
+    name: str
+    said: Sequence[str]
+    robot: str | None = None
+    stops: bool | None = True  # None: to be refused or warned of, whichever
+
+
+def fails(case: Good | Wrong, reason: str) -> Any:
+    """Mark a specimen that the reader does not take as a person expects."""
+    return pytest.param(case, marks=pytest.mark.xfail(strict=True, reason=reason))
+
+
+Q = tuple(f"q{k}" for k in range(1, 8))
+
+GOOD = [
+    # Python and spreadsheets
+    Good("pandas_default", joints=Q[:6]),
+    Good("pandas_no_index", joints=Q[:6]),
+    Good("pandas_time_index", joints=[f"joint_{k}" for k in range(1, 7)]),
+    Good("pandas_index_counts_from_filter", joints=Q[:6]),
+    Good("pandas_semicolon", joints=Q[:6]),
+    Good("pandas_german", unit="deg", joints=[f"Gelenk {k}" for k in range(1, 7)]),
+    Good("pandas_tabs_comma", joints=Q[:6]),
+    Good("pandas_float_format", joints=Q[:6]),
+    Good("pandas_float_format_g", joints=Q[:6]),
+    Good("pandas_all_digits", joints=Q[:6]),
+    Good("pandas_missing", joints=Q[:6]),
+    Good("pandas_na_rep", joints=Q[:6]),
+    Good("pandas_unnamed_columns", options=NO_TIME),
+    Good("pandas_two_header_lines", unit="deg", joints=Q[:6]),
+    Good("pandas_utf16", joints=Q[:6]),
+    Good("pandas_bom", joints=Q[:6]),
+    Good("pandas_quoted", joints=Q[:6]),
+    fails(Good("pandas_array_cells"), "an array in a cell is not split"),
+    fails(Good("pandas_two_array_cells", rates=True), "an array in a cell is not split"),
+    fails(Good("pandas_list_cells"), "a list in a cell is not split"),
+    Good("numpy_savetxt_default"),
+    Good("numpy_savetxt_header", joints=Q[:6]),
+    Good("numpy_savetxt_two_header_lines", joints=Q[:6]),
+    Good("numpy_savetxt_fixed_width", joints=Q[:6]),
+    Good("numpy_savetxt_degrees", options=NO_TIME, unit="deg"),
+    Good("csv_writer", joints=[f"joint{k}" for k in range(1, 7)]),
+    Good("csv_dictwriter_order", joints=[f"joint_{k}" for k in range(1, 8)]),
+    Good("csv_comma_in_name", unit="deg", joints=[f"Joint {k}" for k in range(1, 7)]),
+    Good("csv_trailing_comma", joints=Q[:6]),
+    Good("csv_twelve_columns", "ur5e", NO_TIME),
+    Good("csv_rates_beside", joints=Q[:6], rates=True),
+    fails(
+        Good("csv_commanded_first", joints=[f"q{k}_meas" for k in range(1, 7)]),
+        "a word behind the number hides the joint",
+    ),
+    Good("fstring_spaces", joints=[f"J{k}" for k in range(1, 7)]),
+    Good("fstring_degree_sign", unit="deg", joints=[f"J{k}" for k in range(1, 7)]),
+    Good("tip_and_angles", "urm6", unit="deg", joints=[f"J{k}_Angle" for k in range(1, 7)]),
+    Good("excel_german", joints=[f"Achse {k}" for k in range(1, 7)]),
+    Good("excel_unicode_text", joints=[f"Winkel {k}" for k in range(1, 7)]),
+    Good("spreadsheet_trailing_rows", joints=Q[:6]),
+    # robots, simulators, recorders
+    Good("coppeliasim_one_graph", unit="deg", joints=[f"phi_{k}" for k in range(1, 7)]),
+    fails(
+        Good("coppeliasim_three_graphs", "urm6", joints=[f"J{k}" for k in range(1, 7)], rates=True),
+        "dJ1 (rad/s) is left out: its unit alone does not make it a rate",
+    ),
+    Good("solidworks_en", unit="deg"),
+    Good("solidworks_de", unit="deg"),
+    Good("matlab_writetable", joints=Q[:6], rates=True),
+    fails(Good("matlab_timetable", joints=Q[:6]), "a unit in the cell is refused"),
+    Good("matlab_save_ascii", options=NO_TIME),
+    Good("matlab_save_ascii_with_time"),
+    fails(Good("matlab_writematrix_time_row"), "a row of times in a second file is not taken as the clock"),
+    Good(
+        "simscape_suffixes",
+        unit=("m", "m", "deg", "deg", "deg"),
+        joints=["lateral", "vertical", "wigwag", "tilt", "swivel"],
+    ),
+    Good("ur_rtde_spaces", "ur5e", joints=[f"actual_q_{k}" for k in range(6)]),
+    Good("ur_rtde_commas", "ur5e", joints=[f"actual_q_{k}" for k in range(6)]),
+    Good("ur_rtde_no_time", "ur5e", NO_TIME, joints=[f"actual_q_{k}" for k in range(6)]),
+    fails(
+        Good("rostopic_joint_states", joints=UR, rates=True),
+        "WRONG IN SILENCE: the names in the cells are not used, elbow is taken as pan",
+    ),
+    fails(Good("rostopic_pose"), "orientation of this form is left out in silence"),
+    Good("ros2_echo_joint_states", joints=UR),
+    Good("ros2_echo_with_gripper", "ur5e", joints=UR),
+    fails(
+        Good(
+            "ur_short_names", unit="deg", joints=("base", "shoulder", "elbow", "wrist1", "wrist2", "wrist3")
+        ),
+        "WRONG IN SILENCE: wrist1 is not known, so elbow and shoulder stay exchanged",
+    ),
+    Good("plotjuggler_topics", joints=UR),
+    fails(Good("plotjuggler_padded_dates", joints=Q[:6]), "a date is refused"),
+    fails(
+        Good("kuka_krc_trace", unit="deg", joints=[f"AxisPos_Act{k}" for k in range(1, 7)]),
+        "orientation of this form is left out in silence",
+    ),
+    fails(Good("kuka_fri"), "FRI text is taken as a table of one column"),
+    fails(Good("kuka_fri_gains"), "FRI text is taken as a table of one column"),
+    Good("libfranka", joints=[f"state.q[{k}]" for k in range(7)], rates=True),
+    fails(
+        Good("libfranka_pose", joints=[f"state.q[{k}]" for k in range(7)]),
+        "WRONG IN SILENCE: the recorded pose is left out",
+    ),
+    Good("abb", unit="deg", joints=[f"J{k}" for k in range(1, 7)]),
+    Good("mixed_units", unit=("mm", "rad", "deg", "deg", "deg", "deg"), joints=Q[:6]),
+    Good("joint_names_any_order", joints=UR),
+    Good("cad_path_mm", options=NO_TIME),
+    Good("cad_path_no_header", options={**NO_TIME, "source": "path"}),
+    # clocks
+    Good("clock_ms", joints=Q[:6]),
+    Good("clock_us", joints=Q[:6]),
+    Good("clock_ms_unsaid", joints=Q[:6]),
+    Good("clock_epoch_s", joints=Q[:6]),
+    Good("clock_epoch_ms", joints=Q[:6]),
+    Good("clock_epoch_us", joints=Q[:6]),
+    Good("clock_epoch_ns", joints=Q[:6]),
+    Good("clock_sec_nanosec", joints=Q[:6]),
+    fails(Good("clock_datetime", joints=Q[:6]), "a date is refused"),
+    fails(Good("clock_datetime_whole_second", joints=Q[:6]), "a date is refused"),
+    fails(Good("clock_pandas_datetime", joints=Q[:6]), "a date is refused"),
+    fails(Good("clock_pandas_timedelta", joints=Q[:6]), "a duration is refused"),
+    fails(Good("clock_iso_utc", joints=Q[:6]), "a date is refused"),
+    fails(Good("clock_iso_offset", joints=Q[:6]), "a date is refused"),
+    fails(
+        Good("clock_python_logging", joints=Q[:6]),
+        "WRONG: the date is left out and 5 ms a row assumed, with a warning",
+    ),
+    fails(Good("clock_german_date", joints=Q[:6]), "a date is refused"),
+    fails(
+        Good("clock_american_date", joints=Q[:6]),
+        "WRONG: the date is left out and 5 ms a row assumed, with a warning",
+    ),
+    fails(Good("clock_date_and_time", joints=Q[:6]), "a date is refused"),
+    fails(Good("clock_time_of_day", joints=Q[:6]), "a time of day is refused"),
+    fails(Good("clock_time_of_day_midnight", joints=Q[:6]), "a time of day is refused"),
+    fails(Good("clock_micros_not_padded", joints=Q[:6]), "a time of day is refused"),
+    fails(Good("clock_micros_point_not_padded", joints=Q[:6]), "a date is refused"),
+    fails(Good("clock_minutes", joints=Q[:6]), "a time of day is refused"),
+    Good("clock_uneven", joints=Q[:6]),
+    # the tool beside the joints
+    Good("tcp_xyz_m", "ur5e", joints=Q[:6]),
+    Good("tcp_xyz_mm", "ur5e", joints=Q[:6]),
+    fails(
+        Good("tcp_rotation_vector", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"
+    ),
+    fails(
+        Good("tcp_rx_ry_rz_are_euler", "ur5e", joints=Q[:6]),
+        "orientation of this form is left out in silence",
+    ),
+    Good("tcp_rotation_vector_flips", "ur5e", joints=Q[:6]),
+    fails(Good("tcp_kuka_abc", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"),
+    fails(
+        Good("tcp_roll_pitch_yaw", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"
+    ),
+    fails(
+        Good("tcp_yaw_pitch_roll_deg", "ur5e", joints=Q[:6]),
+        "orientation of this form is left out in silence",
+    ),
+    fails(
+        Good("tcp_quaternion_xyzw", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"
+    ),
+    fails(
+        Good("tcp_quaternion_wxyz", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"
+    ),
+    fails(
+        Good("tcp_quaternion_numbered", "ur5e", joints=Q[:6]),
+        "orientation of this form is left out in silence",
+    ),
+    fails(Good("tcp_ros_names", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"),
+    fails(
+        Good("tcp_matrix_16", "ur5e", joints=Q[:6]),
+        "position and orientation as a matrix are left out in silence",
+    ),
+    fails(
+        Good("tcp_matrix_16_mm", "ur5e", joints=Q[:6]),
+        "position and orientation as a matrix are left out in silence",
+    ),
+    fails(
+        Good("tcp_matrix_12", "ur5e", joints=Q[:6]),
+        "position and orientation as a matrix are left out in silence",
+    ),
+    fails(
+        Good("tcp_matrix_no_header", "ur5e", NO_TIME, unit="deg"),
+        "the matrix behind the joints is not looked at",
+    ),
+    fails(
+        Good("tcp_tells_degrees", "ur5e", unit="deg", joints=Q[:6]),
+        "WRONG: deg taken as rad, though the recorded TCP contradicts",
+    ),
+    Good("tcp_from_another_base", "ur5e", joints=Q[:6]),
+    # values limited to an interval
+    Good("wrap_180", unit="deg", joints=Q[:6]),
+    Good("wrap_360", unit="deg", joints=Q[:6]),
+    Good("wrap_270", unit="deg", joints=Q[:6]),
+    Good("wrap_pi", joints=Q[:6]),
+    Good("wrap_two_turns", joints=Q[:6]),
+]
+
+WRONG = [
+    # the clock
+    Wrong("time_backwards", [r"^log:13, column t: found 0\.12 s after 0\.2 s, allowed: "]),
+    Wrong("time_repeated", [r"^log:10, column t: found 0\.14 s again, allowed: "]),
+    Wrong("time_missing", [r"^log:7, column t: found no time, allowed: a time in every row"]),
+    fails(
+        Wrong(
+            "time_of_one_second", [r"\b1 s\b.*(even|regular|grid)|(even|regular|grid).*\b1 s\b"], stops=False
+        ),
+        "a date is refused, its resolution is not looked at",
+    ),
+    fails(
+        Wrong("time_in_steps", [r"15\.6\d* ms|0\.0156\d* s"], stops=False),
+        "a clock that steps is refused row by row, not rebuilt",
+    ),
+    Wrong("gap_of_two_seconds", [r"2\.02 s.*row 16"], stops=False),
+    fails(
+        Wrong("gap_with_a_possible_turn", [r"(?=.*q5)(?=.*\b16\b)(?=.*(ambiguous|turn))"], stops=False),
+        "WRONG IN SILENCE: across the gap the nearest turn is taken for q5",
+    ),
+    # the samples
+    fails(
+        Wrong(
+            "repeated_samples", [r"(?=.*(repeat|same|held))(?=.*(40 ms|0\.04 s|\b4\b|\b36\b))"], stops=False
+        ),
+        "nothing is said",
+    ),
+    fails(
+        Wrong(
+            "outlier_first_sample",
+            [r"(?=.*q1)(?=.*(row 1\b|first))(?=.*(outlier|0\.7117|jump))"],
+            stops=False,
+        ),
+        "a step in row 2 is said, not the outlier in row 1",
+    ),
+    fails(
+        Wrong("impossible_speed", [r"(?=.*q2)(?=.*(row 1[45]))(?=.*rad/s)"], "ur5e", stops=False),
+        "nothing is said",
+    ),
+    fails(
+        Wrong("beyond_limits", [r"(?=.*q3)(?=.*limit)(?=.*(6\.28|360))"], "ur5e", stops=False),
+        "nothing is said",
+    ),
+    fails(
+        Wrong("in_between_on_wrap", [r"(?=.*q5)(?=.*(in.between|between))(?=.*wrap)"], stops=False),
+        "a large step is said, not what it is",
+    ),
+    Wrong("infinite_value", [r"^log:11, column q6: found inf, allowed: finite numbers"]),
+    Wrong("stray_cell", [r"^log:9, column q4: found 'ERR', allowed: a number"]),
+    Wrong("empty_column", [r"^log, column q4: found no value in any of 30 rows, allowed: "]),
+    # the table
+    Wrong("header_only", [r"^log:1: found a header and no rows, allowed: "]),
+    Wrong("no_bytes", [r"^log: found .*, allowed: "]),
+    Wrong("header_with_fewer_names", [r"^log:1: found 6 names over rows of 7 cells, allowed: "]),
+    Wrong("header_with_more_names", [r"^log:1: found 8 names over rows of 7 cells, allowed: "]),
+    fails(
+        Wrong("header_with_a_name_twice", [r"^log:1, column q3: found as columns 4, 5, allowed: once"]),
+        "q4 is said to be missing, not that q3 is there twice",
+    ),
+    Wrong("header_with_all_names_twice", [r"^log:1, column q1: found as columns 2, 8, allowed: once"]),
+    Wrong("header_without_a_number", [r"^log: found joint columns .* none with number 3; .*--joints"]),
+    Wrong("header_of_unknown_unit", [r"^log, column q1 \[gon\]: found the unit 'gon', allowed: rad, deg"]),
+    Wrong("rows_too_short", [r"^log:8: found 6 cells, allowed: 7", r"^log:20: found 6 cells"]),
+    Wrong("row_cut_off", [r"^log:31: found 2 cells, allowed: 7"]),
+    Wrong("row_of_two_rows", [r"^log:15: found 13 cells, allowed: 7"]),
+    Wrong(
+        "merge_conflict",
+        [r"^log:10: .*<<<<<<<", r"^log:12: .*===", r"^log:14: .*>>>"],
+    ),
+    fails(
+        Wrong("stray_text", [r"^log:12: found .*\[WARN\] connection lost"]),
+        "the number of cells is said, not the text",
+    ),
+    Wrong("nul_bytes", [r"(?i)^log:?.*found.*(NUL|zero|\\x00|binary)"]),
+    fails(
+        Wrong("two_logs", [r"^log:17.*found.*(two|another|second) log"]),
+        "time backwards is said, not why",
+    ),
+    fails(
+        Wrong("two_logs_with_headers", [r"^log:17.*found.*(header|two|another|second)"]),
+        "the second header is called a row without numbers, not another log",
+    ),
+    fails(
+        Wrong("two_publishers", [r"finger_joint"], "ur5e", None),
+        "the names are called text, the other publisher is not named",
+    ),
+    Wrong("decimal_commas_between_commas", [r"found .*(14 cells|decimal).*allowed: "]),
+    Wrong("seven_joints_for_six", [r"found 7 joint columns .*allowed: 6, as robot ur5e has"], "ur5e"),
+    # the units
+    Wrong(
+        "angles_of_unknown_unit",
+        [r"values up to 4[23]\.?\d* in q1, .* no unit, allowed: rad or deg; .*--unit"],
+    ),
+    fails(
+        Wrong("header_says_rad", [r"(?=.*J1)(?=.*found)(?=.*rad)(?=.*(deg|360))"]),
+        "WRONG: loads with values 57 times too large, only the steps are warned of",
+    ),
+    fails(
+        Wrong("header_says_deg_krc", [r"(?=.*AxisPos_Act1)(?=.*rad)(?=.*(deg|°))(?=.*\d mm)"], "ur5e", None),
+        "WRONG IN SILENCE: the header is believed against the recorded TCP",
+    ),
+    fails(
+        Wrong("header_says_mm", [r"(?=.*\bx\b)(?=.*\bmm\b)(?=.*\bm\b)"], "ur5e", None),
+        "WRONG IN SILENCE: the header is believed against the joints",
+    ),
+    fails(
+        Wrong("tcp_of_another_order", [r"(?=.*(TCP|tool))(?=.*\d (mm|m)\b)"], "ur5e", None),
+        "WRONG IN SILENCE: q2 and q3 exchanged though the recorded TCP contradicts",
+    ),
+    fails(
+        Wrong(
+            "quaternion_of_no_length",
+            [r"(?=.*\bqw?\b|.*quaternion)(?=.*(length|norm))(?=.*0\.5)"],
+            "ur5e",
+            None,
+        ),
+        "nothing is said",
+    ),
+]
+
+
+def _case(case: Any) -> Any:
+    """Return a row of a table without its mark."""
+    return case if isinstance(case, Good | Wrong) else case.values[0]
+
+
+def _name(case: Good | Wrong) -> str:
+    return case.name
+
+
+def read(case: Good) -> JointLog:
+    """Read a specimen with what its file cannot tell."""
+    robot = load_robot(case.robot) if case.robot else None
+    return read_log(paths(SPECIMENS[case.name]), ReadOptions(**case.options), robot)
+
+
+def truth_of(case: Good) -> Truth:
+    truth = SPECIMENS[case.name].make().truth
+    assert truth is not None
+    return truth
+
+
+@pytest.mark.parametrize("case", GOOD, ids=_name)
+def test_a_specimen_gives_the_motion_that_it_holds(case: Good) -> None:
+    truth, log = truth_of(case), read(case)
+    np.testing.assert_allclose(log.t, truth.t, rtol=0, atol=truth.t_within)
+    assert log.clock_start == pytest.approx(truth.start, abs=truth.t_within, rel=0)
+    assert log.q.shape == truth.q.shape
+    assert (np.isnan(log.q) == np.isnan(truth.q)).all()
+    assert not (np.abs(log.q - truth.q) > truth.q_within).any()
+    units = [case.unit] * len(log.joints) if isinstance(case.unit, str) else list(case.unit)
+    assert [log.units[name] for name in log.joints] == units
+    assert len(log.joints) >= len(case.joints)
+    assert [n for n, part in zip(log.joints, case.joints, strict=False) if part not in n] == []
+    if case.rates:
+        # As finely as the joints; what is written with few digits is larger here by its rates' size.
+        assert log.qd is not None
+        np.testing.assert_allclose(log.qd, truth.rates, rtol=0, atol=5 * np.max(truth.q_within))
+    _same_tool(log, truth)
+
+
+def _same_tool(log: JointLog, truth: Truth) -> None:
+    """Compare position and orientation of the tool; a quaternion and its negative are one orientation."""
+    if truth.position is not None:
+        assert log.tcp_position is not None
+        np.testing.assert_allclose(log.tcp_position, truth.position, rtol=0, atol=truth.position_within)
+    if truth.rotation is not None:
+        assert log.tcp_quat_xyzw is not None
+        between = Rotation.from_quat(log.tcp_quat_xyzw).inv() * truth.rotation
+        assert between.magnitude().max() <= truth.rotation_within
+
+
+@pytest.mark.parametrize("case", WRONG, ids=_name)
+def test_what_is_wrong_with_a_specimen_is_said(case: Wrong) -> None:
+    stopped, said = outcome(case)
+    missing = [pattern for pattern in case.said if not any(re.search(pattern, line) for line in said)]
+    assert not missing, said
+    assert case.stops in (None, stopped)
+
+
+def outcome(case: Wrong) -> tuple[bool, list[str]]:
+    """Return whether a specimen was refused, and the lines that were said about it."""
+    return _ingested(case.name, load_robot(case.robot) if case.robot else None)
+
+
+def _ingested(name: str, robot: Chain | None) -> tuple[bool, list[str]]:
+    """Return whether a specimen was refused without any option, and the lines that were said about it."""
+    try:
+        run = ingest_log(paths(SPECIMENS[name]), robot=robot)
+    except UrmpipeError as error:
+        files = {str(path) for path in paths(SPECIMENS[name])}
+        assert {finding.file for finding in error.findings} <= files
+        # Without the file's name, which tells what is wrong with it.
+        return True, [str(replace(finding, file="log")) for finding in error.findings]
+    return False, [f"row {w.row}: {w.message}" for w in run.warnings]
+
+
+NO_PERIOD = [case for case in map(_case, GOOD) if case.options == NO_TIME]
+
+
+@pytest.mark.parametrize("case", NO_PERIOD, ids=_name)
+def test_a_specimen_without_a_clock_loads_at_5_ms_and_the_option_is_named(case: Good) -> None:
+    _, said = _ingested(case.name, load_robot(case.robot) if case.robot else None)
+    assert [line for line in said if "5 ms" in line and "--period" in line]
+
+
+@pytest.mark.xfail(strict=True, reason="a unit of the joints is asked for; no word of a path")
+def test_three_columns_without_names_may_be_a_path_and_the_option_is_named() -> None:
+    stopped, said = _ingested("cad_path_no_header", None)
+    assert stopped
+    assert [line for line in said if "--source path" in line]
+
+
+_NO_ROBOT = pytest.mark.xfail(strict=True, reason="the robot is not inferred")
+
+
+@pytest.mark.parametrize(
+    ("name", "robot"),
+    [
+        pytest.param("tcp_xyz_m", "ur5e", marks=_NO_ROBOT),
+        pytest.param("tip_and_angles", "urm6", marks=_NO_ROBOT),
+        ("csv_writer", None),  # six joints are any arm's
+        ("joint_names_any_order", None),  # the same names in ur3 to ur10e
+        ("tcp_from_another_base", None),
+    ],
+)
+def test_the_robot_is_inferred_where_the_recorded_tool_singles_it_out(name: str, robot: str | None) -> None:
+    run = ingest_log(paths(SPECIMENS[name]))
+    assert (run.robot.name if run.robot else None) == robot
+
+
+# The runs of these specimens must go on where their files wrap; the first row tells no turns.
+TURNED: list[Any] = [
+    "pandas_german",
+    "numpy_savetxt_degrees",
+    "fstring_degree_sign",
+    "coppeliasim_one_graph",
+    "wrap_180",
+    "wrap_360",
+    "wrap_270",
+    "wrap_pi",
+    pytest.param(
+        "wrap_two_turns",
+        marks=pytest.mark.xfail(strict=True, reason="WRONG: a step of 4 pi is no wrap"),
+    ),
+]
+
+
+@pytest.mark.parametrize("name", TURNED)
+def test_a_specimen_that_wraps_goes_on(name: str) -> None:
+    case = next(case for case in map(_case, GOOD) if case.name == name)
+    truth = truth_of(case)
+    run = ingest_log(paths(SPECIMENS[name]), read=ReadOptions(**case.options))
+    turns = (run.q[: len(truth.t)] - truth.turned) / (2 * np.pi)
+    np.testing.assert_allclose(turns, np.rint(turns[:1]).repeat(len(truth.t), axis=0), rtol=0, atol=1e-3)
+
+
+def test_every_specimen_stands_in_one_table() -> None:
+    names = [_case(case).name for case in (*GOOD, *WRONG)]
+    assert sorted(names) == sorted(SPECIMENS)
+    assert [one.name for one in SPECIMENS.values() if one.folder == "wrong"] == sorted(
+        (_case(case).name for case in WRONG), key=list(SPECIMENS).index
+    )
+
+
+def test_making_the_specimens_again_gives_the_same_bytes() -> None:
+    there = {path for path in FOLDER.rglob("*") if path.suffix in {".csv", ".txt", ".xyz", ".md"}}
+    made = files()
+    assert there == set(made)
+    assert [path.name for path, content in made.items() if path.read_bytes() != content] == []
+
+
+def test_the_specimens_stay_small() -> None:
+    logs = {path.name: len(content) for path, content in files().items() if path.suffix != ".md"}
+    assert [name for name, size in logs.items() if size >= 12_000] == []
+    written = [path for path in FOLDER.rglob("*") if path.is_file() and path.suffix != ".pyc"]
+    assert sum(path.stat().st_size for path in written) < 500_000
+
+
+def test_the_motion_is_what_its_formula_says() -> None:
+    """By hand at t = 0.14 s: q1 = 0.4 + 0.35 t + 0.30 sin(2.1 t), q6 = -2.3 - 1.7 t + 0.33 sin(1.3 t + 5)."""
+    moved = motion(30, 0.02, robot="ur5e")
+    assert moved.t[7] == 0.14
+    assert moved.q[7, 0] == pytest.approx(0.4 + 0.049 + 0.30 * np.sin(0.294), abs=1e-9)
+    assert moved.q[7, 5] == pytest.approx(-2.3 - 0.238 + 0.33 * np.sin(5.182), abs=1e-9)
+    assert (np.abs(np.diff(moved.q, axis=0)) / 0.02 < np.pi).all()  # what a ur5e can do
+    assert moved.q[:, 4].max() > np.pi > moved.q[0, 4]
+    assert moved.q[:, 5].min() < -np.pi < moved.q[0, 5]
