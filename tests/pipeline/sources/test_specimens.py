@@ -126,7 +126,7 @@ GOOD = [
         Good("rostopic_joint_states", joints=UR, rates=True),
         "WRONG IN SILENCE: the names in the cells are not used, elbow is taken as pan",
     ),
-    fails(Good("rostopic_pose"), "orientation of this form is left out in silence"),
+    Good("rostopic_pose"),
     Good("ros2_echo_joint_states", joints=UR),
     Good("ros2_echo_with_gripper", "ur5e", joints=UR),
     fails(
@@ -137,17 +137,11 @@ GOOD = [
     ),
     Good("plotjuggler_topics", joints=UR),
     fails(Good("plotjuggler_padded_dates", joints=Q[:6]), "a date is refused"),
-    fails(
-        Good("kuka_krc_trace", unit="deg", joints=[f"AxisPos_Act{k}" for k in range(1, 7)]),
-        "orientation of this form is left out in silence",
-    ),
+    Good("kuka_krc_trace", unit="deg", joints=[f"AxisPos_Act{k}" for k in range(1, 7)]),
     fails(Good("kuka_fri"), "FRI text is taken as a table of one column"),
     fails(Good("kuka_fri_gains"), "FRI text is taken as a table of one column"),
     Good("libfranka", joints=[f"state.q[{k}]" for k in range(7)], rates=True),
-    fails(
-        Good("libfranka_pose", joints=[f"state.q[{k}]" for k in range(7)]),
-        "WRONG IN SILENCE: the recorded pose is left out",
-    ),
+    Good("libfranka_pose", joints=[f"state.q[{k}]" for k in range(7)]),
     Good("abb", unit="deg", joints=[f"J{k}" for k in range(1, 7)]),
     Good("mixed_units", unit=("mm", "rad", "deg", "deg", "deg", "deg"), joints=Q[:6]),
     Good("joint_names_any_order", joints=UR),
@@ -187,53 +181,30 @@ GOOD = [
     # the tool beside the joints
     Good("tcp_xyz_m", "ur5e", joints=Q[:6]),
     Good("tcp_xyz_mm", "ur5e", joints=Q[:6]),
-    fails(
-        Good("tcp_rotation_vector", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"
-    ),
+    Good("tcp_rotation_vector", "ur5e", joints=Q[:6]),
     fails(
         Good("tcp_rx_ry_rz_are_euler", "ur5e", joints=Q[:6]),
         "orientation of this form is left out in silence",
     ),
     Good("tcp_rotation_vector_flips", "ur5e", joints=Q[:6]),
-    fails(Good("tcp_kuka_abc", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"),
-    fails(
-        Good("tcp_roll_pitch_yaw", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"
-    ),
-    fails(
-        Good("tcp_yaw_pitch_roll_deg", "ur5e", joints=Q[:6]),
-        "orientation of this form is left out in silence",
-    ),
-    fails(
-        Good("tcp_quaternion_xyzw", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"
-    ),
-    fails(
-        Good("tcp_quaternion_wxyz", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"
-    ),
+    Good("tcp_kuka_abc", "ur5e", joints=Q[:6]),
+    Good("tcp_roll_pitch_yaw", "ur5e", joints=Q[:6]),
+    Good("tcp_yaw_pitch_roll_deg", "ur5e", joints=Q[:6]),
+    Good("tcp_quaternion_xyzw", "ur5e", joints=Q[:6]),
+    Good("tcp_quaternion_wxyz", "ur5e", joints=Q[:6]),
     fails(
         Good("tcp_quaternion_numbered", "ur5e", joints=Q[:6]),
         "orientation of this form is left out in silence",
     ),
-    fails(Good("tcp_ros_names", "ur5e", joints=Q[:6]), "orientation of this form is left out in silence"),
-    fails(
-        Good("tcp_matrix_16", "ur5e", joints=Q[:6]),
-        "position and orientation as a matrix are left out in silence",
-    ),
-    fails(
-        Good("tcp_matrix_16_mm", "ur5e", joints=Q[:6]),
-        "position and orientation as a matrix are left out in silence",
-    ),
+    Good("tcp_ros_names", "ur5e", joints=Q[:6]),
+    Good("tcp_matrix_16", "ur5e", joints=Q[:6]),
+    Good("tcp_matrix_16_mm", "ur5e", joints=Q[:6]),
     fails(
         Good("tcp_matrix_12", "ur5e", joints=Q[:6]),
         "position and orientation as a matrix are left out in silence",
     ),
-    fails(
-        Good("tcp_matrix_no_header", "ur5e", NO_TIME, unit="deg"),
-        "the matrix behind the joints is not looked at",
-    ),
-    fails(
-        Good("tcp_tells_degrees", "ur5e", unit="deg", joints=Q[:6]),
-        "WRONG: deg taken as rad, though the recorded TCP contradicts",
-    ),
+    Good("tcp_matrix_no_header", "ur5e", NO_TIME, unit="deg"),
+    Good("tcp_tells_degrees", "ur5e", unit="deg", joints=Q[:6]),
     Good("tcp_from_another_base", "ur5e", joints=Q[:6]),
     # values limited to an interval
     Good("wrap_180", unit="deg", joints=Q[:6]),
@@ -336,18 +307,9 @@ WRONG = [
         "angles_of_unknown_unit",
         [r"values up to 4[23]\.?\d* in q1, .* no unit, allowed: rad or deg; .*--unit"],
     ),
-    fails(
-        Wrong("header_says_rad", [r"(?=.*J1)(?=.*found)(?=.*rad)(?=.*(deg|360))"]),
-        "WRONG: loads with values 57 times too large, only the steps are warned of",
-    ),
-    fails(
-        Wrong("header_says_deg_krc", [r"(?=.*AxisPos_Act1)(?=.*rad)(?=.*(deg|°))(?=.*\d mm)"], "ur5e", None),
-        "WRONG IN SILENCE: the header is believed against the recorded TCP",
-    ),
-    fails(
-        Wrong("header_says_mm", [r"(?=.*\bx\b)(?=.*\bmm\b)(?=.*\bm\b)"], "ur5e", None),
-        "WRONG IN SILENCE: the header is believed against the joints",
-    ),
+    Wrong("header_says_rad", [r"(?=.*J1)(?=.*found)(?=.*rad)(?=.*(deg|360))"]),
+    Wrong("header_says_deg_krc", [r"(?=.*AxisPos_Act1)(?=.*rad)(?=.*(deg|°))(?=.*\d mm)"], "ur5e", None),
+    Wrong("header_says_mm", [r"(?=.*\bx\b)(?=.*\bmm\b)(?=.*\bm\b)"], "ur5e", None),
     fails(
         Wrong("tcp_of_another_order", [r"(?=.*(TCP|tool))(?=.*\d (mm|m)\b)"], "ur5e", None),
         "WRONG IN SILENCE: q2 and q3 exchanged though the recorded TCP contradicts",
