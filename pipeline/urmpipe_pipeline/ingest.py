@@ -17,6 +17,7 @@ from urmpipe_pipeline.derivatives import Method, derivatives, recorded_agree
 from urmpipe_pipeline.grid import Grid, make_grid
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning, seconds
 from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.results import Repolarization, Run
 from urmpipe_pipeline.robot_inference import infer_robot
 from urmpipe_pipeline.sources import ReadOptions, read_log
@@ -72,7 +73,7 @@ def ingest_log(
         log = replace(log, inferences=(*log.inferences, because))
     if early:
         early(log)
-    warnings = list(log.warnings)
+    warnings = [*log.warnings, *far_from_recorded(robot, log)]
     fixed, audit = _repolarized(log, robot)
     warnings += _unexplained(log, fixed)
     grid = make_grid(log, tsp)

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline.sources.cells import is_missing, is_text
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import Quantity, Unit, key, split_unit, vocabulary
+
+_NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
+_NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,7 +77,30 @@ def columns_of(layouts: Sequence[Layout], titles: Sequence[str]) -> tuple[Column
             number = len(found) + 1
             name = name or f"column {number}"
             found.append(Column(number, table, index, header, name, key(label), unit, text))
-    return tuple(found)
+    return _named_in_cells(found, layouts)
+
+
+def _named_in_cells(columns: Sequence[Column], layouts: Sequence[Layout]) -> tuple[Column, ...]:
+    """Return the columns, those named in the cells beside them by these names.
+
+    rostopic echo -p writes name0, name1, ... with a joint's name in each row, and position0, position1, ...:
+    position0 becomes position.NAME, whatever the order in which the joints were published.
+    """
+    names: dict[tuple[int, str, str], str] = {}
+    for column in columns:
+        match = _NAME_COLUMN.match(column.key)
+        cells = set(layouts[column.table].cells(column.index)) if match and column.text else set()
+        if match and len(cells) == 1:
+            names[column.table, match["before"], match["n"]] = cells.pop()
+    result = []
+    for column in columns:
+        match = _NUMBERED.match(column.key)
+        name = names.get((column.table, match["before"], match["n"])) if match and not column.text else None
+        if match and name:
+            label = f"{column.name.rstrip('0123456789')}.{name}"
+            column = replace(column, name=label, key=key(label))  # noqa: PLW2901
+        result.append(column)
+    return tuple(result)
 
 
 def find_column(columns: Sequence[Column], text: str, option: str) -> Column:

@@ -105,8 +105,8 @@ def _rms(vectors: FloatArray) -> float:
     return float(np.sqrt((vectors**2).sum(axis=1).mean()))
 
 
-def turned_apart(computed: FloatArray, recorded: FloatArray) -> float:
-    """Return the rms angle between orientations in [rad], after the constant turn of the tool that fits best.
+def turned_apart(computed: FloatArray, recorded: FloatArray, *, tool: bool) -> float:
+    """Return the rms angle between orientations in [rad], with a tool after its constant turn that fits best.
 
     The turn is the mean of the relative quaternions: the eigenvector of sum(q q^T) with the largest
     eigenvalue (Markley et al. 2007, "Averaging quaternions", eq. 12).
@@ -114,7 +114,10 @@ def turned_apart(computed: FloatArray, recorded: FloatArray) -> float:
     Args:
         computed: Orientation of the tip as unit quaternions x, y, z, w [-], shape (n, 4).
         recorded: The recorded ones.
+        tool: Whether a tool may turn the recorded ones.
     """
+    if not tool:
+        return float(np.sqrt(np.mean(angle_between(computed, recorded) ** 2)))
     conjugate = computed * np.array([-1.0, -1.0, -1.0, 1.0])
     relative = product(conjugate, recorded)
     _, vectors = np.linalg.eigh(relative.T @ relative)

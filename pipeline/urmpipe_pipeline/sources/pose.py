@@ -178,6 +178,8 @@ def _rotation(
 
 
 def _numbers(family: Family) -> range | None:
-    """Return the numbers of a family if they count up from 0 without a gap."""
+    """Return range(n) if the n numbers of a family count up from 0, or from 1, without a gap."""
     count = range(len(family.columns))
-    return count if sorted(family.columns) == list(count) else None
+    lowest = min(family.columns)
+    counted = lowest in (0, 1) and sorted(family.columns) == [lowest + k for k in count]
+    return count if counted else None

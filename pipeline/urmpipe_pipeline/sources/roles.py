@@ -213,7 +213,7 @@ def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints |
     family = best[0]
     lowest = min(family.columns)
     gaps = [n for n in range(lowest, lowest + len(family.columns)) if n not in family.columns]
-    if gaps:
+    if gaps and not family.twins:  # a number that is there twice is told as such
         missing = ", ".join(map(str, gaps))
         said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
         raise LogError(Finding(f"{said}; {OPTION}", file=file))

@@ -6,8 +6,11 @@ cells, an empty array as one empty cell: seconds, nanoseconds, frame, names, pos
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
+from itertools import takewhile
 
+from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells import is_text, printable
 from urmpipe_pipeline.sources.sniff import Layout
@@ -17,8 +20,11 @@ _FIRST_NAME = 3
 
 def with_names(layout: Layout) -> Layout:
     """Return the layout with names for its columns if it is such a table, else as it is."""
+    if layout.header is not None:
+        return layout
+    _refuse_other_publishers(layout)
     joints = _joints(layout)
-    if layout.header is not None or not joints:
+    if not joints:
         return layout
     count, row = len(joints), layout.sample[0]
     velocity = _FIRST_NAME + 2 * count
@@ -40,12 +46,28 @@ def with_names(layout: Layout) -> Layout:
 
 def _joints(layout: Layout) -> tuple[str, ...]:
     """Return the names of the joints, if each row begins with a stamp and has the same names."""
-    row = layout.sample[0]
+    names = _names(layout.sample[0], layout.decimal)
+    same = all(_names(row, layout.decimal) == names for row in layout.sample)
+    return tuple(map(printable, names)) if same and len(set(names)) == len(names) else ()
+
+
+def _names(row: Sequence[str], decimal: str) -> tuple[str, ...]:
+    """Return the texts behind a stamp, none if the row does not begin with one."""
     if len(row) < _FIRST_NAME + 4 or not (row[0].isdecimal() and row[1].isdecimal() and int(row[1]) < 10**9):
         return ()
-    end = _FIRST_NAME
-    while end < len(row) and is_text(row[end], layout.decimal):
-        end += 1
-    names = row[_FIRST_NAME:end]
-    same = all(other[_FIRST_NAME:end] == names for other in layout.sample)
-    return tuple(map(printable, names)) if same and len(set(names)) == len(names) else ()
+    return tuple(takewhile(lambda cell: is_text(cell, decimal), row[_FIRST_NAME:]))
+
+
+def _refuse_other_publishers(layout: Layout) -> None:
+    """Raise if rows of several publishers, each with joints of its own, stand in one file.
+
+    Raises:
+        LogError: With the names of the joints of each.
+    """
+    first = _names(layout.sample[0], layout.decimal)
+    for row in layout.sample:
+        names = _names(row, layout.decimal)
+        if first and names and names != first:
+            listed, wanted = (", ".join(map(printable, group)) for group in (names, first))
+            message = f"found rows with the joints {listed} among rows with {wanted}, allowed: one publisher"
+            raise LogError(Finding(f"{message}; keep the rows of one of them", str(layout.segment.path)))

@@ -67,7 +67,8 @@ def settle_rotation(
     names = ", ".join(column.name for column in columns)
     sound = [form for form in forms if _is_sound(values, form)]
     if not sound:
-        said = f"{names} hold no quaternion of length 1: the recorded orientation is not used"
+        length = float(np.nanmedian(np.linalg.norm(values, axis=1)))
+        said = f"{names} hold quaternions of length {length:.4g}, allowed: 1; they are not used"
         return Settled(warnings=(LogWarning("orientation", said),))
     choices = [(form, units) for form in sound for units in _possible_units(form, values, told)]
     if len(choices) == 1:
@@ -127,14 +128,15 @@ def _by_kinematics(
         return None
     _, rotation = poses_over_log(robot, q[known])
     computed = quaternions(rotation.reshape(-1, 9), "matrix")
-    distances = []
-    for form, units in choices:
-        recorded = values[known] * [unit.factor for unit in units]
-        distances.append(turned_apart(computed, quaternions(recorded, form)))
-    order = np.argsort(distances)
-    best, second = (distances[k] for k in order[:2])
-    if best > CLOSE or second < CLEARLY * best or second < best + CLOSE:
-        return None
-    form, units = choices[order[1]]
-    said = f"with it the arm's orientation agrees within {np.degrees(best):.3g} deg"
-    return choices[order[0]], f"{said}, as {form} in {units[0].name} within {np.degrees(second):.3g} deg"
+    recorded = [quaternions(values[known] * [unit.factor for unit in units], form) for form, units in choices]
+    for tool in (False, True):
+        distances = [turned_apart(computed, one, tool=tool) for one in recorded]
+        order = np.argsort(distances)
+        best, second = (distances[k] for k in order[:2])
+        if best <= CLOSE and second >= CLEARLY * best and second >= best + CLOSE:
+            form, units = choices[order[1]]
+            said = f"with it the arm's orientation agrees within {np.degrees(best):.2f} deg"
+            return choices[
+                order[0]
+            ], f"{said}, as {form} in {units[0].name} within {np.degrees(second):.2f} deg"
+    return None

@@ -233,7 +233,9 @@ class UnitFinder:
         largest = peak(values)
         if largest > MOST_TURNS * math.tau:
             message = f"found values up to {largest:.6g} in {names} and no unit, allowed: rad or deg"
-            raise LogError(Finding(f"{message}; say which with --unit", self.file))
+            unnamed = len(columns) == 3 and all(column.header.isdigit() for column in columns)
+            path = ", or --source path if they are x, y, z" if unnamed else ""
+            raise LogError(Finding(f"{message}; say which with --unit{path}", self.file))
         self._assume("rad", "joints", columns)
         return vocabulary().units["rad"]
 

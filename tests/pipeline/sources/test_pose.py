@@ -158,7 +158,7 @@ def test_quaternions_of_another_length_are_none(read: Read) -> None:
     log = read(text([*JOINTS_RAD, *XYZ, "qx", "qy", "qz", "qw"], Q, POSITION * 1e3, 2 * ROTATION.as_quat()))
     assert log.rotation_form is None
     assert [w.message for w in log.warnings] == [
-        "qx, qy, qz, qw hold no quaternion of length 1: the recorded orientation is not used"
+        "qx, qy, qz, qw hold quaternions of length 2, allowed: 1; they are not used"
     ]
 
 

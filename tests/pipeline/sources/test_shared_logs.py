@@ -56,7 +56,7 @@ def test_rostopic_echo(arm: Arm) -> None:
     log = read_log([LOGS / "plotjuggler" / "fake_joints.csv"], robot=arm(6))
     assert (log.source, log.rows, log.clock_start) == ("ros", 2725, 1486559106139796569 / 10**9)
     assert log.t_ns[:3].tolist() == [0, 564_113, 1_633_048]
-    assert log.joints == tuple(f"field.position{k}" for k in range(6))
+    assert log.joints == tuple(f"field.position.joint_{k}" for k in range(6))
     assert log.q[1, 0] - log.q[0, 0] == pytest.approx(-3.99473, abs=1e-5)  # the jump that is no wrap
     assert log.q[-1].tolist() == [0.576058272031] * 6
     assert log.qd is not None
