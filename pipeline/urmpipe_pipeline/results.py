@@ -122,6 +122,19 @@ class Run:
         """From the first to the last row, in [s]."""
         return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9
 
+    def joint_unit(self, per: str = "") -> str:
+        """Return the SI unit of the joints: rad, m or both, by the robot or else by the columns' units.
+
+        Args:
+            per: What divides it: "", "/s" or "/s2".
+        """
+        if self.robot is not None:
+            units = {"m" if joint.kind == "prismatic" else "rad" for joint in self.robot.moving}
+        else:
+            told = (self.log.units.get(name, "rad") for name in self.log.joints)
+            units = {"rad" if unit in ("rad", "deg") else "m" for unit in told}
+        return " or ".join(f"{unit}{per}" for unit in sorted(units or {"rad"}, reverse=True))
+
     def to_frame(self) -> pd.DataFrame:
         """Return one row a grid sample: t [s], the joints, their rates, and the TCP where there is one."""
         import pandas as pd

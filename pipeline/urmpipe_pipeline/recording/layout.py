@@ -87,7 +87,7 @@ def _joint_views(run: Run, place: Place, label: str) -> list[View]:
     """Return the joints before and after; none for a path."""
     if not run.log.joints:
         return []
-    unit = _joint_unit(run)
+    unit = run.joint_unit()
     return [
         _series(f"Joints in the file{label} [{unit}]", f"{place.prefix}joints/raw"),
         _series(f"Joints repolarized{label} [{unit}]", f"{place.prefix}joints/repolarized"),
@@ -96,11 +96,12 @@ def _joint_views(run: Run, place: Place, label: str) -> list[View]:
 
 def _motion_views(run: Run, place: Place) -> list[View]:
     """Return the derivatives and the tool centre point, as far as the run has them."""
-    unit = _joint_unit(run)
     views: list[View] = []
     if run.log.joints:
-        views.append(_series(f"Joint rates [{unit}/s]", f"{place.prefix}joints/velocity"))
-        views.append(_series(f"Joint accelerations [{unit}/s2]", f"{place.prefix}joints/acceleration"))
+        views.append(_series(f"Joint rates [{run.joint_unit('/s')}]", f"{place.prefix}joints/velocity"))
+        views.append(
+            _series(f"Joint accelerations [{run.joint_unit('/s2')}]", f"{place.prefix}joints/acceleration")
+        )
     if run.tcp is not None:
         views += [
             _series("TCP [m]", f"{place.prefix}tcp/position"),
@@ -151,12 +152,3 @@ def _tabs(views: Sequence[View], active: int = 0) -> View | Container:
     import rerun.blueprint as rrb
 
     return rrb.Tabs(*views, active_tab=active) if len(views) > 1 else views[0]
-
-
-def _joint_unit(run: Run) -> str:
-    """Return the SI unit of the joints: by the robot's kinds, else by the units that the file used."""
-    if run.robot is not None:
-        units = {"m" if joint.kind == "prismatic" else "rad" for joint in run.robot.moving}
-    else:
-        units = {"m" if run.log.units.get(name) in ("m", "mm") else "rad" for name in run.log.joints}
-    return ", ".join(sorted(units, reverse=True)) or "rad"

@@ -91,7 +91,7 @@ def joints_figure(run: Run) -> Figure | None:
     """Return the joints as the file has them and repolarized, every repolarization marked."""
     if not run.log.joints:
         return None
-    unit = _joint_unit(run)
+    unit = run.joint_unit()
     before = [*_joint_lines(run, run.log.t, run.log.q, f"{unit} in the file", True), *_raw_marks(run)]
     after = [*_joint_lines(run, run.t, run.q, unit, False), *_after_marks(run)]
     panels = [Panel(f"in the file [{unit}]", before), Panel(f"repolarized [{unit}]", after)]
@@ -132,15 +132,6 @@ def _speed_panel(run: Run, t: FloatArray) -> list[Panel]:
         return []
     speed = np.interp(t, run.t, np.linalg.norm(run.tcp.velocity, axis=1))
     return [Panel("‖v‖ [m/s]", [line(t, speed, "speed", MUTED, "m/s")], from_zero=True)]
-
-
-def _joint_unit(run: Run) -> str:
-    """Return rad, m, or both, as the joints are."""
-    if run.robot is not None:
-        sliding = [joint.kind == "prismatic" for joint in run.robot.moving]
-    else:
-        sliding = [run.log.units.get(name) in ("m", "mm") for name in run.log.joints]
-    return "m" if all(sliding) else "rad or m" if any(sliding) else "rad"
 
 
 def _joint_lines(run: Run, t: FloatArray, q: FloatArray, unit: str, legend: bool) -> list[Spec]:
