@@ -104,7 +104,7 @@ def _joint_log(
         tcp_position=_recorded(tcp, tcp_units),
         tcp_rotation=_recorded(rotation, rotation_units),
         rotation_form="vector" if roles.rotation else None,
-        columns=(*_time_columns(clock), *_used_columns(groups, units)),
+        columns=(*_time_columns(plan, clock), *_used_columns(plan, groups, units)),
         digits=digits,
         inferences=(
             *plan.tables.inferences,
@@ -131,19 +131,26 @@ def _times(
     return content.clock - start, start, (), ()
 
 
-def _time_columns(clock: Clock) -> list[LogColumn]:
+def _header(plan: Plan, column: Column) -> str:
+    """Return the name of a column as its file has it; empty if the file has no header."""
+    return "" if plan.tables.layouts[column.table].header is None else column.header
+
+
+def _time_columns(plan: Plan, clock: Clock) -> list[LogColumn]:
     """Return the columns of the clock with their units."""
     return [
-        LogColumn(column.name, column.header, "time", i, unit, 10.0 ** (EXPONENTS[unit] - 9))
+        LogColumn(column.name, _header(plan, column), "time", i, unit, 10.0 ** (EXPONENTS[unit] - 9))
         for i, (column, unit) in enumerate(zip(clock.columns, clock.units.values(), strict=True))
     ]
 
 
-def _used_columns(groups: Sequence[Sequence[Column]], units: Sequence[Sequence[Unit]]) -> Iterator[LogColumn]:
+def _used_columns(
+    plan: Plan, groups: Sequence[Sequence[Column]], units: Sequence[Sequence[Unit]]
+) -> Iterator[LogColumn]:
     """Yield the columns of each group with their units."""
     for role, group, group_units in zip(ROLES[1:], groups, units, strict=True):
         for i, (column, unit) in enumerate(zip(group, group_units, strict=True)):
-            yield LogColumn(column.name, column.header, role, i, unit.name, unit.factor)
+            yield LogColumn(column.name, _header(plan, column), role, i, unit.name, unit.factor)
 
 
 def _in_si(values: FloatArray, units: Sequence[Unit]) -> FloatArray:
