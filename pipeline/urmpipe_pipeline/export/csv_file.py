@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urmpipe_pipeline.export.lines import differences, quoted, write_lines
+from urmpipe_pipeline.export.lines import differences, quoted, texts, write_lines
 from urmpipe_pipeline.export.tables import Table
 
 
@@ -14,6 +14,6 @@ def write_csv(table: Table, path: Path) -> list[str]:
     Numbers have the shortest decimal text that gives the same double; times are exact.
     """
     head = ",".join(quoted(column.name) for column in table.columns) + "\n"
-    values = [column.values for column in table.columns]
+    values = texts([column.values for column in table.columns])
     write_lines(path, head, values, ",")
     return differences(path, head, values, ",")

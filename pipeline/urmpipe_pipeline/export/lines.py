@@ -19,26 +19,30 @@ TAIL = 1 << 16
 """The last line stands within so many bytes of the end."""
 
 
+def texts(columns: Sequence[Any]) -> list[Any]:
+    """Return columns as they are written: times as Arrow arrays of their text, all others as they are."""
+    return [column.text() if isinstance(column, Times) else column for column in columns]
+
+
 def write_lines(path: Path, head: str, columns: Sequence[Any], delimiter: str) -> None:
     """Write a head and a line a row.
 
     Args:
         path: The file.
         head: What stands above the rows, with its line end.
-        columns: Arrays of shape (n,), or `Times`; NaN is an empty cell.
+        columns: What `texts` returned, each of shape (n,); NaN is an empty cell.
         delimiter: The sign between cells.
     """
-    ready = [column.text() if isinstance(column, Times) else column for column in columns]
-    rows = len(ready[0])
+    rows = len(columns[0])
     with path.open("wb") as file:
         file.write(head.encode())
         for start in range(0, rows, SLICE):
-            file.write(_lines([column[start : start + SLICE] for column in ready], delimiter))
+            file.write(_lines([column[start : start + SLICE] for column in columns], delimiter))
 
 
 def differences(path: Path, head: str, columns: Sequence[Any], delimiter: str) -> list[str]:
     """Return how a file differs from what was to be written: its head, its rows, its first and last row."""
-    rows = len(columns[0].ns if isinstance(columns[0], Times) else columns[0])
+    rows = len(columns[0])
     with path.open("rb") as file:
         found = [] if file.read(len(head.encode())) == head.encode() else ["the head"]
         first = file.readline().decode()
@@ -78,26 +82,22 @@ def _cells(column: Any) -> Any:
     if not isinstance(column, np.ndarray):
         return column  # times are text already
     if column.dtype.kind == "U":
-        texts = {name: quoted(name) for name in np.unique(column).tolist()}
-        return pa.array([texts[name] for name in column.tolist()], pa.string())
+        names, places = np.unique(column, return_inverse=True)
+        return pa.array(list(map(quoted, names.tolist())), pa.string()).take(pa.array(places))
     return pa.array(column, from_pandas=True).cast(pa.string()).fill_null("")
 
 
 def _holds(line: str, columns: Sequence[Any], row: int, delimiter: str) -> bool:
-    """Tell whether a line holds the values of a row: numbers as numbers, all else as text."""
+    """Tell whether a line holds the values of a row: numbers as numbers, all else to the letter."""
     cells = next(csv.reader([line], delimiter=delimiter), [])
-    return len(cells) == len(columns) and all(map(_same, cells, (_at(column, row) for column in columns)))
-
-
-def _at(column: Any, row: int) -> Any:
-    """Return one value of a column; of times its text without the zeros that other rows may need."""
-    return column[row] if isinstance(column, np.ndarray) else Times(column.ns[row : row + 1], column.unit)
+    values = [column[row] if isinstance(column, np.ndarray) else column[row].as_py() for column in columns]
+    return len(cells) == len(values) and all(map(_same, cells, values))
 
 
 def _same(cell: str, value: Any) -> bool:
-    """Tell whether a cell holds a value."""
-    if isinstance(value, Times):
-        return cell.startswith(value.text()[0].as_py())
     if isinstance(value, str):
         return cell == value
-    return (cell == "" and bool(np.isnan(value))) or (cell != "" and float(cell) == value)
+    try:
+        return float(cell or "nan") == value or (cell == "" and bool(np.isnan(value)))
+    except ValueError:
+        return False

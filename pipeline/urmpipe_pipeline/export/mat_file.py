@@ -12,6 +12,7 @@ from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.export.metadata import MARK, as_json
 from urmpipe_pipeline.export.tables import Table, joint_units
 from urmpipe_pipeline.export.times import Times
+from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.results import Comparison, Deviation, Run
 
 DESCRIPTION = 116
@@ -51,7 +52,7 @@ def run_fields(run: Run, about: Mapping[str, Any]) -> dict[str, Any]:
     tcp = run.tcp
     nothing = np.empty((0, 0))
     return {
-        "name": run.name,
+        "name": printable(run.name),
         "rows": "grid",
         "t": run.t,
         "clock_ns": run.log.clock_start_ns + run.t_ns,
@@ -63,7 +64,7 @@ def run_fields(run: Run, about: Mapping[str, Any]) -> dict[str, Any]:
         "a": nothing if tcp is None else tcp.acceleration,
         "euler_zyx": nothing if tcp is None else tcp.euler_zyx,
         "p_recorded": nothing if run.tcp_recorded is None else run.tcp_recorded,
-        "joints": cells(run.log.joints),
+        "joints": cells([printable(name) for name in run.log.joints]),
         "units": {
             "t": "s", "clock_ns": "ns", "q": cells(units), "qd": cells([f"{unit}/s" for unit in units]),
             "qdd": cells([f"{unit}/s2" for unit in units]), "p": "m", "v": "m/s", "a": "m/s2",
@@ -78,10 +79,10 @@ def file_fields(run: Run, table: Table, about: Mapping[str, Any]) -> dict[str, A
     columns = [column for column in table.columns if not isinstance(column.values, Times)]
     clock = [column for column in table.columns if isinstance(column.values, Times)]
     return {
-        "name": run.name,
+        "name": printable(run.name),
         "rows": "file",
         "t": run.log.t,
-        "clock_ns": table.clock_ns,
+        "clock_ns": np.empty((0, 0)) if table.clock_ns is None else table.clock_ns,
         "values": np.column_stack([np.asarray(column.values) for column in columns]),
         "names": cells([column.name for column in columns]),
         "units": cells([column.unit for column in columns]),
@@ -94,8 +95,8 @@ def file_fields(run: Run, table: Table, about: Mapping[str, Any]) -> dict[str, A
 def comparison_fields(comparison: Comparison, about: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a comparison in SI, with a struct a log in the cell `runs`."""
     return {
-        "name": comparison.name,
-        "reference": comparison.reference.name,
+        "name": printable(comparison.name),
+        "reference": printable(comparison.reference.name),
         "verdict": comparison.verdict,
         "tolerance": dict(comparison.tolerance),
         "runs": cells([_deviation(run) for run in comparison.runs]),
@@ -105,7 +106,7 @@ def comparison_fields(comparison: Comparison, about: Mapping[str, Any]) -> dict[
 
 def _deviation(run: Deviation) -> dict[str, Any]:
     return {
-        "name": run.name,
+        "name": printable(run.name),
         "verdict": run.verdict,
         "sample": run.sample,
         "t": run.t,

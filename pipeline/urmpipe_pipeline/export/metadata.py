@@ -44,5 +44,5 @@ def describe(result: Run | Comparison, rows: str) -> dict[str, Any]:
 
 
 def as_json(about: dict[str, Any]) -> str:
-    """Return a description as JSON."""
-    return json.dumps(json_ready(about), ensure_ascii=False)
+    """Return a description as JSON, which every encoding can hold."""
+    return json.dumps(json_ready(about))

@@ -21,7 +21,7 @@ def write_parquet(table: Table, about: Mapping[str, Any], path: Path) -> list[st
     """Write a table and return how the file differs from it, read back.
 
     A missing sample is a null. The metadata `urmpipe` of the schema are JSON, the metadata `unit` of each
-    column are its unit; the last column is the clock of the file in integer [ns].
+    column are its unit; the last column is the clock of the file in integer [ns], if it has one.
     """
     import pyarrow as pa
     import pyarrow.parquet as pq
@@ -37,7 +37,7 @@ def write_parquet(table: Table, about: Mapping[str, Any], path: Path) -> list[st
         pa.field(column.name, array.type, metadata={b"unit": column.unit.encode()})
         for column, array in zip(columns, arrays, strict=True)
     ]
-    if CLOCK not in [column.name for column in columns]:
+    if table.clock_ns is not None and CLOCK not in [column.name for column in columns]:
         arrays.append(pa.array(table.clock_ns))
         fields.append(pa.field(CLOCK, pa.int64(), metadata={b"unit": b"ns"}))
     written = pa.Table.from_arrays(arrays, schema=pa.schema(fields, {KEY: as_json(dict(about)).encode()}))

@@ -14,7 +14,9 @@ from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_pipeline.export.originals import originals
 from urmpipe_pipeline.export.times import Times, shares
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogColumn, LogWarning, Role
+from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.results import AXES, Comparison, Run
+from urmpipe_pipeline.sources.vocabulary import split_unit
 
 Values: TypeAlias = FloatArray | IntArray | NDArray[np.str_] | Times
 
@@ -48,25 +50,31 @@ class Table:
     """What leaves, as a table.
 
     Attributes:
-        columns: Its columns.
-        clock_ns: The file's own clock at every row in integer [ns], shape (n,).
+        columns: Its columns, at least one.
+        clock_ns: The file's own clock at every row in integer [ns], shape (n,); None if it has none.
         warnings: What could not leave.
     """
 
     columns: tuple[Column, ...]
-    clock_ns: IntArray
+    clock_ns: IntArray | None
     warnings: tuple[LogWarning, ...] = ()
 
     @property
     def rows(self) -> int:
         """Number of rows."""
-        return len(self.clock_ns)
+        values = self.columns[0].values
+        return len(values.ns if isinstance(values, Times) else values)
 
 
-def file_table(log: JointLog) -> Table:
+def file_table(log: JointLog, *, units_told: bool = True) -> Table:
     """Return the columns of the file that were used: its names, its units, its rows, its numbers.
 
     Nothing is repolarized or resampled; times are those of the file's clock.
+
+    Args:
+        log: The log.
+        units_told: Whether the format keeps the units beside the names; else those that the names do not
+            tell are warned of.
 
     Raises:
         RecordingError: If the log came from no file.
@@ -77,20 +85,23 @@ def file_table(log: JointLog) -> Table:
     kept = [column for column in log.columns if _kept(log, column)]
     names = _names(kept)
     clock_ns = log.clock_start_ns + log.t_ns
-    clock = iter(shares(clock_ns, [column.unit for column in kept if column.role == "time"]))
+    timed = [column.unit for column in kept if column.role == "time"]
+    clock = iter(shares(clock_ns, timed))
     columns = [
         Column(name, column.unit, next(clock) if column.role == "time" else _numbers(log, column))
         for name, column in zip(names, kept, strict=True)
     ]
-    return Table(tuple(columns), clock_ns, tuple(_lost(log, kept)))
+    warnings = [*_lost(log, kept), *([] if units_told else _unsaid_units(kept))]
+    return Table(tuple(columns), clock_ns if timed else None, tuple(warnings))
 
 
 def grid_table(run: Run) -> Table:
     """Return the run on its grid in SI, each name with its unit: t, q, q', q'', and the tool centre point."""
     columns = [Column("t [s]", "s", Times(run.t_ns, "s"))]
     units = joint_units(run)
+    joints = [printable(name) for name in run.log.joints]
     for prefix, order, values in (("", "", run.q), ("d_", "/s", run.qd), ("dd_", "/s2", run.qdd)):
-        names = [prefix + name for name in run.log.joints]
+        names = [prefix + name for name in joints]
         columns += _group(names, [unit + order for unit in units], values)
     if run.tcp is not None:
         for name, unit, values in (
@@ -106,7 +117,7 @@ def grid_table(run: Run) -> Table:
 def delta_table(comparison: Comparison) -> Table:
     """Return the compared samples of all logs, one below the other: deviation, reference and actual in SI."""
     runs = comparison.runs
-    names = np.repeat([run.name for run in runs], [len(run.sample) for run in runs])
+    names = np.repeat([printable(run.name) for run in runs], [len(run.sample) for run in runs])
     columns = [
         Column("run", "", names),
         Column("sample", "", np.concatenate([run.sample for run in runs])),
@@ -123,7 +134,7 @@ def delta_table(comparison: Comparison) -> Table:
 
 def joint_units(run: Run) -> list[str]:
     """Return rad or m for each joint: the robot says so, or else the unit of its column."""
-    if run.robot is not None:
+    if run.robot is not None and run.log.joints:
         return ["rad" if joint.kind == "revolute" else "m" for joint in run.robot.moving]
     units = {column.index: column.unit for column in run.log.columns if column.role == "joint"}
     return ["m" if units.get(j) in ("m", "cm", "mm") else "rad" for j in range(len(run.log.joints))]
@@ -158,7 +169,7 @@ def _names(columns: Sequence[LogColumn]) -> list[str]:
 
 def _own_name(column: LogColumn) -> str:
     """Return our name of a column with its unit; without a header a clock has only its place for a name."""
-    name = "t" if column.role == "time" and not column.header else column.name
+    name = "t" if column.role == "time" and not column.header else printable(column.name)
     return f"{name} [{column.unit}]"
 
 
@@ -173,3 +184,16 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
         if inference.what == "columns not used":
             said = f"{inference.value}: not ingested ({inference.evidence}), so they cannot leave"
             yield LogWarning("not-exported", said)
+
+
+def _unsaid_units(columns: Sequence[LogColumn]) -> list[LogWarning]:
+    """Return a warning for each unit that is not of SI and that the names of its columns do not tell."""
+    unsaid: dict[str, list[str]] = {}
+    for column in columns:
+        told = not column.header or split_unit(column.header)[1]
+        if column.role != "time" and column.factor != 1.0 and not told:
+            unsaid.setdefault(column.unit, []).append(column.name)
+    return [
+        LogWarning("unit-not-in-name", f"{', '.join(names)}: in {unit}, which their names do not tell")
+        for unit, names in unsaid.items()
+    ]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urmpipe_pipeline.export.lines import differences, write_lines
+from urmpipe_pipeline.export.lines import differences, texts, write_lines
 from urmpipe_pipeline.export.metadata import MARK
 from urmpipe_pipeline.export.poses import Poses
 from urmpipe_pipeline.export.times import Times
@@ -17,6 +17,6 @@ def write_tum(poses: Poses, path: Path) -> list[str]:
 
     Times are those of the log's clock in [s], exact in decimals.
     """
-    values = [Times(poses.clock_ns, "s"), *poses.position.T, *poses.quat_xyzw.T]
+    values = texts([Times(poses.clock_ns, "s"), *poses.position.T, *poses.quat_xyzw.T])
     write_lines(path, HEAD, values, " ")
     return differences(path, HEAD, values, " ")

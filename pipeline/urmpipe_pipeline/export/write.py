@@ -107,7 +107,9 @@ def export_result(
 def _table(result: Run | Comparison, options: ExportOptions) -> Table:
     if isinstance(result, Comparison):
         return delta_table(result)
-    return file_table(result.log) if options.chosen_rows == "file" else grid_table(result)
+    if options.chosen_rows == "file":
+        return file_table(result.log, units_told=options.to != "csv")
+    return grid_table(result)
 
 
 def _writer(

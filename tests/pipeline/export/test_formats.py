@@ -15,7 +15,7 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 from urmpipe_models.kinematics import poses_over_log
-from urmpipe_pipeline.export import Format, Rows, export_result
+from urmpipe_pipeline.export import FORMATS, Format, Rows, export_result
 from urmpipe_pipeline.export.options import ExportOptions
 from urmpipe_pipeline.export.poses import continuous
 from urmpipe_pipeline.results import Comparison, Run
@@ -236,3 +236,16 @@ def test_a_name_keeps_its_signs_inside_the_file(comparison: Comparison, tmp_path
     else:
         found = (read_csv(path) if to == "csv" else pq.read_table(path))["run"][0].as_py()
     assert found == 'a "b", c;ü'
+
+
+@pytest.mark.parametrize("to", FORMATS)
+def test_names_that_no_text_can_hold_do_not_stop_it(
+    comparison: Comparison, tmp_path: Path, to: Format
+) -> None:
+    """A file name of bytes that are no UTF-8 has lone surrogates for them in Python."""
+    odd = "a\udcff"
+    log = replace(comparison.runs[0].run.log, joints=(odd, *"bcdef"))
+    run = replace(comparison.runs[0].run, name=odd, log=log)
+    changed = replace(comparison, name=odd, runs=(replace(comparison.runs[0], name=odd, run=run),))
+    assert export_result(changed, tmp_path / f"c.{to}", ExportOptions(to)).files[0].rows == 40
+    assert export_result(run, tmp_path / f"r.{to}", ExportOptions(to)).files[0].rows == 40

@@ -16,7 +16,7 @@ from scipy.io import savemat
 from urmpipe_models.errors import OptionError, OutputError, RecordingError, UrmpipeError
 from urmpipe_pipeline.export import FORMATS, Format, export_result, format_of, lines, mat_file, parquet_file
 from urmpipe_pipeline.export.identity import is_export
-from urmpipe_pipeline.export.lines import differences, write_lines
+from urmpipe_pipeline.export.lines import differences, texts, write_lines
 from urmpipe_pipeline.export.options import ExportOptions
 from urmpipe_pipeline.export.times import Times
 from urmpipe_pipeline.export.write import write_all
@@ -119,6 +119,18 @@ def test_a_csv_is_never_replaced_even_if_it_is_ours(run: Run, tmp_path: Path) ->
     assert path.read_bytes() == before
 
 
+def test_what_a_mat_file_cannot_hold_is_said_before_it_is_written(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mat_file, "LARGEST", 1000)
+    message = said(OutputError, lambda: export_result(run, tmp_path / "a.mat", ExportOptions("mat")))
+    size = 40 * 8 * (2 + 3 * 6 + 5 * 3)
+    assert message == (
+        f"found {size} bytes, allowed: 1000 in a MAT file of version 5; --to parquet takes all"
+    )
+    assert not list(tmp_path.iterdir())
+
+
 def test_of_several_trajectories_all_are_written_or_none(comparison: Comparison, tmp_path: Path) -> None:
     (tmp_path / "c-b-actual.tum").write_text("precious")
     with pytest.raises(OutputError):
@@ -183,12 +195,15 @@ def test_other_numbers_at_the_ends_of_a_mat_file_are_seen(tmp_path: Path) -> Non
         (lambda text: text.replace("0.000,1", "0.000,2"), ["row 1"]),
         (lambda text: text.replace("0.002,\n", "0.002,0\n"), ["row 3"]),
         (lambda text: text.replace("0.002", "0.003"), ["row 3"]),
+        (lambda text: text.replace("0.000", "0.001"), ["row 1"]),
+        (lambda text: text.replace("0.000,1", "0.000,one"), ["row 1"]),
+        (lambda text: "", ["the head", "0 rows of 3", "row 1", "row 3"]),
     ],
 )
 def test_damage_at_head_count_or_ends_is_seen(
     tmp_path: Path, damage: Callable[[str], str], found: list[str]
 ) -> None:
-    columns = [Times(np.array([0, 1_000_000, 2_000_000]), "s"), np.array([1.0, 2.5, np.nan])]
+    columns = texts([Times(np.array([0, 1_000_000, 2_000_000]), "s"), np.array([1.0, 2.5, np.nan])])
     path = tmp_path / "a.csv"
     write_lines(path, "a,b\n", columns, ",")
     assert path.read_text() == "a,b\n0.000,1\n0.001,2.5\n0.002,\n"
@@ -197,7 +212,9 @@ def test_damage_at_head_count_or_ends_is_seen(
 
 
 def test_slices_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    columns = [Times(np.arange(10) * 10**6, "ms"), np.arange(10) / 4, np.array([f"r{k}" for k in range(10)])]
+    columns = texts(
+        [Times(np.arange(10) * 10**6, "ms"), np.arange(10) / 4, np.array([f"r{k}" for k in range(10)])]
+    )
     write_lines(tmp_path / "whole", "", columns, " ")
     monkeypatch.setattr(lines, "SLICE", 3)
     write_lines(tmp_path / "sliced", "", columns, " ")

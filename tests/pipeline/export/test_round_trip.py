@@ -10,11 +10,16 @@ from decimal import Decimal
 from pathlib import Path
 
 import pandas as pd
+import pyarrow.parquet as pq
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
+from scipy.io import loadmat
 
 import urmpipe
+from urmpipe_pipeline.export import FORMATS, Format
 from urmpipe_pipeline.export.times import EXPONENTS
+from urmpipe_pipeline.sources import ReadOptions
 
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "latin-1")
 STYLES = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))
@@ -181,6 +186,36 @@ def test_columns_that_were_not_used_are_named(tmp_path: Path) -> None:
         "battery: not ingested (no role is known for them), so they cannot leave",
     ]
     assert [name for name, _ in result.columns] == ["t", "q1"]
+
+
+def test_units_that_the_names_do_not_tell_are_told(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,q1,q2,q3 [deg]\n0,1,2,3\n1,2,3,4\n")
+    run = urmpipe.ingest(tmp_path / "log.csv", read=ReadOptions(units={"": "deg"}))
+    result = urmpipe.export(run, tmp_path / "again.csv", rows="file")
+    assert [warning.message for warning in result.warnings] == [
+        "q1, q2: in deg, which their names do not tell"
+    ]
+    assert result.columns[1] == ("q1", "deg")
+    assert not urmpipe.export(run, tmp_path / "again.parquet", rows="file").warnings
+
+
+def test_a_clock_that_the_file_did_not_have_does_not_leave_with_it(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("q1,q2\n1,2\n1.5,2.5\n")
+    run = urmpipe.ingest(tmp_path / "log.csv")
+    urmpipe.export(run, tmp_path / "a.parquet", rows="file")
+    assert pq.read_table(tmp_path / "a.parquet").column_names == ["q1", "q2"]
+    urmpipe.export(run, tmp_path / "a.mat", rows="file")
+    assert loadmat(tmp_path / "a.mat", simplify_cells=True)["run"]["clock_ns"].size == 0
+
+
+@pytest.mark.parametrize("to", FORMATS[:3])
+def test_a_path_leaves_though_a_robot_was_named(tmp_path: Path, to: Format) -> None:
+    (tmp_path / "path.csv").write_text("t,x,y,z\n0,1,2,3\n1,1,2,4\n2,1,2,5\n")
+    run = urmpipe.ingest(tmp_path / "path.csv", robot="urm6")
+    for rows in ("grid", "file"):
+        result = urmpipe.export(run, tmp_path / f"{rows}.{to}", rows=rows)
+        assert result.files[0].rows == 3
+        assert len(result.columns) == 4
 
 
 def test_the_grid_is_a_log_again(tmp_path: Path) -> None:
