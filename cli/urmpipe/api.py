@@ -13,8 +13,6 @@ from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import Method
-from urmpipe_pipeline.export import Exported, Format, Rows, export_result, format_of
-from urmpipe_pipeline.export.options import ExportOptions
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.operands import load_run, log_files
@@ -25,6 +23,8 @@ from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     import pandas as pd
+
+    from urmpipe_pipeline.export import Exported, Format, Rows
 
 PathLike = str | Path
 Robot = Chain | str | Path
@@ -210,6 +210,8 @@ def export(
     Raises:
         UrmpipeError: With everything that is wrong with the recording, the options or the output.
     """
+    from urmpipe_pipeline.export import ExportOptions, export_result, format_of
+
     target = None if output is None else Path(output)
     options = ExportOptions(format_of(to, target), rows, tcp)
     if isinstance(result, (Run, Comparison)):

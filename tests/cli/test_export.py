@@ -77,7 +77,7 @@ def test_json_is_all_that_stands_on_standard_output(urmpipe: RunCommand, recordi
     ran = urmpipe("export", "log.rrd", "-o", "a.tum", "--json")
     assert json.loads(ran.out) == {
         "schema": 1,
-        "files": [{"file": "a.tum", "rows": 5}],
+        "files": [{"file": "a.tum", "samples": 5}],
         "to": "tum",
         "rows": "grid",
         "columns": [

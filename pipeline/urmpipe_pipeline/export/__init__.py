@@ -5,7 +5,16 @@ or `poses` -> `write`, which takes the writer of the format (`csv_file`, `parque
 `tum_file`). Each file is read back before it gets its name.
 """
 
-from urmpipe_pipeline.export.options import FORMATS, Format, Rows, format_of
+from urmpipe_pipeline.export.options import FORMATS, ExportOptions, Format, Rows, format_of
 from urmpipe_pipeline.export.write import Exported, ExportedFile, export_result
 
-__all__ = ["FORMATS", "Exported", "ExportedFile", "Format", "Rows", "export_result", "format_of"]
+__all__ = [
+    "FORMATS",
+    "ExportOptions",
+    "Exported",
+    "ExportedFile",
+    "Format",
+    "Rows",
+    "export_result",
+    "format_of",
+]

@@ -45,7 +45,7 @@ def differences(path: Path, head: str, columns: Sequence[Any], delimiter: str) -
     rows = len(columns[0])
     with path.open("rb") as file:
         found = [] if file.read(len(head.encode())) == head.encode() else ["the head"]
-        first = file.readline().decode()
+        first = file.readline().decode(errors="replace")
         count = bool(first) + sum(block.count(b"\n") for block in iter(lambda: file.read(1 << 20), b""))
         file.seek(max(0, file.tell() - TAIL))
         last = file.read().decode(errors="replace").rstrip("\n").rpartition("\n")[2]
@@ -68,14 +68,15 @@ def _lines(columns: Sequence[Any], delimiter: str) -> memoryview:
     """Return the bytes of the lines of some rows."""
     import pyarrow.compute as pc
 
-    cells = pc.binary_join_element_wise(*(_cells(column) for column in columns), delimiter)
+    missing = "" if len(columns) > 1 else '""'  # a line without any sign is no row to most readers
+    cells = pc.binary_join_element_wise(*(_cells(column, missing) for column in columns), delimiter)
     lines = pc.binary_join_element_wise(cells, "", "\n")
     _, offsets, content = lines.buffers()
     ends = np.frombuffer(offsets, dtype=np.int32)[lines.offset : lines.offset + len(lines) + 1]
     return memoryview(content)[int(ends[0]) : int(ends[-1])]
 
 
-def _cells(column: Any) -> Any:
+def _cells(column: Any, missing: str) -> Any:
     """Return the texts of some rows of a column."""
     import pyarrow as pa
 
@@ -84,7 +85,7 @@ def _cells(column: Any) -> Any:
     if column.dtype.kind == "U":
         names, places = np.unique(column, return_inverse=True)
         return pa.array(list(map(quoted, names.tolist())), pa.string()).take(pa.array(places))
-    return pa.array(column, from_pandas=True).cast(pa.string()).fill_null("")
+    return pa.array(column, from_pandas=True).cast(pa.string()).fill_null(missing)
 
 
 def _holds(line: str, columns: Sequence[Any], row: int, delimiter: str) -> bool:

@@ -16,7 +16,7 @@ from urmpipe_pipeline.export.times import Times, shares
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.results import AXES, Comparison, Run
-from urmpipe_pipeline.sources.vocabulary import split_unit
+from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
 Values: TypeAlias = FloatArray | IntArray | NDArray[np.str_] | Times
 
@@ -190,7 +190,7 @@ def _unsaid_units(columns: Sequence[LogColumn]) -> list[LogWarning]:
     """Return a warning for each unit that is not of SI and that the names of its columns do not tell."""
     unsaid: dict[str, list[str]] = {}
     for column in columns:
-        told = not column.header or split_unit(column.header)[1]
+        told = not column.header or vocabulary().unit(split_unit(column.header)[1] or "")
         if column.role != "time" and column.factor != 1.0 and not told:
             unsaid.setdefault(column.unit, []).append(column.name)
     return [

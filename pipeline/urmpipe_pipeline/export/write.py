@@ -65,7 +65,7 @@ class Exported:
         """Return the object that `urmpipe export --json` prints."""
         return {
             "schema": 1,
-            "files": [{"file": str(one.path), "rows": one.rows} for one in self.files],
+            "files": [{"file": str(one.path), "samples": one.rows} for one in self.files],
             "to": self.to,
             "rows": self.rows,
             "columns": [{"name": name, "unit": unit} for name, unit in self.columns],

@@ -15,8 +15,7 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 from urmpipe_models.kinematics import poses_over_log
-from urmpipe_pipeline.export import FORMATS, Format, Rows, export_result
-from urmpipe_pipeline.export.options import ExportOptions
+from urmpipe_pipeline.export import FORMATS, ExportOptions, Format, Rows, export_result
 from urmpipe_pipeline.export.poses import continuous
 from urmpipe_pipeline.results import Comparison, Run
 

@@ -14,10 +14,18 @@ import pytest
 from scipy.io import savemat
 
 from urmpipe_models.errors import OptionError, OutputError, RecordingError, UrmpipeError
-from urmpipe_pipeline.export import FORMATS, Format, export_result, format_of, lines, mat_file, parquet_file
+from urmpipe_pipeline.export import (
+    FORMATS,
+    ExportOptions,
+    Format,
+    export_result,
+    format_of,
+    lines,
+    mat_file,
+    parquet_file,
+)
 from urmpipe_pipeline.export.identity import is_export
 from urmpipe_pipeline.export.lines import differences, texts, write_lines
-from urmpipe_pipeline.export.options import ExportOptions
 from urmpipe_pipeline.export.times import Times
 from urmpipe_pipeline.export.write import write_all
 from urmpipe_pipeline.results import Comparison, Run

@@ -189,7 +189,7 @@ def test_columns_that_were_not_used_are_named(tmp_path: Path) -> None:
 
 
 def test_units_that_the_names_do_not_tell_are_told(tmp_path: Path) -> None:
-    (tmp_path / "log.csv").write_text("t,q1,q2,q3 [deg]\n0,1,2,3\n1,2,3,4\n")
+    (tmp_path / "log.csv").write_text("t,q1,q2 (arm),q3 [deg]\n0,1,2,3\n1,2,3,4\n")
     run = urmpipe.ingest(tmp_path / "log.csv", read=ReadOptions(units={"": "deg"}))
     result = urmpipe.export(run, tmp_path / "again.csv", rows="file")
     assert [warning.message for warning in result.warnings] == [
@@ -206,6 +206,12 @@ def test_a_clock_that_the_file_did_not_have_does_not_leave_with_it(tmp_path: Pat
     assert pq.read_table(tmp_path / "a.parquet").column_names == ["q1", "q2"]
     urmpipe.export(run, tmp_path / "a.mat", rows="file")
     assert loadmat(tmp_path / "a.mat", simplify_cells=True)["run"]["clock_ns"].size == 0
+
+
+def test_a_missing_sample_of_the_only_column_stays_a_row(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("q1,note\n1,a\n,b\n3,c\n")
+    urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
+    assert pd.read_csv(tmp_path / "again.csv")["q1"].isna().tolist() == [False, True, False]
 
 
 @pytest.mark.parametrize("to", FORMATS[:3])
