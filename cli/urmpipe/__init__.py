@@ -4,6 +4,7 @@
     run = urmpipe.ingest("log.csv", robot="urm6")
     comparison = urmpipe.compare("path.csv", ["log.csv"], robot="urm6")
     urmpipe.report([comparison], "report.html")
+    urmpipe.export(run, "log.parquet")
 
 The functions are loaded when they are first used.
 """
@@ -15,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from urmpipe.api import Report as Report
     from urmpipe.api import compare as compare
+    from urmpipe.api import export as export
     from urmpipe.api import ingest as ingest
     from urmpipe.api import report as report
     from urmpipe.api import write_map as write_map
@@ -22,6 +24,7 @@ if TYPE_CHECKING:
     from urmpipe_models.catalogue import robot_names as robot_names
     from urmpipe_models.chain import Chain as Chain
     from urmpipe_models.errors import UrmpipeError as UrmpipeError
+    from urmpipe_pipeline.export import Exported as Exported
     from urmpipe_pipeline.recording import read_recording as read_recording
     from urmpipe_pipeline.recording import write_recording as write_recording
     from urmpipe_pipeline.results import Comparison as Comparison
@@ -35,10 +38,12 @@ _HOME = {
     "Chain": "urmpipe_models.chain",
     "Comparison": "urmpipe_pipeline.results",
     "ReadOptions": "urmpipe_pipeline.sources",
+    "Exported": "urmpipe_pipeline.export",
     "Report": "urmpipe.api",
     "Run": "urmpipe_pipeline.results",
     "UrmpipeError": "urmpipe_models.errors",
     "compare": "urmpipe.api",
+    "export": "urmpipe.api",
     "ingest": "urmpipe.api",
     "load_robot": "urmpipe_models.catalogue",
     "read_map": "urmpipe_pipeline.sources",

@@ -26,6 +26,8 @@ from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE
 if TYPE_CHECKING:
     import pandas as pd
 
+    from urmpipe_pipeline.export import Exported, Format, Rows
+
 PathLike = str | Path
 Robot = Chain | str | Path
 
@@ -183,17 +185,7 @@ def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> 
     from urmpipe_pipeline.report import write_report
 
     files = [Path(one) for one in results if isinstance(one, (str, Path))]
-    foreign = [path for path in files if path.exists() and not is_recording(path)]
-    if foreign:
-        raise RecordingError(
-            *(
-                Finding(
-                    "found no recording of urmpipe, allowed: a .rrd that ingest or compare wrote",
-                    file=str(path),
-                )
-                for path in foreign
-            )
-        )
+    _refuse_foreign(files)
     shown = tuple(read_recording(Path(one)) if isinstance(one, (str, Path)) else one for one in results)
     return Report(write_report(shown, Path(output), inputs=files), shown)
 
@@ -232,6 +224,38 @@ def _offset(frame: Transform) -> tuple[float, ...]:
     return (x, y, z, *rpy_of(frame.rotation))
 
 
+def export(
+    result: PathLike | Run | Comparison,
+    output: PathLike | None = None,
+    *,
+    to: Format | None = None,
+    rows: Rows | None = None,
+    tcp: Tcp | None = None,
+) -> Exported:
+    """Write a run or a comparison as tables (CSV, Parquet, MAT) or as trajectories (TUM).
+
+    Args:
+        result: A recording (.rrd), or what `ingest` or `compare` returned.
+        output: The file to write; default: NAME-grid.csv and the like in the working folder.
+        to: csv, parquet, mat or tum; default: by the output's suffix.
+        rows: grid: t, q, rates and the tool centre point on the run's grid, in SI; file: the columns of
+            the log that were used as its file has them: their names, units, rows, numbers and clock.
+            Default: grid; file with tcp recorded.
+        tcp: Of a trajectory: fk (default) by forward kinematics, recorded as the log has it.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the recording, the options or the output.
+    """
+    from urmpipe_pipeline.export import ExportOptions, export_result, format_of
+
+    target = None if output is None else Path(output)
+    options = ExportOptions(format_of(to, target), rows, tcp)
+    if isinstance(result, (Run, Comparison)):
+        return export_result(result, target, options, [result.recording] if result.recording else [])
+    _refuse_foreign([Path(result)])
+    return export_result(read_recording(Path(result)), target, options, [Path(result)])
+
+
 def place_robot(
     robot: Robot | None,
     base: Transform | None = None,
@@ -263,6 +287,14 @@ def place_robot(
             "found --base, --tool, --base-link or --tip without a robot; allowed: with --robot NAME|FILE"
         )
     return None
+
+
+def _refuse_foreign(files: Sequence[Path]) -> None:
+    """Raise a `RecordingError` with all files that are there and are no recordings."""
+    foreign = [path for path in files if path.exists() and not is_recording(path)]
+    if foreign:
+        message = "found no recording of urmpipe, allowed: a .rrd that ingest or compare wrote"
+        raise RecordingError(*(Finding(message, file=str(path)) for path in foreign))
 
 
 def _refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:

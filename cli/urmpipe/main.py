@@ -27,6 +27,7 @@ COMMANDS = {
     "ingest": "Turn one log into a recording.",
     "compare": "Hold logs against a reference and give a verdict.",
     "report": "Write the HTML report of recordings.",
+    "export": "Write a recording as CSV, Parquet, MAT or TUM.",
     "robot": "List, show and export robots.",
 }
 """Each command and its short help: --help must not import them all (a test holds both together)."""

@@ -83,6 +83,7 @@ class LogColumn:
         factor: To SI.
         sign: 1, or -1 where the file counts the other way.
         offset: Added before the factor, in the file's unit.
+        number: Its number among the columns of all tables of the log, from 1.
     """
 
     name: str
@@ -93,6 +94,7 @@ class LogColumn:
     factor: float = 1.0
     sign: int = 1
     offset: float = 0.0
+    number: int = 0
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -1,6 +1,6 @@
 """Writing a file so that it is whole or not there: beside its place first, then renamed.
 
-An output replaces only a recording or a report that urmpipe wrote, and never an input.
+An output replaces only a recording, a report or an export that urmpipe wrote, and never an input.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
 
-OutputKind = Literal["recording", "report", "map"]
+OutputKind = Literal["recording", "report", "map", "export"]
 
 GENERATOR = re.compile(rb"<meta\s+name=\"generator\"\s+content=\"urmpipe\b", re.IGNORECASE)
 """How a report of ours tells where it comes from."""
@@ -82,9 +82,8 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     if any(one.exists() and path.samefile(one) for one in inputs):
         return f"found an input of this command, allowed: any other name for the {kind}"
     if not path.is_file() or not _is_ours(path, kind):
-        return (
-            f"found a file that is no {kind} of urmpipe's, allowed: a new name, or such a {kind} to replace"
-        )
+        such = f"such {'an' if kind == 'export' else 'a'} {kind}"
+        return f"found a file that is no {kind} of urmpipe's, allowed: a new name, or {such} to replace"
     return None
 
 
@@ -94,6 +93,10 @@ def _is_ours(path: Path, kind: OutputKind) -> bool:
     if kind == "map":
         with path.open("rb") as file:
             return file.readline().strip() == MAP_HEADER.encode()
+    if kind == "export":
+        from urmpipe_pipeline.export.identity import is_export
+
+        return is_export(path)
     from urmpipe_pipeline.recording.identity import is_ours
 
     return is_ours(path)

@@ -122,18 +122,21 @@ class Run:
         """From the first to the last row, in [s]."""
         return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9
 
+    @property
+    def joint_units(self) -> list[str]:
+        """The SI unit of each joint, rad or m: by the robot, else by the unit of its column."""
+        if self.robot is not None and self.log.joints:
+            return ["rad" if joint.kind == "revolute" else "m" for joint in self.robot.moving]
+        told = (self.log.units.get(name, "rad") for name in self.log.joints)
+        return ["rad" if unit in ("rad", "deg") else "m" for unit in told]
+
     def joint_unit(self, per: str = "") -> str:
-        """Return the SI unit of the joints: rad, m or both, by the robot or else by the columns' units.
+        """Return the SI unit of all joints: rad, m or both.
 
         Args:
             per: What divides it: "", "/s" or "/s2".
         """
-        if self.robot is not None:
-            units = {"m" if joint.kind == "prismatic" else "rad" for joint in self.robot.moving}
-        else:
-            told = (self.log.units.get(name, "rad") for name in self.log.joints)
-            units = {"rad" if unit in ("rad", "deg") else "m" for unit in told}
-        return " or ".join(f"{unit}{per}" for unit in sorted(units or {"rad"}, reverse=True))
+        return " or ".join(f"{unit}{per}" for unit in sorted(set(self.joint_units) or {"rad"}, reverse=True))
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a grid sample: t [s], the joints, their rates, and the TCP where there is one."""

@@ -102,6 +102,16 @@ def test_a_broken_recording_is_not_replaced(tmp_path: Path) -> None:
     assert refusal(path, kind="recording") == wanted
 
 
+def test_an_output_that_is_no_export_of_ours_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "run.tum"
+    wanted = "found a file that is no export of urmpipe's, allowed: a new name, or such an export to replace"
+    path.write_text(REPORT)
+    assert refusal(path, kind="export") == wanted
+    path.write_text("# urmpipe export: t x y z\n")
+    write(path, kind="export")
+    assert path.read_text() == "new"
+
+
 def test_a_folder_is_not_replaced(tmp_path: Path) -> None:
     assert refusal(tmp_path) == "found a folder, allowed: the name of a file for the report"
     assert refusal(Path()) == "found a folder, allowed: the name of a file for the report"

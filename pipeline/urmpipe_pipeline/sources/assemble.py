@@ -20,7 +20,7 @@ from urmpipe_pipeline.joint_log import (
 )
 from urmpipe_pipeline.sources.cells import is_number, plain, significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
-from urmpipe_pipeline.sources.clock import EXPONENTS, Clock, even_clock
+from urmpipe_pipeline.sources.clock import EXPONENTS, even_clock
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.content import Content
 from urmpipe_pipeline.sources.kinematic_units import by_kinematics
@@ -93,8 +93,8 @@ def assemble(
         tcp_rotation=_recorded(rotation, turned.units),
         rotation_form=turned.form,
         columns=(
-            *_time_columns(plan.clocks[plan.main]),
-            *_used_columns([(group, found) for group, _, found in used], signs, offsets),
+            *_time_columns(plan),
+            *_used_columns(plan, [(group, found) for group, _, found in used], signs, offsets),
         ),
         digits=digits,
         inferences=(
@@ -154,15 +154,22 @@ def _corrected(values: FloatArray, signs: Sequence[int], offsets: Sequence[float
     return values
 
 
-def _time_columns(clock: Clock) -> list[LogColumn]:
-    """Return the columns of the clock with their units."""
-    return [
-        LogColumn(column.name, column.header, "time", i, unit, 10.0 ** (EXPONENTS[unit] - 9))
-        for i, (column, unit) in enumerate(zip(clock.columns, clock.units.values(), strict=True))
-    ]
+def _header(plan: Plan, column: Column) -> str:
+    """Return the name of a column as its file has it; empty if the file has no header."""
+    return "" if plan.tables.layouts[column.table].header is None else column.header
+
+
+def _time_columns(plan: Plan) -> Iterator[LogColumn]:
+    """Yield the columns of the clock with their units."""
+    clock = plan.clocks[plan.main]
+    for i, (column, unit) in enumerate(zip(clock.columns, clock.units.values(), strict=True)):
+        factor = 10.0 ** (EXPONENTS[unit] - 9)
+        header = _header(plan, column)
+        yield LogColumn(column.name, header, "time", i, unit, factor, number=column.number)
 
 
 def _used_columns(
+    plan: Plan,
     groups: Sequence[tuple[Sequence[Column], Sequence[Unit]]],
     signs: Sequence[int],
     offsets: Sequence[float],
@@ -172,7 +179,8 @@ def _used_columns(
         for i, (column, unit) in enumerate(zip(group, units, strict=True)):
             sign = signs[i] if role in ("joint", "rate", "acceleration") else 1
             offset = offsets[i] if role == "joint" else 0.0
-            yield LogColumn(column.name, column.header, role, i, unit.name, unit.factor, sign, offset)
+            header = _header(plan, column)
+            yield LogColumn(column.name, header, role, i, unit.name, unit.factor, sign, offset, column.number)
 
 
 def _in_si(values: FloatArray, units: Sequence[Unit]) -> FloatArray:

@@ -190,9 +190,9 @@ def _of(log: JointLog, role: Role) -> list[LogColumn]:
 
 
 def _called(log: JointLog, column: LogColumn) -> str:
-    """Return what tells a column from all others: its header, or its longer name where headers repeat."""
+    """Return what tells a column from all others: its header, or its number where that does not."""
     twins = [other for other in log.columns if other.header == column.header]
-    return column.header if column.header and len(twins) == 1 else column.name
+    return column.header if column.header and len(twins) == 1 else str(column.number)
 
 
 def _clock(log: JointLog) -> dict[str, Any]:

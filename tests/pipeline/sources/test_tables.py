@@ -200,6 +200,11 @@ def test_without_header_a_first_column_in_even_steps_is_the_time(read: Read, arm
     assert read(text, arm(3)).q.shape == (3, 3)  # three joints take all three columns
 
 
+def test_without_header_no_column_has_the_name_of_one(read: Read) -> None:
+    log = read("0.0,0.1,2.5\n0.01,0.3,2.4\n0.02,0.4,2.9\n")
+    assert [(column.name, column.header) for column in log.columns] == [("1", ""), ("q1", ""), ("q2", "")]
+
+
 def test_delimiter_and_decimal_sign_can_be_given(read: Read) -> None:
     assert_the_log(
         read("t;q1;q2\n0;0,1;-1,25\n0,005;0,2;-1,5\n0,01;0,3;-1,75\n", delimiter="semicolon", decimal=",")

@@ -1,0 +1,67 @@
+"""`urmpipe export`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+
+from urmpipe.options import output_options
+from urmpipe.process import tune_pyarrow
+
+
+@click.command(short_help="Write a recording as CSV, Parquet, MAT or TUM.")
+@click.argument("recording", metavar="RUN.rrd", type=click.Path(path_type=Path))
+@click.option(
+    "--to",
+    type=click.Choice(["csv", "parquet", "mat", "tum"]),
+    help="The format [default: by the suffix of the output].",
+)
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="The file [default: RUN-ROWS.FORMAT here]."
+)
+@click.option(
+    "--rows",
+    type=click.Choice(["grid", "file"]),
+    help="The run on its grid in SI, or the file's own rows, names and units [default: grid].",
+)
+@click.option(
+    "--tcp",
+    type=click.Choice(["fk", "recorded"]),
+    help="Poses for --to tum: by the joints, or as the log recorded them [default: fk].",
+)
+@output_options
+def export(recording: Path, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> int:
+    """Write what a recording holds, for other tools.
+
+    --rows grid is what urmpipe made of a log: t, the repolarized joints, their rates, and the motion of the
+    tool centre point, in SI. --rows file is what the log said: its columns under their own names, in their
+    own units, with its own clock; nothing is repolarized or resampled. Columns that ingest did not use are
+    not in a recording.
+
+    A comparison leaves as its deviations; as TUM, reference and actual become two trajectories for evo. A
+    CSV carries no mark of whose it is, so an existing one is never replaced.
+
+    \b
+    Examples:
+      urmpipe export log.rrd --to csv
+      urmpipe export log.rrd --rows file -o log-again.csv
+      urmpipe export log.rrd -o log.mat
+      urmpipe export log.rrd --to tum --tcp recorded
+      urmpipe export log-against-path.rrd -o deviations.parquet --json
+    """
+    tune_pyarrow()
+    from urmpipe import api
+    from urmpipe.printing import print_json, print_warnings
+
+    result = api.export(recording, output, **options)
+    if not quiet:
+        print_warnings(result.warnings)
+    if as_json:
+        print_json(result.to_dict())
+    elif not quiet:
+        columns = len(result.columns)
+        for one in result.files:
+            click.echo(f"Export: {one.path}  ({one.rows} rows, {columns} columns)")
+    return 0

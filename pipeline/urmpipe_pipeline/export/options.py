@@ -1,0 +1,76 @@
+"""What can be asked of an export, and what makes no sense together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal, get_args
+
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.compare import Tcp
+from urmpipe_pipeline.results import Comparison, Run
+
+Format = Literal["csv", "parquet", "mat", "tum"]
+FORMATS: tuple[Format, ...] = get_args(Format)
+
+Rows = Literal["grid", "file"]
+"""grid: the run on its grid, in SI; file: the rows of the file, its columns in its own units."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExportOptions:
+    """What leaves, and how.
+
+    Attributes:
+        to: The format.
+        rows: Rows of the grid or of the file; None takes the grid, or of a recorded pose the file.
+        tcp: Of a trajectory: by forward kinematics, or as the log recorded it; None takes fk.
+    """
+
+    to: Format
+    rows: Rows | None = None
+    tcp: Tcp | None = None
+
+    def __post_init__(self) -> None:
+        for option, value, allowed in (
+            ("--to", self.to, FORMATS),
+            ("--rows", self.rows, get_args(Rows)),
+            ("--tcp", self.tcp, get_args(Tcp)),
+        ):
+            if value is not None and value not in allowed:
+                raise OptionError(f"{option}: found {value}, allowed: {', '.join(allowed)}")
+        if self.tcp is not None and self.to != "tum":
+            raise OptionError(f"--tcp: found with --to {self.to}, which has both, allowed: with --to tum")
+        if self.tcp == "recorded" and self.rows == "grid":
+            message = "found with --tcp recorded, whose orientations stand at the file's rows only"
+            raise OptionError(f"--rows grid: {message}, allowed: --rows file")
+
+    @property
+    def chosen_rows(self) -> Rows:
+        """The rows that leave of a run."""
+        return self.rows or ("file" if self.tcp == "recorded" else "grid")
+
+    def check(self, result: Run | Comparison) -> None:
+        """Raise an `OptionError` if a comparison is asked for what only a run has."""
+        if not isinstance(result, Comparison):
+            return
+        for option, value in (("--rows", self.rows), ("--tcp", self.tcp)):
+            if value is not None:
+                found = "found with a comparison, which has the samples that it compared"
+                raise OptionError(f"{option}: {found}, allowed: with a run")
+
+
+def format_of(to: Format | None, output: Path | None) -> Format:
+    """Return the format that is asked for, or else that of the output's suffix.
+
+    Raises:
+        OptionError: If neither tells.
+    """
+    if to is not None:
+        return to
+    suffix = output.suffix.lower().lstrip(".") if output else ""
+    for known in FORMATS:
+        if suffix == known:
+            return known
+    found = f"the output {output}" if output else "neither a format nor an output"
+    raise OptionError(f"--to: found {found}, allowed: --to {'|'.join(FORMATS)}, or an output that ends so")

@@ -1,0 +1,111 @@
+"""Trajectories of poses: by forward kinematics, as recorded, and those of a comparison."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.errors import Finding, RecordingError
+from urmpipe_models.kinematics import poses_over_log
+from urmpipe_pipeline.compare import Tcp
+from urmpipe_pipeline.export.options import ExportOptions, Rows
+from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning
+from urmpipe_pipeline.results import Comparison, Deviation, Run
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Poses:
+    """A trajectory of poses without missing samples.
+
+    Attributes:
+        name: What it is, for a file's name; empty if there is no other.
+        clock_ns: The file's own clock in integer [ns], shape (n,).
+        position: In [m], shape (n, 3).
+        quat_xyzw: Unit quaternions x, y, z, w [-], neighbours in one hemisphere, shape (n, 4).
+        left_out: Rows without a pose.
+    """
+
+    name: str
+    clock_ns: IntArray
+    position: FloatArray
+    quat_xyzw: FloatArray
+    left_out: int = 0
+
+
+def poses_of(result: Run | Comparison, options: ExportOptions) -> tuple[list[Poses], list[LogWarning]]:
+    """Return the trajectories of a result and what is to be said of them.
+
+    Raises:
+        RecordingError: If a run has neither a robot nor, if that is asked for, a recorded pose.
+    """
+    if isinstance(result, Run):
+        poses = _run_poses(result, options.tcp or "fk", options.chosen_rows)
+        said = f"{poses.left_out} of {poses.left_out + len(poses.clock_ns)} rows have no pose: left out"
+        return [poses], [LogWarning("left-out", said)] if poses.left_out else []
+    said = "a comparison holds positions: every orientation is written as 0 0 0 1, compare translations only"
+    found = [one for run in result.runs for one in _deviation_poses(run, alone=len(result.runs) == 1)]
+    return found, [LogWarning("no-orientation", said)]
+
+
+def continuous(quat: FloatArray) -> FloatArray:
+    """Return quaternions with signs such that each is in the hemisphere of the one before.
+
+    q and -q are one orientation; without jumps between them they can be interpolated.
+
+    Args:
+        quat: Shape (n, 4), without NaN.
+    """
+    dots = np.einsum("ij,ij->i", quat[1:], quat[:-1])
+    signs = np.cumprod(np.concatenate(([1.0], np.where(dots < 0.0, -1.0, 1.0))))
+    return quat * signs[: len(quat), np.newaxis]
+
+
+def _run_poses(run: Run, tcp: Tcp, rows: Rows) -> Poses:
+    if tcp == "recorded":
+        return _recorded_poses(run)
+    if run.robot is None or not run.log.joints:
+        lacks = "robot" if run.log.joints else "joints"
+        allowed = "a log ingested with --robot NAME|FILE, or --tcp recorded of a log that recorded its pose"
+        raise _lacking(run, f"found no {lacks}, so no pose; allowed: {allowed}")
+    t_ns, q = (run.t_ns, run.q) if rows == "grid" else (run.log.t_ns, run.log.q)
+    there = np.flatnonzero(np.isfinite(q).all(axis=1))
+    _refuse_none(run, there)
+    from scipy.spatial.transform import Rotation
+
+    position, rotation = poses_over_log(run.robot, q[there])
+    quat = np.asarray(Rotation.from_matrix(rotation).as_quat(), dtype=np.float64)
+    clock = run.log.clock_start_ns + t_ns[there]
+    return Poses("", clock, position, continuous(quat), len(q) - len(there))
+
+
+def _recorded_poses(run: Run) -> Poses:
+    position, quat = run.log.tcp_position, run.log.tcp_quat_xyzw
+    if position is None or quat is None:
+        lacks = "position" if position is None else "orientation"
+        allowed = "a log that recorded position and orientation, or --tcp fk with a robot"
+        raise _lacking(run, f"found no recorded {lacks}, so no recorded pose; allowed: {allowed}")
+    there = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(quat).all(axis=1))
+    _refuse_none(run, there)
+    clock = run.log.clock_start_ns + run.log.t_ns[there]
+    return Poses("", clock, position[there], continuous(quat[there]), len(position) - len(there))
+
+
+def _deviation_poses(one: Deviation, *, alone: bool) -> list[Poses]:
+    """Return the reference and the log at the compared samples, both on the log's clock."""
+    clock = one.run.log.clock_start_ns + one.t_ns
+    upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(clock), 1))
+    prefix = "" if alone else f"{one.name}-"
+    return [
+        Poses(f"{prefix}reference", clock, one.reference, upright),
+        Poses(f"{prefix}actual", clock, one.actual, upright),
+    ]
+
+
+def _refuse_none(run: Run, there: IntArray) -> None:
+    if not len(there):
+        raise _lacking(run, "found no row with a pose, allowed: at least one")
+
+
+def _lacking(run: Run, message: str) -> RecordingError:
+    return RecordingError(Finding(message, str(run.recording) if run.recording else run.name))

@@ -1,0 +1,184 @@
+"""Write an export: beside its place, read back, renamed; of several files all or none."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.export.csv_file import write_csv
+from urmpipe_pipeline.export.mat_file import comparison_fields, file_fields, run_fields, write_mat
+from urmpipe_pipeline.export.metadata import describe
+from urmpipe_pipeline.export.options import ExportOptions, Format
+from urmpipe_pipeline.export.parquet_file import write_parquet
+from urmpipe_pipeline.export.poses import Poses, poses_of
+from urmpipe_pipeline.export.tables import Table, delta_table, file_table, grid_table
+from urmpipe_pipeline.export.tum_file import write_tum
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.results import Comparison, Run
+
+POSE_COLUMNS = (
+    ("t", "s"), ("x", "m"), ("y", "m"), ("z", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""),
+)  # fmt: skip
+
+
+@dataclass(frozen=True, slots=True)
+class ExportedFile:
+    """A file that was written.
+
+    Attributes:
+        path: Where it is.
+        rows: Rows of numbers in it.
+    """
+
+    path: Path
+    rows: int
+
+
+@dataclass(frozen=True, slots=True)
+class Exported:
+    """What left.
+
+    Attributes:
+        files: The files: one, or of a comparison as trajectories two a log.
+        to: Their format.
+        rows: Which rows they hold: grid, file, or compared (of a comparison).
+        columns: Name and unit of each column.
+        left_out: Rows without a pose, which a trajectory cannot hold.
+        warnings: What could not leave.
+    """
+
+    files: tuple[ExportedFile, ...]
+    to: Format
+    rows: str
+    columns: tuple[tuple[str, str], ...]
+    left_out: int = 0
+    warnings: tuple[LogWarning, ...] = ()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object that `urmpipe export --json` prints."""
+        return {
+            "schema": 1,
+            "files": [{"file": str(one.path), "samples": one.rows} for one in self.files],
+            "to": self.to,
+            "rows": self.rows,
+            "columns": [{"name": name, "unit": unit} for name, unit in self.columns],
+            "left_out": self.left_out,
+            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+        }
+
+
+def export_result(
+    result: Run | Comparison, output: Path | None, options: ExportOptions, inputs: Sequence[Path] = ()
+) -> Exported:
+    """Write a result as tables or trajectories.
+
+    Args:
+        result: A run or a comparison.
+        output: The file; None names it after the recording or the result, in the working folder. Of
+            several trajectories each has its own name behind that of the file.
+        options: What leaves, and how.
+        inputs: Files that are never replaced.
+
+    Raises:
+        OptionError: If the options make no sense for the result.
+        RecordingError: If the result does not hold what is asked for.
+        OutputError: If a file may not be written there, or did not read back as it was written.
+    """
+    options.check(result)
+    rows = "compared" if isinstance(result, Comparison) else options.chosen_rows
+    ending = f"-{rows}" if isinstance(result, Run) else ""
+    name = result.recording.stem if result.recording else _file_name(result.name)
+    target = output or Path(f"{name}{ending}.{options.to}")
+    if options.to == "tum":
+        return _export_poses(result, target, options, rows, inputs)
+    table = _table(result, options)
+    write_all([target], [_writer(result, table, options.to, rows, target)], options.to, inputs)
+    names = tuple((column.name, column.unit) for column in table.columns)
+    return Exported((ExportedFile(target, table.rows),), options.to, rows, names, 0, table.warnings)
+
+
+def _table(result: Run | Comparison, options: ExportOptions) -> Table:
+    if isinstance(result, Comparison):
+        return delta_table(result)
+    if options.chosen_rows == "file":
+        return file_table(result.log, units_told=options.to != "csv")
+    return grid_table(result)
+
+
+def _writer(
+    result: Run | Comparison, table: Table, to: Format, rows: str, target: Path
+) -> Callable[[Path], list[str]]:
+    """Return what writes a table to a path."""
+    about = describe(result, rows)
+    if to == "csv":
+        return partial(write_csv, table)
+    if to == "parquet":
+        return partial(write_parquet, table, about)
+    if isinstance(result, Comparison):
+        return partial(write_mat, "comparison", comparison_fields(result, about), target=target)
+    fields = file_fields(result, table, about) if rows == "file" else run_fields(result, about)
+    return partial(write_mat, "run", fields, target=target)
+
+
+def _export_poses(
+    result: Run | Comparison, target: Path, options: ExportOptions, rows: str, inputs: Sequence[Path]
+) -> Exported:
+    found, warnings = poses_of(result, options)
+    targets = list(_targets(target, found))
+    write_all(targets, [partial(write_tum, poses) for poses in found], "tum", inputs)
+    files = tuple(ExportedFile(path, len(poses.clock_ns)) for path, poses in zip(targets, found, strict=True))
+    left_out = sum(poses.left_out for poses in found)
+    return Exported(files, "tum", rows, POSE_COLUMNS, left_out, tuple(warnings))
+
+
+def _targets(target: Path, found: Sequence[Poses]) -> Iterator[Path]:
+    """Yield a file for each trajectory; names that are one without their odd signs get a number."""
+    taken: set[str] = set()
+    for poses in found:
+        stem = f"{target.stem}-{_file_name(poses.name)}" if poses.name else target.stem
+        name, number = stem, 2
+        while name in taken:
+            name, number = f"{stem}-{number}", number + 1
+        taken.add(name)
+        yield target.with_name(name + target.suffix)
+
+
+def write_all(
+    targets: Sequence[Path],
+    writers: Sequence[Callable[[Path], list[str]]],
+    to: Format,
+    inputs: Sequence[Path],
+) -> None:
+    """Write all files beside their places, and rename them only when all were read back as written.
+
+    Args:
+        targets: Where they are to stand.
+        writers: What writes each to a path and returns how the file differs from what it wrote.
+        to: Their format.
+        inputs: Files that are never replaced.
+
+    Raises:
+        OutputError: If one may not be written there, or did not read back as it was written.
+    """
+    if to == "csv" and targets[0].is_file():
+        found = "found a file, allowed: a new name; nothing in a CSV tells whose it is, so none is replaced"
+        raise OutputError(Finding(found, str(targets[0])))
+    with ExitStack() as stack:
+        parts = [stack.enter_context(guarded_output(path, inputs, "export")) for path in targets]
+        for path, part, write in zip(targets, parts, writers, strict=True):
+            wrong = write(part)
+            if wrong:
+                said = f"reads back otherwise than written: {', '.join(wrong)}"
+                raise OutputError(Finding(said, str(path)))
+
+
+def _file_name(name: str) -> str:
+    """Return a name without the signs that folders and shells take for their own."""
+    return re.sub(r'[\s/\\:*?"<>|]+', "_", name).strip("._") or "export"
