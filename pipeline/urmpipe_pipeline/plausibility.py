@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning
-from urmpipe_pipeline.motion import Motion, over_rows
+from urmpipe_pipeline.joint_motion import JointMotion, over_rows
 from urmpipe_pipeline.sources.units import FASTEST
 
 FAR = 5.0
@@ -66,7 +66,7 @@ def implausible(
     """
     if len(q) < 2 or not q.shape[1]:
         return []
-    motion = Motion.of(log, q, turning)
+    motion = JointMotion.of(log, q, turning)
     outliers = outlying_ends(motion)
     held = pace(motion)
     warnings = [*outlier_warnings(motion, outliers), *repeated_samples(motion, held)]
@@ -79,7 +79,7 @@ def implausible(
     return warnings
 
 
-def outlying_ends(motion: Motion) -> NDArray[np.int64]:
+def outlying_ends(motion: JointMotion) -> NDArray[np.int64]:
     """Return row and joint index where the first or the last row is off the motion of the others.
 
     It is if the joint steps there by more than `FAR` times what it does anywhere else, and starts or stops
@@ -95,10 +95,10 @@ def outlying_ends(motion: Motion) -> NDArray[np.int64]:
     return np.concatenate(found)
 
 
-def outlier_warnings(motion: Motion, outliers: NDArray[np.int64]) -> list[LogWarning]:
+def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[LogWarning]:
     """Return a warning for each end that is an outlier: which joints are off, and by how much."""
     q, warnings = motion.q, []
-    for (row, beside), kind in zip(motion.ends, ("outlier-first", "outlier-last"), strict=True):
+    for row, beside in motion.ends:
         joints = outliers[outliers[:, 0] == row, 1].tolist()
         if joints:
             steps = ", ".join(
@@ -108,11 +108,13 @@ def outlier_warnings(motion: Motion, outliers: NDArray[np.int64]) -> list[LogWar
             )
             said = f"row {row + 1} is off the motion of the other rows: {steps}"
             hint = "it stays; take it out of the file if the arm was not there"
-            warnings.append(LogWarning(kind, f"{said}; {hint}", row + 1))
+            warnings.append(
+                LogWarning("outlier-last" if row else "outlier-first", f"{said}; {hint}", row + 1)
+            )
     return warnings
 
 
-def pace(motion: Motion) -> float:
+def pace(motion: JointMotion) -> float:
     """Return how many rows a moving arm's values stay bit for bit the same, on average; 1 where they do not.
 
     More than 1 is a slow controller polled fast: its differences are stairs. An arm at rest makes few runs
@@ -131,7 +133,7 @@ def pace(motion: Motion) -> float:
     return float(runs[moving].mean())
 
 
-def repeated_samples(motion: Motion, rows: float) -> list[LogWarning]:
+def repeated_samples(motion: JointMotion, rows: float) -> list[LogWarning]:
     """Return a warning if the values stay the same for several rows, as `pace` tells."""
     if rows == 1.0:
         return []
@@ -160,7 +162,7 @@ def _in_one_go(q: FloatArray, changes: NDArray[np.int64]) -> bool:
     return bool(together or large > 1.5 * small)
 
 
-def beyond_limits(motion: Motion, robot: Chain) -> list[LogWarning]:
+def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
     """Return a warning for each joint that leaves its limits: how often, where first, where worst."""
     q, slack = motion.q, ROUNDED_LIMIT + motion.fineness
     lower, upper = np.array([(joint.lower, joint.upper) for joint in robot.moving]).T
@@ -189,7 +191,9 @@ def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
     return np.where(np.isfinite(own), own, fallback)
 
 
-def too_fast(motion: Motion, limits: FloatArray, told: NDArray[np.int64], period: float) -> list[LogWarning]:
+def too_fast(
+    motion: JointMotion, limits: FloatArray, told: NDArray[np.int64], period: float
+) -> list[LogWarning]:
     """Return a warning for each joint that steps faster than it can: how often, where first, where worst.
 
     Rows closer in time than the usual period are taken to be that far apart: it is their clock that hurries.

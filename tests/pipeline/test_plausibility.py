@@ -16,7 +16,7 @@ from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.repolarizer import repolarize
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning
-from urmpipe_pipeline.motion import format_steps, largest_steps
+from urmpipe_pipeline.joint_motion import format_steps, largest_steps
 from urmpipe_pipeline.plausibility import implausible
 from urmpipe_pipeline.sources import ReadOptions
 

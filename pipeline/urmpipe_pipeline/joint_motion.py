@@ -17,7 +17,7 @@ _SIDE_BY_SIDE = 64
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Motion:
+class JointMotion:
     """What the checks look at.
 
     Attributes:
@@ -40,7 +40,7 @@ class Motion:
     fineness: FloatArray
 
     @classmethod
-    def of(cls, log: JointLog, q: FloatArray, turning: NDArray[np.bool_]) -> Motion:
+    def of(cls, log: JointLog, q: FloatArray, turning: NDArray[np.bool_]) -> JointMotion:
         """Return the motion of a log from its repolarized values, and which of its joints turn."""
         inner = largest_steps(q[1:-1]) if len(q) > 3 else np.zeros(q.shape[1])
         units = tuple("rad" if turns else "m" for turns in turning)
