@@ -18,7 +18,7 @@ FAR = 5.0
 """An outlying end is further off than so many times the largest step between the other rows."""
 
 LEAST_STEP = 0.01
-"""A step below this in [rad] or [m] makes no outlier."""
+"""A step below this in [rad] or [m], beside that of the number format, makes no outlier."""
 
 HARDEST_STOP = 100.0
 """Acceleration in [rad/s2] or [m/s2] that no joint of an arm reaches: a smaller one may be a hard start."""
@@ -89,7 +89,7 @@ def outlying_ends(motion: JointMotion) -> NDArray[np.int64]:
     found = [np.empty((0, 2), dtype=np.int64)]
     for row, beside in motion.ends if len(q) >= LEAST_ROWS else ():
         dt = max(abs(int(t_ns[row]) - int(t_ns[beside])) / 1e9, motion.period)
-        least = np.maximum(FAR * motion.inner, max(LEAST_STEP, HARDEST_STOP * dt**2))
+        least = np.maximum(LEAST_STEP + motion.fineness, np.maximum(FAR * motion.inner, HARDEST_STOP * dt**2))
         joints = np.flatnonzero(np.abs(q[row] - q[beside]) > least)  # never where values are missing: NaN
         found.append(np.column_stack((np.full(len(joints), row), joints)))
     return np.concatenate(found)

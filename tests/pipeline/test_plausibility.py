@@ -154,9 +154,16 @@ def noisy_rest() -> tuple[FloatArray, FloatArray]:
     return q, clock(1000, 0.001)
 
 
+def first_digit() -> tuple[FloatArray, FloatArray]:
+    """A joint that creeps, in a format of two decimals: its last digit changes once, at the start."""
+    q = np.full((200, 2), 0.02)
+    q[0, 0] = 0.01
+    return q, clock(200, 0.001)
+
+
 NO_OUTLIERS = [
     swing, transient, stop_at_one_hertz, late_second_row, jumps_everywhere, too_short, first_value_missing,
-    noisy_rest,
+    noisy_rest, first_digit,
 ]  # fmt: skip
 
 
@@ -377,6 +384,40 @@ SLOW_ENOUGH = [wraps, hurrying_clock, tenths_of_degrees, four_digits, noise, gap
 @pytest.mark.parametrize("make", SLOW_ENOUGH)
 def test_what_is_no_impossible_speed(make: Callable[[], dict[str, Any]]) -> None:
     assert found(**make()) == []
+
+
+# Sound logs at random
+
+FORMATS: list[tuple[str, Callable[[FloatArray], FloatArray]]] = [
+    ("rad", lambda q: q),
+    ("rad", lambda q: np.round(q, 2)),
+    ("deg", lambda q: np.radians(np.round(np.degrees(q), 0))),
+    ("rad", lambda q: q + np.random.default_rng(5).normal(0.0, 1e-3, q.shape)),
+]
+
+
+@pytest.mark.parametrize(("unit", "rounded"), FORMATS, ids=["exact", "2 decimals", "whole degrees", "noise"])
+@pytest.mark.parametrize("spoiled", ["even", "jitter", "lost rows", "lost values", "wrapped"])
+def test_nothing_is_said_of_sound_logs(
+    unit: str, rounded: Callable[[FloatArray], FloatArray], spoiled: str
+) -> None:
+    rng = np.random.default_rng(6)
+    for period in (0.001, 0.005, 0.05, 0.2):
+        t = clock(int(rng.integers(20, 2000)), period)
+        joints = int(rng.integers(1, 8))
+        swings = np.sin(np.outer(t, rng.uniform(0.1, 1.9, joints)) + rng.uniform(0.0, 6.0, joints))
+        q = swings * rng.uniform(0.2, 1.0, joints)  # up to 1.9 rad/s
+        if spoiled == "wrapped":
+            q = np.mod(q + 3.0 + np.pi, 2.0 * np.pi) - np.pi
+        q = rounded(q)
+        if spoiled == "jitter":
+            t = t + rng.uniform(0.0, 0.9 * period, len(t))
+        elif spoiled == "lost rows":
+            kept = np.sort(rng.choice(len(t), len(t) * 9 // 10, replace=False))
+            t, q = t[kept], q[kept]
+        elif spoiled == "lost values":
+            q = np.where(rng.random(q.shape) < 0.05, np.nan, q)
+        assert found(q, t, arm(joints, velocity=2.2), unit=unit) == []
 
 
 # Real logs, and the whole way
