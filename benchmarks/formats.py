@@ -11,6 +11,7 @@ import sys
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from multiprocessing import get_context
 from pathlib import Path
 
 import numpy as np
@@ -148,10 +149,19 @@ def ingest(log: Path, output: Path, options: Sequence[str]) -> list[str]:
     return [*urmpipe, str(log), "--robot", "urm6", "-q", "-o", str(output), *options]
 
 
+def write_apart(one: Format, path: Path, rows: int) -> None:
+    """Write a log in a process of its own: the memory of this one would count for those that it starts."""
+    process = get_context("fork").Process(target=lambda: one.write(path, *motion(rows)))
+    process.start()
+    process.join()
+    if process.exitcode:
+        raise RuntimeError(f"{path} was not written")
+
+
 def refusal(one: Format, folder: Path) -> str | None:
     """Return the first line of what urmpipe says where it refuses a format, seen on a short log."""
     log, output = folder / f"short{one.suffix}", folder / "short.rrd"
-    one.write(log, *motion(100))
+    write_apart(one, log, 100)
     done = subprocess.run(ingest(log, output, one.options), capture_output=True, text=True, check=False)
     log.unlink()
     output.unlink(missing_ok=True)
@@ -161,8 +171,8 @@ def refusal(one: Format, folder: Path) -> str | None:
 def measure(name: str, one: Format, rows: int, count: int, folder: Path) -> dict[str, list[Usage]]:
     """Return what the plain file and the same numbers in a format take, in turn."""
     plain, log, output = folder / "plain.csv", folder / f"log{one.suffix}", folder / "log.rrd"
-    PLAIN.write(plain, *motion(rows))
-    one.write(log, *motion(rows))
+    write_apart(PLAIN, plain, rows)
+    write_apart(one, log, rows)
     commands = {"plain comma": ingest(plain, output, ()), name: ingest(log, output, one.options)}
     try:
         return rounds(commands, count, outputs=(output,))
