@@ -81,16 +81,46 @@ def _smoothed(q: FloatArray, tsp: float) -> tuple[FloatArray, FloatArray]:
 
     The first and the last half window share the cubic of the first and the last whole one.
     """
-    from scipy.ndimage import maximum_filter1d
-    from scipy.signal import savgol_filter
-
-    window = min(WINDOW, len(q) - 1 + len(q) % 2)
-    missing, half = np.isnan(q), window // 2
-    incomplete = maximum_filter1d(missing.astype(np.uint8), window, axis=0) > 0
-    incomplete[:half], incomplete[-half:] = missing[:window].any(axis=0), missing[-window:].any(axis=0)
-    whole = np.where(missing, 0.0, q)  # the fit at the ends refuses NaN
-    qd, qdd = (
-        np.where(incomplete, np.nan, savgol_filter(whole, window, POLYNOMIAL, deriv=k, delta=tsp, axis=0))
-        for k in (1, 2)
-    )
+    half = (min(WINDOW, len(q)) - 1) // 2
+    x = np.linspace(-1.0, 1.0, 2 * half + 1)
+    powers = np.vander(x, POLYNOMIAL + 1, increasing=True)
+    fit = np.asarray(np.linalg.pinv(powers), dtype=np.float64)  # from samples to coefficients
+    qd, qdd = np.empty_like(q), np.empty_like(q)
+    for block in row_blocks(len(q) - 2 * half):
+        window = q[block.start : block.stop + 2 * half]
+        _fit_middles(window, fit, qd[half:-half][block], qdd[half:-half][block])
+    ends = ((slice(half), q[: 2 * half + 1], x[:half]), (slice(-half, None), q[-2 * half - 1 :], x[-half:]))
+    for end, samples, side in ends:
+        _, c1, c2, c3 = fit @ samples
+        at = side[:, None]
+        qd[end] = c1 + 2.0 * c2 * at + 3.0 * c3 * at**2
+        qdd[end] = 2.0 * c2 + 6.0 * c3 * at
+    qd *= 1.0 / (half * tsp)
+    qdd *= 1.0 / (half * tsp) ** 2
     return qd, qdd
+
+
+def _fit_middles(q: FloatArray, fit: FloatArray, first: FloatArray, second: FloatArray) -> None:
+    """Fill in the derivatives of the cubic in the middle of each window, over x.
+
+    Samples before and after the middle weigh the same, with opposite sign in the first derivative.
+
+    Args:
+        q: Samples, shape (m + 2 half, joints).
+        fit: From the samples of a window to the coefficients of the cubic, shape (4, 2 half + 1).
+        first: First derivatives, shape (m, joints).
+        second: Second derivatives, shape (m, joints).
+    """
+    count, half = len(first), fit.shape[1] // 2
+    middle = q[half : half + count]
+    np.multiply(middle, 0.0, out=first)  # which is NaN where the middle is missing
+    np.multiply(middle, 2.0 * fit[2, half], out=second)
+    pair = np.empty_like(first)
+    for k in range(1, half + 1):
+        before, after = q[half - k : half - k + count], q[half + k : half + k + count]
+        np.subtract(after, before, out=pair)
+        pair *= fit[1, half + k]
+        first += pair
+        np.add(after, before, out=pair)
+        pair *= 2.0 * fit[2, half + k]
+        second += pair

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
@@ -16,6 +17,7 @@ from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
 from urmpipe_pipeline.derivatives import Method, derivatives, recorded_agree
 from urmpipe_pipeline.grid import Grid, make_grid
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning, seconds
+from urmpipe_pipeline.plausibility import implausible
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.results import Repolarization, Run
@@ -76,6 +78,9 @@ def ingest_log(
     warnings = [*log.warnings, *far_from_recorded(robot, log)]
     fixed, audit = _repolarized(log, robot)
     warnings += _unexplained(log, fixed)
+    timed = options.period is not None or any(column.role == "time" for column in log.columns)
+    turning = _turning(log, robot)
+    warnings += implausible(log, fixed.q, robot, turning, fixed.unexplained, timed=timed)
     grid = make_grid(log, tsp)
     warnings += grid.warnings
     q = grid.resample(fixed.q)
@@ -117,7 +122,7 @@ def _given(options: ReadOptions) -> dict[str, Any] | None:
 
 def _repolarized(log: JointLog, robot: Chain | None) -> tuple[Repolarized, list[Repolarization]]:
     """Repolarize the joints that turn, on the file's own rows; joint indices are those of the log."""
-    turning = np.array([_turns(log, robot, j) for j in range(len(log.joints))], dtype=np.bool_)
+    turning = _turning(log, robot)
     dt = seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
     limits = np.inf if robot is None else np.array([joint.velocity for joint in robot.moving])[turning]
     if turning.all():
@@ -129,6 +134,11 @@ def _repolarized(log: JointLog, robot: Chain | None) -> tuple[Repolarized, list[
         q[:, which], unexplained[:, 1] = part.q, which[part.unexplained[:, 1]]
         fixed = part._replace(q=q, joints=which[part.joints], unexplained=unexplained)
     return fixed, _audit(log, fixed)
+
+
+def _turning(log: JointLog, robot: Chain | None) -> NDArray[np.bool_]:
+    """Tell which joints turn, shape (joints,)."""
+    return np.array([_turns(log, robot, j) for j in range(len(log.joints))], dtype=np.bool_)
 
 
 def _turns(log: JointLog, robot: Chain | None, joint: int) -> bool:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.signal import savgol_filter
 
 from urmpipe_pipeline.derivatives import WINDOW, Method, derivatives, recorded_agree
 
@@ -36,6 +37,16 @@ def test_four_digit_angles_need_smoothing() -> None:
     inner = slice(WINDOW, -WINDOW)
     assert np.abs(rough - exact)[inner].max() > 10.0
     assert np.abs(smooth - exact)[inner].max() < 1.0
+
+
+@pytest.mark.parametrize("count", [5, 6, 30, 31, 32, 400, 16_500])
+def test_smoothing_is_that_of_savitzky_and_golay(count: int) -> None:
+    q = np.random.default_rng(count).normal(size=(count, 3))
+    window = min(WINDOW, count - 1 + count % 2)
+    for k, got in enumerate(derivatives(q, TSP, "savgol"), start=1):
+        expected = savgol_filter(q, window, 3, deriv=k, delta=TSP, axis=0)
+        # 31 products, each rounded at 1e-16 of the largest value, and the fit's condition of 1e2
+        np.testing.assert_allclose(got, expected, rtol=0.0, atol=1e-12 * np.abs(expected).max())
 
 
 def test_a_missing_sample_leaves_only_its_neighbours_without_a_derivative() -> None:

@@ -17,6 +17,9 @@ from urmpipe_pipeline.sources.sniff import Layout
 Bytes = NDArray[np.uint8]
 
 _NEWLINES = b"\n\r"
+_RUNS = (b"\t", b"  ", b" \n", b" \r", b"\n ", b"\r ")
+"""None of these is in lines that are parted by single spaces already."""
+
 _TO_POINTS = bytes.maketrans(b",.", b".~")
 
 
@@ -108,6 +111,8 @@ def squeeze(block: bytes) -> bytes:
     Args:
         block: Whole lines.
     """
+    if not any(run in block for run in _RUNS) and block[:1] != b" " != block[-1:]:
+        return block
     signs: Bytes = np.frombuffer(block, dtype=np.uint8)
     blank = (signs == ord(" ")) | (signs == ord("\t"))
     skipped = np.zeros_like(blank)

@@ -1,0 +1,118 @@
+"""docs/logs.md against the code: one table has every kind of warning and of error."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Iterator
+from fnmatch import fnmatch
+from pathlib import Path
+
+import pytest
+
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.errors import UrmpipeError
+from urmpipe_pipeline.ingest import ingest_log
+
+ROOT = Path(__file__).parents[2]
+PAGE = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
+
+
+def table() -> dict[str, tuple[str, str, str]]:
+    """Return what each kind means, error or warning, and what to do."""
+    lines = PAGE.split("\n## What is checked\n")[1].splitlines()
+    rows = [[cell.strip() for cell in line.strip("|").split("|")] for line in lines if line.startswith("|")]
+    assert rows[0] == ["kind", "what it means", "", "what to do"]
+    found: dict[str, tuple[str, str, str]] = {}
+    for names, meaning, severity, remedy in rows[2:]:
+        for name in names.split(", "):
+            assert name.strip("`") not in found
+            found[name.strip("`")] = meaning, severity, remedy
+            assert (severity == "warning") == name.startswith("`")
+    return found
+
+
+ROWS = table()
+WARNINGS = {kind for kind, (_, severity, _) in ROWS.items() if severity == "warning"}
+ERRORS = {kind for kind, (_, severity, _) in ROWS.items() if severity == "error"}
+
+
+def test_each_row_is_an_error_or_a_warning_and_says_what_to_do() -> None:
+    assert ROWS.keys() == WARNINGS | ERRORS
+    assert all(meaning and remedy for meaning, _, remedy in ROWS.values())
+
+
+def kinds(path: Path) -> Iterator[str]:
+    """Yield the kinds of the warnings that a module makes; an f-string's unknown parts are stars."""
+    tree = ast.parse(path.read_text(encoding="utf-8"))
+    constants = {
+        target.id: node.value
+        for node in tree.body
+        if isinstance(node, ast.Assign)
+        for target in node.targets
+        if isinstance(target, ast.Name)
+    }
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "LogWarning":
+            named = [keyword.value for keyword in node.keywords if keyword.arg == "kind"]
+            for kind in (*node.args[:1], *named):
+                yield from texts(constants.get(kind.id, kind) if isinstance(kind, ast.Name) else kind)
+
+
+def texts(kind: ast.expr) -> Iterator[str]:
+    """Yield the texts that an expression may be."""
+    match kind:
+        case ast.Constant(value=str(text)):
+            yield text
+        case ast.IfExp(body=body, orelse=orelse):
+            yield from (*texts(body), *texts(orelse))
+        case ast.JoinedStr(values=parts):
+            yield "".join(str(part.value) if isinstance(part, ast.Constant) else "*" for part in parts)
+        case _:
+            raise AssertionError(f"line {kind.lineno}: the kind of a warning stands where it is made")
+
+
+MADE = {kind for path in sorted((ROOT / "pipeline").rglob("*.py")) for kind in kinds(path)}
+
+
+def test_each_kind_of_warning_has_its_row() -> None:
+    assert [kind for kind in sorted(MADE) if not any(fnmatch(row, kind) for row in WARNINGS)] == []
+
+
+def test_each_row_of_a_warning_has_its_code() -> None:
+    assert [row for row in sorted(WARNINGS) if not any(fnmatch(row, kind) for kind in MADE)] == []
+
+
+SPECIMENS = {
+    "no log": "",
+    "no rows": "t,q1,q2\n",
+    "ragged header": "t,q1\n0,1,2\n0.1,2,3\n",
+    "ragged row": "t,q1,q2\n0,1,2\n0.1,1\n0.2,1,2\n",
+    "stray text": "t,q1,q2\n0,1,2\n0.1,1,2\n0.2,x,2\n0.3,1,2\n",
+    "time out of order": "t,q1,q2\n0,1,2\n0.1,1,2\n0.05,1,2\n0.2,1,2\n",
+    "infinite value": "t,q1,q2\n0,1,2\n0.1,inf,2\n0.2,1,2\n",
+    "empty column": "t,q1,q2\n0,1,\n0.1,1,\n",
+    "same name twice": "t,q1,q1\n0,1,2\n0.1,1,2\n",
+    "no joints": "t,a,b\n0,1,2\n0.1,1,2\n",
+    "unknown unit": "t,q1 [furlong],q2 [furlong]\n0,1,2\n0.1,1,2\n",
+    "unclear unit": "t,q1,q2\n0,1,200\n0.1,1,201\n",
+}
+
+
+def test_each_error_of_the_table_has_a_specimen() -> None:
+    assert SPECIMENS.keys() == ERRORS
+
+
+@pytest.mark.parametrize("kind", SPECIMENS)
+def test_an_error_stops(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text(SPECIMENS[kind], encoding="utf-8")
+    with pytest.raises(UrmpipeError) as error:
+        ingest_log([path])
+    assert all("found" in finding.message for finding in error.value.findings)
+
+
+def test_a_log_of_another_number_of_joints_stops(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,q1,q2\n0,1,2\n0.1,1,2\n", encoding="utf-8")
+    with pytest.raises(UrmpipeError, match="found 2 joint columns"):
+        ingest_log([path], robot=load_robot("ur5e"))
