@@ -18,6 +18,7 @@ class ReadOptions:
         joints: Names or numbers (from 1) of the joint columns, in the robot's order.
         units: Unit of a column by its name or number; by "" that of all joint columns that turn.
         period: Time between rows in [s], of a log without a time column.
+        skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
     """
 
     source: str | None = None
@@ -27,3 +28,4 @@ class ReadOptions:
     joints: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     period: float | None = None
+    skip_bad: bool = False

@@ -54,7 +54,7 @@ def read_log(
     with ThreadPoolExecutor(max_workers=1) as beside:
         hashed = [beside.submit(fingerprint, file) for file in files]
         plan = make_plan(tables, options, robot)
-        content = read_content(plan)
+        content = read_content(plan, skip_bad=options.skip_bad)
         log = _joint_log(plan, content, options, robot, files, [future.result() for future in hashed])
     release_memory()
     return log
@@ -116,7 +116,7 @@ def _joint_log(
             *finder.inferences,
             *_about_digits(digits),
         ),
-        warnings=(*clock.warnings, *noticed, *finder.warnings, *missing, *gaps(t_ns)),
+        warnings=(*content.warnings, *clock.warnings, *noticed, *finder.warnings, *missing, *gaps(t_ns)),
     )
 
 
