@@ -56,7 +56,7 @@ def sniff_arrays(segment: Segment, delimiter: str | None = None, decimal: str | 
     form = replace(form, delimiter=outer.delimiter, decimal=outer.decimal, names=outer.names)
     values = _values(form, [row for row in rows if row.number >= outer.first_line])
     lengths = tuple(_length([row[j] for row in values]) for j in range(len(outer.names)))
-    if not any(_is_numeric(value) for row in values for value in row):
+    if not any(lengths):
         return None
     _refuse_commas(segment, form, rows)
     return _spread(outer, replace(form, lengths=lengths), values)

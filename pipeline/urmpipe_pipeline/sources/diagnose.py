@@ -84,6 +84,7 @@ class CarefulReader:
         self._next_line = layout.first_line
         self._line = 0
         self._row = 0
+        self._in_conflict = False
         self._other_side = False
         self._ended = False
         self._wanted = (*columns, *(part.column for part in clock))
@@ -145,9 +146,10 @@ class CarefulReader:
 
     def _mark(self, text: str) -> None:
         """Report a merge conflict once, at its first mark; what was merged in is not read."""
-        if not self._other_side and text[0] in "<=":
+        if text[0] == "<" or (text[0] == "=" and not self._in_conflict):
             side = "the rows of one side, without the marks of git"
             self._report(f"found {_shown(text)}, a merge conflict, allowed: {side}", lasting=True)
+        self._in_conflict = text[0] != ">"
         self._other_side = text[0] in "|="
 
     def _values(self, cells: Sequence[str]) -> list[float]:

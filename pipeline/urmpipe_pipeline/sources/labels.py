@@ -87,7 +87,7 @@ def _layout(segment: Segment, rows: Sequence[HeadLine], labels: tuple[str, ...],
     )
     plain = [value for row in values for value in row if isinstance(value, str)]
     decimal = "," if any(is_number(v, ",") and not is_number(v, ".") for v in plain) else "."
-    form = replace(form, lengths=lengths, decimal=decimal)
+    form = replace(form, lengths=lengths, decimal=decimal, opening=opening if any(lengths) else "")
     sample = []
     for row in values:
         try:

@@ -283,8 +283,11 @@ def _names(
         return (*cells, ""), Inference("header", f"line {line}", "each row ends with a delimiter")
     if len(cells) == width - 1 and count_up([row[0] for row in full]):
         return ("", *cells), Inference("header", f"line {line}", "the first column is an unnamed index")
-    found_text = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column"
-    raise LogError(Finding(found_text, file=str(segment.path), line=line))
+    number = abs(len(cells) - width)
+    remedy = f"{'add' if len(cells) < width else 'take out'} {number} name{'s' if number > 1 else ''}"
+    found_text = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column; {remedy}"
+    without = f"or delete line {line}: without names the columns are taken as joints in order"
+    raise LogError(Finding(f"{found_text}, {without}", file=str(segment.path), line=line))
 
 
 def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[int], width: int) -> None:
