@@ -118,7 +118,7 @@ class Form:
             return [self._value(part) for part in self._labelled(text)]
         arrays = iter(self.arrays(text))
         cells = split_line(self.replaced(text, lambda _: _MARK), self.delimiter)
-        whole = (re.sub(_MARK, lambda _: next(arrays), cell) for cell in cells)
+        whole = (re.sub(_MARK, lambda _: next(arrays, _MARK), cell) for cell in cells)
         return [self._value(cell) for cell in whole]
 
     def arrays(self, text: str) -> list[str]:
@@ -141,13 +141,15 @@ class Form:
         for value, length, name in zip(values, self.lengths, self.names, strict=True):
             if isinstance(value, str) and length and not is_missing(value):
                 raise RowError(f"found {_shown(value)}, allowed: an array of {length} numbers", name)
-            if isinstance(value, list) and len(value) != (length or 1):
-                allowed = f"{length}, as in the other rows" if length else "a number"
+            if isinstance(value, list) and length and len(value) != length:
+                allowed = f"{length}, as in the other rows"
                 raise RowError(f"found an array of {len(value)} numbers, allowed: {allowed}", name)
             if isinstance(value, str):
                 cells += [value] * max(length, 1)
-            else:
+            elif length:
                 cells += [cell.replace(".", self.decimal) for cell in value]
+            else:  # a plain cell that looks like an array
+                cells.append(self.opening + " ".join(value) + CLOSING[self.opening])
         return cells
 
     def flat(self, block: bytes, encoding: str) -> tuple[bytes, int]:

@@ -92,6 +92,22 @@ def test_matrices_are_flat_and_no_joints(tmp_path: Path) -> None:
     assert found(log, "arrays") == "q (7), pose (16)"
 
 
+def test_plain_cells_that_look_like_arrays(read: Read, wrong: Wrong) -> None:
+    text = 't,q,note\n0,"[1 2]",\n0.1,"[3 4]","[by hand]"\n0.2,"[5 6]",end\n'
+    assert read(text).q.tolist() == [[1, 2], [3, 4], [5, 6]]
+    assert wrong('t,q,qd_1,qd_2\n0,"[1 2]",1,1\n0.1,"[3 4]",1,[1]\n0.2,"[5 6]",1,1\n') == [
+        "log.csv:3, column qd_2: found '[1]', allowed: a number,"
+        " or an empty, Null or NaN cell where a sample is missing"
+    ]
+
+
+def test_control_signs_beyond_the_head(read: Read, wrong: Wrong) -> None:
+    lines = [f"{0.1 * k:.1f},[1 {k % 3}]" for k in range(9000)]
+    lines[8000] = "800.0,\x01"
+    said = "found '\\x01', allowed: an array of 2 numbers"
+    assert wrong("\n".join(["t,q", *lines]))[0] == f"log.csv:8002, column q: {said}"
+
+
 def test_missing_samples_in_arrays(read: Read) -> None:
     log = read('t,q\n0,"[1. nan]"\n0.1,"[2. 3.]"\n0.2,\n0.3,"[None, 4]"\n')
     np.testing.assert_array_equal(log.q, [[1, np.nan], [2, 3], [np.nan, np.nan], [np.nan, 4]])
