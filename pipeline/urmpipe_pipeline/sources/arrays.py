@@ -20,7 +20,7 @@ _PLAIN = "7"
 
 _STARTS = {
     opening: re.compile(
-        rf'(?:^|[,;|\t ])"?(?:\w*\.?(?:array|tensor)\()?{re.escape(opening)}+\s*(?:[-+.\d]|nan|\w+\.)',
+        rf'(?:^|[,;|\t ])"?{re.escape(opening)}+\s*(?:[-+.\d]|nan|\w+\.)',
         re.IGNORECASE,
     )
     for opening in CLOSING

@@ -28,7 +28,7 @@ CLOSING = {"[": "]", "(": ")"}
 CONFLICT_MARK = re.compile(r"^(?:(?:<{7}|>{7}|\|{7}) |={7}\s*$)", re.MULTILINE)
 """What git leaves in a file whose versions it could not merge."""
 
-_WORDS = re.compile(r"(?:\b\w+\.)?\b(?:array|tensor|float\d+|int\d+)(?=[(\[])|,\s*dtype=[\w.]+")
+_WORDS = re.compile(r"\b(?:\w+\.)?(?:float|int)\d+(?=\()")
 _INNER = re.compile(r"[^\s,;\[\]()]+")
 _SHOWN = 40
 _MARK = "\x01"
@@ -69,7 +69,7 @@ class Form:
         decimal: Decimal sign of the plain values; inside brackets it is always a point.
         opening: The bracket that arrays begin with, empty if there are none.
         continued: Whether arrays go on in a next line, which then begins with a blank.
-        words: What programs write around arrays, such as np.float64: it is left out.
+        words: What programs write around the numbers of arrays, such as np.float64: it is left out.
         labels: What stands before each value, in the order of the row; none in a plain table.
         tail: What ends each row behind its last value.
     """
@@ -253,7 +253,7 @@ class Form:
 
 
 def words_around(texts: Iterable[str]) -> tuple[str, ...]:
-    """Return what programs write around arrays in some rows, such as np.float64 and array."""
+    """Return what programs write around the numbers of arrays, such as np.float64."""
     return tuple(sorted({word for text in texts for word in _WORDS.findall(text)}, key=len, reverse=True))
 
 
