@@ -156,6 +156,7 @@ def log_options(command: Command) -> Command:
     """Add the options of every command that takes a log."""
     for option in (
         click.option("--strict", is_flag=True, help="Warnings are errors (exit 2)."),
+        click.option("--skip-bad", is_flag=True, help="Leave out rows that cannot be read, up to 1 %."),
         click.option(
             "--derivative",
             type=click.Choice(["central", "savgol"]),

@@ -165,7 +165,7 @@ class JointLog:
 
     @property
     def rows(self) -> int:
-        """Number of rows read."""
+        """Number of rows read; rows that were left out count nowhere."""
         return len(self.t_ns)
 
     @property

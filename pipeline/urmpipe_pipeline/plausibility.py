@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from urmpipe_models.chain import Chain
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning
 from urmpipe_pipeline.joint_motion import JointMotion, over_rows
-from urmpipe_pipeline.sources.units import FASTEST
+from urmpipe_pipeline.sources.unit_evidence import FASTEST
 
 FAR = 5.0
 """An outlying end is further off than so many times the largest step between the other rows."""

@@ -64,6 +64,25 @@ def test_without_a_robot_it_says_so(urmpipe: RunCommand) -> None:
     assert "no kinematics" in ran.out
 
 
+def test_rows_that_cannot_be_read_are_left_out_if_asked_for(urmpipe: RunCommand, tmp_path: Path) -> None:
+    lines = MATLAB.read_text().splitlines(keepends=True)
+    lines[1000] = "torn\n"
+    (tmp_path / "log.csv").write_text("".join(lines))
+    ran = urmpipe("ingest", "log.csv", "--robot", "urm6", "--json")
+    assert ran.code == 2
+    assert [error["message"] for error in json.loads(ran.out)["errors"]] == [
+        "found 1 cell ('torn'), allowed: 7",
+        "1 of 7383 rows cannot be read; --skip-bad leaves them out",
+    ]
+    ran = urmpipe("ingest", "log.csv", "--robot", "urm6", "--json", "--skip-bad")
+    assert ran.code == 0
+    answer = json.loads(ran.out)
+    assert answer["samples"] == 7382
+    skipped = [(w["row"], w["message"]) for w in answer["warnings"] if w["kind"] == "skipped-row"]
+    said = "data row 1000 of the file is left out: found 1 cell ('torn'), allowed: 7"
+    assert skipped == [(1000, said)]
+
+
 def test_strict_makes_a_warning_an_error_and_writes_nothing(urmpipe: RunCommand, tmp_path: Path) -> None:
     ran = urmpipe("ingest", MATLAB, "--robot", "urm6", "--strict")
     assert ran.code == 2

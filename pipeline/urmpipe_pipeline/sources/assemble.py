@@ -109,6 +109,7 @@ def assemble(
             *_about_digits(digits),
         ),
         warnings=(
+            *content.warnings,
             *plan.clocks[plan.main].warnings,
             *noticed,
             *finder.warnings,

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from decimal import Decimal
 
 import numpy as np
@@ -17,6 +18,15 @@ from urmpipe_pipeline.sources.table import NO_TIME, REPORTED, Numbers
 GAP = 3.0
 """Times the median period: more than this between two rows is a gap."""
 
+FAR_BACK = 10.0
+"""Median periods: a clock that falls back by more, to about its first time, begins again."""
+
+SKIPPED = "skipped-row"
+"""The kind of the warnings about rows that were left out; their row is the one read in their place."""
+
+MOST_SKIPPED = 0.01
+"""Share of the rows that may be left out because they cannot be read."""
+
 SHOWN_GAPS = 10
 """Gaps that are told one by one; the others are counted."""
 
@@ -30,8 +40,41 @@ def trimmed(numbers: Numbers) -> Numbers:
         end -= 1
     if end == len(numbers.clock):
         return numbers
-    lines = None if numbers.lines is None else numbers.lines[:end]
-    return Numbers(numbers.values[:end], numbers.clock[:end], numbers.findings, numbers.wrong, lines)
+    return replace(numbers, values=numbers.values[:end], clock=numbers.clock[:end])
+
+
+def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
+    """Return the numbers without the rows that could not be read, and a warning for each of these.
+
+    Args:
+        numbers: What was read, `may_skip` it.
+    """
+    if not numbers.unread:
+        return numbers, []
+    rows = np.delete(np.arange(len(numbers.values)), sorted(numbers.unread))
+    clock = None if numbers.clock is None else numbers.clock[rows]
+    read = replace(
+        numbers,
+        values=numbers.values[rows],
+        clock=clock,
+        findings=numbers.lasting,
+        wrong=len(numbers.lasting),
+        rows=rows + 1,
+    )
+    shown = sorted(numbers.unread.items())[:SHOWN_FINDINGS]
+    warnings = [
+        LogWarning(SKIPPED, f"data row {row + 1} of the file is left out: {said}", row - k + 1)
+        for k, (row, said) in enumerate(shown)
+    ]
+    if len(numbers.unread) > len(shown):
+        more = len(numbers.unread) - len(shown)
+        warnings.append(LogWarning(SKIPPED, f"{more} more rows are left out"))
+    return read, warnings
+
+
+def may_skip(numbers: Numbers) -> bool:
+    """Return whether so few rows could not be read that they may be left out."""
+    return 0 < len(numbers.unread) <= MOST_SKIPPED * len(numbers.values)
 
 
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
@@ -53,9 +96,11 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
         total += len(rows)
         wrong += rows
     wrong = sorted(wrong)[:SHOWN_FINDINGS]
-    line_of = _line_finder(layout, numbers, [row for row, _, _ in wrong])
+    rows_in_file = [numbers.file_row(row) for row, _, _ in wrong]
+    lines = lines_of_rows(layout, rows_in_file) if wrong else {}
     file = str(layout.segment.path)
-    findings = [*numbers.findings, *(Finding(m, file, line_of(row), row, c) for row, c, m in wrong)]
+    about = zip(wrong, rows_in_file, strict=True)
+    findings = [*numbers.findings, *(Finding(m, file, lines.get(row), row, c) for (_, c, m), row in about)]
     findings = sorted(findings, key=lambda finding: finding.line or 0)[:SHOWN_FINDINGS]
     if total > len(findings):
         findings.append(Finding(f"{total - len(findings)} more findings", file=file))
@@ -97,7 +142,7 @@ def refuse_empty(values: FloatArray, names: Sequence[str], file: str) -> None:
 def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, str]]:
     """Yield row, column and message where the time is missing, repeated or runs backwards."""
     times = numbers.clock
-    if times is None or not clock.columns:
+    if times is None or not len(times) or not clock.columns:
         return
     name = clock.columns[0].header
     if times.min() > REPORTED and (np.diff(times) > 0).all():
@@ -106,10 +151,22 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
         yield index + 1, name, "found no time, allowed: a time in every row"
     valid = np.flatnonzero(times > REPORTED)
     steps = np.diff(times[valid])
+    begins = _second_logs(times[valid], steps)
     for k in np.flatnonzero(steps <= 0).tolist():
         now, before = (_shown(int(times[valid[i]]), clock.unit) for i in (k + 1, k))
         found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
-        yield int(valid[k + 1]) + 1, name, f"{found}, allowed: times that increase from row to row"
+        again = ": a second log begins here, from about the same time" if k in begins else ""
+        yield int(valid[k + 1]) + 1, name, f"{found}, allowed: times that increase from row to row{again}"
+
+
+def _second_logs(times: IntArray, steps: IntArray) -> set[int]:
+    """Return the steps back to about the first time, after which the times go on: two logs in one file."""
+    if len(steps) < 3:
+        return set()
+    period = np.median(np.abs(steps))
+    far, near = steps < -FAR_BACK * period, np.abs(times[1:] - times[0]) <= GAP * period
+    goes_on = np.append(steps[1:] > 0, False)
+    return set(np.flatnonzero(far & near & goes_on).tolist())
 
 
 def _infinities(numbers: Numbers, names: Sequence[str]) -> Iterable[tuple[int, str, str]]:
@@ -129,14 +186,6 @@ def _shown(nanoseconds: int, unit: str) -> str:
     """Return a time in the file's own unit."""
     value = Decimal(nanoseconds).scaleb(-EXPONENTS[unit]).normalize()
     return f"{value:f} {unit}"
-
-
-def _line_finder(layout: Layout, numbers: Numbers, rows: Sequence[int]) -> Callable[[int], int | None]:
-    """Return the function from row to line, both from 1."""
-    if numbers.lines is not None:
-        lines = numbers.lines
-        return lambda row: int(lines[row - 1])
-    return (lines_of_rows(layout, rows) if rows else {}).get
 
 
 def gaps(t_ns: IntArray) -> list[LogWarning]:

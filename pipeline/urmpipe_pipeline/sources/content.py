@@ -8,10 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray
-from urmpipe_pipeline.sources.checks import find_errors, trimmed
+from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
+from urmpipe_pipeline.sources.blockwise import read_blockwise
+from urmpipe_pipeline.sources.checks import MOST_SKIPPED, find_errors, may_skip, trimmed, without_unread
 from urmpipe_pipeline.sources.columns import Column
-from urmpipe_pipeline.sources.diagnose import lines_of_rows, read_carefully
+from urmpipe_pipeline.sources.diagnose import lines_of_rows
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.roles import Roles
 from urmpipe_pipeline.sources.sniff import Layout
@@ -30,6 +31,7 @@ class Content:
         rows: How many rows there are.
         roles: The columns, without those that could not be joined.
         inferences: What was found out while joining.
+        warnings: What was left out while reading.
     """
 
     columns: Mapping[int, tuple[Column, ...]]
@@ -38,6 +40,7 @@ class Content:
     rows: int
     roles: Roles
     inferences: tuple[Inference, ...]
+    warnings: tuple[LogWarning, ...]
 
     @property
     def timed(self) -> bool:
@@ -57,34 +60,59 @@ class Content:
         return self.numbers[column.table].values[:, self.columns[column.table].index(column)]
 
 
-def read_content(plan: Plan) -> Content:
+def read_content(plan: Plan, *, skip_bad: bool = False) -> Content:
     """Return the numbers that a plan asks for.
+
+    Args:
+        plan: What is to be read.
+        skip_bad: Leave out rows that cannot be read, if they are few.
 
     Raises:
         LogError: With everything that is wrong with rows, cells and times of all tables, or if the files
             of one log differ in their times.
     """
     columns = {t: tuple(c for c in plan.roles.columns if c.table == t) for t in plan.used}
-    read = for_all(plan.used, lambda table: _numbers(plan, table, columns[table]))
-    numbers = dict(zip(plan.used, read, strict=True))
+    read = for_all(plan.used, lambda table: _numbers(plan, table, columns[table], skip_bad))
+    numbers = {table: found for table, (found, _) in zip(plan.used, read, strict=True)}
+    warnings = tuple(warning for _, noticed in read for warning in noticed)
     roles, said = _joined(plan, numbers)
     main = numbers[plan.main]
-    return Content(columns, numbers, main.clock, len(main.values), roles, said)
+    return Content(columns, numbers, main.clock, len(main.values), roles, said, warnings)
 
 
-def _numbers(plan: Plan, table: int, columns: Sequence[Column]) -> Numbers:
-    """Return the numbers of one table; raise what is wrong with them."""
+def _numbers(
+    plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool
+) -> tuple[Numbers, list[LogWarning]]:
+    """Return the numbers of one table, and what was left out; raise what is wrong with them."""
     layout, clock = plan.tables.layouts[table], plan.clocks[table]
     places = [column.index for column in columns]
-    numbers = read_fast(layout, places, clock.parts) or read_carefully(layout, places, clock.parts)
+    numbers = read_fast(layout, places, clock.parts) or read_blockwise(layout, places, clock.parts)
+    unread = f"{len(numbers.unread)} of {len(numbers.values)} rows cannot be read"
+    hint, warnings = "", _about_other_lines(layout, numbers)
+    if skip_bad and may_skip(numbers):
+        numbers, skipped = without_unread(numbers)
+        warnings += skipped
+    elif skip_bad and numbers.unread:
+        hint = f"{unread}, allowed with --skip-bad: {MOST_SKIPPED:.0%} of them"
+    elif may_skip(numbers):
+        hint = f"{unread}; --skip-bad leaves them out"
     numbers = trimmed(numbers)
-    if not len(numbers.values):
+    file = str(layout.segment.path)
+    if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
-        raise LogError(Finding(message, str(layout.segment.path)))
+        raise LogError(Finding(message, file))
     findings = find_errors(layout, numbers, [column.header for column in columns], clock)
     if findings:
-        raise LogError(*findings)
-    return numbers
+        raise LogError(*findings, *([Finding(hint, file)] if hint else []))
+    return numbers, warnings
+
+
+def _about_other_lines(layout: Layout, numbers: Numbers) -> list[LogWarning]:
+    """Return a warning about lines among labelled rows that are none."""
+    if not numbers.left_out or layout.form is None:
+        return []
+    said = f"{numbers.left_out} lines without the labels of the rows are left out"
+    return [LogWarning("other-lines", said)]
 
 
 def _joined(plan: Plan, numbers: Mapping[int, Numbers]) -> tuple[Roles, tuple[Inference, ...]]:
@@ -138,7 +166,7 @@ def _difference(plan: Plan, numbers: Mapping[int, Numbers], table: int) -> Findi
             row = int(different[0])
             times = f"{other.clock[row] / 1e9:.9g} s, allowed: {main.clock[row] / 1e9:.9g} s"
             message = f"found {times}, as in {title}: the tables of one log share their times"
-            return _at_row(message, layout, row + 1, plan.clocks[table].columns[0].header)
+            return _at_row(message, layout, other.file_row(row + 1), plan.clocks[table].columns[0].header)
     if len(main.values) != len(other.values):
         message = f"found {len(other.values)} rows, allowed: {len(main.values)}, as in {title}"
         return Finding(f"{message}: the tables of one log share their times", file)

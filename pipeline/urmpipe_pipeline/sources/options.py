@@ -26,6 +26,7 @@ class ReadOptions:
         rotation: Form of the recorded orientation, as `RotationForm` lists them.
         units: Unit of a column by its name or number; by "" that of all joint columns that turn.
         period: Time between rows in [s], of a log without a time column.
+        skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
     """
 
     source: str | None = None
@@ -41,3 +42,4 @@ class ReadOptions:
     rotation: RotationForm | None = None
     units: Mapping[str, str] = field(default_factory=dict)
     period: float | None = None
+    skip_bad: bool = False

@@ -38,7 +38,7 @@ def read_log(
     with ThreadPoolExecutor(max_workers=1) as beside:
         hashed = [beside.submit(fingerprint, file) for file in files]
         plan = make_plan(tables, options, robot)
-        content = read_content(plan)
+        content = read_content(plan, skip_bad=options.skip_bad)
         log = assemble(plan, content, options, robot, _name(files), [future.result() for future in hashed])
     release_memory()
     return log

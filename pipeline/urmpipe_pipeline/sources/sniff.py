@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,6 +20,7 @@ from urmpipe_pipeline.sources.cells import (
     printable,
     split_line,
 )
+from urmpipe_pipeline.sources.form import Form
 from urmpipe_pipeline.sources.text import HeadLine, Segment, head_lines
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
@@ -34,6 +36,8 @@ SAMPLED_LINES = 250
 
 _NAMES = {",": "comma", ";": "semicolon", "\t": "tab", SPACE: "spaces", "|": "bar", ".": "point"}
 _SIGNS = {name: sign for sign, name in _NAMES.items()} | {"\\t": "\t", "space": SPACE, "pipe": "|"}
+
+_TOLD = re.compile(r'"?sep=([,;|\t])"?', re.IGNORECASE)
 
 Row = list[str]
 
@@ -54,6 +58,7 @@ class Layout:
         offset: Offset of that line in bytes.
         sample: Cells of the first rows.
         inferences: What was found out.
+        form: How its rows become rows of plain cells, if they hold arrays or labels.
     """
 
     segment: Segment
@@ -66,6 +71,7 @@ class Layout:
     offset: int
     sample: tuple[tuple[str, ...], ...]
     inferences: tuple[Inference, ...]
+    form: Form | None = None
 
     def cells(self, column: int) -> list[str]:
         """Return the sampled cells of a column."""
@@ -82,21 +88,28 @@ class _Style:
     fit: float = 0.0
 
 
-def sniff(segment: Segment, delimiter: str | None = None, decimal: str | None = None) -> Layout:
+def sniff(
+    segment: Segment,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    lines: Sequence[HeadLine] | None = None,
+) -> Layout:
     """Return how a table is written.
 
     Args:
         segment: The table's text.
         delimiter: The sign between cells, or its name, if the file need not tell.
         decimal: The decimal sign, or its name, if the file need not tell.
+        lines: The lines of its head with a plain cell for each array, if it holds arrays.
 
     Raises:
         LogError: If it holds no numbers, no rows, or a header that does not fit its rows.
         OptionError: If delimiter or decimal is none that is allowed.
     """
-    delimiters = _choices("delimiter", delimiter, DELIMITERS)
+    lines = head_lines(segment) if lines is None else lines
+    told, lines = _told_delimiter(lines)
+    delimiters = _choices("delimiter", delimiter or told, DELIMITERS)
     decimals = _choices("decimal sign", decimal, DECIMALS)
-    lines = head_lines(segment)
     body = [line for line in lines if not line.text.lstrip().startswith(COMMENTS)][:SAMPLED_LINES]
     style = _best_style([line.text for line in body[:SCORED_LINES]], delimiters, decimals)
     rows = [split_line(line.text, style.delimiter) for line in body]
@@ -119,8 +132,14 @@ def sniff(segment: Segment, delimiter: str | None = None, decimal: str | None = 
         first_line=body[first].number,
         offset=body[first].offset,
         sample=tuple(tuple(row) for row in rows[first:]),
-        inferences=(*_style_inferences(style, delimiter, decimal), said),
+        inferences=(*_style_inferences(style, delimiter, decimal, told), said),
     )
+
+
+def _told_delimiter(lines: Sequence[HeadLine]) -> tuple[str | None, Sequence[HeadLine]]:
+    """Return the delimiter that a first line sep=; tells (Excel), and the other lines."""
+    told = _TOLD.fullmatch(lines[0].text.rstrip("\r\n ")) if lines else None
+    return (told[1], lines[1:]) if told else (None, lines)
 
 
 def _choices(what: str, given: str | None, allowed: Sequence[str]) -> Sequence[str]:
@@ -164,8 +183,11 @@ def _credit(style: _Style) -> tuple[bool, float]:
     return style.width > 1 and style.fit >= LEAST_FIT, style.fit
 
 
-def _style_inferences(style: _Style, delimiter: str | None, decimal: str | None) -> list[Inference]:
+def _style_inferences(
+    style: _Style, delimiter: str | None, decimal: str | None, told: str | None
+) -> list[Inference]:
     parts, reads = f"it makes rows of {style.width} cells", "with it most cells are numbers"
+    parts = "the first line says so" if told else parts
     given = "given as an option"
     return [
         Inference("delimiter", _NAMES[style.delimiter], given if delimiter else parts),
@@ -229,7 +251,7 @@ def _header(before: Sequence[HeadLine], delimiter: str, width: int) -> tuple[tup
 
 def _header_cells(text: str, delimiter: str, width: int) -> Row:
     """Split a header line, with its own delimiter if only that gives a name a column (numpy.savetxt)."""
-    text = text.strip()
+    text = text.strip(" " if delimiter == "\t" else None)  # a tab before the first name: an unnamed index
     for comment in ("#", "//", "% "):
         text = text.removeprefix(comment)
     tried = [split_line(text, sign) for sign in (delimiter, *DELIMITERS)]
@@ -261,8 +283,11 @@ def _names(
         return (*cells, ""), Inference("header", f"line {line}", "each row ends with a delimiter")
     if len(cells) == width - 1 and count_up([row[0] for row in full]):
         return ("", *cells), Inference("header", f"line {line}", "the first column is an unnamed index")
-    found_text = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column"
-    raise LogError(Finding(found_text, file=str(segment.path), line=line))
+    number = abs(len(cells) - width)
+    remedy = f"{'add' if len(cells) < width else 'take out'} {number} name{'s' if number > 1 else ''}"
+    found_text = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column; {remedy}"
+    without = f"or delete line {line}: without names the columns are taken as joints in order"
+    raise LogError(Finding(f"{found_text}, {without}", file=str(segment.path), line=line))
 
 
 def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[int], width: int) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import codecs
 import os
-from pathlib import Path
+from collections.abc import Generator
 from types import TracebackType
 
 import numpy as np
@@ -16,10 +16,14 @@ from urmpipe_pipeline.sources.sniff import Layout
 
 Bytes = NDArray[np.uint8]
 
+BLOCK_BYTES = 1 << 20
+"""What is read at once."""
+
 _NEWLINES = b"\n\r"
 _RUNS = (b"\t", b"  ", b" \n", b" \r", b"\n ", b"\r ")
 """None of these is in lines that are parted by single spaces already."""
 
+_GOES_ON = (b"", b" ", b"\t")  # nothing: what comes next is not read yet
 _TO_POINTS = bytes.maketrans(b",.", b".~")
 
 
@@ -28,11 +32,9 @@ def open_table(layout: Layout) -> TableStream | NativeFile:
 
     Where nothing is to be converted it is pyarrow's own, which needs no Python while it is read.
     """
-    stream = TableStream(layout)
     path = layout.segment.path
-    if stream.converts or layout.segment.end != path.stat().st_size:
-        return stream
-    stream.close()
+    if _converts(layout) or layout.segment.end != path.stat().st_size:
+        return TableStream(layout)
     file = OSFile(os.fsencode(path))
     file.seek(layout.offset)
     return file
@@ -41,60 +43,42 @@ def open_table(layout: Layout) -> TableStream | NativeFile:
 class TableStream:
     """The rows of a table as a file to read from, header excluded.
 
-    Latin-1 passes as it is: numbers are the same bytes in UTF-8, and text columns are not read. Decimal
-    commas become points here, since pyarrow 26 parses decimals with another point wrongly in threads (they
-    share a buffer); a point becomes a sign that no number has, so that 1.5 stays no number.
+    Args:
+        layout: How the table is written.
+        block: Some whole rows, as they stand in the file, instead of all.
+
+    Attributes:
+        closed: Whether it is closed.
+        left_out: Lines among labelled rows that are none, so far.
     """
 
-    def __init__(self, layout: Layout) -> None:
-        segment = layout.segment
-        self._file = Path(segment.path).open("rb", buffering=0)  # noqa: SIM115 (closed by close)
-        self._file.seek(layout.offset)
-        self._left = segment.end - layout.offset
-        wide = segment.encoding.startswith("utf-16")
-        self._decoder = codecs.getincrementaldecoder(segment.encoding)(errors="replace") if wide else None
-        self._squeezed = layout.delimiter == SPACE
-        self._signs = _TO_POINTS if layout.decimal == "," != layout.delimiter else None
-        self._cut_line = b""
+    def __init__(self, layout: Layout, block: bytes | None = None) -> None:
+        self._layout = layout
+        self._blocks = row_blocks(layout) if block is None else (one for one in (block,))
         self._ready = b""
-
-    @property
-    def converts(self) -> bool:
-        """Whether the bytes read are others than the file's own."""
-        return self._decoder is not None or self._signs is not None or self._squeezed
+        self.closed = False
+        self.left_out = 0
 
     def read(self, size: int = -1) -> bytes:
-        """Return up to so many bytes of the table, none at its end."""
-        size = self._left if size < 0 else size
+        """Return up to so many bytes of the table, none at its end.
+
+        Raises:
+            UnfitError: If rows with arrays or labels are not written like the others.
+        """
         while not self._ready:
-            raw = self._file.read(min(size, self._left))
-            self._left -= len(raw)
-            self._ready = self._converted(raw)
-            if not raw:
+            block = next(self._blocks, None)
+            if block is None:
                 break
+            self._ready, left_out = converted(self._layout, block)
+            self.left_out += left_out
+        size = len(self._ready) if size < 0 else size
         block, self._ready = self._ready[:size], self._ready[size:]
         return block
 
-    def _converted(self, raw: bytes) -> bytes:
-        """Return the next bytes of the file as the parser wants them; no bytes mean the end of the table."""
-        block = raw if self._decoder is None else self._decoder.decode(raw, final=not raw).encode("utf-8")
-        if self._signs is not None:
-            block = block.translate(self._signs)
-        if not self._squeezed:
-            return block
-        block = self._cut_line + block
-        end = max(block.rfind(b"\n"), block.rfind(b"\r")) + 1 if raw else len(block)
-        self._cut_line = block[end:]
-        return squeeze(block[:end])
-
-    @property
-    def closed(self) -> bool:
-        """Whether the file is closed."""
-        return self._file.closed
-
     def close(self) -> None:
         """Close the file."""
-        self._file.close()
+        self._blocks.close()
+        self.closed = True
 
     def __enter__(self) -> TableStream:
         return self
@@ -103,6 +87,71 @@ class TableStream:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def row_blocks(layout: Layout) -> Generator[bytes, None, None]:
+    """Yield the rows of a table as they stand in the file, some thousand at a time, in `byte_encoding`.
+
+    Args:
+        layout: How the table is written.
+    """
+    segment = layout.segment
+    left = segment.end - layout.offset
+    wide = segment.encoding.startswith("utf-16")
+    decoder = codecs.getincrementaldecoder(segment.encoding)(errors="replace") if wide else None
+    cut_row = b""
+    with segment.path.open("rb", buffering=0) as file:
+        file.seek(layout.offset)
+        while left > 0:
+            raw = file.read(min(BLOCK_BYTES, left))
+            left -= len(raw) if raw else left
+            block = raw if decoder is None else decoder.decode(raw, final=left <= 0).encode("utf-8")
+            block = cut_row + block
+            end = end_of_rows(block, layout) if left > 0 else len(block)
+            cut_row = block[end:]
+            if end:
+                yield block[:end]
+
+
+def byte_encoding(layout: Layout) -> str:
+    """Return the encoding of the blocks: UTF-8, or Latin-1, whose numbers are the same bytes in UTF-8."""
+    return "latin-1" if layout.segment.encoding == "latin-1" else "utf-8"
+
+
+def converted(layout: Layout, block: bytes) -> tuple[bytes, int]:
+    """Return whole rows as the parser wants them, and how many other lines were left out.
+
+    Decimal commas become points here, since pyarrow 26 parses decimals with another point wrongly in threads
+    (they share a buffer); a point becomes a sign that no number has, so that 1.5 stays no number.
+
+    Args:
+        layout: How the table is written.
+        block: Whole rows as they stand in the file.
+
+    Raises:
+        UnfitError: If rows with arrays or labels are not written like the others.
+    """
+    left_out = 0
+    if layout.form is not None:
+        block, left_out = layout.form.flat(block, byte_encoding(layout))
+    if layout.decimal == "," != layout.delimiter:
+        block = block.translate(_TO_POINTS)
+    return (squeeze(block) if layout.delimiter == SPACE else block), left_out
+
+
+def _converts(layout: Layout) -> bool:
+    """Return whether the parser wants other bytes than the file's own."""
+    wide = layout.segment.encoding.startswith("utf-16")
+    points = layout.decimal == "," != layout.delimiter
+    return wide or points or layout.delimiter == SPACE or layout.form is not None
+
+
+def end_of_rows(block: bytes, layout: Layout) -> int:
+    """Return where the last whole row of a block ends."""
+    end = max(block.rfind(b"\n"), block.rfind(b"\r")) + 1
+    while layout.form is not None and layout.form.continued and end and block[end : end + 1] in _GOES_ON:
+        end = block.rfind(b"\n", 0, end - 1) + 1
+    return end
 
 
 def squeeze(block: bytes) -> bytes:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from typing import Any
 
@@ -17,11 +17,11 @@ from pyarrow import csv
 from urmpipe_models.errors import Finding
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.sources.cells import is_number, plain, to_float
+from urmpipe_pipeline.sources.form import UnfitError
 from urmpipe_pipeline.sources.sniff import Layout
-from urmpipe_pipeline.sources.stream import open_table
+from urmpipe_pipeline.sources.stream import BLOCK_BYTES, TableStream, open_table
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
-BLOCK_BYTES = 1 << 20
 NO_TIME = np.iinfo(np.int64).min
 """Stands where a row has no time."""
 REPORTED = NO_TIME + 1
@@ -47,30 +47,46 @@ class Numbers:
         clock: Time of each row in [ns] on the file's clock, or NO_TIME, or REPORTED; None without a clock.
         findings: What is wrong with rows and cells, the first of them.
         wrong: How many such findings there are.
-        lines: Line of the file of each row, where they were counted.
+        lasting: Those of the findings that leaving out rows does not mend.
+        unread: Rows that could not be read, by their index, with what is wrong with each.
+        left_out: Lines among labelled rows that are none.
+        rows: Data row of the file of each row, from 1, where some were left out.
     """
 
     values: FloatArray
     clock: IntArray | None
     findings: tuple[Finding, ...] = ()
     wrong: int = 0
-    lines: IntArray | None = None
+    lasting: tuple[Finding, ...] = ()
+    unread: Mapping[int, str] = field(default_factory=dict)
+    left_out: int = 0
+    rows: IntArray | None = None
+
+    def file_row(self, row: int) -> int:
+        """Return the data row of the file of a row that was read, both from 1."""
+        return row if self.rows is None else int(self.rows[row - 1])
 
 
-def read_fast(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn]) -> Numbers | None:
+def read_fast(
+    layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn], block: bytes | None = None
+) -> Numbers | None:
     """Return the numbers of some columns, or None if the parser stumbles over a row or a cell.
 
     Args:
         layout: How the table is written.
         columns: Which columns hold numbers.
         clock: The columns of its clock; their values in [ns] are added.
+        block: Some whole rows, as they stand in the file, instead of all.
     """
     narrow, wide = ([_scale(layout, part, exact) for part in clock] for exact in (False, True))
     for scales in (narrow,) if narrow == wide else (narrow, wide):
         try:
-            return _numbers(_parse(layout, columns, clock, scales), columns, clock, scales)
+            table, left_out = _parse(layout, columns, clock, scales, block)
+            return replace(_numbers(table, columns, clock, scales), left_out=left_out)
         except (pa.ArrowInvalid, OverflowError):
             continue
+        except UnfitError:
+            break
     return None
 
 
@@ -110,17 +126,23 @@ def _numbers(
 
 
 def _parse(
-    layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn], scales: Sequence[int]
-) -> pa.Table:
+    layout: Layout,
+    columns: Sequence[int],
+    clock: Sequence[ClockColumn],
+    scales: Sequence[int],
+    block: bytes | None,
+) -> tuple[pa.Table, int]:
+    """Return the parsed columns, and how many lines that are no rows were left out."""
     types: dict[str, Any] = {str(column): pa.float64() for column in columns}
     for part, scale in zip(clock, scales, strict=True):
         types[str(part.column)] = pa.decimal128(_PRECISION, scale)
     names = [str(column) for column in range(len(layout.names))]
     quoted_commas = layout.delimiter == layout.decimal  # "0,5","1,5": the stream leaves them
-    with open_table(layout) as stream:
-        return csv.read_csv(
+    with open_table(layout) if block is None else TableStream(layout, block) as stream:
+        threads = not quoted_commas and block is None
+        table = csv.read_csv(
             stream,
-            csv.ReadOptions(column_names=names, block_size=BLOCK_BYTES, use_threads=not quoted_commas),
+            csv.ReadOptions(column_names=names, block_size=BLOCK_BYTES, use_threads=threads),
             csv.ParseOptions(delimiter=layout.delimiter),
             csv.ConvertOptions(
                 column_types=types,
@@ -130,6 +152,7 @@ def _parse(
             ),
             memory_pool=pa.system_memory_pool(),  # the default one keeps what it once had
         )
+        return table, stream.left_out if isinstance(stream, TableStream) else 0
 
 
 def _fill(target: FloatArray, chunk: pa.Array) -> None:

@@ -10,6 +10,8 @@ from typing import TypeVar
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources import coppeliasim
+from urmpipe_pipeline.sources.arrays import sniff_arrays
+from urmpipe_pipeline.sources.labels import sniff_labels
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.ros2 import with_names
 from urmpipe_pipeline.sources.sniff import Layout, sniff
@@ -73,7 +75,7 @@ def open_tables(files: Sequence[Path], options: ReadOptions) -> Tables:
     if len(files) == 1 and (forced or (options.source is None and coppeliasim.is_export(segments[0]))):
         titled = coppeliasim.graphs(segments[0]) or titled
         forced = True
-    layouts = for_all(titled, lambda item: with_names(sniff(item[1], options.delimiter, options.decimal)))
+    layouts = for_all(titled, lambda item: _layout(item[1], options))
     known, said = _known(layouts, options) if not forced else (None, _coppeliasim(titled, options))
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
     encoding = Inference(
@@ -86,6 +88,13 @@ def open_tables(files: Sequence[Path], options: ReadOptions) -> Tables:
         titles=tuple(title for title, _ in titled),
         inferences=(encoding, said),
     )
+
+
+def _layout(segment: Segment, options: ReadOptions) -> Layout:
+    """Return how a table is written: rows with labels, with arrays in their cells, or plain ones."""
+    given = options.delimiter, options.decimal
+    found = None if options.delimiter else sniff_labels(segment)
+    return found or sniff_arrays(segment, *given) or with_names(sniff(segment, *given))
 
 
 def for_all(items: Sequence[T], function: Callable[[T], U]) -> list[U]:
@@ -110,7 +119,9 @@ def _known(layouts: Sequence[Layout], options: ReadOptions) -> tuple[KnownSource
     """Return the source that the columns give away."""
     if options.source is not None:
         return vocabulary().source(options.source), Inference("source", options.source, "given as an option")
-    names = [name for layout in layouts for name in layout.names]
+    names = [
+        name for layout in layouts for name in (*layout.names, *(layout.form.labels if layout.form else ()))
+    ]
     for source in vocabulary().sources:
         if source.wrote(names):
             return source, Inference("source", source.name, "the names of its columns")

@@ -24,6 +24,10 @@ SPECIMENS = {
     "ragged.csv": b"t,q1\n0,1\n0.1,2,3\n",
     "text.csv": b"t,q1\n0,1\n0.1,two\n",
     "backwards.csv": b"t,q1\n0,1\n-1,2\n",
+    "arrays.csv": b't,q\n0,"[ 1. 2.\n  3.]"\n0.1,"[ 1. 2.\n  3.]"\n',
+    "unclosed.csv": b't,q\n0,"[ 1. 2.]"\n0.1,"[ 1. 2."\n0.2,"[ 1. 2.]"\n',
+    "labels.txt": b"Time: 0.1 q values: [1, 2] Type: 0\nquality\nTime: 0.2 q values: [1, 3] Type: 0\n",
+    "second.csv": b"t,q1\n0,1\n1,2\nt,q1\n0,1\n1,2\n",
     "empty.csv": b"",
     "log.mat": b"MATLAB 5.0",
 }

@@ -1,18 +1,23 @@
-"""Damaged files: whatever is in them, they are read to a sound log or refused by an error of ours."""
+"""Damaged files: read to a sound log, or refused with each damage named once."""
 
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import Phase, given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.errors import UrmpipeError
+from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log
+
+Read = Callable[..., JointLog]
+Wrong = Callable[..., list[str]]
 
 SPECIMENS = [
     b"t,q1,q2\n0,1,2\n0.1,2,3\n0.2,1,2\n",
@@ -24,8 +29,12 @@ SPECIMENS = [
     b"# t q1 q2\n0 1 2\n 0.1  3 4\n",
     b'"t","q1"\n"0,0","1,5"\n"0,1","1,5"\n',
     b"%time,field.header.seq,field.name0,field.position0\n1486559106139796569,1,a,0.5\n",
+    b't,q\n0,"[ 1. 2.\n  3.]"\n0.1,"[ 1. 2.\n  3.]"\n0.2,"[ 1. 2.\n  3.]"\n',
+    b"connected\nTime: 0.1 q values: [1, 2] Type: 0\nTime: 0.2 q values: [1, 3] Type: 0\n",
+    b"t,q1\n0,1\n<<<<<<< HEAD\n1,2\n=======\n1,3\n>>>>>>> other\nt,q1\n0,1\n",
 ]
 PIECES = [
+    *(b"[", b"]", b"Time:", b"\n ", b"=======\n", b"q1 = "),
     *(b",", b";", b"\n", b"\r", b"\t", b" ", b".", b'"', b"#", b"%", b"[deg]", b"(m)", b"q1", b"time", b""),
     *(
         b"nan",
@@ -42,7 +51,13 @@ PIECES = [
     ),
 ]
 OPTIONS = [
-    *(ReadOptions(), ReadOptions(source="path"), ReadOptions(source="coppeliasim"), ReadOptions(time="1")),
+    *(
+        ReadOptions(),
+        ReadOptions(skip_bad=True),
+        ReadOptions(source="path"),
+        ReadOptions(source="coppeliasim"),
+        ReadOptions(time="1"),
+    ),
     *(
         ReadOptions(joints=("2", "3")),
         ReadOptions(units={"": "deg"}),
@@ -84,3 +99,145 @@ def test_a_sound_log_or_an_error_of_ours(content: bytes, options: ReadOptions, r
     assert set(log.joints) <= set(log.units)
     assert log.joints or log.tcp_position is not None
     assert robot is None or len(log.joints) in (0, len(robot.coordinates))
+
+
+INCREASE = "allowed: times that increase from row to row"
+
+
+def rows(count: int, start: float = 0.0) -> list[str]:
+    """Rows of a log of two joints at 10 ms."""
+    return [f"{start + 0.01 * k:.2f},0.{k % 7},1.{k % 5}" for k in range(count)]
+
+
+def joined(*lines: str) -> str:
+    return "\n".join(["t,q1 [rad],q2 [rad]", *lines]) + "\n"
+
+
+def test_a_merge_conflict_is_named_once(wrong: Wrong) -> None:
+    """The other side is not read: its times would all be errors."""
+    both = ["<<<<<<< HEAD", *rows(30, 1.0), "=======", *rows(30, 1.0), ">>>>>>> branch"]
+    side = "a merge conflict, allowed: the rows of one side, without the marks of git"
+    said = [
+        f"log.csv:102: found '<<<<<<< HEAD', {side}",
+        "log.csv:195, column q1 [rad]: found 'x', allowed: a number,"
+        " or an empty, Null or NaN cell where a sample is missing",
+    ]
+    text = joined(*rows(100), *both, *rows(30, 1.3), "1.7,x,0.5", *rows(9, 1.8))
+    assert wrong(text) == [*said, "log.csv: 1 of 203 rows cannot be read; --skip-bad leaves them out"]
+    assert wrong(text, skip_bad=True) == said[:1]
+
+
+def test_a_conflict_from_the_first_line_on(wrong: Wrong) -> None:
+    text = "<<<<<<< HEAD\n" + joined(*rows(9)) + "=======\n" + joined(*rows(9)) + ">>>>>>> b\n"
+    assert wrong(text) == [
+        "log.csv:12: found '=======', a merge conflict, allowed: the rows of one side,"
+        " without the marks of git"
+    ]
+
+
+@pytest.mark.parametrize("behind", [30, 100_000])
+def test_a_header_again_begins_a_second_log(wrong: Wrong, behind: int) -> None:
+    said = "found the header again, allowed: one log a file; a second log begins here"
+    assert wrong(joined(*rows(100), "t,q1 [rad],q2 [rad]", *rows(behind))) == [f"log.csv:102: {said}"]
+
+
+def test_a_clock_that_begins_again_begins_a_second_log(wrong: Wrong) -> None:
+    assert wrong(joined(*rows(100), *rows(30))) == [
+        f"log.csv:102, column t: found 0 s after 0.99 s, {INCREASE}:"
+        " a second log begins here, from about the same time"
+    ]
+    assert wrong(joined(*rows(100), *rows(30, 0.5))) == [
+        f"log.csv:102, column t: found 0.5 s after 0.99 s, {INCREASE}"
+    ]
+
+
+def test_rows_on_end_that_are_wrong_alike_are_one_finding(wrong: Wrong) -> None:
+    longer = [f"{row},7" for row in rows(500, 4.0)]
+    assert wrong(joined(*rows(300), "paused", "by hand", *longer)) == [
+        "log.csv:302: found 1 cell ('paused'), allowed: 3",
+        "log.csv:303: found 1 cell ('by hand'), allowed: 3",
+        "log.csv:304: found 4 cells, allowed: 3 (and so 499 more rows below it)",
+    ]
+
+
+@pytest.mark.parametrize(
+    ("header", "said"),
+    [
+        ("t,q1", "found 2 names over rows of 3 cells, allowed: a name a column; add 1 name"),
+        ("t,q1,q2,q3,q4", "found 5 names over rows of 3 cells, allowed: a name a column; take out 2 names"),
+    ],
+)
+def test_a_header_of_another_width(wrong: Wrong, header: str, said: str) -> None:
+    text = "\n".join([header, "0.0,1.5,0.5", "0.3,1.5,0.5", "0.4,1.5,0.5"])
+    without = "or delete line 1: without names the columns are taken as joints in order"
+    assert wrong(text) == [f"log.csv:1: {said}, {without}"]
+
+
+def test_rows_that_cannot_be_read_are_left_out_if_asked_for(read: Read, wrong: Wrong) -> None:
+    lines = rows(1000)
+    lines[100], lines[500], lines[501] = "torn, 0.5", "5.00,abc,1.5", "(paused)"
+    said = [
+        "log.csv:102: found 2 cells, allowed: 3",
+        "log.csv:502, column q1 [rad]: found 'abc', allowed: a number,"
+        " or an empty, Null or NaN cell where a sample is missing",
+        "log.csv:503: found 1 cell ('(paused)'), allowed: 3",
+    ]
+    assert wrong(joined(*lines)) == [
+        *said, "log.csv: 3 of 1000 rows cannot be read; --skip-bad leaves them out"
+    ]  # fmt: skip
+    log = read(joined(*lines), skip_bad=True)
+    kept = np.delete(np.arange(1000), [100, 500, 501])
+    np.testing.assert_array_equal(log.t_ns, kept * 10_000_000)
+    np.testing.assert_array_equal(log.q, np.c_[kept % 7 / 10, (kept % 5 + 10) / 10])
+    skipped = [(w.row, w.message) for w in log.warnings if w.kind == "skipped-row"]
+    assert skipped == [
+        (101, "data row 101 of the file is left out: found 2 cells, allowed: 3"),
+        (500, f"data row 501 of the file is left out: {said[1].partition(', ')[2]}"),
+        (500, "data row 502 of the file is left out: found 1 cell ('(paused)'), allowed: 3"),
+    ]
+
+
+def test_lines_stay_those_of_the_file_when_rows_are_left_out(wrong: Wrong) -> None:
+    lines = rows(400)
+    lines[100], lines[300] = "torn", "2.00,inf,1"
+    assert wrong(joined(*lines), skip_bad=True) == [
+        "log.csv:302, column q1 [rad]: found inf, allowed: finite numbers",
+        f"log.csv:302, column t: found 2 s after 2.99 s, {INCREASE}",
+    ]
+
+
+def test_no_more_than_one_row_in_a_hundred_is_left_out(read: Read, wrong: Wrong) -> None:
+    lines = rows(300)
+    lines[20] = lines[120] = lines[220] = "torn"
+    assert read(joined(*lines), skip_bad=True).rows == 297
+    lines[221] = "torn"
+    assert wrong(joined(*lines), skip_bad=True)[-1] == (
+        "log.csv: 4 of 300 rows cannot be read, allowed with --skip-bad: 1% of them"
+    )
+
+
+def test_many_rows_left_out_are_counted(read: Read) -> None:
+    lines = rows(10_000)
+    lines[50::200] = ["torn"] * 50
+    warnings = [w for w in read(joined(*lines), skip_bad=True).warnings if w.kind == "skipped-row"]
+    assert len(warnings) == 21
+    assert warnings[-1].message == "30 more rows are left out"
+    assert warnings[0].row == 51
+
+
+@settings(max_examples=20, deadline=None, phases=[Phase.generate])
+@given(
+    st.sets(st.integers(0, 79_999), min_size=1, max_size=12), st.sampled_from(["torn", "x,1,2", "1,2", "# a"])
+)
+def test_a_damaged_log_is_the_sound_one_without_its_wrong_rows(places: set[int], damage: str) -> None:
+    """Over several blocks, comments between."""
+    lines = rows(80_000)
+    for place in places:
+        lines[place] = damage
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "log.csv"
+        path.write_text(joined(*lines))
+        log = read_log([path], ReadOptions(skip_bad=True))
+    kept = np.delete(np.arange(80_000), sorted(places))
+    np.testing.assert_array_equal(log.t_ns, (kept - kept[0]) * 10_000_000)
+    np.testing.assert_array_equal(log.q, np.c_[kept % 7 / 10, (kept % 5 + 10) / 10])

@@ -202,7 +202,8 @@ def test_names_that_stand_twice(wrong: Wrong) -> None:
 
 def test_a_header_that_does_not_fit_its_rows(wrong: Wrong) -> None:
     assert wrong("t,q1\n0,1,2,3\n0.1,1,2,3\n") == [
-        "log.csv:1: found 2 names over rows of 4 cells, allowed: a name a column"
+        "log.csv:1: found 2 names over rows of 4 cells, allowed: a name a column; add 2 names,"
+        " or delete line 1: without names the columns are taken as joints in order"
     ]
 
 

@@ -137,14 +137,26 @@ def test_joints_and_matrices_without_header(arm: Arm) -> None:
     assert (log.rows, log.first_line) == (20, 2)
 
 
-@pytest.mark.parametrize("name", ["iiwa-dmp-text/iiwa_example1.txt", "iiwa14-fri-text/pour1.txt",
-                                  "iiwa14-fri-text/iiwa14_singularity_change_config.txt"])  # fmt: skip
-def test_fri_text_is_refused_in_one_line(name: str, arm: Arm) -> None:
-    with pytest.raises(LogError) as caught:
-        read_log([LOGS / name], robot=arm(7))
-    (finding,) = caught.value.findings
-    assert (finding.line, finding.column) == (1, "1")
-    assert finding.message.startswith("found 'Time: ")
+@pytest.mark.parametrize(
+    ("name", "rows", "period", "start", "first", "last"),
+    [
+        ("iiwa-dmp-text/iiwa_example1.txt", 1724, 0.003, 12.39, -0.0001, -0.1573),
+        ("iiwa14-fri-text/pour1.txt", 1625, 0.003, 6.159, -0.05752, 0.00001),
+        ("iiwa14-fri-text/iiwa14_singularity_change_config.txt", 994, 0.015, 0.015, -0.05576, -0.06191),
+    ],
+)
+def test_fri_text(
+    name: str, rows: int, period: float, start: float, first: float, last: float, arm: Arm
+) -> None:
+    path = LOGS / name
+    log = read_log([path], robot=arm(7))
+    assert (log.source, log.rows, log.period, log.clock_start) == ("fri", rows, period, start)
+    assert log.joints == tuple(f"q_{k + 1}" for k in range(7))
+    assert (log.q[0, 0], log.q[-1, 6]) == (first, last)
+    lists = [line.split("[")[1].split("]")[0] for line in path.read_text().splitlines()]
+    np.testing.assert_array_equal(log.q, [[float(cell) for cell in text.split(",")] for text in lists])
+    assert log.tcp_position is None  # p0 is a virtual position
+    assert not log.warnings
 
 
 @pytest.mark.parametrize("name", ["README.md", "panda-matlab-ascii/frankaEmikaPanda.urdf"])

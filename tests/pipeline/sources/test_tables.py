@@ -247,7 +247,18 @@ def test_provenance(read: Read) -> None:
 
 def test_source_names() -> None:
     assert source_names() == (
-        *("coppeliasim", "ur-rtde", "libfranka", "ros", "ros2", "abb", "plotjuggler", "solidworks", "matlab"),
+        *(
+            "coppeliasim",
+            "ur-rtde",
+            "libfranka",
+            "ros",
+            "ros2",
+            "fri",
+            "abb",
+            "plotjuggler",
+            "solidworks",
+            "matlab",
+        ),
         *("path", "table"),
     )
 
