@@ -3,16 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from decimal import Decimal
+from dataclasses import replace
 
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning
-from urmpipe_pipeline.sources.clock import EXPONENTS, Clock
+from urmpipe_pipeline.sources.clock import Clock
 from urmpipe_pipeline.sources.diagnose import SHOWN_FINDINGS, lines_of_rows
 from urmpipe_pipeline.sources.sniff import Layout
-from urmpipe_pipeline.sources.table import NO_TIME, REPORTED, Numbers
+from urmpipe_pipeline.sources.table import NO_TIME, UNREADABLE, Numbers
+from urmpipe_pipeline.sources.text_cells import LONGEST_CELL
 
 GAP = 3.0
 """Times the median period: more than this between two rows is a gap."""
@@ -31,7 +32,7 @@ def trimmed(numbers: Numbers) -> Numbers:
     if end == len(numbers.clock):
         return numbers
     lines = None if numbers.lines is None else numbers.lines[:end]
-    return Numbers(numbers.values[:end], numbers.clock[:end], numbers.findings, numbers.wrong, lines)
+    return replace(numbers, values=numbers.values[:end], clock=numbers.clock[:end], lines=lines)
 
 
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
@@ -100,14 +101,17 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
     if times is None or not clock.columns:
         return
     name = clock.columns[0].header
-    if times.min() > REPORTED and (np.diff(times) > 0).all():
+    if times.min() > UNREADABLE and (np.diff(times) > 0).all():
         return
     for index in np.flatnonzero(times == NO_TIME).tolist():
         yield index + 1, name, "found no time, allowed: a time in every row"
-    valid = np.flatnonzero(times > REPORTED)
+    for index in np.flatnonzero(times == UNREADABLE).tolist():
+        text = " ".join(cells.text(index).strip() for cells in numbers.texts)
+        yield index + 1, name, f"found {text[:LONGEST_CELL]!r}, allowed: times as in the other rows"
+    valid = np.flatnonzero(times > UNREADABLE)
     steps = np.diff(times[valid])
     for k in np.flatnonzero(steps <= 0).tolist():
-        now, before = (_shown(int(times[valid[i]]), clock.unit) for i in (k + 1, k))
+        now, before = (clock.shown(int(times[valid[i]])) for i in (k + 1, k))
         found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
         yield int(valid[k + 1]) + 1, name, f"{found}, allowed: times that increase from row to row"
 
@@ -123,12 +127,6 @@ def _unusual(values: FloatArray) -> list[int]:
     """Return the columns that may hold NaN or infinities: their sums are not finite, as is quickly seen."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.flatnonzero(~np.isfinite(values.sum(axis=0))).tolist()
-
-
-def _shown(nanoseconds: int, unit: str) -> str:
-    """Return a time in the file's own unit."""
-    value = Decimal(nanoseconds).scaleb(-EXPONENTS[unit]).normalize()
-    return f"{value:f} {unit}"
 
 
 def _line_finder(layout: Layout, numbers: Numbers, rows: Sequence[int]) -> Callable[[int], int | None]:

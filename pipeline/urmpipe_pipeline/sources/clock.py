@@ -1,10 +1,11 @@
-"""The clock: which column is the time, its unit, and integer nanoseconds from its text."""
+"""The clock: which column is the time, its unit or the form of its text."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
 from itertools import pairwise
 
 import numpy as np
@@ -15,7 +16,9 @@ from urmpipe_pipeline.sources.cells import LONGEST_NS, count_up, to_float
 from urmpipe_pipeline.sources.columns import Column, find_column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.sniff import Layout
+from urmpipe_pipeline.sources.stamps import known_forms
 from urmpipe_pipeline.sources.table import ClockColumn
+from urmpipe_pipeline.sources.text_clock import DATE, SECOND_NS, TIME_OF_DAY
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
 
 PAPER_PERIOD = 0.005
@@ -23,6 +26,9 @@ PAPER_PERIOD = 0.005
 
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 """Powers of ten from a unit to [ns]."""
+
+FORMS_TOLD = "numbers in s, ms, us or ns, or times such as 2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec"
+"""What a clock may look like, for errors."""
 
 SHORTEST, LONGEST = 0.0005, 1.0
 """Usual periods of a log in [s]: they tell the unit of a clock that does not say it."""
@@ -38,7 +44,7 @@ class Clock:
     Attributes:
         columns: One column, or seconds and nanoseconds apart; none if the table has no time.
         parts: The same for the reader.
-        unit: Its unit.
+        unit: Its unit: s, ms, us, ns, or where it is text "date" or "time of day".
         inferences: What was found out.
         warnings: What a person should know.
     """
@@ -52,8 +58,27 @@ class Clock:
     @property
     def units(self) -> dict[str, str]:
         """The unit of each of its columns by name."""
-        names = {exponent: unit for unit, exponent in EXPONENTS.items()}
-        return {c.name: names[part.exponent] for c, part in zip(self.columns, self.parts, strict=True)}
+        return {column.name: _unit_of(part) for column, part in zip(self.columns, self.parts, strict=True)}
+
+    def shown(self, nanoseconds: int) -> str:
+        """Return a time as the file would write it."""
+        if self.unit == DATE:
+            seconds, rest = divmod(nanoseconds, SECOND_NS)
+            date = np.datetime64(seconds, "s").item().isoformat(" ")
+            return f"{date}.{rest:09d}".rstrip("0").rstrip(".")
+        if self.unit == TIME_OF_DAY:
+            sign, (seconds, rest) = "-" * (nanoseconds < 0), divmod(abs(nanoseconds), SECOND_NS)
+            clock = f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+            return f"{sign}{clock}.{rest:09d}".rstrip("0").rstrip(".")
+        value = Decimal(nanoseconds).scaleb(-EXPONENTS[self.unit]).normalize()
+        return f"{value:f} {self.unit}"
+
+
+def _unit_of(part: ClockColumn) -> str:
+    """Return the unit of a column of the clock."""
+    if part.forms:
+        return part.forms[0].unit
+    return next(unit for unit, exponent in EXPONENTS.items() if exponent == part.exponent)
 
 
 def find_clock(
@@ -75,18 +100,16 @@ def find_clock(
         joints: How many joints the robot has, if there is one.
 
     Raises:
-        LogError: If the time is a date, or its unit cannot be told.
+        LogError: If the time is text in no form that is known, or its unit cannot be told.
         OptionError: If its unit is given as one that is no time.
     """
     chosen, why = _columns(columns, layout, options, joints)
     if not chosen:
         return Clock(inferences=(Inference("time column", "none", why),))
-    dates = [column for column in chosen if column.text]
-    if dates:
-        message = f"found {layout.cells(dates[0].index)[0]!r}, allowed: times as numbers in s, ms, us or ns"
-        file = str(layout.segment.path)
-        raise LogError(Finding(message, file, layout.first_line, 1, dates[0].header))
     found = Inference("time column", " and ".join(column.name for column in chosen), why)
+    if chosen[0].text:
+        parts = tuple(_text_part(column, layout, units) for column in chosen)
+        return Clock(chosen, parts, _unit_of(parts[0]), (found,))
     if len(chosen) == 2:
         both = (ClockColumn(chosen[0].index, 9), ClockColumn(chosen[1].index, 0))
         return Clock(chosen, both, "s", (found,))
@@ -95,6 +118,21 @@ def find_clock(
     _refuse_ages(time, layout, unit)
     parts = (ClockColumn(time.index, EXPONENTS[unit]),)
     return Clock(chosen, parts, unit, (found, Inference("unit of the time", unit, evidence)), warnings)
+
+
+def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> ClockColumn:
+    """Return a column of text for the reader: the forms that it may have."""
+    cells, given = layout.cells(column.index), units.get(column.number)
+    forms = known_forms(cells)
+    if not forms:
+        message = f"found {cells[0]!r}, allowed: {FORMS_TOLD}"
+        raise LogError(Finding(message, str(layout.segment.path), layout.first_line, 1, column.header))
+    wanted = given or column.unit
+    asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
+    if given is not None and not asked:
+        keys = ", ".join(dict.fromkeys(key for form in forms for key in form.keys)) or "none"
+        raise OptionError(f"--unit: found {given.name} for the time {column.name!r}, allowed: {keys}")
+    return ClockColumn(column.index, forms=asked or forms)
 
 
 def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
@@ -138,27 +176,63 @@ def _columns(
     if options.time is not None:
         if options.time.lower() == "none":
             return (), "given as an option"
-        return (find_column(columns, options.time, "--time"),), "given as an option"
+        column = find_column(columns, options.time, "--time")
+        return _with_other_half(column, columns, layout), "given as an option"
     if layout.header is None:
-        return _without_header(columns, layout, joints)
-    return _by_name(columns) or _by_content(columns, layout) or ((), "no column is named like a time")
+        found = _without_header(columns, layout, joints) or _texts(columns, layout)
+        return found or ((), "there is no header")
+    return (
+        _by_name(columns)
+        or _by_content(columns, layout)
+        or _texts(columns, layout)
+        or ((), "no column is named like a time")
+    )
 
 
 def _by_name(columns: Sequence[Column]) -> tuple[tuple[Column, ...], str] | None:
+    """Return a column of numbers that is named like a time, or seconds and nanoseconds apart."""
     words = vocabulary()
-    dates = []
+    numeric = [column for column in columns if not column.text]
     for pattern in words.time:
-        for column in (column for column in columns if pattern.search(column.key)):
-            if not column.text:
+        for column in numeric:
+            if pattern.search(column.key):
                 return (column,), "its name"
-            dates.append(column)
     for seconds, nanoseconds in words.time_pairs:
         for first in (column for column in columns if seconds.search(column.key)):
             stem = seconds.sub("", first.key)
             for second in columns:
                 if nanoseconds.search(second.key) and nanoseconds.sub("", second.key) == stem:
                     return (first, second), "their names: seconds and nanoseconds apart"
-    return ((dates[0],), "its name") if dates else None
+    return None
+
+
+def _texts(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column, ...], str] | None:
+    """Return a clock of text: by its name, or as the only column of its kind; a date with its time of day."""
+    texts = [column for column in columns if column.text]
+    words = (*vocabulary().time, *vocabulary().dates)
+    named = [column for pattern in words for column in texts if pattern.search(column.key)]
+    clocks = [column for column in texts if known_forms(layout.cells(column.index))]
+    named_clocks = [column for column in named if column in clocks]
+    if named_clocks:
+        return _with_other_half(named_clocks[0], columns, layout), "its name"
+    if clocks and (len(clocks) == 1 or len(_with_other_half(clocks[0], columns, layout)) == len(clocks)):
+        return _with_other_half(clocks[0], columns, layout), "its cells are dates or times"
+    return ((named[0],), "its name") if named else None
+
+
+def _with_other_half(column: Column, columns: Sequence[Column], layout: Layout) -> tuple[Column, ...]:
+    """Return a column; a date beside the only column of times of day, and the reverse, with this one."""
+
+    def half(column: Column) -> str | None:
+        """Return what a column holds, if it is half a clock."""
+        forms = known_forms(layout.cells(column.index)) if column.text else ()
+        return forms[0].half if forms else None
+
+    other = {DATE: TIME_OF_DAY, TIME_OF_DAY: DATE}.get(half(column) or "")
+    others = [candidate for candidate in columns if other is not None and half(candidate) == other]
+    if len(others) != 1:
+        return (column,)
+    return (column, others[0]) if other == TIME_OF_DAY else (others[0], column)
 
 
 def _by_content(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column, ...], str] | None:
@@ -174,13 +248,13 @@ def _by_content(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column
 
 def _without_header(
     columns: Sequence[Column], layout: Layout, joints: int | None
-) -> tuple[tuple[Column, ...], str]:
+) -> tuple[tuple[Column, ...], str] | None:
     """Return the first column if it alone runs in even steps, unless the robot's joints take all columns."""
     even = [column for column in columns if not column.text and _even(layout.cells(column.index), layout)]
     counts = count_up(layout.cells(0))
     if even == [columns[0]] and not counts and len(columns) > 1 and len(columns) != joints:
         return (columns[0],), "the first column alone increases in even steps"
-    return (), "there is no header"
+    return None
 
 
 def _steps(cells: Sequence[str], layout: Layout) -> list[float]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray
+from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
 from urmpipe_pipeline.sources.checks import find_errors, trimmed
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.diagnose import lines_of_rows, read_carefully
@@ -17,6 +17,7 @@ from urmpipe_pipeline.sources.roles import Roles
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.table import Numbers, read_fast
 from urmpipe_pipeline.sources.tables import for_all
+from urmpipe_pipeline.sources.text_times import timed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -29,7 +30,8 @@ class Content:
         clock: Times of the rows in [ns] on the file's clock, None without one.
         rows: How many rows there are.
         roles: The columns, without those that could not be joined.
-        inferences: What was found out while joining.
+        inferences: What was found out while reading the times and joining.
+        warnings: What a person should know about the times.
     """
 
     columns: Mapping[int, tuple[Column, ...]]
@@ -38,6 +40,7 @@ class Content:
     rows: int
     roles: Roles
     inferences: tuple[Inference, ...]
+    warnings: tuple[LogWarning, ...]
 
     def values(self, group: Sequence[Column]) -> FloatArray:
         """Return the numbers of some columns, shape (n, columns), C-contiguous; no copy if they are all."""
@@ -64,7 +67,8 @@ def read_content(plan: Plan) -> Content:
     numbers = dict(zip(plan.used, read, strict=True))
     roles, said = _joined(plan, numbers)
     main = numbers[plan.main]
-    return Content(columns, numbers, main.clock, len(main.values), roles, said)
+    said = (*main.inferences, *said)
+    return Content(columns, numbers, main.clock, len(main.values), roles, said, main.warnings)
 
 
 def _numbers(plan: Plan, table: int, columns: Sequence[Column]) -> Numbers:
@@ -72,7 +76,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column]) -> Numbers:
     layout, clock = plan.tables.layouts[table], plan.clocks[table]
     places = [column.index for column in columns]
     numbers = read_fast(layout, places, clock.parts) or read_carefully(layout, places, clock.parts)
-    numbers = trimmed(numbers)
+    numbers = trimmed(timed(layout, clock.parts, numbers))
     if not len(numbers.values):
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
         raise LogError(Finding(message, str(layout.segment.path)))

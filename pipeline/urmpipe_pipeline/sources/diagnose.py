@@ -12,6 +12,7 @@ from urmpipe_models.errors import Finding
 from urmpipe_pipeline.sources.cells import is_missing, is_text, split_line, to_float, to_nanoseconds
 from urmpipe_pipeline.sources.sniff import COMMENTS, Layout
 from urmpipe_pipeline.sources.table import NO_TIME, REPORTED, ClockColumn, Numbers
+from urmpipe_pipeline.sources.text_cells import TextCells
 
 SHOWN_FINDINGS = 20
 """Findings that are told one by one; the others are counted."""
@@ -42,6 +43,7 @@ def read_carefully(layout: Layout, columns: Sequence[int], clock: Sequence[Clock
         tuple(reader.findings),
         reader.wrong,
         np.array(lines),
+        tuple(TextCells.of(texts) for texts in reader.texts),
     )
 
 
@@ -76,6 +78,7 @@ class _Reader:
         self._file = str(layout.segment.path)
         self._line = 0
         self._row = 0
+        self.texts: list[list[str]] = [[] for part in clock if part.forms]
         self._wanted = (*columns, *(part.column for part in clock))
 
     def rows(self) -> Iterator[tuple[int, int, list[float]]]:
@@ -83,6 +86,8 @@ class _Reader:
         for line, text in data_lines(self.layout):
             self._line, self._row = line, self._row + 1
             cells = self._cells(text)
+            for texts, part in zip(self.texts, self.clock, strict=False):
+                texts.append("" if cells is None else cells[part.column])
             if cells is None:
                 yield line, REPORTED, [math.nan] * len(self.columns)
             else:
@@ -115,7 +120,7 @@ class _Reader:
 
     def _time(self, cells: Sequence[str]) -> int:
         total = 0
-        for part in self.clock:
+        for part in () if self.texts else self.clock:
             cell = cells[part.column]
             time = to_nanoseconds(cell, self.layout.decimal, part.exponent)
             if time is None and is_missing(cell):

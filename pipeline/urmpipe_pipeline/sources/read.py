@@ -128,13 +128,13 @@ def _times(
         t_ns, said, noticed = even_clock(content.rows, options.period)
         return t_ns, 0, said, noticed
     start = int(content.clock[0])
-    return content.clock - start, start, (), ()
+    return content.clock - start, start, (), content.warnings
 
 
 def _time_columns(clock: Clock) -> list[LogColumn]:
-    """Return the columns of the clock with their units."""
+    """Return the columns of the clock with their units; the factor of text is 1."""
     return [
-        LogColumn(column.name, column.header, "time", i, unit, 10.0 ** (EXPONENTS[unit] - 9))
+        LogColumn(column.name, column.header, "time", i, unit, 10.0 ** (EXPONENTS.get(unit, 9) - 9))
         for i, (column, unit) in enumerate(zip(clock.columns, clock.units.values(), strict=True))
     ]
 

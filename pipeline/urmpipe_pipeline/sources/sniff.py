@@ -20,6 +20,7 @@ from urmpipe_pipeline.sources.cells import (
     split_line,
 )
 from urmpipe_pipeline.sources.text import HeadLine, Segment, head_lines
+from urmpipe_pipeline.sources.text_clock import looks_like_a_clock
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 COMMENTS = ("#", "%", "//")
@@ -153,10 +154,13 @@ def _best_style(lines: Sequence[str], delimiters: Sequence[str], decimals: Seque
 
 
 def _fit(rows: Sequence[Row], width: int, decimal: str) -> float:
-    """Return the share of rows of one width with numbers, times the share of their text that is numbers."""
+    """Return the share of rows of one width with numbers, times the share of their text that is numbers.
+
+    A date or a time counts as a number: 0.005 sec and 2021-04-11 22:27:21 are one cell.
+    """
     full = [row for row in rows if len(row) == width and any(is_number(cell, decimal) for cell in row)]
     cells = [cell for row in full for cell in row if not is_missing(cell)]
-    numbers = sum(len(cell) for cell in cells if is_number(cell, decimal))
+    numbers = sum(len(cell) for cell in cells if is_number(cell, decimal) or looks_like_a_clock(cell))
     return len(full) / len(rows) * numbers / sum(map(len, cells)) if full else 0.0
 
 

@@ -18,6 +18,7 @@ Bytes = NDArray[np.uint8]
 
 _NEWLINES = b"\n\r"
 _TO_POINTS = bytes.maketrans(b",.", b".~")
+_FROM_POINTS = np.frombuffer(bytes.maketrans(b".~", b",."), dtype=np.uint8)
 
 
 def open_table(layout: Layout) -> TableStream | NativeFile:
@@ -33,6 +34,11 @@ def open_table(layout: Layout) -> TableStream | NativeFile:
     file = OSFile(os.fsencode(path))
     file.seek(layout.offset)
     return file
+
+
+def as_written(layout: Layout, cells: Bytes) -> Bytes:
+    """Return cells that a stream has read with the signs that the file has."""
+    return _FROM_POINTS[cells] if layout.decimal == "," != layout.delimiter else cells
 
 
 class TableStream:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import Any
 
@@ -15,10 +15,12 @@ from numpy.typing import NDArray
 from pyarrow import csv
 
 from urmpipe_models.errors import Finding
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
 from urmpipe_pipeline.sources.cells import is_number, plain, to_float
 from urmpipe_pipeline.sources.sniff import Layout
-from urmpipe_pipeline.sources.stream import open_table
+from urmpipe_pipeline.sources.stream import as_written, open_table
+from urmpipe_pipeline.sources.text_cells import TextCells
+from urmpipe_pipeline.sources.text_clock import Form
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 BLOCK_BYTES = 1 << 20
@@ -26,16 +28,25 @@ NO_TIME = np.iinfo(np.int64).min
 """Stands where a row has no time."""
 REPORTED = NO_TIME + 1
 """Stands where a row has no time because of a finding that is reported already."""
+UNREADABLE = NO_TIME + 2
+"""Stands where the text of a row's time is none."""
 
 _PRECISION = 38  # digits of a decimal128
 
 
 @dataclass(frozen=True, slots=True)
 class ClockColumn:
-    """A column of the clock: its place, and the power of ten from its unit to [ns] (9 for s)."""
+    """A column of the clock.
+
+    Attributes:
+        column: Its place.
+        exponent: Power of ten from its unit to [ns]: 9 for s.
+        forms: What its cells may be if they are text: then exponent means nothing.
+    """
 
     column: int
-    exponent: int
+    exponent: int = 0
+    forms: tuple[Form, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,10 +55,14 @@ class Numbers:
 
     Attributes:
         values: Numbers in the file's own units, shape (n, columns); NaN where a sample is missing.
-        clock: Time of each row in [ns] on the file's clock, or NO_TIME, or REPORTED; None without a clock.
+        clock: Time of each row in [ns] on the file's clock, or NO_TIME, REPORTED or UNREADABLE; None without
+            a clock; without meaning while the texts of the clock are not read.
         findings: What is wrong with rows and cells, the first of them.
         wrong: How many such findings there are.
         lines: Line of the file of each row, where they were counted.
+        texts: The cells of the clock's columns, if they are text.
+        inferences: What the clock's rows told about it.
+        warnings: What a person should know about it.
     """
 
     values: FloatArray
@@ -55,6 +70,9 @@ class Numbers:
     findings: tuple[Finding, ...] = ()
     wrong: int = 0
     lines: IntArray | None = None
+    texts: tuple[TextCells, ...] = ()
+    inferences: tuple[Inference, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
 
 
 def read_fast(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn]) -> Numbers | None:
@@ -63,12 +81,17 @@ def read_fast(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColum
     Args:
         layout: How the table is written.
         columns: Which columns hold numbers.
-        clock: The columns of its clock; their values in [ns] are added.
+        clock: The columns of its clock; their values in [ns] are added. If they are text, their cells are
+            read as they are.
     """
-    narrow, wide = ([_scale(layout, part, exact) for part in clock] for exact in (False, True))
+    texts = [part for part in clock if part.forms]
+    numeric = [part for part in clock if not part.forms]
+    narrow, wide = ([_scale(layout, part, exact) for part in numeric] for exact in (False, True))
     for scales in (narrow,) if narrow == wide else (narrow, wide):
         try:
-            return _numbers(_parse(layout, columns, clock, scales), columns, clock, scales)
+            table = _parse(layout, columns, numeric, scales, texts)
+            numbers = _numbers(table, columns, numeric, scales)
+            return replace(numbers, texts=tuple(_text_cells(table, layout, part) for part in texts))
         except (pa.ArrowInvalid, OverflowError):
             continue
     return None
@@ -110,11 +133,17 @@ def _numbers(
 
 
 def _parse(
-    layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn], scales: Sequence[int]
+    layout: Layout,
+    columns: Sequence[int],
+    clock: Sequence[ClockColumn],
+    scales: Sequence[int],
+    texts: Sequence[ClockColumn],
 ) -> pa.Table:
+    """Return the columns as pyarrow parses them: float64, decimals for the clock, bytes for its texts."""
     types: dict[str, Any] = {str(column): pa.float64() for column in columns}
     for part, scale in zip(clock, scales, strict=True):
         types[str(part.column)] = pa.decimal128(_PRECISION, scale)
+    types |= {str(part.column): pa.binary() for part in texts}
     names = [str(column) for column in range(len(layout.names))]
     quoted_commas = layout.delimiter == layout.decimal  # "0,5","1,5": the stream leaves them
     with open_table(layout) as stream:
@@ -130,6 +159,20 @@ def _parse(
             ),
             memory_pool=pa.system_memory_pool(),  # the default one keeps what it once had
         )
+
+
+def _text_cells(table: pa.Table, layout: Layout, part: ClockColumn) -> TextCells:
+    """Return the cells of a parsed column of bytes: offsets of 32 bits, and the bytes between them."""
+    data, starts, total = [], [np.zeros(1, dtype=np.int64)], 0
+    for chunk in table.column(str(part.column)).chunks:
+        _, offsets, content = chunk.buffers()
+        own = np.frombuffer(offsets, dtype="<i4")[chunk.offset : chunk.offset + len(chunk) + 1]
+        if len(chunk) and content is not None:
+            data.append(np.frombuffer(content, dtype=np.uint8)[own[0] : own[-1]])
+        starts.append(own[1:].astype(np.int64) + (total - own[0]))
+        total += int(own[-1] - own[0])
+    joined = np.concatenate(data) if data else np.empty(0, dtype=np.uint8)
+    return TextCells(as_written(layout, joined), np.concatenate(starts))
 
 
 def _fill(target: FloatArray, chunk: pa.Array) -> None:

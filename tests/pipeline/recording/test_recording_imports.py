@@ -24,6 +24,9 @@ SPECIMENS = {
     "ragged.csv": b"t,q1\n0,1\n0.1,2,3\n",
     "text.csv": b"t,q1\n0,1\n0.1,two\n",
     "backwards.csv": b"t,q1\n0,1\n-1,2\n",
+    "dates.csv": b'timestamp,q1\n" 01/20/2021 10:11:32.332",1\n" 01/20/2021 10:11:32.532",2\n',
+    "german.csv": b"Datum;Uhrzeit;A1\n20.01.2021;10:11:32,332;1\n20.01.2021;10:11:32,432;2\n",
+    "coarse.csv": b"Time,q1\n" + b"".join(b"10:11:%02d,1\n" % (k // 4) for k in range(40)),
     "empty.csv": b"",
     "log.mat": b"MATLAB 5.0",
 }

@@ -43,6 +43,10 @@ def test_names_of_the_time(read: Read, name: str) -> None:
         ("timestamp", ["1740416404047049", "1740416404052050"], [5_001_000], "us"),
         ("%time", ["1486559106139796569", "1486559106140360682"], [564_113], "ns"),
         ("__time", ["1396293888.886", "1396293888.985"], [99_000_000], "s"),
+        ("timestamp", ["1740416404.047049", "1740416404.052050"], [5_001_000], "s"),
+        ("Zeit [ms]", ["-2.5", "0", "2.5"], [2_500_000, 2_500_000], "ms"),
+        ("t", ["3601.25", "3601.255"], [5_000_000], "s"),
+        ("time", ["1.0e+00", "1.005e+00", "1.01e+00"], [5_000_000, 5_000_000], "s"),
     ],
 )
 def test_units_of_the_time(read: Read, name: str, times: list[str], steps: list[int], unit: str) -> None:
@@ -125,13 +129,6 @@ def test_the_time_as_the_user_says(read: Read, wrong: Wrong) -> None:
     assert wrong(text, time="c") == ["--time: found no column 'c', allowed: a, b, q1"]
 
 
-def test_dates_are_not_read(wrong: Wrong) -> None:
-    said = "found '2021-04-11 22:27:21.573641', allowed: times as numbers in s, ms, us or ns"
-    text = "date,timestamp,q1\nx,2021-04-11 22:27:21.573641,1\ny,2021-04-11 22:27:21.583641,1\n"
-    assert wrong(text) == [f"log.csv:2, column timestamp: {said}"]
-    assert wrong(text, time="timestamp") == [f"log.csv:2, column timestamp: {said}"]
-
-
 def test_two_columns_of_one_name(wrong: Wrong, read: Read) -> None:
     text = "time,time,q1\n0,0.5,1\n1,0.6,2\n"
     assert wrong(text) == [
@@ -175,3 +172,15 @@ def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:
     assert wrong(clocked("t [s]", "0", "1", "1e30")) == [
         "log.csv:4, column t [s]: found '1e30', allowed: a number in every row"
     ]
+
+
+def test_frames_are_no_clock(read: Read) -> None:
+    log = read("Frame,q1\n1,0.5\n2,0.6\n3,0.7\n", period=0.02)
+    assert log.t_ns.tolist() == [0, 20_000_000, 40_000_000]
+    assert log.joints == ("q1",)
+
+
+def test_libfranka_writes_milliseconds(read: Read) -> None:
+    names = ",".join(f"state.q[{k}]" for k in range(7))
+    log = read(f"time,{names}\n1000,0,0,0,0,0,0,0\n1001,1,1,1,1,1,1,1\n")
+    assert (log.source, log.clock_start, log.t_ns.tolist()) == ("libfranka", 1.0, [0, 1_000_000])
