@@ -60,8 +60,8 @@ def print_run(run: Run) -> None:
     for inference in log.inferences:
         table.add_row(inference.what, inference.value, inference.evidence)
     grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
-    own = len(run.t_ns) == log.rows and bool((run.t_ns == log.t_ns).all())
-    table.add_row("grid", grid, "the log's own rows" if own else "resampled")
+    resampled = any(warning.kind == "resampled" for warning in run.warnings)
+    table.add_row("grid", grid, "resampled" if resampled else "the log's own rows")
     table.add_row(
         "robot",
         run.robot.name if run.robot else "none",

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning
+from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
+from urmpipe_pipeline.quantised import behind_repeated
 from urmpipe_pipeline.sources.clock import Clock
 from urmpipe_pipeline.sources.diagnose import SHOWN_FINDINGS, lines_of_rows
 from urmpipe_pipeline.sources.sniff import Layout
@@ -33,6 +34,33 @@ def trimmed(numbers: Numbers) -> Numbers:
         return numbers
     lines = None if numbers.lines is None else numbers.lines[:end]
     return replace(numbers, values=numbers.values[:end], clock=numbers.clock[:end], lines=lines)
+
+
+def rebuilt(numbers: Numbers) -> Numbers:
+    """Return the numbers, with a regular clock where the file's is too coarse for its rows.
+
+    Args:
+        numbers: What was read of a table, its times that of the file.
+    """
+    times = numbers.clock
+    if times is None or times.min(initial=0) <= UNREADABLE:
+        return numbers
+    steps = np.diff(times)
+    if not len(steps) or steps.min() != 0:
+        return numbers
+    clock = behind_repeated(times)
+    if clock is None:
+        return numbers
+    period, resolution = f"{clock.period / 1e9:.9g} s", f"{clock.resolution / 1e9:.9g} s"
+    seen = f"times in steps of {resolution} stand in {clock.resolution / clock.period:.4g} rows each"
+    found = Inference("clock", f"rebuilt with a period of {period}", seen)
+    warning = LogWarning("clock-rebuilt", f"{seen}: a regular clock of {period} is taken in their place")
+    return replace(
+        numbers,
+        clock=clock.t_ns,
+        inferences=(*numbers.inferences, found),
+        warnings=(*numbers.warnings, warning),
+    )
 
 
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:

@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
-from urmpipe_pipeline.sources.checks import find_errors, trimmed
+from urmpipe_pipeline.sources.checks import find_errors, rebuilt, trimmed
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.diagnose import lines_of_rows, read_carefully
 from urmpipe_pipeline.sources.plan import Plan
@@ -76,7 +76,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column]) -> Numbers:
     layout, clock = plan.tables.layouts[table], plan.clocks[table]
     places = [column.index for column in columns]
     numbers = read_fast(layout, places, clock.parts) or read_carefully(layout, places, clock.parts)
-    numbers = trimmed(timed(layout, clock.parts, numbers))
+    numbers = rebuilt(trimmed(timed(layout, clock.parts, numbers)))
     if not len(numbers.values):
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
         raise LogError(Finding(message, str(layout.segment.path)))

@@ -184,3 +184,42 @@ def test_libfranka_writes_milliseconds(read: Read) -> None:
     names = ",".join(f"state.q[{k}]" for k in range(7))
     log = read(f"time,{names}\n1000,0,0,0,0,0,0,0\n1001,1,1,1,1,1,1,1\n")
     assert (log.source, log.clock_start, log.t_ns.tolist()) == ("libfranka", 1.0, [0, 1_000_000])
+
+
+def test_a_coarse_clock_is_rebuilt_and_that_is_said(read: Read) -> None:
+    """20 Hz, whole seconds: the first and the last second are not whole."""
+    stamps = (np.arange(13, 13 + 200) // 20).tolist()
+    log = read(clocked("t [s]", *map(str, stamps)), units={"": "deg"})
+    assert log.period == pytest.approx(0.05, rel=1e-9)
+    assert (np.abs(log.t + log.clock_start - stamps) <= 1.0).all()
+    said = "times in steps of 1 s stand in 20 rows each"
+    assert [(w.kind, w.message) for w in log.warnings if w.kind == "clock-rebuilt"] == [
+        ("clock-rebuilt", f"{said}: a regular clock of 0.05 s is taken in their place")
+    ]
+    assert [(i.value, i.evidence) for i in log.inferences if i.what == "clock"] == [
+        ("rebuilt with a period of 0.05 s", said)
+    ]
+
+
+def test_a_coarse_time_of_day_goes_over_midnight(read: Read) -> None:
+    cells = [f"23:59:{k // 10 + 50}" if k < 100 else f"00:00:0{k // 10 - 10}" for k in range(200)]
+    log = read(clocked("Time", *cells), units={"": "deg"})
+    assert log.period == pytest.approx(0.1, rel=1e-9)
+    assert log.t[-1] == pytest.approx(19.9, rel=1e-9)
+
+
+def test_irregular_repeats_stay_errors(wrong: Wrong) -> None:
+    rows = [0, 0, 0, 1, 1, 1, 1, 1, 1, 2, 3, 3, 3, 3]
+    allowed = "allowed: times that increase from row to row"
+    repeats = [k for k in range(1, len(rows)) if rows[k] == rows[k - 1]]
+    assert wrong(clocked("t [s]", *map(str, rows))) == [
+        f"log.csv:{k + 2}, column t [s]: found {rows[k]} s again, {allowed}" for k in repeats
+    ]
+
+
+def test_one_repeat_stays_an_error(wrong: Wrong) -> None:
+    times = [0.005 * k for k in range(50)]
+    times[20] = times[19]
+    assert wrong(clocked("t", *(f"{time:.3f}" for time in times))) == [
+        "log.csv:22, column t: found 0.095 s again, allowed: times that increase from row to row"
+    ]
