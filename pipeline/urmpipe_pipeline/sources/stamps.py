@@ -49,9 +49,9 @@ def _shapes(block: Bytes) -> Iterator[IntArray | slice]:
         yield slice(None)
         return
     yield np.flatnonzero(keys == keys[0])
-    _, which = np.unique(keys[others], return_inverse=True)
-    order = np.argsort(which, kind="stable")
-    yield from np.split(others[order], np.flatnonzero(np.diff(which[order])) + 1)
+    others = others[np.argsort(keys[others], kind="stable")]
+    ordered = keys[others]
+    yield from np.split(others, np.flatnonzero(ordered[1:] != ordered[:-1]) + 1)
 
 
 def _read_shape(cells: Bytes, form: Form) -> IntArray | int:

@@ -53,7 +53,7 @@ class TextCells:
         for first in range(0, len(self), BLOCK):
             starts = self.starts[first : first + BLOCK + 1]
             lengths = np.minimum(np.diff(starts), LONGEST_CELL)
-            for length in np.unique(lengths).tolist():
+            for length in np.flatnonzero(np.bincount(lengths)).tolist():
                 if not 0 < length < LONGEST_CELL:
                     continue
                 rows = np.flatnonzero(lengths == length)

@@ -134,7 +134,9 @@ def _date(parts: Parts) -> tuple[IntArray, Flags]:
     written = (parts.number("year") * 100 + month) * 100 + parts.number("day")
     if len(written) and (written == written[0]).all():
         written = written[:1]
-    few, places = np.unique(written, return_inverse=True)
+    few = np.sort(written)  # np.unique would import numpy.ma
+    few = few[np.append(True, few[1:] != few[:-1])]
+    places = np.searchsorted(few, written)
     day, real = _days_since_1970(few // 10_000, few // 100 % 100, few % 100)
     shape = (len(parts.cells),)
     return np.broadcast_to(day[places], shape), np.broadcast_to(real[places], shape)

@@ -69,6 +69,11 @@ class Reading:
         return np.diff(self.times[self.times > UNREADABLE])
 
     @property
+    def backwards(self) -> int:
+        """How often the clock runs backwards."""
+        return int(np.count_nonzero(self.steps < 0))
+
+    @property
     def name(self) -> str:
         """What the forms are called."""
         return " and ".join(form.name for form in self.forms)
@@ -79,8 +84,8 @@ def read_columns(
 ) -> tuple[list[Reading], list[str]]:
     """Return the readings of a clock that fit it best, and why: several if they differ and nothing decides.
 
-    Those with the fewest cells that are no times; of these, those that do not run backwards; of these, one
-    for all whose steps are the same.
+    Those with the fewest cells that are no times; of these, those that run backwards in the fewest places;
+    of these, one for all whose steps are the same.
 
     Args:
         columns: The columns, whose times are added.
@@ -89,7 +94,8 @@ def read_columns(
     readings = [_read(columns, combination) for combination in product(*forms)]
     fewest = min(reading.unreadable for reading in readings)
     readable = [reading for reading in readings if reading.unreadable == fewest]
-    forwards = [reading for reading in readable if (reading.steps >= 0).all()] or readable[:1]
+    least = min(reading.backwards for reading in readable)
+    forwards = [reading for reading in readable if reading.backwards == least]
     different: list[Reading] = []
     for reading in forwards:
         if not any(np.array_equal(reading.steps, other.steps) for other in different):
@@ -136,8 +142,8 @@ def _said(reading: Reading, columns: Sequence[TextCells], evidence: Sequence[str
         reasons.append("without a time zone: taken as UTC")
     said = [Inference("form of the time", reading.name, "; ".join(reasons))]
     if reading.nights:
-        fallen = f"the time of day falls back by nearly 24 h {reading.nights} times"
-        said.append(Inference("midnight", f"{reading.nights} times", f"{fallen}: the next day begins"))
+        why = "there the time of day falls back by nearly 24 h: the next day begins"
+        said.append(Inference("nights passed", str(reading.nights), why))
     return tuple(said)
 
 

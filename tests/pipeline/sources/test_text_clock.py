@@ -192,6 +192,16 @@ def test_microseconds_that_are_not_zero_padded(read: Read) -> None:
     assert evidence(log) == ("its cells, such as '10:11:32:995021'; in another form they run backwards")
 
 
+def test_a_wrong_row_does_not_change_what_its_neighbours_mean(wrong: Wrong) -> None:
+    """One row too late in the file: as decimals the clock would run backwards in more places."""
+    cells = [f"10:11:{33 + k // 200}:{k % 200 * 5000}" for k in range(600)]
+    cells[300] = "10:11:33:0"
+    assert wrong(clocked(*cells, name="Time")) == [
+        "log.csv:302, column Time: found 10:11:33 after 10:11:34.495,"
+        " allowed: times that increase from row to row"
+    ]
+
+
 def test_zero_padded_digits_behind_a_colon_are_decimals(read: Read) -> None:
     log = read(clocked("10:11:32:995", "10:11:33:000", "10:11:33:005", name="Time"))
     assert np.diff(log.t_ns).tolist() == [5 * MS] * 2
@@ -212,8 +222,8 @@ def test_digits_behind_a_colon_that_nothing_tells_are_asked_for(read: Read, wron
 def test_midnight(read: Read, wrong: Wrong) -> None:
     log = read(clocked("23:59:59.995", "00:00:00", "00:00:00.005", name="Time"))
     assert log.t_ns.tolist() == [0, 5 * MS, 10 * MS]
-    assert [(i.value, i.evidence) for i in log.inferences if i.what == "midnight"] == [
-        ("1 times", "the time of day falls back by nearly 24 h 1 times: the next day begins")
+    assert [(i.value, i.evidence) for i in log.inferences if i.what == "nights passed"] == [
+        ("1", "there the time of day falls back by nearly 24 h: the next day begins")
     ]
     assert wrong(clocked("12:00:00", "12:00:01", "11:59:59", name="Time")) == [
         "log.csv:4, column Time: found 11:59:59 after 12:00:01, allowed: times that increase from row to row"
