@@ -104,6 +104,29 @@ def find_clock(
         OptionError: If its unit is given as one that is no time.
     """
     chosen, why = _columns(columns, layout, options, joints)
+    return clock_of(chosen, why, layout, source, units)
+
+
+def clock_of(
+    chosen: tuple[Column, ...],
+    why: str,
+    layout: Layout,
+    source: KnownSource | None,
+    units: Mapping[int, Unit],
+) -> Clock:
+    """Return the clock that columns make.
+
+    Args:
+        chosen: The columns: one, a date and a time of day, seconds and nanoseconds; or none.
+        why: Why these.
+        layout: Their table.
+        source: The source, if it is known.
+        units: Units given by the user, by the column's number.
+
+    Raises:
+        LogError: If the time is text in no form that is known, or its unit cannot be told.
+        OptionError: If its unit is given as one that is no time.
+    """
     if not chosen:
         return Clock(inferences=(Inference("time column", "none", why),))
     found = Inference("time column", " and ".join(column.name for column in chosen), why)
@@ -214,7 +237,8 @@ def _texts(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column, ...
     clocks = [column for column in texts if known_forms(layout.cells(column.index))]
     named_clocks = [column for column in named if column in clocks]
     if named_clocks:
-        return _with_other_half(named_clocks[0], columns, layout), "its name"
+        found = _with_other_half(named_clocks[0], columns, layout)
+        return found, "its name" if len(found) == 1 else "a date and a time of day"
     if clocks and (len(clocks) == 1 or len(_with_other_half(clocks[0], columns, layout)) == len(clocks)):
         return _with_other_half(clocks[0], columns, layout), "its cells are dates or times"
     return ((named[0],), "its name") if named else None
@@ -250,7 +274,9 @@ def _without_header(
     columns: Sequence[Column], layout: Layout, joints: int | None
 ) -> tuple[tuple[Column, ...], str] | None:
     """Return the first column if it alone runs in even steps, unless the robot's joints take all columns."""
-    even = [column for column in columns if not column.text and _even(layout.cells(column.index), layout)]
+    even = [
+        column for column in columns if not column.text and runs_evenly(layout.cells(column.index), layout)
+    ]
     counts = count_up(layout.cells(0))
     if even == [columns[0]] and not counts and len(columns) > 1 and len(columns) != joints:
         return (columns[0],), "the first column alone increases in even steps"
@@ -273,7 +299,13 @@ def _increases(cells: Sequence[str], layout: Layout) -> bool:
     return bool(steps) and min(steps) > 0
 
 
-def _even(cells: Sequence[str], layout: Layout) -> bool:
+def runs_evenly(cells: Sequence[str], layout: Layout) -> bool:
+    """Return whether numbers increase in steps that differ by less than 1 %.
+
+    Args:
+        cells: Sampled cells.
+        layout: Their table.
+    """
     steps = _steps(cells, layout)
     return len(steps) >= 2 and min(steps) > 0 and max(steps) - min(steps) <= _EVEN * max(steps)
 

@@ -66,6 +66,8 @@ def read_content(plan: Plan) -> Content:
     read = for_all(plan.used, lambda table: _numbers(plan, table, columns[table]))
     numbers = dict(zip(plan.used, read, strict=True))
     roles, said = _joined(plan, numbers)
+    if plan.time_file is not None:
+        numbers[plan.main] = _with_times(plan, numbers[plan.main])
     main = numbers[plan.main]
     said = (*main.inferences, *said)
     return Content(columns, numbers, main.clock, len(main.values), roles, said, main.warnings)
@@ -84,6 +86,22 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column]) -> Numbers:
     if findings:
         raise LogError(*findings)
     return numbers
+
+
+def _with_times(plan: Plan, main: Numbers) -> Numbers:
+    """Return the numbers of the main table with the times of the other file.
+
+    Raises:
+        LogError: If these are wrong, or more or fewer than the rows.
+    """
+    assert plan.time_file is not None
+    times = _numbers(plan, plan.time_file, ())
+    if len(times.values) != len(main.values):
+        file = str(plan.tables.layouts[plan.time_file].segment.path)
+        title = plan.tables.layouts[plan.main].segment.path.name
+        message = f"found {len(times.values)} times, allowed: {len(main.values)}, as {title} has rows"
+        raise LogError(Finding(message, file))
+    return replace(main, clock=times.clock, inferences=times.inferences, warnings=times.warnings)
 
 
 def _joined(plan: Plan, numbers: Mapping[int, Numbers]) -> tuple[Roles, tuple[Inference, ...]]:

@@ -62,8 +62,10 @@ def data_lines(layout: Layout) -> Iterator[tuple[int, str]]:
     """Yield number and text of each line with a data row, not of blank lines and comments."""
     for number, line in layout.segment.lines():
         text = line.strip()
-        if number >= layout.first_line and text and not text.startswith(COMMENTS):
-            yield number, line
+        if number < layout.first_line or not text or text.startswith(COMMENTS):
+            continue
+        for row in split_line(text, layout.delimiter) if layout.across else (line,):
+            yield number, row
 
 
 class _Reader:

@@ -69,7 +69,7 @@ def _joint_log(
     sources: Sequence[SourceFile],
 ) -> JointLog:
     """Return the log of what was read: units found, values in SI."""
-    roles, layout, clock = content.roles, plan.tables.layouts[plan.main], plan.clocks[plan.main]
+    roles, layout, clock = content.roles, plan.tables.layouts[plan.main], plan.clock
     file = str(layout.segment.path)
     t_ns, start, timed, noticed = _times(content, options)
     q, qd, qdd = (content.values(group) for group in (roles.joints, roles.rates, roles.accelerations))

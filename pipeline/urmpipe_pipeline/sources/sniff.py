@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline.joint_log import Inference
@@ -19,7 +19,7 @@ from urmpipe_pipeline.sources.cells import (
     printable,
     split_line,
 )
-from urmpipe_pipeline.sources.text import HeadLine, Segment, head_lines
+from urmpipe_pipeline.sources.text import HEAD_BYTES, HeadLine, Segment, head_lines
 from urmpipe_pipeline.sources.text_clock import looks_like_a_clock
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
@@ -55,6 +55,7 @@ class Layout:
         offset: Offset of that line in bytes.
         sample: Cells of the first rows.
         inferences: What was found out.
+        across: Whether the rows of its only column stand side by side in one line.
     """
 
     segment: Segment
@@ -67,6 +68,7 @@ class Layout:
     offset: int
     sample: tuple[tuple[str, ...], ...]
     inferences: tuple[Inference, ...]
+    across: bool = False
 
     def cells(self, column: int) -> list[str]:
         """Return the sampled cells of a column."""
@@ -122,6 +124,23 @@ def sniff(segment: Segment, delimiter: str | None = None, decimal: str | None = 
         sample=tuple(tuple(row) for row in rows[first:]),
         inferences=(*_style_inferences(style, delimiter, decimal), said),
     )
+
+
+def across(layout: Layout) -> Layout:
+    """Return a table of a single line of numbers as one column; any other as it is.
+
+    Args:
+        layout: How the table is written, as far as its beginning tells.
+    """
+    if layout.header is not None or len(layout.sample) != 1 or len(layout.names) < 3:
+        return layout
+    lines = layout.segment.lines()
+    if any(line.strip() for number, line in lines if number > layout.first_line):
+        return layout
+    longer = layout.segment.end - layout.segment.start > HEAD_BYTES  # then the last value is cut
+    cells = layout.sample[0][: -1 if longer else None][:SAMPLED_LINES]
+    column = tuple((cell,) for cell in cells)
+    return replace(layout, names=("1",), sample=column, across=True)
 
 
 def _choices(what: str, given: str | None, allowed: Sequence[str]) -> Sequence[str]:

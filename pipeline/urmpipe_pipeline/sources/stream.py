@@ -57,6 +57,7 @@ class TableStream:
         wide = segment.encoding.startswith("utf-16")
         self._decoder = codecs.getincrementaldecoder(segment.encoding)(errors="replace") if wide else None
         self._squeezed = layout.delimiter == SPACE
+        self._across = layout.delimiter.encode() if layout.across else None
         self._signs = _TO_POINTS if layout.decimal == "," != layout.delimiter else None
         self._cut_line = b""
         self._ready = b""
@@ -64,7 +65,9 @@ class TableStream:
     @property
     def converts(self) -> bool:
         """Whether the bytes read are others than the file's own."""
-        return self._decoder is not None or self._signs is not None or self._squeezed
+        return (
+            self._decoder is not None or self._signs is not None or self._squeezed or self._across is not None
+        )
 
     def read(self, size: int = -1) -> bytes:
         """Return up to so many bytes of the table, none at its end."""
@@ -84,11 +87,12 @@ class TableStream:
         if self._signs is not None:
             block = block.translate(self._signs)
         if not self._squeezed:
-            return block
+            return block.replace(self._across, b"\n") if self._across else block
         block = self._cut_line + block
         end = max(block.rfind(b"\n"), block.rfind(b"\r")) + 1 if raw else len(block)
         self._cut_line = block[end:]
-        return squeeze(block[:end])
+        block = squeeze(block[:end])
+        return block.replace(self._across, b"\n") if self._across else block
 
     @property
     def closed(self) -> bool:
