@@ -9,13 +9,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_pipeline.joint_log import IntArray
 from urmpipe_pipeline.sources.cells import LONGEST_NS
+from urmpipe_pipeline.sources.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 Flags = NDArray[np.bool_]
@@ -231,7 +231,8 @@ FORMS: Sequence[Form] = _forms()
 """All forms, the usual ones first."""
 
 
-@lru_cache(maxsize=4096)
 def looks_like_a_clock(cell: str) -> bool:
     """Return whether the text of a cell may be a time."""
-    return cell[:1] in "+-0123456789" and any(form.pattern.match(cell) for form in FORMS)
+    if len(cell) >= LONGEST_CELL or cell[:1] not in "+-0123456789":
+        return False
+    return any(form.pattern.match(cell) for form in FORMS)
