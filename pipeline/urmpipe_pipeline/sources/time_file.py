@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.sources.clock import Clock, clock_of, runs_evenly
+from urmpipe_pipeline.sources.clock import Clock, clock_of
+from urmpipe_pipeline.sources.clock_columns import runs_evenly
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.tables import Tables
 from urmpipe_pipeline.sources.vocabulary import Unit, key, vocabulary
