@@ -64,8 +64,8 @@ def print_run(run: Run, *, alternatives: bool = False) -> None:
         cells = (inference.what, inference.value, inference.evidence, otherwise(inference))
         table.add_row(*cells[: len(columns)])
     grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
-    own = len(run.t_ns) == log.rows and bool((run.t_ns == log.t_ns).all())
-    table.add_row("grid", grid, "the log's own rows" if own else "resampled")
+    resampled = any(warning.kind == "resampled" for warning in run.warnings)
+    table.add_row("grid", grid, "resampled" if resampled else "the log's own rows")
     if not any(inference.what == "robot" for inference in log.inferences):
         because = run.robot.description if run.robot else "not given: no kinematics (--robot NAME|FILE)"
         table.add_row("robot", run.robot.name if run.robot else "none", because)

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning
+from urmpipe_pipeline.quantised import Regular, behind_rounded
 
 REGULAR = 0.01
 """A log is regular if no sample is further from its place on the grid than this share of the period."""
@@ -30,7 +31,7 @@ class Grid:
     Attributes:
         t_ns: Times from the log's first row in integer [ns], shape (g,).
         tsp: Sampling period in [s]; 0 for a single sample.
-        own: True if the grid is the log's own rows.
+        own: True if each sample is a row of the log, at its own time or that of the clock rounded to it.
         source_ns: The rows' times in integer [ns], shape (n,).
         warnings: What was changed.
     """
@@ -85,7 +86,7 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     Args:
         log: The log, its times strictly increasing.
         tsp: The period wanted in [s]; None for the log's own, which is its rows where they are
-            regular and else its median period.
+            regular (as far as the resolution of their clock tells) and else its median period.
     """
     t = log.t_ns
     if len(t) < 2:
@@ -93,6 +94,12 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     mean = float(t[-1] - t[0]) / (len(t) - 1)
     ideal = t[0] + np.arange(len(t)) * mean
     regular = bool(np.max(np.abs(t - ideal)) <= REGULAR * mean)
+    clock = None if regular else behind_rounded(t)
+    if clock is not None and (
+        tsp is None or abs(tsp * 1e9 - clock.period) <= REGULAR * clock.period / len(t)
+    ):
+        even = clock.t_ns - clock.t_ns[0] + t[0]
+        return Grid(even, clock.period / 1e9, True, t, (_rounded(clock),))
     wanted = tsp * 1e9 if tsp is not None else mean if regular else float(np.median(np.diff(t)))
     if regular and abs(wanted - mean) <= REGULAR * mean / len(t):
         return Grid(t, mean / 1e9, True, t, ())
@@ -100,6 +107,14 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     grid = np.rint(np.arange(count) * wanted).astype(np.int64) + t[0]
     in_gap = inside_gaps(grid, t)
     return Grid(grid, wanted / 1e9, False, t, tuple(_changes(log, wanted, count, in_gap)))
+
+
+def _rounded(clock: Regular) -> LogWarning:
+    """Say that a regular clock is seen behind rounded times."""
+    said = f"the times are those of a regular clock of {clock.period / 1e6:.6g} ms in steps of"
+    return LogWarning(
+        "clock-rounded", f"{said} {clock.resolution / 1e6:.6g} ms: the rows are taken as regular"
+    )
 
 
 def _changes(log: JointLog, wanted: float, count: int, in_gap: NDArray[np.bool_]) -> list[LogWarning]:

@@ -91,3 +91,21 @@ def test_logs_of_no_and_one_row_have_a_grid(count: int) -> None:
     assert len(grid.t_ns) == count
     assert grid.own
     assert not inside_gaps(np.arange(3), np.arange(count)).any()
+
+
+def test_a_clock_rounded_to_milliseconds_is_regular_and_that_is_said() -> None:
+    """300 Hz in whole milliseconds: steps of 3, 3, 4 ms."""
+    t = np.floor(np.arange(300) / 0.3).astype(np.int64) * MS
+    grid = make_grid(log_at(t))
+    assert grid.own
+    assert grid.tsp == pytest.approx(1 / 300, rel=1e-5)  # a millisecond in a second, over 300 rows
+    assert np.abs(grid.t_ns - t).max() <= MS
+    np.testing.assert_array_equal(grid.source_ns, t)
+    assert [(w.kind, w.message) for w in grid.warnings] == [
+        (
+            "clock-rounded",
+            f"the times are those of a regular clock of {grid.tsp * 1e3:.6g} ms in steps of 1 ms:"
+            " the rows are taken as regular",
+        )
+    ]
+    assert not make_grid(log_at(t), 0.01).own

@@ -159,3 +159,13 @@ def test_options_that_make_no_sense_are_refused(tmp_path: Path, options: dict[st
     with pytest.raises(OptionError) as error:
         ingest_log([path], **options)
     assert str(error.value) == said
+
+
+@pytest.mark.parametrize("rows", [1, 2])
+def test_few_samples_keep_their_recorded_rates(tmp_path: Path, rows: int) -> None:
+    """Two samples have no differences of the second order: nothing contradicts what was recorded."""
+    path = tmp_path / "log.csv"
+    path.write_text("".join(["t,q1,qd1\n", "0,0.5,0.25\n", "0.1,0.6,0.75\n"][: rows + 1]))
+    run = ingest_log([path], read=RAD)
+    assert run.qd[:, 0].tolist() == [0.25, 0.75][:rows]
+    assert "recorded-rates" not in [warning.kind for warning in run.warnings]

@@ -100,7 +100,7 @@ def assemble(
         inferences=(
             *plan.tables.inferences,
             *layout.inferences,
-            *plan.clocks[plan.main].inferences,
+            *plan.clock.inferences,
             *timed,
             *roles.inferences,
             *content.inferences,
@@ -110,7 +110,7 @@ def assemble(
         ),
         warnings=(
             *content.warnings,
-            *plan.clocks[plan.main].warnings,
+            *plan.clock.warnings,
             *noticed,
             *finder.warnings,
             *turned.warnings,
@@ -161,10 +161,10 @@ def _header(plan: Plan, column: Column) -> str:
 
 
 def _time_columns(plan: Plan) -> Iterator[LogColumn]:
-    """Yield the columns of the clock with their units."""
-    clock = plan.clocks[plan.main]
+    """Yield the columns of the clock with their units; the factor of text is 1."""
+    clock = plan.clock
     for i, (column, unit) in enumerate(zip(clock.columns, clock.units.values(), strict=True)):
-        factor = 10.0 ** (EXPONENTS[unit] - 9)
+        factor = 10.0 ** (EXPONENTS.get(unit, 9) - 9)  # of a date: 1
         header = _header(plan, column)
         yield LogColumn(column.name, header, "time", i, unit, factor, number=column.number)
 

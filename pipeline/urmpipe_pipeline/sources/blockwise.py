@@ -7,10 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_pipeline.joint_log import IntArray
 from urmpipe_pipeline.sources.diagnose import CarefulReader
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.stream import byte_encoding, end_of_rows, row_blocks
 from urmpipe_pipeline.sources.table import ClockColumn, Numbers, read_fast
+from urmpipe_pipeline.sources.text_cells import TextCells
 
 READ_WITH_CARE = 1 << 16
 """Bytes that are read row by row if there is something wrong in them."""
@@ -29,13 +31,19 @@ def read_blockwise(layout: Layout, columns: Sequence[int], clock: Sequence[Clock
     reader = CarefulReader(layout, columns, clock)
     parts = [part for block in row_blocks(layout) for part in _parts(reader, block)]
     values = [part.values for part in parts] or [np.empty((0, len(columns)))]
-    times = [part.clock for part in parts if part.clock is not None] or [np.empty(0, dtype=np.int64)]
+    times = [_times(part) for part in parts] or [np.empty(0, dtype=np.int64)]
     return replace(
         reader.verdict(),
         values=np.concatenate(values),
         clock=np.concatenate(times) if clock else None,
+        texts=tuple(TextCells.joined(texts) for texts in zip(*(part.texts for part in parts), strict=True)),
         left_out=sum(part.left_out for part in parts),
     )
+
+
+def _times(part: Numbers) -> IntArray:
+    """Return the times of a part; none yet where they are text, which is read of all parts at once."""
+    return np.zeros(len(part.values), dtype=np.int64) if part.clock is None else part.clock
 
 
 def _parts(reader: CarefulReader, block: bytes, *, small: bool = False) -> Iterator[Numbers]:

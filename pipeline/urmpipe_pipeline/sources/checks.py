@@ -4,16 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
-from decimal import Decimal
 
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning
-from urmpipe_pipeline.sources.clock import EXPONENTS, Clock
+from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
+from urmpipe_pipeline.quantised import behind_repeated
+from urmpipe_pipeline.sources.clock import Clock
 from urmpipe_pipeline.sources.diagnose import SHOWN_FINDINGS, lines_of_rows
 from urmpipe_pipeline.sources.sniff import Layout
-from urmpipe_pipeline.sources.table import NO_TIME, REPORTED, Numbers
+from urmpipe_pipeline.sources.table import NO_TIME, UNREADABLE, Numbers
+from urmpipe_pipeline.sources.text_cells import LONGEST_CELL
 
 GAP = 3.0
 """Times the median period: more than this between two rows is a gap."""
@@ -57,6 +58,7 @@ def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
         numbers,
         values=numbers.values[rows],
         clock=clock,
+        texts=tuple(cells.at(rows) for cells in numbers.texts),
         findings=numbers.lasting,
         wrong=len(numbers.lasting),
         rows=rows + 1,
@@ -75,6 +77,33 @@ def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
 def may_skip(numbers: Numbers) -> bool:
     """Return whether so few rows could not be read that they may be left out."""
     return 0 < len(numbers.unread) <= MOST_SKIPPED * len(numbers.values)
+
+
+def rebuilt(numbers: Numbers) -> Numbers:
+    """Return the numbers, with a regular clock where the file's is too coarse for its rows.
+
+    Args:
+        numbers: What was read of a table, its times that of the file.
+    """
+    times = numbers.clock
+    if times is None or times.min(initial=0) <= UNREADABLE:
+        return numbers
+    steps = np.diff(times)
+    if not len(steps) or steps.min() != 0:
+        return numbers
+    clock = behind_repeated(times)
+    if clock is None:
+        return numbers
+    period, resolution = f"{clock.period / 1e9:.9g} s", f"{clock.resolution / 1e9:.9g} s"
+    seen = f"times in steps of {resolution} stand in {clock.resolution / clock.period:.4g} rows each"
+    found = Inference("clock", f"rebuilt with a period of {period}", seen)
+    warning = LogWarning("clock-rebuilt", f"{seen}: a regular clock of {period} is taken in their place")
+    return replace(
+        numbers,
+        clock=clock.t_ns,
+        inferences=(*numbers.inferences, found),
+        warnings=(*numbers.warnings, warning),
+    )
 
 
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
@@ -145,15 +174,18 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
     if times is None or not len(times) or not clock.columns:
         return
     name = clock.columns[0].header
-    if times.min() > REPORTED and (np.diff(times) > 0).all():
+    if times.min() > UNREADABLE and (np.diff(times) > 0).all():
         return
     for index in np.flatnonzero(times == NO_TIME).tolist():
         yield index + 1, name, "found no time, allowed: a time in every row"
-    valid = np.flatnonzero(times > REPORTED)
+    for index in np.flatnonzero(times == UNREADABLE).tolist():
+        text = " ".join(cells.text(index).strip() for cells in numbers.texts)
+        yield index + 1, name, f"found {text[:LONGEST_CELL]!r}, allowed: times as in the other rows"
+    valid = np.flatnonzero(times > UNREADABLE)
     steps = np.diff(times[valid])
     begins = _second_logs(times[valid], steps)
     for k in np.flatnonzero(steps <= 0).tolist():
-        now, before = (_shown(int(times[valid[i]]), clock.unit) for i in (k + 1, k))
+        now, before = (clock.shown(int(times[valid[i]])) for i in (k + 1, k))
         found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
         again = ": a second log begins here, from about the same time" if k in begins else ""
         yield int(valid[k + 1]) + 1, name, f"{found}, allowed: times that increase from row to row{again}"
@@ -165,7 +197,7 @@ def _second_logs(times: IntArray, steps: IntArray) -> set[int]:
         return set()
     period = np.median(np.abs(steps))
     far, near = steps < -FAR_BACK * period, np.abs(times[1:] - times[0]) <= GAP * period
-    goes_on = np.append(steps[1:] > 0, False)
+    goes_on = np.append((steps[1:] > 0) & (steps[1:] <= GAP * period), False)
     return set(np.flatnonzero(far & near & goes_on).tolist())
 
 
@@ -180,12 +212,6 @@ def _unusual(values: FloatArray) -> list[int]:
     """Return the columns that may hold NaN or infinities: their sums are not finite, as is quickly seen."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.flatnonzero(~np.isfinite(values.sum(axis=0))).tolist()
-
-
-def _shown(nanoseconds: int, unit: str) -> str:
-    """Return a time in the file's own unit."""
-    value = Decimal(nanoseconds).scaleb(-EXPONENTS[unit]).normalize()
-    return f"{value:f} {unit}"
 
 
 def gaps(t_ns: IntArray) -> list[LogWarning]:

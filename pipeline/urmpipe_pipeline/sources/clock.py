@@ -1,22 +1,25 @@
-"""The clock: which column is the time, its unit, and integer nanoseconds from its text."""
+"""The clock: which column is the time, its unit or the form of its text."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from decimal import Decimal
 
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline.joint_log import Inference, IntArray, LogWarning
-from urmpipe_pipeline.sources.cells import LONGEST_NS, count_up, to_float
-from urmpipe_pipeline.sources.columns import Column, find_column
+from urmpipe_pipeline.sources.cells import LONGEST_NS
+from urmpipe_pipeline.sources.clock_columns import steps_of, time_columns, times_of
+from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.sniff import Layout
+from urmpipe_pipeline.sources.stamps import known_forms
 from urmpipe_pipeline.sources.table import ClockColumn
-from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
+from urmpipe_pipeline.sources.text_clock import DATE, SECOND_NS, TIME_OF_DAY
+from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
 
 PAPER_PERIOD = 0.005
 """Tsp of the paper in [s]: taken where nothing tells the time. Source: [UrmArm2021]_ eq. 22."""
@@ -24,11 +27,13 @@ PAPER_PERIOD = 0.005
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 """Powers of ten from a unit to [ns]."""
 
+FORMS_TOLD = "numbers in s, ms, us or ns, or times such as 2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec"
+"""What a clock may look like, for errors."""
+
 SHORTEST, LONGEST = 0.0005, 1.0
 """Usual periods of a log in [s]: they tell the unit of a clock that does not say it."""
 
 _EPOCH = (946_684_800.0, 4_102_444_800.0)  # 2000 to 2100 as Unix time in [s]
-_EVEN = 0.01  # steps of a clock in a file without header differ by less than this share
 
 
 @dataclass(frozen=True, slots=True)
@@ -38,7 +43,7 @@ class Clock:
     Attributes:
         columns: One column, or seconds and nanoseconds apart; none if the table has no time.
         parts: The same for the reader.
-        unit: Its unit.
+        unit: Its unit: s, ms, us, ns, or where it is text "date" or "time of day".
         inferences: What was found out.
         warnings: What a person should know.
     """
@@ -52,8 +57,27 @@ class Clock:
     @property
     def units(self) -> dict[str, str]:
         """The unit of each of its columns by name."""
-        names = {exponent: unit for unit, exponent in EXPONENTS.items()}
-        return {c.name: names[part.exponent] for c, part in zip(self.columns, self.parts, strict=True)}
+        return {column.name: _unit_of(part) for column, part in zip(self.columns, self.parts, strict=True)}
+
+    def shown(self, nanoseconds: int) -> str:
+        """Return a time as the file would write it."""
+        if self.unit == DATE:
+            seconds, rest = divmod(nanoseconds, SECOND_NS)
+            date = np.datetime64(seconds, "s").item().isoformat(" ")
+            return f"{date}.{rest:09d}".rstrip("0").rstrip(".")
+        if self.unit == TIME_OF_DAY:
+            sign, (seconds, rest) = "-" * (nanoseconds < 0), divmod(abs(nanoseconds), SECOND_NS)
+            clock = f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+            return f"{sign}{clock}.{rest:09d}".rstrip("0").rstrip(".")
+        value = Decimal(nanoseconds).scaleb(-EXPONENTS[self.unit]).normalize()
+        return f"{value:f} {self.unit}"
+
+
+def _unit_of(part: ClockColumn) -> str:
+    """Return the unit of a column of the clock."""
+    if part.forms:
+        return part.forms[0].unit
+    return next(unit for unit, exponent in EXPONENTS.items() if exponent == part.exponent)
 
 
 def find_clock(
@@ -75,18 +99,39 @@ def find_clock(
         joints: How many joints the robot has, if there is one.
 
     Raises:
-        LogError: If the time is a date, or its unit cannot be told.
+        LogError: If the time is text in no form that is known, or its unit cannot be told.
         OptionError: If its unit is given as one that is no time.
     """
-    chosen, why = _columns(columns, layout, options, joints)
+    chosen, why = time_columns(columns, layout, options, joints)
+    return clock_of(chosen, why, layout, source, units)
+
+
+def clock_of(
+    chosen: tuple[Column, ...],
+    why: str,
+    layout: Layout,
+    source: KnownSource | None,
+    units: Mapping[int, Unit],
+) -> Clock:
+    """Return the clock that columns make.
+
+    Args:
+        chosen: The columns: one, a date and a time of day, seconds and nanoseconds; or none.
+        why: Why these.
+        layout: Their table.
+        source: The source, if it is known.
+        units: Units given by the user, by the column's number.
+
+    Raises:
+        LogError: If the time is text in no form that is known, or its unit cannot be told.
+        OptionError: If its unit is given as one that is no time.
+    """
     if not chosen:
         return Clock(inferences=(Inference("time column", "none", why),))
-    dates = [column for column in chosen if column.text]
-    if dates:
-        message = f"found {layout.cells(dates[0].index)[0]!r}, allowed: times as numbers in s, ms, us or ns"
-        file = str(layout.segment.path)
-        raise LogError(Finding(message, file, layout.first_line, 1, dates[0].header))
     found = Inference("time column", " and ".join(column.name for column in chosen), why)
+    if chosen[0].text:
+        parts = tuple(_text_part(column, layout, units) for column in chosen)
+        return Clock(chosen, parts, _unit_of(parts[0]), (found,))
     if len(chosen) == 2:
         both = (ClockColumn(chosen[0].index, 9), ClockColumn(chosen[1].index, 0))
         return Clock(chosen, both, "s", (found,))
@@ -97,9 +142,24 @@ def find_clock(
     return Clock(chosen, parts, unit, (found, Inference("unit of the time", unit, evidence)), warnings)
 
 
+def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> ClockColumn:
+    """Return a column of text for the reader: the forms that it may have."""
+    cells, given = layout.cells(column.index), units.get(column.number)
+    forms = known_forms(cells)
+    if not forms:
+        message = f"found {cells[0]!r}, allowed: {FORMS_TOLD}"
+        raise LogError(Finding(message, str(layout.segment.path), layout.first_line, 1, column.header))
+    wanted = given or column.unit
+    asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
+    if given is not None and not asked:
+        keys = ", ".join(dict.fromkeys(key for form in forms for key in form.keys)) or "none"
+        raise OptionError(f"--unit: found {given.name} for the time {column.name!r}, allowed: {keys}")
+    return ClockColumn(column.index, forms=asked or forms)
+
+
 def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
     """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
-    for value in _times(layout.cells(time.index), layout)[:1]:
+    for value in times_of(layout.cells(time.index), layout)[:1]:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
             message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
             hint = f"say the unit with --unit {time.name}=ns"
@@ -131,79 +191,6 @@ def even_clock(rows: int, period: float | None) -> tuple[IntArray, tuple[Inferen
     return times, (Inference("period", "0.005 s", "assumed"),), [LogWarning("assumed-period", said)]
 
 
-def _columns(
-    columns: Sequence[Column], layout: Layout, options: ReadOptions, joints: int | None
-) -> tuple[tuple[Column, ...], str]:
-    """Return the columns that hold the time, and why."""
-    if options.time is not None:
-        if options.time.lower() == "none":
-            return (), "given as an option"
-        return (find_column(columns, options.time, "--time"),), "given as an option"
-    if layout.header is None:
-        return _without_header(columns, layout, joints)
-    return _by_name(columns) or _by_content(columns, layout) or ((), "no column is named like a time")
-
-
-def _by_name(columns: Sequence[Column]) -> tuple[tuple[Column, ...], str] | None:
-    words = vocabulary()
-    dates = []
-    for pattern in words.time:
-        for column in (column for column in columns if pattern.search(column.key)):
-            if not column.text:
-                return (column,), "its name"
-            dates.append(column)
-    for seconds, nanoseconds in words.time_pairs:
-        for first in (column for column in columns if seconds.search(column.key)):
-            stem = seconds.sub("", first.key)
-            for second in columns:
-                if nanoseconds.search(second.key) and nanoseconds.sub("", second.key) == stem:
-                    return (first, second), "their names: seconds and nanoseconds apart"
-    return ((dates[0],), "its name") if dates else None
-
-
-def _by_content(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column, ...], str] | None:
-    """Return a column with a unit of time, or an unnamed first one that runs like a clock."""
-    timed = [c for c in columns if not c.text and c.unit and (c.unit.quantity, c.unit.order) == ("time", 0)]
-    if len(timed) == 1:
-        return (timed[0],), f"its unit, {timed[0].unit_text}"
-    cells = layout.cells(0)
-    if columns[0].key == "" and not columns[0].text and not count_up(cells) and _increases(cells, layout):
-        return (columns[0],), "the first column has no name and always increases"
-    return None
-
-
-def _without_header(
-    columns: Sequence[Column], layout: Layout, joints: int | None
-) -> tuple[tuple[Column, ...], str]:
-    """Return the first column if it alone runs in even steps, unless the robot's joints take all columns."""
-    even = [column for column in columns if not column.text and _even(layout.cells(column.index), layout)]
-    counts = count_up(layout.cells(0))
-    if even == [columns[0]] and not counts and len(columns) > 1 and len(columns) != joints:
-        return (columns[0],), "the first column alone increases in even steps"
-    return (), "there is no header"
-
-
-def _steps(cells: Sequence[str], layout: Layout) -> list[float]:
-    """Return the steps between sampled times."""
-    times = _times(cells, layout)
-    return [after - before for before, after in pairwise(times)]
-
-
-def _times(cells: Sequence[str], layout: Layout) -> list[float]:
-    values = (to_float(cell, layout.decimal) for cell in cells)
-    return [value for value in values if value is not None and math.isfinite(value)]
-
-
-def _increases(cells: Sequence[str], layout: Layout) -> bool:
-    steps = _steps(cells, layout)
-    return bool(steps) and min(steps) > 0
-
-
-def _even(cells: Sequence[str], layout: Layout) -> bool:
-    steps = _steps(cells, layout)
-    return len(steps) >= 2 and min(steps) > 0 and max(steps) - min(steps) <= _EVEN * max(steps)
-
-
 def _unit(
     time: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]
 ) -> tuple[str, str, tuple[LogWarning, ...]]:
@@ -225,8 +212,8 @@ def _unit(
 def _unit_from_values(time: Column, layout: Layout) -> tuple[str, str, tuple[LogWarning, ...]]:
     """Tell the unit by the year that the times give, or else by their steps."""
     cells = layout.cells(time.index)
-    start = next(iter(_times(cells, layout)), 0.0)
-    steps = sorted(step for step in _steps(cells, layout) if step > 0)
+    start = next(iter(times_of(cells, layout)), 0.0)
+    steps = sorted(step for step in steps_of(cells, layout) if step > 0)
     step = steps[len(steps) // 2] if steps else 0.0
     for unit, exponent in EXPONENTS.items():
         scale = 10.0 ** (exponent - 9)

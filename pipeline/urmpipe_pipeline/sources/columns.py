@@ -137,7 +137,7 @@ def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Un
     given = {}
     for text, unit_text in options.units.items():
         unit = vocabulary().unit(unit_text)
-        quantities: tuple[Quantity, ...] = ("angle", "length", "time") if text else ("angle",)
+        quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
         if unit is None or unit.quantity not in quantities:
             allowed = [name for quantity in quantities for name in vocabulary().spelled(quantity)]
             raise OptionError(f"--unit: found {unit_text!r}, allowed: {', '.join(allowed)}")

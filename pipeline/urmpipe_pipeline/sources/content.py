@@ -10,7 +10,14 @@ import numpy as np
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
 from urmpipe_pipeline.sources.blockwise import read_blockwise
-from urmpipe_pipeline.sources.checks import MOST_SKIPPED, find_errors, may_skip, trimmed, without_unread
+from urmpipe_pipeline.sources.checks import (
+    MOST_SKIPPED,
+    find_errors,
+    may_skip,
+    rebuilt,
+    trimmed,
+    without_unread,
+)
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.diagnose import lines_of_rows
 from urmpipe_pipeline.sources.plan import Plan
@@ -18,6 +25,7 @@ from urmpipe_pipeline.sources.roles import Roles
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.table import Numbers, read_fast
 from urmpipe_pipeline.sources.tables import for_all
+from urmpipe_pipeline.sources.text_times import timed
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -30,8 +38,8 @@ class Content:
         clock: Times of the rows in [ns] on the file's clock, None without one.
         rows: How many rows there are.
         roles: The columns, without those that could not be joined.
-        inferences: What was found out while joining.
-        warnings: What was left out while reading.
+        inferences: What was found out while reading the times and joining.
+        warnings: What was left out, and what a person should know about the times.
     """
 
     columns: Mapping[int, tuple[Column, ...]]
@@ -73,17 +81,18 @@ def read_content(plan: Plan, *, skip_bad: bool = False) -> Content:
     """
     columns = {t: tuple(c for c in plan.roles.columns if c.table == t) for t in plan.used}
     read = for_all(plan.used, lambda table: _numbers(plan, table, columns[table], skip_bad))
-    numbers = {table: found for table, (found, _) in zip(plan.used, read, strict=True)}
-    warnings = tuple(warning for _, noticed in read for warning in noticed)
+    numbers = dict(zip(plan.used, read, strict=True))
     roles, said = _joined(plan, numbers)
+    if plan.time_file is not None:
+        numbers[plan.main] = _with_times(plan, numbers[plan.main], skip_bad)
     main = numbers[plan.main]
+    said = (*main.inferences, *said)
+    warnings = tuple(dict.fromkeys(warning for one in numbers.values() for warning in one.warnings))
     return Content(columns, numbers, main.clock, len(main.values), roles, said, warnings)
 
 
-def _numbers(
-    plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool
-) -> tuple[Numbers, list[LogWarning]]:
-    """Return the numbers of one table, and what was left out; raise what is wrong with them."""
+def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) -> Numbers:
+    """Return the numbers of one table; raise what is wrong with them."""
     layout, clock = plan.tables.layouts[table], plan.clocks[table]
     places = [column.index for column in columns]
     numbers = read_fast(layout, places, clock.parts) or read_blockwise(layout, places, clock.parts)
@@ -96,7 +105,7 @@ def _numbers(
         hint = f"{unread}, allowed with --skip-bad: {MOST_SKIPPED:.0%} of them"
     elif may_skip(numbers):
         hint = f"{unread}; --skip-bad leaves them out"
-    numbers = trimmed(numbers)
+    numbers = rebuilt(trimmed(timed(layout, clock.parts, numbers)))
     file = str(layout.segment.path)
     if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
@@ -104,7 +113,7 @@ def _numbers(
     findings = find_errors(layout, numbers, [column.header for column in columns], clock)
     if findings:
         raise LogError(*findings, *([Finding(hint, file)] if hint else []))
-    return numbers, warnings
+    return replace(numbers, warnings=(*warnings, *numbers.warnings))
 
 
 def _about_other_lines(layout: Layout, numbers: Numbers) -> list[LogWarning]:
@@ -113,6 +122,23 @@ def _about_other_lines(layout: Layout, numbers: Numbers) -> list[LogWarning]:
         return []
     said = f"{numbers.left_out} lines without the labels of the rows are left out"
     return [LogWarning("other-lines", said)]
+
+
+def _with_times(plan: Plan, main: Numbers, skip_bad: bool) -> Numbers:
+    """Return the numbers of the main table with the times of the other file.
+
+    Raises:
+        LogError: If these are wrong, or more or fewer than the rows.
+    """
+    assert plan.time_file is not None
+    times = _numbers(plan, plan.time_file, (), skip_bad)
+    if len(times.values) != len(main.values):
+        file = str(plan.tables.layouts[plan.time_file].segment.path)
+        title = plan.tables.layouts[plan.main].segment.path.name
+        message = f"found {len(times.values)} times, allowed: {len(main.values)}, as {title} has rows"
+        raise LogError(Finding(message, file))
+    warnings = (*main.warnings, *times.warnings)
+    return replace(main, clock=times.clock, inferences=times.inferences, warnings=warnings)
 
 
 def _joined(plan: Plan, numbers: Mapping[int, Numbers]) -> tuple[Roles, tuple[Inference, ...]]:

@@ -14,6 +14,7 @@ from urmpipe_pipeline.sources.cells import is_missing, is_text, split_line, to_f
 from urmpipe_pipeline.sources.form import CONFLICT_MARK, RowError, Value
 from urmpipe_pipeline.sources.sniff import COMMENTS, Layout
 from urmpipe_pipeline.sources.table import NO_TIME, REPORTED, ClockColumn, Numbers
+from urmpipe_pipeline.sources.text_cells import TextCells
 
 SHOWN_FINDINGS = 20
 """Findings that are told one by one; the others are counted."""
@@ -42,8 +43,10 @@ def data_lines(layout: Layout, lines: Iterable[tuple[int, str]]) -> Iterator[tup
     lines = (line for line in lines if line[0] >= layout.first_line)
     for number, line in lines if layout.form is None else layout.form.rows(lines):
         text = line.strip()
-        if text and not text.startswith(COMMENTS):
-            yield number, line
+        if not text or text.startswith(COMMENTS):
+            continue
+        for row in split_line(text, layout.delimiter) if layout.across else (line,):
+            yield number, row
 
 
 @dataclass(slots=True)
@@ -84,6 +87,8 @@ class CarefulReader:
         self._next_line = layout.first_line
         self._line = 0
         self._row = 0
+        self._text_parts = [part for part in clock if part.forms]
+        self._texts: list[list[str]] = []
         self._in_conflict = False
         self._other_side = False
         self._ended = False
@@ -104,12 +109,17 @@ class CarefulReader:
         numbered = list(enumerate((line.rstrip("\r\n") for line in lines), start=self._next_line))
         self._next_line += len(lines)
         values, times, rows = array("d"), array("q"), 0
+        self._texts = [[] for _ in self._text_parts]
         for time, row in self._rows(numbered):
             times.append(time)
             values.extend(row)
             rows += 1
-        table = np.array(values).reshape(rows, len(self.columns))
-        return Numbers(table, np.array(times) if self.clock else None, left_out=self._others(numbered))
+        return Numbers(
+            np.array(values).reshape(rows, len(self.columns)),
+            np.array(times, dtype=np.int64) if self.clock else None,
+            left_out=self._others(numbered),
+            texts=tuple(TextCells.of(texts) for texts in self._texts),
+        )
 
     def verdict(self) -> Numbers:
         """Return what was found to be wrong, without numbers."""
@@ -137,12 +147,14 @@ class CarefulReader:
             self._line, self._row = line, self._row + 1
             if CONFLICT_MARK.match(text):
                 self._mark(text)
-                yield REPORTED, nothing
+                cells = None
             elif self._other_side:
-                yield REPORTED, nothing
+                cells = None
             else:
                 cells = self._cells(text)
-                yield (REPORTED, nothing) if cells is None else (self._time(cells), self._values(cells))
+            for texts, part in zip(self._texts, self._text_parts, strict=True):
+                texts.append("" if cells is None else cells[part.column])
+            yield (REPORTED, nothing) if cells is None else (self._time(cells), self._values(cells))
 
     def _mark(self, text: str) -> None:
         """Report a merge conflict once, at its first mark; what was merged in is not read."""
@@ -201,7 +213,7 @@ class CarefulReader:
 
     def _time(self, cells: Sequence[str]) -> int:
         total = 0
-        for part in self.clock:
+        for part in () if self._text_parts else self.clock:
             cell = cells[part.column]
             time = to_nanoseconds(cell, self.layout.decimal, part.exponent)
             if time is None and is_missing(cell):

@@ -19,6 +19,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.roles import Roles, assign
 from urmpipe_pipeline.sources.tables import PATH, Tables
+from urmpipe_pipeline.sources.time_file import clock_of_file, time_file
 from urmpipe_pipeline.sources.vocabulary import Unit
 
 
@@ -31,12 +32,19 @@ class Plan:
         clocks: The clock of each table.
         roles: The columns that matter.
         units: Units given by the user, by the column's number; by 0 that of all joints that turn.
+        time_file: Index of the table that holds the times of the others, if one does nothing else.
     """
 
     tables: Tables
     clocks: tuple[Clock, ...]
     roles: Roles
     units: Mapping[int, Unit]
+    time_file: int | None = None
+
+    @property
+    def clock(self) -> Clock:
+        """The clock of the log."""
+        return self.clocks[self.main if self.time_file is None else self.time_file]
 
     @property
     def main(self) -> int:
@@ -64,6 +72,12 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
     columns = columns_of(tables.layouts, tables.titles)
     units = given_units(columns, options)
     joints = len(robot.coordinates) if robot else None
+    apart = None if options.time else time_file(tables, columns)
+    if apart is not None:
+        found = clock_of_file(tables, columns, apart, units)
+        rest = [column for column in columns if column.table != apart]
+        roles = _roles(rest, tables, options, robot, only=1 - apart)
+        return Plan(tables, tuple(found if i == apart else Clock() for i in (0, 1)), roles, units, apart)
     clocks = tuple(
         find_clock([c for c in columns if c.table == i], layout, options, tables.known, units, joints)
         for i, layout in enumerate(tables.layouts)
@@ -92,9 +106,16 @@ def _renamed(roles: Roles, names: Sequence[str]) -> Roles:
     return replace(roles, joints=joints)
 
 
-def _roles(columns: Sequence[Column], tables: Tables, options: ReadOptions, robot: Chain | None) -> Roles:
-    main = tables.layouts[0]
-    several = len(set(tables.paths)) > 1
+def _roles(
+    columns: Sequence[Column],
+    tables: Tables,
+    options: ReadOptions,
+    robot: Chain | None,
+    only: int | None = None,
+) -> Roles:
+    """Return the roles of the columns of all tables, or of the only one that matters."""
+    main = tables.layouts[only or 0]
+    several = only is None and len(set(tables.paths)) > 1
     if main.header is None and not several:
         return without_header(columns, main, options, robot, path=options.source == PATH)
     plots = one_plot_a_file(columns, tables.paths, robot) if several and not options.joints else None

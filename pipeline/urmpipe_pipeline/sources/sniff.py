@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline.joint_log import Inference
@@ -21,7 +21,8 @@ from urmpipe_pipeline.sources.cells import (
     split_line,
 )
 from urmpipe_pipeline.sources.form import Form
-from urmpipe_pipeline.sources.text import HeadLine, Segment, head_lines
+from urmpipe_pipeline.sources.text import HEAD_BYTES, HeadLine, Segment, head_lines
+from urmpipe_pipeline.sources.text_clock import looks_like_a_clock
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 COMMENTS = ("#", "%", "//")
@@ -59,6 +60,7 @@ class Layout:
         sample: Cells of the first rows.
         inferences: What was found out.
         form: How its rows become rows of plain cells, if they hold arrays or labels.
+        across: Whether the rows of its only column stand side by side in one line.
     """
 
     segment: Segment
@@ -72,6 +74,7 @@ class Layout:
     sample: tuple[tuple[str, ...], ...]
     inferences: tuple[Inference, ...]
     form: Form | None = None
+    across: bool = False
 
     def cells(self, column: int) -> list[str]:
         """Return the sampled cells of a column."""
@@ -142,6 +145,23 @@ def _told_delimiter(lines: Sequence[HeadLine]) -> tuple[str | None, Sequence[Hea
     return (told[1], lines[1:]) if told else (None, lines)
 
 
+def across(layout: Layout) -> Layout:
+    """Return a table of a single line of numbers as one column; any other as it is.
+
+    Args:
+        layout: How the table is written, as far as its beginning tells.
+    """
+    if layout.header is not None or len(layout.sample) != 1 or len(layout.names) < 3:
+        return layout
+    lines = layout.segment.lines()
+    if any(line.strip() for number, line in lines if number > layout.first_line):
+        return layout
+    longer = layout.segment.end - layout.segment.start > HEAD_BYTES  # then the last value is cut
+    cells = layout.sample[0][: -1 if longer else None][:SAMPLED_LINES]
+    column = tuple((cell,) for cell in cells)
+    return replace(layout, names=("1",), sample=column, across=True)
+
+
 def _choices(what: str, given: str | None, allowed: Sequence[str]) -> Sequence[str]:
     """Return the signs to try: the one given by the user, or all."""
     if given is None:
@@ -172,10 +192,13 @@ def _best_style(lines: Sequence[str], delimiters: Sequence[str], decimals: Seque
 
 
 def _fit(rows: Sequence[Row], width: int, decimal: str) -> float:
-    """Return the share of rows of one width with numbers, times the share of their text that is numbers."""
+    """Return the share of rows of one width with numbers, times the share of their text that is numbers.
+
+    A date or a time counts as a number: 0.005 sec and 2021-04-11 22:27:21 are one cell.
+    """
     full = [row for row in rows if len(row) == width and any(is_number(cell, decimal) for cell in row)]
     cells = [cell for row in full for cell in row if not is_missing(cell)]
-    numbers = sum(len(cell) for cell in cells if is_number(cell, decimal))
+    numbers = sum(len(cell) for cell in cells if is_number(cell, decimal) or looks_like_a_clock(cell))
     return len(full) / len(rows) * numbers / sum(map(len, cells)) if full else 0.0
 
 

@@ -25,6 +25,7 @@ _RUNS = (b"\t", b"  ", b" \n", b" \r", b"\n ", b"\r ")
 
 _GOES_ON = (b"", b" ", b"\t")  # nothing: what comes next is not read yet
 _TO_POINTS = bytes.maketrans(b",.", b".~")
+_FROM_POINTS = np.frombuffer(bytes.maketrans(b".~", b",."), dtype=np.uint8)
 
 
 def open_table(layout: Layout) -> TableStream | NativeFile:
@@ -38,6 +39,11 @@ def open_table(layout: Layout) -> TableStream | NativeFile:
     file = OSFile(os.fsencode(path))
     file.seek(layout.offset)
     return file
+
+
+def as_written(layout: Layout, cells: Bytes) -> Bytes:
+    """Return cells that a stream has read with the signs that the file has."""
+    return _FROM_POINTS[cells] if layout.decimal == "," != layout.delimiter else cells
 
 
 class TableStream:
@@ -136,14 +142,15 @@ def converted(layout: Layout, block: bytes) -> tuple[bytes, int]:
         block, left_out = layout.form.flat(block, byte_encoding(layout))
     if layout.decimal == "," != layout.delimiter:
         block = block.translate(_TO_POINTS)
-    return (squeeze(block) if layout.delimiter == SPACE else block), left_out
+    block = squeeze(block) if layout.delimiter == SPACE else block
+    return (block.replace(layout.delimiter.encode(), b"\n") if layout.across else block), left_out
 
 
 def _converts(layout: Layout) -> bool:
     """Return whether the parser wants other bytes than the file's own."""
     wide = layout.segment.encoding.startswith("utf-16")
     points = layout.decimal == "," != layout.delimiter
-    return wide or points or layout.delimiter == SPACE or layout.form is not None
+    return wide or points or layout.delimiter == SPACE or layout.form is not None or layout.across
 
 
 def end_of_rows(block: bytes, layout: Layout) -> int:

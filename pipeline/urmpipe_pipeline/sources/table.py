@@ -15,27 +15,38 @@ from numpy.typing import NDArray
 from pyarrow import csv
 
 from urmpipe_models.errors import Finding
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
 from urmpipe_pipeline.sources.cells import is_number, plain, to_float
 from urmpipe_pipeline.sources.form import UnfitError
 from urmpipe_pipeline.sources.sniff import Layout
-from urmpipe_pipeline.sources.stream import BLOCK_BYTES, TableStream, open_table
+from urmpipe_pipeline.sources.stream import BLOCK_BYTES, TableStream, as_written, open_table
+from urmpipe_pipeline.sources.text_cells import TextCells
+from urmpipe_pipeline.sources.text_clock import Form
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 NO_TIME = np.iinfo(np.int64).min
 """Stands where a row has no time."""
 REPORTED = NO_TIME + 1
 """Stands where a row has no time because of a finding that is reported already."""
+UNREADABLE = NO_TIME + 2
+"""Stands where the text of a row's time is none."""
 
 _PRECISION = 38  # digits of a decimal128
 
 
 @dataclass(frozen=True, slots=True)
 class ClockColumn:
-    """A column of the clock: its place, and the power of ten from its unit to [ns] (9 for s)."""
+    """A column of the clock.
+
+    Attributes:
+        column: Its place.
+        exponent: Power of ten from its unit to [ns]: 9 for s.
+        forms: What its cells may be if they are text: then exponent means nothing.
+    """
 
     column: int
-    exponent: int
+    exponent: int = 0
+    forms: tuple[Form, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -44,13 +55,17 @@ class Numbers:
 
     Attributes:
         values: Numbers in the file's own units, shape (n, columns); NaN where a sample is missing.
-        clock: Time of each row in [ns] on the file's clock, or NO_TIME, or REPORTED; None without a clock.
+        clock: Time of each row in [ns] on the file's clock, or NO_TIME, REPORTED or UNREADABLE; None without
+            a clock; without meaning while the texts of the clock are not read.
         findings: What is wrong with rows and cells, the first of them.
         wrong: How many such findings there are.
         lasting: Those of the findings that leaving out rows does not mend.
         unread: Rows that could not be read, by their index, with what is wrong with each.
         left_out: Lines among labelled rows that are none.
         rows: Data row of the file of each row, from 1, where some were left out.
+        texts: The cells of the clock's columns, if they are text.
+        inferences: What the clock's rows told about it.
+        warnings: What a person should know about it.
     """
 
     values: FloatArray
@@ -61,6 +76,9 @@ class Numbers:
     unread: Mapping[int, str] = field(default_factory=dict)
     left_out: int = 0
     rows: IntArray | None = None
+    texts: tuple[TextCells, ...] = ()
+    inferences: tuple[Inference, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
 
     def file_row(self, row: int) -> int:
         """Return the data row of the file of a row that was read, both from 1."""
@@ -75,14 +93,19 @@ def read_fast(
     Args:
         layout: How the table is written.
         columns: Which columns hold numbers.
-        clock: The columns of its clock; their values in [ns] are added.
+        clock: The columns of its clock; their values in [ns] are added. If they are text, their cells are
+            read as they are.
         block: Some whole rows, as they stand in the file, instead of all.
     """
-    narrow, wide = ([_scale(layout, part, exact) for part in clock] for exact in (False, True))
+    texts = [part for part in clock if part.forms]
+    numeric = [part for part in clock if not part.forms]
+    narrow, wide = ([_scale(layout, part, exact) for part in numeric] for exact in (False, True))
     for scales in (narrow,) if narrow == wide else (narrow, wide):
         try:
-            table, left_out = _parse(layout, columns, clock, scales, block)
-            return replace(_numbers(table, columns, clock, scales), left_out=left_out)
+            table, left_out = _parse(layout, columns, numeric, scales, texts, block)
+            numbers = _numbers(table, columns, numeric, scales)
+            cells = tuple(_text_cells(table, layout, part) for part in texts)
+            return replace(numbers, texts=cells, left_out=left_out)
         except (pa.ArrowInvalid, OverflowError):
             continue
         except UnfitError:
@@ -130,12 +153,17 @@ def _parse(
     columns: Sequence[int],
     clock: Sequence[ClockColumn],
     scales: Sequence[int],
+    texts: Sequence[ClockColumn],
     block: bytes | None,
 ) -> tuple[pa.Table, int]:
-    """Return the parsed columns, and how many lines that are no rows were left out."""
+    """Return the columns as pyarrow parses them, and how many lines that are no rows were left out.
+
+    They are float64, decimals for the clock, bytes for its texts.
+    """
     types: dict[str, Any] = {str(column): pa.float64() for column in columns}
     for part, scale in zip(clock, scales, strict=True):
         types[str(part.column)] = pa.decimal128(_PRECISION, scale)
+    types |= {str(part.column): pa.binary() for part in texts}
     names = [str(column) for column in range(len(layout.names))]
     quoted_commas = layout.delimiter == layout.decimal  # "0,5","1,5": the stream leaves them
     with open_table(layout) if block is None else TableStream(layout, block) as stream:
@@ -153,6 +181,20 @@ def _parse(
             memory_pool=pa.system_memory_pool(),  # the default one keeps what it once had
         )
         return table, stream.left_out if isinstance(stream, TableStream) else 0
+
+
+def _text_cells(table: pa.Table, layout: Layout, part: ClockColumn) -> TextCells:
+    """Return the cells of a parsed column of bytes: offsets of 32 bits, and the bytes between them."""
+    data, starts, total = [], [np.zeros(1, dtype=np.int64)], 0
+    for chunk in table.column(str(part.column)).chunks:
+        _, offsets, content = chunk.buffers()
+        own = np.frombuffer(offsets, dtype="<i4")[chunk.offset : chunk.offset + len(chunk) + 1]
+        if len(chunk) and content is not None:
+            data.append(np.frombuffer(content, dtype=np.uint8)[own[0] : own[-1]])
+        starts.append(own[1:].astype(np.int64) + (total - own[0]))
+        total += int(own[-1] - own[0])
+    joined = np.concatenate(data) if data else np.empty(0, dtype=np.uint8)
+    return TextCells(as_written(layout, joined), np.concatenate(starts))
 
 
 def _fill(target: FloatArray, chunk: pa.Array) -> None:

@@ -14,7 +14,7 @@ from urmpipe_pipeline.sources.arrays import sniff_arrays
 from urmpipe_pipeline.sources.labels import sniff_labels
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.ros2 import with_names
-from urmpipe_pipeline.sources.sniff import Layout, sniff
+from urmpipe_pipeline.sources.sniff import Layout, across, sniff
 from urmpipe_pipeline.sources.text import Segment, open_text
 from urmpipe_pipeline.sources.vocabulary import KnownSource, vocabulary
 
@@ -76,6 +76,8 @@ def open_tables(files: Sequence[Path], options: ReadOptions) -> Tables:
         titled = coppeliasim.graphs(segments[0]) or titled
         forced = True
     layouts = for_all(titled, lambda item: _layout(item[1], options))
+    if len(files) > 1:
+        layouts = [across(layout) for layout in layouts]
     known, said = _known(layouts, options) if not forced else (None, _coppeliasim(titled, options))
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
     encoding = Inference(

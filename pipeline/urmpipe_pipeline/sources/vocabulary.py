@@ -12,7 +12,7 @@ from typing import Any, Literal
 
 from urmpipe_models.orientation import RotationForm
 
-Quantity = Literal["angle", "length", "time", "ratio"]
+Quantity = Literal["angle", "length", "time", "date", "ratio"]
 Patterns = tuple[re.Pattern[str], ...]
 
 _BRACKETS = re.compile(r"^(?P<label>.*?\S)\s*[\[(](?P<inside>[^\[\]()]*)[\])]\s*$")
@@ -83,6 +83,8 @@ class Vocabulary:
     """All words, as vocabulary.toml has them."""
 
     time: Patterns
+    dates: Patterns
+    months: Mapping[str, int]
     time_pairs: tuple[tuple[re.Pattern[str], re.Pattern[str]], ...]
     index: Patterns
     joint: Mapping[str, Patterns]
@@ -126,6 +128,8 @@ def vocabulary() -> Vocabulary:
     joint = data["joint"]
     return Vocabulary(
         time=_compiled(data["time"]["patterns"]),
+        dates=_compiled(data["time"]["dates"]),
+        months={word: k for k, words in enumerate(data["time"]["months"], start=1) for word in words},
         time_pairs=tuple(
             (re.compile(pair["seconds"]), re.compile(pair["nanoseconds"])) for pair in data["time"]["pairs"]
         ),

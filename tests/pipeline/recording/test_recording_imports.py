@@ -28,6 +28,9 @@ SPECIMENS = {
     "unclosed.csv": b't,q\n0,"[ 1. 2.]"\n0.1,"[ 1. 2."\n0.2,"[ 1. 2.]"\n',
     "labels.txt": b"Time: 0.1 q values: [1, 2] Type: 0\nquality\nTime: 0.2 q values: [1, 3] Type: 0\n",
     "second.csv": b"t,q1\n0,1\n1,2\nt,q1\n0,1\n1,2\n",
+    "dates.csv": b'timestamp,q1\n" 01/20/2021 10:11:32.332",1\n" 01/20/2021 10:11:32.532",2\n',
+    "german.csv": b"Datum;Uhrzeit;A1\n20.01.2021;10:11:32,332;1\n20.01.2021;10:11:32,432;2\n",
+    "coarse.csv": b"Time,q1\n" + b"".join(b"10:11:%02d,1\n" % (k // 4) for k in range(40)),
     "empty.csv": b"",
     "log.mat": b"MATLAB 5.0",
 }

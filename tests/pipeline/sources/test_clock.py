@@ -43,6 +43,10 @@ def test_names_of_the_time(read: Read, name: str) -> None:
         ("timestamp", ["1740416404047049", "1740416404052050"], [5_001_000], "us"),
         ("%time", ["1486559106139796569", "1486559106140360682"], [564_113], "ns"),
         ("__time", ["1396293888.886", "1396293888.985"], [99_000_000], "s"),
+        ("timestamp", ["1740416404.047049", "1740416404.052050"], [5_001_000], "s"),
+        ("Zeit [ms]", ["-2.5", "0", "2.5"], [2_500_000, 2_500_000], "ms"),
+        ("t", ["3601.25", "3601.255"], [5_000_000], "s"),
+        ("time", ["1.0e+00", "1.005e+00", "1.01e+00"], [5_000_000, 5_000_000], "s"),
     ],
 )
 def test_units_of_the_time(read: Read, name: str, times: list[str], steps: list[int], unit: str) -> None:
@@ -125,13 +129,6 @@ def test_the_time_as_the_user_says(read: Read, wrong: Wrong) -> None:
     assert wrong(text, time="c") == ["--time: found no column 'c', allowed: a, b, q1"]
 
 
-def test_dates_are_not_read(wrong: Wrong) -> None:
-    said = "found '2021-04-11 22:27:21.573641', allowed: times as numbers in s, ms, us or ns"
-    text = "date,timestamp,q1\nx,2021-04-11 22:27:21.573641,1\ny,2021-04-11 22:27:21.583641,1\n"
-    assert wrong(text) == [f"log.csv:2, column timestamp: {said}"]
-    assert wrong(text, time="timestamp") == [f"log.csv:2, column timestamp: {said}"]
-
-
 def test_two_columns_of_one_name(wrong: Wrong, read: Read) -> None:
     text = "time,time,q1\n0,0.5,1\n1,0.6,2\n"
     assert wrong(text) == [
@@ -174,4 +171,55 @@ def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:
     assert read(text, units={"t": "ns"}).t_ns.tolist() == [0, 50_000]
     assert wrong(clocked("t [s]", "0", "1", "1e30")) == [
         "log.csv:4, column t [s]: found '1e30', allowed: a number in every row"
+    ]
+
+
+def test_frames_are_no_clock(read: Read) -> None:
+    log = read("Frame,q1\n1,0.5\n2,0.6\n3,0.7\n", period=0.02)
+    assert log.t_ns.tolist() == [0, 20_000_000, 40_000_000]
+    assert log.joints == ("q1",)
+
+
+def test_libfranka_writes_milliseconds(read: Read) -> None:
+    names = ",".join(f"state.q[{k}]" for k in range(7))
+    log = read(f"time,{names}\n1000,0,0,0,0,0,0,0\n1001,1,1,1,1,1,1,1\n")
+    assert (log.source, log.clock_start, log.t_ns.tolist()) == ("libfranka", 1.0, [0, 1_000_000])
+
+
+def test_a_coarse_clock_is_rebuilt_and_that_is_said(read: Read) -> None:
+    """20 Hz, whole seconds: the first and the last second are not whole."""
+    stamps = (np.arange(13, 13 + 200) // 20).tolist()
+    log = read(clocked("t [s]", *map(str, stamps)), units={"": "deg"})
+    assert log.period == pytest.approx(0.05, rel=1e-9)
+    assert (np.abs(log.t + log.clock_start - stamps) <= 1.0).all()
+    said = "times in steps of 1 s stand in 20 rows each"
+    assert [(w.kind, w.message) for w in log.warnings if w.kind == "clock-rebuilt"] == [
+        ("clock-rebuilt", f"{said}: a regular clock of 0.05 s is taken in their place")
+    ]
+    assert [(i.value, i.evidence) for i in log.inferences if i.what == "clock"] == [
+        ("rebuilt with a period of 0.05 s", said)
+    ]
+
+
+def test_a_coarse_time_of_day_goes_over_midnight(read: Read) -> None:
+    cells = [f"23:59:{k // 10 + 50}" if k < 100 else f"00:00:0{k // 10 - 10}" for k in range(200)]
+    log = read(clocked("Time", *cells), units={"": "deg"})
+    assert log.period == pytest.approx(0.1, rel=1e-9)
+    assert log.t[-1] == pytest.approx(19.9, rel=1e-9)
+
+
+def test_irregular_repeats_stay_errors(wrong: Wrong) -> None:
+    rows = [0, 0, 0, 1, 1, 1, 1, 1, 1, 2, 3, 3, 3, 3]
+    allowed = "allowed: times that increase from row to row"
+    repeats = [k for k in range(1, len(rows)) if rows[k] == rows[k - 1]]
+    assert wrong(clocked("t [s]", *map(str, rows))) == [
+        f"log.csv:{k + 2}, column t [s]: found {rows[k]} s again, {allowed}" for k in repeats
+    ]
+
+
+def test_one_repeat_stays_an_error(wrong: Wrong) -> None:
+    times = [0.005 * k for k in range(50)]
+    times[20] = times[19]
+    assert wrong(clocked("t", *(f"{time:.3f}" for time in times))) == [
+        "log.csv:22, column t: found 0.095 s again, allowed: times that increase from row to row"
     ]

@@ -83,12 +83,15 @@ def test_plotjuggler_with_empty_cells() -> None:
     ]
 
 
-def test_dates_are_refused() -> None:
+def test_quoted_and_padded_dates() -> None:
+    """01/20/2021 can only be the 20th of January."""
     path = LOGS / "plotjuggler" / "simple_parse_timestamp.csv"
-    with pytest.raises(LogError) as caught:
-        read_log([path])
-    said = "found '01/20/2021 10:11:32.332', allowed: times as numbers in s, ms, us or ns"
-    assert str(caught.value) == f"{path}:2, column timestamp: {said}"
+    log = read_log([path], ReadOptions(joints=("A", "B", "C", "D"), units={"": "rad"}))
+    assert log.t_ns.tolist() == [0, 200_000_000, 400_000_000, 600_000_000, 610_000_000]
+    assert log.clock_start_ns == 1_611_137_492_332_000_000  # 2021-01-20 10:11:32.332 UTC
+    assert log.units["timestamp"] == "date"
+    assert np.isnan(log.q[3, 3])
+    assert log.q[3, :3].tolist() == [6.0, 4.0, -2.0]
 
 
 def test_epoch_in_seconds(arm: Arm) -> None:

@@ -83,7 +83,7 @@ def test_units_given_by_the_user(read: Read, wrong: Wrong, arm: Arm) -> None:
     assert not log.warnings
     assert wrong(text, units={"": "mm"}) == ["--unit: found 'mm', allowed: rad, deg"]
     assert wrong(text, units={"q1": "inch"}) == [
-        "--unit: found 'inch', allowed: rad, deg, m, mm, cm, s, ms, us, ns"
+        "--unit: found 'inch', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
     ]
     assert wrong(text, units={"q9": "deg"}) == ["--unit: found no column 'q9', allowed: t, q1, q2, q3"]
     assert wrong(text, units={"q1": "s", "t": "s"}) == [
