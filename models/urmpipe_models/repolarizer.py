@@ -139,10 +139,10 @@ def notice(
     """
     alone = wrap_change(step, period, max_step(elapsed, period, max_speed))
     both = wrap_change(residual + step, period, max_step(lasted + elapsed, period, max_speed))
-    halves = np.logical_and(alone == 0.0, residual * step > 0.0)
+    halves = np.logical_and(np.abs(alone) < 1.0, residual * step > 0.0)
     in_between = np.logical_and(halves, np.abs(both) > 0.0)
     change = np.where(in_between, both, alone)
-    unexplained = np.logical_and(np.abs(step) > period / 4.0, change == 0.0)
+    unexplained = np.logical_and(np.abs(step) > period / 4.0, np.abs(change) < 1.0)
     return Flags(change, unexplained, in_between)
 
 
@@ -247,7 +247,7 @@ class _Found(NamedTuple):
 
 def _found_in_all(q: FloatArray, dt: FloatArray, periods: FloatArray, speeds: FloatArray) -> _Found:
     """Judge the steps of all columns, by row and then by joint: whole columns at once, others one by one."""
-    count, joints = q.shape
+    joints = q.shape[1]
     complete = np.ones(joints, dtype=np.bool_)
     with np.errstate(over="ignore", invalid="ignore"):
         if not np.isfinite(q.sum()):  # one pass over all says whether to look column by column
@@ -262,9 +262,16 @@ def _found_in_all(q: FloatArray, dt: FloatArray, periods: FloatArray, speeds: Fl
         found = _judged(q[present, one], _elapsed(present, dt), periods[one], speeds[one])
         between = np.where(found.between < 0, -1, np.append(present, -1)[found.between])
         parts.append(found._replace(rows=present[found.rows], joints=found.joints + j, between=between))
-    every = _Found(*(np.concatenate(column) for column in zip(*parts, strict=True)))
-    order = np.argsort(every.rows * max(joints, 1) + every.joints, kind="stable")
-    return _Found(*(column[order] for column in every))
+    rows = np.concatenate([one.rows for one in parts])
+    columns = np.concatenate([one.joints for one in parts])
+    order = np.argsort(rows * max(joints, 1) + columns, kind="stable")
+    return _Found(
+        rows[order],
+        columns[order],
+        np.concatenate([one.change for one in parts])[order],
+        np.concatenate([one.unexplained for one in parts])[order],
+        np.concatenate([one.between for one in parts])[order],
+    )
 
 
 def _judged(values: FloatArray, elapsed: FloatArray, periods: FloatArray, speeds: FloatArray) -> _Found:
@@ -312,7 +319,7 @@ def _after_in_between(rows: IntArray, columns: IntArray, paired: NDArray[np.bool
 
 
 def _elapsed(present: IntArray, dt: FloatArray) -> FloatArray:
-    """Return the time from each value to the next, the first 0; added up from left to right as `step` does."""
+    """Return the time from each value to the next, the first 0; added from left to right as in `step`."""
     elapsed = dt[present]
     elapsed[:1] = 0.0
     apart = np.diff(present, prepend=present[:1])

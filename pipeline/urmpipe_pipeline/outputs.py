@@ -14,7 +14,10 @@ from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
 
-OutputKind = Literal["recording", "report"]
+OutputKind = Literal["recording", "report", "audit"]
+
+AUDIT_COLUMNS = ("joint", "row", "line", "t", "kind", "step", "from", "to")
+"""The header of an audit, by which one of ours is known."""
 
 GENERATOR = re.compile(rb"<meta\s+name=\"generator\"\s+content=\"urmpipe\b", re.IGNORECASE)
 """How a report of ours tells where it comes from."""
@@ -88,6 +91,9 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
 def _is_ours(path: Path, kind: OutputKind) -> bool:
     if kind == "report":
         return is_report(path)
+    if kind == "audit":
+        with path.open("rb") as file:
+            return file.readline(HEAD).strip() == ",".join(AUDIT_COLUMNS).encode()
     from urmpipe_pipeline.recording.identity import is_ours
 
     return is_ours(path)

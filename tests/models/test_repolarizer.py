@@ -49,7 +49,9 @@ def run_steps(q: Iterable[float], dt: Iterable[float], **options: float) -> Step
             in_between.append(last)
             odd[last] = False
         last = last if math.isnan(value) else i
-    return Stepped(np.array(out, dtype=float), np.array(changes, dtype=float), np.array(odd), in_between, state)
+    return Stepped(
+        np.array(out, dtype=float), np.array(changes, dtype=float), np.array(odd), in_between, state
+    )
 
 
 motions = st_np.arrays(
@@ -132,7 +134,7 @@ def test_missing_samples_keep_the_turns_and_give_more_time() -> None:
     result = repolarize(q, np.full(6, 0.1), max_speed=2.0)
     assert np.isnan(result.q[2:4]).all()
     np.testing.assert_array_equal(result.q[4], -3.13 + FULL_TURN)
-    assert result.change.tolist() == [1]  # back from -3.13 to 2.6 in 0.1 s would take 5.5 rad/s: not explained
+    assert result.change.tolist() == [1]  # back from -3.13 to 2.6 would take 5.5 rad/s: not explained
     assert result.unexplained.tolist() == [[5, 0]]
 
 

@@ -16,9 +16,22 @@ from urmpipe.process import tune_pyarrow
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: LOG.rrd here]."
 )
+@click.option(
+    "--audit",
+    metavar="FILE.csv",
+    type=click.Path(path_type=Path),
+    help="Write every wrap, repair and open question, one a line.",
+)
 @log_options
 @output_options
-def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bool, **options: Any) -> int:
+def ingest(
+    logs: tuple[Path, ...],
+    output: Path | None,
+    audit: Path | None,
+    as_json: bool,
+    quiet: bool,
+    **options: Any,
+) -> int:
     """Turn one log into a recording: checked, repolarized, with the arm's kinematics.
 
     Several files are one log whose source writes one a plot (SolidWorks); a folder stands for the
@@ -39,7 +52,13 @@ def ingest(logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bo
     shared = {name: options.pop(name) for name in ("tsp", "derivative", "strict")}
     with progress_bar(f"Writing {target}", quiet=quiet) as progress:
         run = api.ingest(
-            logs, robot=robot, read=api.read_options(options), output=target, progress=progress, **shared
+            logs,
+            robot=robot,
+            read=api.read_options(options),
+            output=target,
+            audit=audit,
+            progress=progress,
+            **shared,
         )
     print_warnings(() if quiet else run.warnings)
     if as_json:

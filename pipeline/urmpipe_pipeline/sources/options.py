@@ -18,6 +18,10 @@ class ReadOptions:
         joints: Names or numbers (from 1) of the joint columns, in the robot's order.
         units: Unit of a column by its name or number; by "" that of all joint columns that turn.
         period: Time between rows in [s], of a log without a time column.
+        interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that
+            of all joints that turn; in the file's own unit.
+        repair: Whether samples that a linear resampling left on a wrap are put on the line through their
+            neighbours.
     """
 
     source: str | None = None
@@ -27,3 +31,5 @@ class ReadOptions:
     joints: tuple[str, ...] = ()
     units: Mapping[str, str] = field(default_factory=dict)
     period: float | None = None
+    interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    repair: bool = False
