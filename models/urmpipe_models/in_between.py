@@ -19,7 +19,7 @@ FAR = 4.0
 PERCEPTIBLE = 5e-4
 """... and by more than this share of a period: 0.18 deg, a few steps of a coarse encoder."""
 
-AROUND = (-2, -1, 2, 3)
+AROUND = (-4, -3, -2, -1, 2, 3, 4, 5)
 """The steps around sample s whose speeds are the motion around it: step i leads to sample i."""
 
 
