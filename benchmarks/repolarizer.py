@@ -178,9 +178,9 @@ def main() -> None:
         "",
         *machine("scipy"),
         "Errors are of what a method makes of the wrapped log, against the motion before it was wrapped.",
-        "p7 is the same for whole turns, so a turn too much shows in the joint only: there numpy.unwrap takes",
-        "a real jump above pi for a wrap. It also loses all that follows a missing sample. The delay is that",
-        "of the clean log: the shift with the least median distance.",
+        "p7 is the same for whole turns, so a turn too much shows in the joint only: there numpy.unwrap",
+        "takes a real jump above pi for a wrap. It also loses all that follows a missing sample. The delay",
+        "is that of the clean log: the shift with the least median distance.",
     ]
     found = {}
     for title, (wrapped, true) in logs(x).items():

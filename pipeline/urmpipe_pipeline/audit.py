@@ -123,7 +123,9 @@ def _repolarized(
     limits = np.array([np.inf if robot is None else robot.moving[j].velocity for j in range(len(turning))])
     dt = seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
     fixed = repolarize(log.q, dt, period=periods, max_speed=limits)
-    if not given and len(fixed.unexplained) and (doubled := _doubled(log, fixed)):
+    asked = [] if "" in given or not len(fixed.unexplained) else _doubled(log, fixed)
+    doubled = [j for j in asked if log.joints[j] not in given]
+    if doubled:
         periods[doubled] = 2.0 * FULL_TURN
         fixed = repolarize(log.q, dt, period=periods, max_speed=limits)
     return fixed, periods, limits

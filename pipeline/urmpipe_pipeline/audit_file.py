@@ -23,9 +23,9 @@ def write_audit(run: Run, part: Path, path: Path) -> None:
         OutputError: If it did not read back as it was written.
     """
     rows = [list(AUDIT_COLUMNS), *([str(cell) for cell in _cells(one.to_dict())] for one in run.audit)]
-    with part.open("w", encoding="utf-8", newline="") as file:
+    with part.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file:
         csv.writer(file).writerows(rows)
-    with part.open(encoding="utf-8", newline="") as file:
+    with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:
         if list(csv.reader(file)) != rows:
             raise OutputError(Finding("reads back otherwise than written", str(path)))
 

@@ -82,9 +82,8 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     if any(one.exists() and path.samefile(one) for one in inputs):
         return f"found an input of this command, allowed: any other name for the {kind}"
     if not path.is_file() or not _is_ours(path, kind):
-        return (
-            f"found a file that is no {kind} of urmpipe's, allowed: a new name, or such a {kind} to replace"
-        )
+        such = f"such {'an' if kind == 'audit' else 'a'} {kind}"
+        return f"found a file that is no {kind} of urmpipe's, allowed: a new name, or {such} to replace"
     return None
 
 
