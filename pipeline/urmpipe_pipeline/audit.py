@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.in_between import beside_wraps, off_line, repair
@@ -168,9 +169,12 @@ def _in_between(log: JointLog, fixed: Repolarized, periods: FloatArray) -> _Plac
     """Return the in-between samples, with how far they lie from the line through their neighbours."""
     found = [np.empty((0, 2), dtype=np.int64)]
     off = [np.empty(0)]
+    every, times, sparse = np.arange(log.rows), log.t, _sparse(log)
     for j in np.unique(fixed.joints).tolist():
-        present = np.flatnonzero(~np.isnan(log.q[:, j]))
-        q, x, t = log.q[present, j], fixed.q[present, j], seconds(log.t_ns[present])
+        present, q, x, t = every, log.q[:, j], fixed.q[:, j], times
+        if sparse[j]:
+            present = np.flatnonzero(~np.isnan(q))
+            q, x, t = q[present], x[present], t[present]
         wraps = np.searchsorted(present, fixed.rows[fixed.joints == j])
         hidden = np.searchsorted(present, fixed.in_between[fixed.in_between[:, 1] == j, 0])
         at = np.union1d(hidden, beside_wraps(q, x, t, wraps, float(periods[j])))
@@ -205,7 +209,7 @@ def _ambiguous(
         float(np.median(steps)) if len(steps) and steps.max() > GAP * steps.min() else steps.max(initial=0)
     )
     wide = np.flatnonzero(steps > GAP * usual)
-    sparse = np.isnan(log.q.sum(axis=0))
+    sparse = _sparse(log)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
         after, before = _wide_steps(log, j, GAP * usual) if sparse[j] else (wide + 1, wide)
         if not len(after):
@@ -219,6 +223,13 @@ def _ambiguous(
     at, on = np.concatenate(rows), np.concatenate(joints)
     order = np.lexsort((on, at))
     return _steps_to(log, at[order], on[order]), speeds[on[order]]
+
+
+def _sparse(log: JointLog) -> NDArray[np.bool_]:
+    """Tell which joints miss samples; one pass over all says whether to look column by column."""
+    if not np.isnan(log.q.sum()):
+        return np.zeros(len(log.joints), dtype=np.bool_)
+    return np.asarray(np.isnan(log.q.sum(axis=0)))
 
 
 def _wide_steps(log: JointLog, joint: int, longest: float) -> tuple[IntArray, IntArray]:

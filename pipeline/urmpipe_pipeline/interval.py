@@ -124,27 +124,36 @@ def said_intervals(
     log: JointLog, fixed: Repolarized, periods: FloatArray, given: Mapping[str, Interval]
 ) -> tuple[list[Inference], list[LogWarning]]:
     """Return the interval of each joint that was given or seen to wrap, and what contradicts it."""
-    groups: dict[tuple[str, str], list[int]] = {}
+    groups: dict[tuple[str, bool], list[int]] = {}
     warnings = []
+    ends: dict[int, Interval] = {}
+    least = most = np.empty(0)
+    if len(fixed.rows):
+        least, most = log.q.min(axis=0), log.q.max(axis=0)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
         column = _column(log, j)
         interval = given.get(log.joints[j], given.get(""))
         if interval is not None:
-            groups.setdefault((_shown(interval, column), "given as an option"), []).append(j)
+            groups.setdefault((_shown(interval, column), True), []).append(j)
         elif (fixed.joints == j).any():
-            low, high = sorted(_in_file(column, v) for v in (np.nanmin(log.q[:, j]), np.nanmax(log.q[:, j])))
+            if np.isnan(least[j]):  # slower, but deaf to NaN
+                least[j], most[j] = np.nanmin(log.q[:, j]), np.nanmax(log.q[:, j])
+            low, high = sorted(_in_file(column, value) for value in (least[j], most[j]))
+            ends[j] = low, high
             period = float(periods[j]) / abs(column.factor)
             if high - low > (1.0 + SHOWN_SLACK) * period:
                 warnings.append(_too_wide(column, low, high, period))
             else:
-                groups.setdefault((_shown(_likely(low, high, period), column), ""), []).append(j)
+                groups.setdefault((_shown(_likely(low, high, period), column), False), []).append(j)
     said = [
         Inference(
             f"interval of {', '.join(log.joints[j] for j in joints)}",
             value,
-            why or _evidence(log, fixed, joints, periods),
+            "given as an option"
+            if is_given
+            else _evidence(log, fixed, periods, {j: ends[j] for j in joints}),
         )
-        for (value, why), joints in groups.items()
+        for (value, is_given), joints in groups.items()
     ]
     return said, warnings
 
@@ -204,13 +213,14 @@ def _too_wide(column: LogColumn, low: float, high: float, period: float) -> LogW
     return LogWarning("interval", said)
 
 
-def _evidence(log: JointLog, fixed: Repolarized, joints: Sequence[int], periods: FloatArray) -> str:
-    """Return why some joints of one unit are limited to an interval."""
-    column = _column(log, joints[0])
-    ends = [_in_file(column, value) for value in (np.nanmin(log.q[:, joints]), np.nanmax(log.q[:, joints]))]
-    wraps = int(np.isin(fixed.joints, joints).sum())
-    period = float(periods[joints[0]]) / abs(column.factor)
+def _evidence(log: JointLog, fixed: Repolarized, periods: FloatArray, ends: Mapping[int, Interval]) -> str:
+    """Return why some joints of one unit, whose values have these ends, are limited to an interval."""
+    first = next(iter(ends))
+    column = _column(log, first)
+    wraps = int(np.isin(fixed.joints, list(ends)).sum())
+    period = float(periods[first]) / abs(column.factor)
+    low, high = min(one for one, _ in ends.values()), max(one for _, one in ends.values())
     return (
-        f"{wraps} wrap{'s' if wraps > 1 else ''} by {period:.6g} {column.unit}, values from"
-        f" {min(ends):.6g} to {max(ends):.6g}"
+        f"{wraps} wrap{'s' if wraps > 1 else ''} by {period:.6g} {column.unit}, values from {low:.6g} to"
+        f" {high:.6g}"
     )

@@ -20,7 +20,8 @@ MOST = 500
 AUDIT_NOTES: dict[AuditKind, str] = {
     "in-between": "in-between: a sample that a linear resampling left on a wrap, Step rad off the line of its"
     " neighbours; it stands as it is.",
-    "repaired": "repaired: such a sample, put on that line.",
+    "repaired": "repaired: a sample that a linear resampling left on a wrap, put on the line of its"
+    " neighbours, Step rad away.",
     "unexplained": "unexplained: a step above a quarter period that is no wrap; it stays.",
     "ambiguous": "ambiguous: a gap in which the joint can have turned more than half a period.",
 }

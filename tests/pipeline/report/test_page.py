@@ -228,6 +228,19 @@ def test_a_long_audit_is_folded_and_a_very_long_one_cut(bare_run: Run) -> None:
     assert cut.note == "200 more; the JSON output lists them all."
 
 
+def test_the_audit_says_what_its_kinds_mean(bare_run: Run) -> None:
+    wrap = AuditEntry("phi1", 2, 0.0075, 0.0025, -6.28, 0, 1)
+    table = tables.audit_table(
+        replace(bare_run, audit=(wrap, replace(wrap, kind="repaired"), replace(wrap, kind="ambiguous")))
+    )
+    assert [row[0].text for row in table.rows] == ["wrap", "repaired", "ambiguous"]
+    assert table.title == "Audit of the repolarizer (1 wrap)"
+    assert table.note == (
+        "repaired: a sample that a linear resampling left on a wrap, put on the line of its neighbours, Step"
+        " rad away. ambiguous: a gap in which the joint can have turned more than half a period."
+    )
+
+
 def test_a_report_of_four_logs_is_small(comparison: Comparison) -> None:
     four = replace(comparison, runs=comparison.runs * 2)
     # every trace is decimated to the same number of points, however long the log is
