@@ -40,7 +40,8 @@ def derivatives(
         q: Joint values in [rad] or [m], shape (g, joints).
         tsp: Sampling period T in [s].
         method: central or savgol.
-        broken: Sample before and joint index of each step that is no motion, shape (b, 2).
+        broken: First and last of some steps that are no motion, by the sample before the step, and joint
+            index, shape (b, 3).
 
     Returns:
         Rates in [rad/s] or [m/s] and second derivatives in [rad/s2] or [m/s2], shape (g, joints); NaN
@@ -82,13 +83,13 @@ def _blanked(
         rates: q' and q'', shape (g, joints).
         reach: Samples to either side that a derivative is made of; those at the ends share the first and
             the last whole window.
-        broken: Sample before and joint index of each, shape (b, 2).
+        broken: First and last broken step and joint index, shape (b, 3).
     """
     if broken is not None and len(broken):
-        count, at = len(rates[0]), broken[:, 0]
-        first = np.where(at < 2 * reach, 0, at - reach + 1)
-        end = np.where(at >= count - 1 - 2 * reach, count, at + reach + 1)
-        mixed = inside_spans(first, end, broken[:, 1], rates[0].shape)
+        count, (first, last, joints) = len(rates[0]), broken.T
+        start = np.where(first < 2 * reach, 0, first - reach + 1)
+        end = np.where(last >= count - 1 - 2 * reach, count, last + reach + 1)
+        mixed = inside_spans(start, end, joints, rates[0].shape)
         for values in rates:
             values[mixed] = np.nan
     return rates

@@ -75,14 +75,14 @@ class Grid:
             rows: Row before, row after and joint index, shape (b, 3).
 
         Returns:
-            Grid sample before each step and joint index, shape (m, 2): the first and the last that each
-            reaches into; those between have no value.
+            First and last step of the grid that each reaches into, by the sample before the step, and joint
+            index, shape (m, 3).
         """
         if self.own:
-            return np.column_stack((rows[:, 1] - 1, rows[:, 2]))
+            return np.column_stack((rows[:, 0], rows[:, 1] - 1, rows[:, 2]))
         first, end = self._between(rows)
-        found = np.concatenate([np.column_stack((at - 1, rows[:, 2])) for at in (first, end)])
-        return found[(found[:, 0] >= 0) & (found[:, 0] < len(self.t_ns) - 1)]
+        last = np.minimum(end - 1, len(self.t_ns) - 2)
+        return np.column_stack((first - 1, last, rows[:, 2]))[first - 1 <= last]
 
     def _between(self, rows: IntArray) -> tuple[IntArray, IntArray]:
         """Return the first grid sample after each row before, and the first at or after the row after."""

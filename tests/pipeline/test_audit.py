@@ -13,6 +13,7 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.audit import LISTED, Audited, audit_log
+from urmpipe_pipeline.derivatives import Method, derivatives
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogColumn
 from urmpipe_pipeline.recording import read_recording, write_recording
@@ -243,6 +244,29 @@ def test_rates_across_an_unexplained_step_are_left_out(tmp_path: Path) -> None:
         run.qd[[28, 31], 0], 10.0, rtol=1e-12
     )  # 0.05 rad in 5 ms, roundings of 1e-15 rad
     assert not np.isnan(run.q).any()
+
+
+def test_rates_about_an_in_between_sample_are_left_out_on_any_grid(tmp_path: Path) -> None:
+    q = wrap(moving())
+    q[20] = 0.4 * q[19] + 0.6 * q[21]
+    table = np.column_stack([0.005 * np.arange(40), q])
+    np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,q1", comments="", fmt="%.17g")
+    for tsp, left_out in ((None, range(19, 22)), (0.001, range(95, 106))):
+        run = ingest_log([tmp_path / "a.csv"], read=ReadOptions(units={"": "rad"}), tsp=tsp)
+        assert np.flatnonzero(np.isnan(run.qd[:, 0])).tolist() == list(left_out)
+        assert np.nanmax(np.abs(run.qd)) < 10.1
+    repaired = ingest_log([tmp_path / "a.csv"], read=ReadOptions(units={"": "rad"}, repair=True))
+    np.testing.assert_allclose(repaired.qd[:, 0], 10.0, rtol=1e-10)  # roundings of 1e-15 rad in 10 ms
+
+
+def test_rates_at_the_ends_share_the_first_and_the_last_window() -> None:
+    q = 0.01 * np.arange(60.0)[:, np.newaxis]
+    at_start, at_end = np.array([[1, 1, 0]]), np.array([[57, 57, 0]])
+    cases: tuple[tuple[Method, int, int], ...] = (("central", 3, 57), ("savgol", 17, 43))
+    for method, start, end in cases:
+        left = [np.isnan(derivatives(q, 0.01, method, one)[0][:, 0]) for one in (at_start, at_end)]
+        assert np.flatnonzero(left[0]).tolist() == list(range(start))
+        assert np.flatnonzero(left[1]).tolist() == list(range(end, 60))
 
 
 def test_resampling_leaves_an_unexplained_step_open_and_counts_it(tmp_path: Path) -> None:

@@ -218,7 +218,7 @@ def test_metadata_of_any_text_come_back(
     run = make_run(rows=3)
     log = replace(
         run.log, name=name, source=source, files=(SourceFile(file, what, 2**40),), joints=tuple(joints),
-        clock_start_ns=int(number), first_line=9, digits=None,
+        clock_start_ns=row or 0, first_line=9, digits=None,
         columns=tuple(LogColumn(n, n, "joint", j, unit, number) for j, n in enumerate(joints)),
         inferences=(Inference(what, value, message),), warnings=(LogWarning(kind, message, row),),
     )  # fmt: skip
