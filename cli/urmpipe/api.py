@@ -12,6 +12,7 @@ from urmpipe_models.catalogue import load_robot, robot_names
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
 from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_pipeline.audit_file import write_audit
 from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import ingest_log
@@ -71,6 +72,7 @@ def ingest(
     derivative: Method | None = None,
     strict: bool = False,
     output: PathLike | None = None,
+    audit: PathLike | None = None,
     progress: Callable[[float], None] | None = None,
 ) -> Run:
     """Turn one log into a run, and write its recording if an output is named.
@@ -85,6 +87,7 @@ def ingest(
         derivative: central or savgol; default: savgol for quantised logs, else central.
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write.
+        audit: A CSV file to write the repolarizer's audit to.
         progress: Told the share of the recording that is written, 0..1.
 
     Returns:
@@ -106,7 +109,14 @@ def ingest(
         _refuse_warnings(strict, run.warnings)
         return run
 
-    return make(None) if output is None else record(make, Path(output), files, progress)
+    if audit is None:
+        return make(None) if output is None else record(make, Path(output), files, progress)
+    if output is not None and Path(audit).resolve() == Path(output).resolve():
+        raise OptionError(f"found {audit} as recording and as audit; allowed: a name for each")
+    with guarded_output(Path(audit), files, "audit") as part:
+        run = make(None) if output is None else record(make, Path(output), files, progress)
+        write_audit(run, part, Path(audit))
+    return run
 
 
 def compare(

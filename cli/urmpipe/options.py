@@ -91,6 +91,21 @@ def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) 
     return {column: unit for column, _, unit in pairs} or None
 
 
+def _intervals(
+    ctx: click.Context, param: click.Parameter, values: tuple[str, ...]
+) -> dict[str, tuple[float, float]] | None:
+    """Return LOW:HIGH (all joints that turn) and JOINT=LOW:HIGH options as a mapping."""
+    intervals = {}
+    for value in values:
+        joint, _, ends = value.rpartition("=")
+        try:
+            low, high = map(float, ends.split(":"))
+        except ValueError:
+            raise click.BadParameter(f"found {value!r}, allowed: LOW:HIGH or JOINT=LOW:HIGH") from None
+        intervals[joint] = low, high
+    return intervals or None
+
+
 def placing_options(command: Command) -> Command:
     """Add what places and cuts an arm: --base, --tool, --base-link, --tip."""
     for option in (
@@ -163,6 +178,18 @@ def log_options(command: Command) -> Command:
             help="How joints are differentiated [default: by the digits].",
         ),
         click.option("--tsp", type=DURATION, help="Period of the grid [default: the log's own]."),
+        click.option(
+            "--repair",
+            is_flag=True,
+            help="Put samples that were left on a wrap on the line of their neighbours.",
+        ),
+        click.option(
+            "--interval",
+            multiple=True,
+            callback=_intervals,
+            metavar="[JOINT=]LOW:HIGH",
+            help="What the joints are limited to, in their own unit [default: by the wraps].",
+        ),
         click.option("--period", type=DURATION, help="Period of a log without a time column [default: 5ms]."),
         click.option(
             "--unit",

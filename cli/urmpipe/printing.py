@@ -70,20 +70,26 @@ def print_run(run: Run, *, alternatives: bool = False) -> None:
         because = run.robot.description if run.robot else "not given: no kinematics (--robot NAME|FILE)"
         table.add_row("robot", run.robot.name if run.robot else "none", because)
     console.print(table)
-    if not run.repolarizations:
+    _print_audit(console, run)
+
+
+def _print_audit(console: Console, run: Run) -> None:
+    """Print what the repolarizer did, and what it could not decide."""
+    if not run.audit:
         console.print("No repolarization.")
         return
+    wraps = len(run.repolarizations)
+    others = f", {len(run.audit) - wraps} other findings" if len(run.audit) > wraps else ""
     audit = new_table(
-        "Joint", "Row", "t_r [s]", "Step [rad]", "Turns", title=f"{len(run.repolarizations)} repolarizations"
+        "What", "Joint", "Row", "t_r [s]", "Step [rad]", "Turns", title=f"{wraps} repolarizations{others}"
     )
-    for one in run.repolarizations[:LISTED]:
+    for one in run.audit[:LISTED]:
         instant = f"{one.t:.6g} ± {one.half_period:.4g}"
-        audit.add_row(
-            one.joint, str(one.row), instant, f"{one.step:+.5f}", f"{one.before:+d} → {one.after:+d}"
-        )
+        turns = f"{one.before:+d} → {one.after:+d}"
+        audit.add_row(one.kind, one.joint, str(one.row), instant, f"{one.step:+.5f}", turns)
     console.print(audit)
-    if len(run.repolarizations) > LISTED:
-        console.print(f"... and {len(run.repolarizations) - LISTED} more")
+    if len(run.audit) > LISTED:
+        console.print(f"... and {len(run.audit) - LISTED} more")
 
 
 def print_comparison(result: Comparison) -> None:

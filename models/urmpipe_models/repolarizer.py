@@ -5,8 +5,10 @@ periods, out = in + P k, so that the joint goes on where it was. It is causal, f
 delays nothing; before the first repolarization the output is the input, bit for bit.
 
 A step d between two samples is a repolarization when it is a whole period but for what the joint can
-have moved meanwhile: | |d| - P | <= max_step, max_step = min(largest speed x dt, P / 4). A step that is
-merely larger than half a period is none: it stays, flagged as unexplained.
+have moved meanwhile: | |d| - P | <= max_step, max_step = min(largest speed x dt, P / 4). So are two steps
+of one sign that only together are a whole period: the sample between them was left on the jump by a
+linear resampling, is no place where the joint ever was, and is told as an in-between sample. A step that
+is merely larger than half a period is none: it stays, flagged as unexplained.
 
 Source: [UrmArm2021]_ eq. 15-18 with the corrections of the errata (eq. 17's sign, multi-turn k, eq. 18
 as a threshold).
@@ -31,20 +33,28 @@ NO_LIMIT = 1e30
 LARGEST_VALUE = 1e300
 """A value at or above it is missing, as NaN is: the comparison also traces, where isnan does not."""
 
+LEAST_REST = 0.01
+"""Share of P by which a wrap may always miss the whole period: clocks jitter, and joints overshoot limits."""
+
+IntArray = NDArray[np.int64]
+
 
 class State(NamedTuple):
     """What the repolarizer of one joint remembers.
 
     Attributes:
         last: The last input that had a value, in the unit of the period.
-        before: The one before it: two samples back.
+        residual: The step to it in the turns of now, so less a period if it was a wrap; 0 where there is
+            none, or where it was used up as a half of a wrap.
+        lasted: Time that this step took in [s].
         turns: k, the whole periods added now.
         elapsed: Time since `last` in [s]; more than a sample where values are missing.
-        seen: How many values came so far, counted to 2.
+        seen: 1 once a value came.
     """
 
     last: Element = 0.0
-    before: Element = 0.0
+    residual: Element = 0.0
+    lasted: Element = 0.0
     turns: Element = 0.0
     elapsed: Element = 0.0
     seen: Element = 0.0
@@ -56,10 +66,13 @@ class Flags(NamedTuple):
     Attributes:
         change: Change of k: -1, 0 or 1.
         unexplained: True (1 in a trace) for a step above P / 4 that is no repolarization.
+        in_between: True where this step and the one before are a wrap only together: the value before
+            this one lies on the jump, and its step was told as unexplained if it is above P / 4.
     """
 
     change: Element
     unexplained: Element
+    in_between: Element
 
 
 class Repolarized(NamedTuple):
@@ -70,44 +83,67 @@ class Repolarized(NamedTuple):
         rows: Row index of every repolarization, from 0, ascending, shape (r,).
         joints: Joint index of each, shape (r,).
         change: Change of k at each, shape (r,).
-        unexplained: Row and joint index of every unexplained step, shape (u, 2).
+        unexplained: Row and joint index of every unexplained step, shape (u, 2), without those to an
+            in-between sample, which the step after explains.
+        in_between: Row and joint index of every in-between sample, shape (b, 2).
     """
 
     q: FloatArray
-    rows: NDArray[np.int64]
-    joints: NDArray[np.int64]
-    change: NDArray[np.int64]
-    unexplained: NDArray[np.int64]
+    rows: IntArray
+    joints: IntArray
+    change: IntArray
+    unexplained: IntArray
+    in_between: IntArray
 
 
 def max_step(elapsed: Element, period: Element, max_speed: Element) -> Element:
-    """Return how far a joint can have moved: min(max_speed x elapsed, P / 4), in the period's unit.
+    """Return how far a joint can have moved, in the period's unit.
+
+    It is max_speed x elapsed, but not less than P / 100 and not more than P / 4.
 
     Args:
         elapsed: Time since the last value in [s].
         period: P.
         max_speed: Largest speed in the period's unit per second; inf without a limit.
     """
-    return np.minimum(np.minimum(max_speed, NO_LIMIT) * elapsed, period / 4.0)
+    reached = np.minimum(max_speed, NO_LIMIT) * elapsed
+    return np.minimum(np.maximum(reached, LEAST_REST * period), period / 4.0)
 
 
-def notice(last: Element, q: Element, period: Element, allowed: Element) -> Flags:
+def wrap_change(step: Element, period: Element, allowed: Element) -> Element:
+    """Return the change of k that a step asks for: -1, 0 or 1.
+
+    Args:
+        step: Difference of two values, in the unit of the period.
+        period: P.
+        allowed: By how much a whole period may be missed; see `max_step`.
+    """
+    return np.where(np.abs(np.abs(step) - period) <= allowed, -np.sign(step), 0.0)
+
+
+def notice(
+    step: Element, elapsed: Element, residual: Element, lasted: Element, period: Element, max_speed: Element
+) -> Flags:
     """Judge the step from one value to the next: the decision of the repolarizer, and all of it.
 
     Args:
-        last: Value before, in the unit of the period.
-        q: Value now.
+        step: The step, in the unit of the period.
+        elapsed: Time that it took in [s].
+        residual: The step before it in the turns of now, 0 for none.
+        lasted: Time that one took in [s].
         period: P.
-        allowed: What `max_step` returns.
+        max_speed: Largest speed in the period's unit per second; inf without a limit.
 
     Returns:
-        The change of k and the flag; no change and no flag where a value is missing (NaN).
+        The change of k and the flags; no change and no flag where a value is missing (NaN).
     """
-    step = q - last
-    size = np.abs(step)
-    wrapped = np.abs(size - period) <= allowed
-    change = np.where(wrapped, -np.sign(step), 0.0)
-    return Flags(change, np.logical_and(size > period / 4.0, np.logical_not(wrapped)))
+    alone = wrap_change(step, period, max_step(elapsed, period, max_speed))
+    both = wrap_change(residual + step, period, max_step(lasted + elapsed, period, max_speed))
+    halves = np.logical_and(np.abs(alone) < 1.0, residual * step > 0.0)
+    in_between = np.logical_and(halves, np.abs(both) > 0.0)
+    change = np.where(in_between, both, alone)
+    unexplained = np.logical_and(np.abs(step) > period / 4.0, np.abs(change) < 1.0)
+    return Flags(change, unexplained, in_between)
 
 
 def turned(q: Element, turns: Element, period: Element) -> Element:
@@ -133,88 +169,162 @@ def step(
     Source: [UrmArm2021]_ eq. 15-18.
     """
     elapsed = state.elapsed + dt
-    flags = notice(state.last, q, period, max_step(elapsed, period, max_speed))
-    known = state.seen > 0.0
-    flags = Flags(np.where(known, flags.change, 0.0), np.logical_and(known, flags.unexplained))
-    turns = state.turns + flags.change
+    move = q - state.last
     has_value = np.abs(q) < LARGEST_VALUE
+    known = np.logical_and(has_value, state.seen > 0.0)
+    flags = notice(move, elapsed, state.residual, state.lasted, period, max_speed)
+    flags = Flags(
+        np.where(known, flags.change, 0.0),
+        np.logical_and(known, flags.unexplained),
+        np.logical_and(known, flags.in_between),
+    )
+    turns = state.turns + flags.change
+    residual = np.where(flags.in_between, 0.0, move + period * flags.change)
     following = State(
         last=np.where(has_value, q, state.last),
-        before=np.where(has_value, state.last, state.before),
+        residual=np.where(known, residual, state.residual),
+        lasted=np.where(known, elapsed, state.lasted),
         turns=turns,
         elapsed=np.where(has_value, 0.0, elapsed),
-        seen=np.where(has_value, np.minimum(state.seen + 1.0, 2.0), state.seen),
+        seen=np.where(has_value, 1.0, state.seen),
     )
     return following, turned(q, turns, period), flags
 
 
 def repolarize(
-    q: FloatArray, dt: FloatArray, *, period: float = FULL_TURN, max_speed: FloatArray | float = np.inf
+    q: FloatArray,
+    dt: FloatArray,
+    *,
+    period: FloatArray | float = FULL_TURN,
+    max_speed: FloatArray | float = np.inf,
 ) -> Repolarized:
     """Repolarize a whole log: what `step` gives sample by sample, bit for bit.
 
     Args:
         q: Joint values in the unit of the period, shape (n, joints); NaN where a sample is missing.
         dt: Time from the row before in [s], shape (n,); the first is not used.
-        period: P.
+        period: P, shape (joints,) or one for all.
         max_speed: Largest speeds in the period's unit per second, shape (joints,) or one for all.
     """
-    count, joints = q.shape
-    speeds = np.broadcast_to(np.asarray(max_speed, dtype=np.float64), (joints,))
-    missing = np.isnan(q.sum())  # one pass over all says whether to look column by column
-    complete = ~np.isnan(q.sum(axis=0)) if missing else np.ones(joints, dtype=np.bool_)
-    found = [_steps_of_complete(q, dt, period, speeds, complete)]
-    found += [_steps_of_sparse(q, dt, period, speeds, j) for j in map(int, np.flatnonzero(~complete))]
-    rows, columns, change, odd = (np.concatenate(parts) for parts in zip(*found, strict=True))
-    order = np.lexsort((columns, rows))
-    rows, columns, change, odd = rows[order], columns[order], change[order], odd[order]
+    joints = q.shape[1]
+    periods, speeds = (
+        np.broadcast_to(np.asarray(one, dtype=np.float64), (joints,)) for one in (period, max_speed)
+    )
+    found = _found_in_all(q, dt, periods, speeds)
+    wraps = found.change != 0
     out = q.copy()
-    for j in np.unique(columns[change != 0]):
-        mine = (columns == j) & (change != 0)
-        bounds = [*rows[mine], count]
-        for k, start, end in zip(np.cumsum(change[mine]), bounds[:-1], bounds[1:], strict=True):
-            out[start:end, j] = turned(q[start:end, j], float(k), period)
-    wraps = change != 0
-    return Repolarized(out, rows[wraps], columns[wraps], change[wraps], np.column_stack((rows, columns))[odd])
+    for j in np.unique(found.joints[wraps]):
+        mine = wraps & (found.joints == j)
+        _add_turns(out[:, j], found.rows[mine], found.change[mine], periods[j])
+    between = found.between[found.between >= 0]
+    on_jump = np.column_stack((between, found.joints[found.between >= 0]))
+    odd = np.column_stack((found.rows, found.joints))[found.unexplained]
+    explained = np.isin(odd[:, 0] * joints + odd[:, 1], on_jump[:, 0] * joints + on_jump[:, 1])
+    return Repolarized(
+        out, found.rows[wraps], found.joints[wraps], found.change[wraps], odd[~explained], on_jump
+    )
 
 
-_Found = tuple[NDArray[np.int64], NDArray[np.int64], NDArray[np.int64], NDArray[np.bool_]]
+def _add_turns(column: FloatArray, rows: IntArray, change: IntArray, period: float) -> None:
+    """Repolarize a column in place, in blocks that stay in the cache."""
+    k = np.append(0.0, np.cumsum(change))
+    for block in row_blocks(len(column)):
+        stop = min(block.stop, len(column))
+        first, last = np.searchsorted(rows, (block.start, stop))
+        bounds = np.concatenate(([block.start], rows[first:last], [stop]))
+        column[block] = turned(column[block], np.repeat(k[first : last + 1], np.diff(bounds)), period)
 
 
-def _steps_of_complete(
-    q: FloatArray, dt: FloatArray, period: float, speeds: FloatArray, complete: NDArray[np.bool_]
-) -> _Found:
-    """Find the steps of the columns that miss no sample; only steps above P / 4 need to be judged."""
-    candidates = [_nothing()[:2]]
-    for block in row_blocks(len(q) - 1):
-        large = np.abs(q[1:][block] - q[:-1][block]) > period / 4.0
+class _Found(NamedTuple):
+    """Steps that were judged: by row and joint index, `between` the row of the in-between sample or -1."""
+
+    rows: IntArray
+    joints: IntArray
+    change: IntArray
+    unexplained: NDArray[np.bool_]
+    between: IntArray
+
+
+def _found_in_all(q: FloatArray, dt: FloatArray, periods: FloatArray, speeds: FloatArray) -> _Found:
+    """Judge the steps of all columns, by row and then by joint: whole columns at once, others one by one."""
+    joints = q.shape[1]
+    complete = np.ones(joints, dtype=np.bool_)
+    with np.errstate(over="ignore", invalid="ignore"):
+        if not np.isfinite(q.sum()):  # one pass over all says whether to look column by column
+            complete = np.isfinite(q.sum(axis=0))
+    whole = np.flatnonzero(complete)
+    part = q if complete.all() else q[:, whole]
+    found = _judged(part, dt, periods[whole], speeds[whole])
+    parts = [found._replace(joints=whole[found.joints])]
+    for j in np.flatnonzero(~complete):
+        present = np.flatnonzero(np.abs(q[:, j]) < LARGEST_VALUE)
+        one = slice(j, j + 1)
+        found = _judged(q[present, one], _elapsed(present, dt), periods[one], speeds[one])
+        between = np.where(found.between < 0, -1, np.append(present, -1)[found.between])
+        parts.append(found._replace(rows=present[found.rows], joints=found.joints + j, between=between))
+    rows = np.concatenate([one.rows for one in parts])
+    columns = np.concatenate([one.joints for one in parts])
+    order = np.argsort(rows * max(joints, 1) + columns, kind="stable")
+    return _Found(
+        rows[order],
+        columns[order],
+        np.concatenate([one.change for one in parts])[order],
+        np.concatenate([one.unexplained for one in parts])[order],
+        np.concatenate([one.between for one in parts])[order],
+    )
+
+
+def _judged(values: FloatArray, elapsed: FloatArray, periods: FloatArray, speeds: FloatArray) -> _Found:
+    """Judge the steps of columns that miss no value: those above P / 4 and the ones after them.
+
+    A wrap is above P / 4, and so is one of the two steps about an in-between sample.
+    """
+    rows, columns = _candidates(values, periods)
+    step = values[rows, columns] - values[rows - 1, columns]
+    first = rows < 2  # nothing stands before the step from the first value to the second
+    before = np.where(first, 0.0, values[rows - 1, columns] - values[rows - 2, columns])
+    lasted = np.where(first, 0.0, elapsed[rows - 1])
+    period, speed = periods[columns], speeds[columns]
+    residual = before + period * wrap_change(before, period, max_step(lasted, period, speed))
+    flags = notice(step, elapsed[rows], residual, lasted, period, speed)
+    again = _after_in_between(rows, columns, flags.in_between)
+    change = np.where(again, 0.0, flags.change)  # the step before is used up: alone this one is no wrap
+    in_between = flags.in_between & ~again
+    unexplained = (np.abs(step) > period / 4.0) & (change == 0.0)
+    return _Found(rows, columns, change.astype(np.int64), unexplained, np.where(in_between, rows - 1, -1))
+
+
+def _candidates(values: FloatArray, periods: FloatArray) -> tuple[IntArray, IntArray]:
+    """Return row and column of the steps above P / 4 and of those after them, by column and then by row."""
+    count = len(values)
+    keys = [np.empty(0, dtype=np.int64)]
+    for block in row_blocks(count - 1):
+        large = np.abs(values[1:][block] - values[:-1][block]) > periods / 4.0
         if large.any():
             at_row, at_column = np.nonzero(large)
-            candidates.append((at_row + block.start + 1, at_column))
-    rows, columns = (np.concatenate(parts) for parts in zip(*candidates, strict=True))
-    rows, columns = rows[complete[columns]], columns[complete[columns]]
-    allowed = max_step(dt[rows], period, speeds[columns])
-    flags = notice(q[rows - 1, columns], q[rows, columns], period, allowed)
-    return rows, columns, flags.change.astype(np.int64), flags.unexplained
+            keys.append(at_column * count + at_row + block.start + 1)
+    large_keys = np.concatenate(keys)
+    following = large_keys[large_keys % max(count, 1) < count - 1] + 1
+    columns, rows = np.divmod(np.unique(np.concatenate((large_keys, following))), max(count, 1))
+    return rows, columns
 
 
-def _steps_of_sparse(q: FloatArray, dt: FloatArray, period: float, speeds: FloatArray, joint: int) -> _Found:
-    """Find the steps of a column with missing samples: between values, over the time that they lie apart."""
-    present = np.flatnonzero(np.abs(q[:, joint]) < LARGEST_VALUE)
-    if len(present) < 2:
-        return _nothing()
-    elapsed = dt[present[1:]]
-    for i in np.flatnonzero(np.diff(present) > 1):
-        # np.cumsum adds from left to right, as `step` does; a difference of times would round otherwise
-        elapsed[i] = np.cumsum(dt[present[i] + 1 : present[i + 1] + 1])[-1]
-    flags = notice(
-        q[present[:-1], joint], q[present[1:], joint], period, max_step(elapsed, period, speeds[joint])
-    )
-    at = np.flatnonzero((flags.change != 0.0) | flags.unexplained)
-    rows = present[1:][at]
-    return rows, np.full(len(rows), joint), flags.change[at].astype(np.int64), flags.unexplained[at]
+def _after_in_between(rows: IntArray, columns: IntArray, paired: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Tell which pairs share a step with the pair before: of pairs in a row every second one does."""
+    follows = np.zeros(len(rows), dtype=np.bool_)
+    follows[1:] = paired[1:] & paired[:-1] & (np.diff(rows) == 1) & (np.diff(columns) == 0)
+    index = np.arange(len(rows))
+    start = np.maximum.accumulate(np.where(follows, 0, index))
+    return np.asarray(follows & ((index - start) % 2 == 1))
 
 
-def _nothing() -> _Found:
-    none = np.empty(0, dtype=np.int64)
-    return none, none, none, np.empty(0, dtype=np.bool_)
+def _elapsed(present: IntArray, dt: FloatArray) -> FloatArray:
+    """Return the time from each value to the next, the first 0; added from left to right as in `step`."""
+    elapsed = dt[present]
+    elapsed[:1] = 0.0
+    apart = np.diff(present, prepend=present[:1])
+    for length in np.unique(apart[apart > 1]):
+        at = np.flatnonzero(apart == length)
+        passed = present[at - 1][:, np.newaxis] + np.arange(1, length + 1)
+        elapsed[at] = np.cumsum(dt[passed], axis=1)[:, -1]
+    return elapsed

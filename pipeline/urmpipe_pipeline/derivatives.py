@@ -7,7 +7,8 @@ from typing import Literal
 import numpy as np
 
 from urmpipe_models.kinematics import row_blocks
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.grid import inside_spans
+from urmpipe_pipeline.joint_log import FloatArray, IntArray
 
 Method = Literal["central", "savgol"]
 
@@ -24,17 +25,23 @@ RESTING = 0.01
 """... or by less than this rms, in [rad/s] or [m/s]: a robot that stands still has rates of noise only."""
 
 
-def derivatives(q: FloatArray, tsp: float, method: Method = "central") -> tuple[FloatArray, FloatArray]:
+def derivatives(
+    q: FloatArray, tsp: float, method: Method = "central", broken: IntArray | None = None
+) -> tuple[FloatArray, FloatArray]:
     """Return q' and q'' on a uniform grid.
 
     central: q'_i = (q_{i+1} - q_{i-1}) / 2T, q''_i = (q_{i+1} - 2 q_i + q_{i-1}) / T^2, at the ends the
     three-point one-sided forms. savgol: those of the cubic fitted to 31 samples about each
-    (Savitzky and Golay). A missing sample (NaN) leaves its neighbours without a derivative.
+    (Savitzky and Golay). A missing sample (NaN) leaves its neighbours without a derivative, and so
+    does a step that is no motion: the difference across it is no speed, however large, and would be read as
+    one.
 
     Args:
         q: Joint values in [rad] or [m], shape (g, joints).
         tsp: Sampling period T in [s].
         method: central or savgol.
+        broken: First and last of some steps that are no motion, by the sample before the step, and joint
+            index, shape (b, 3).
 
     Returns:
         Rates in [rad/s] or [m/s] and second derivatives in [rad/s2] or [m/s2], shape (g, joints); NaN
@@ -44,7 +51,13 @@ def derivatives(q: FloatArray, tsp: float, method: Method = "central") -> tuple[
     if count < 3:
         return np.full_like(q, np.nan), np.full_like(q, np.nan)
     if method == "savgol" and count > POLYNOMIAL + 1:
-        return _smoothed(q, tsp)
+        return _blanked(_smoothed(q, tsp), _window(count) // 2, broken)
+    return _blanked(_central(q, tsp), 1, broken)
+
+
+def _central(q: FloatArray, tsp: float) -> tuple[FloatArray, FloatArray]:
+    """Return the central differences of three samples or more."""
+    count = len(q)
     qd, qdd = np.empty_like(q), np.empty_like(q)
     for block in row_blocks(count - 2):  # in blocks, so that what is read again is still in the cache
         before, here, after = q[:-2][block], q[1:-1][block], q[2:][block]
@@ -59,6 +72,27 @@ def derivatives(q: FloatArray, tsp: float, method: Method = "central") -> tuple[
     qd[-1] = (3.0 * q[-1] - 4.0 * q[-2] + q[-3]) * (0.5 / tsp)
     qdd[0], qdd[-1] = qdd[1], qdd[-2]
     return qd, qdd
+
+
+def _blanked(
+    rates: tuple[FloatArray, FloatArray], reach: int, broken: IntArray | None
+) -> tuple[FloatArray, FloatArray]:
+    """Take out, in place, the derivatives that are made of samples on both sides of a broken step.
+
+    Args:
+        rates: q' and q'', shape (g, joints).
+        reach: Samples to either side that a derivative is made of; those at the ends share the first and
+            the last whole window.
+        broken: First and last broken step and joint index, shape (b, 3).
+    """
+    if broken is not None and len(broken):
+        count, (first, last, joints) = len(rates[0]), broken.T
+        start = np.where(first < 2 * reach, 0, first - reach + 1)
+        end = np.where(last >= count - 1 - 2 * reach, count, last + reach + 1)
+        mixed = inside_spans(start, end, joints, rates[0].shape)
+        for values in rates:
+            values[mixed] = np.nan
+    return rates
 
 
 def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
@@ -76,12 +110,17 @@ def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
     return error <= max(AGREEMENT * size, RESTING)
 
 
+def _window(count: int) -> int:
+    """Return the samples of a smoothing window over so many samples: an odd number."""
+    return min(WINDOW, count - 1 + count % 2)
+
+
 def _smoothed(q: FloatArray, tsp: float) -> tuple[FloatArray, FloatArray]:
     """Return the derivatives of the fitted cubic, NaN where the samples it is fitted to are not all there.
 
     The first and the last half window share the cubic of the first and the last whole one.
     """
-    half = (min(WINDOW, len(q)) - 1) // 2
+    half = _window(len(q)) // 2
     x = np.linspace(-1.0, 1.0, 2 * half + 1)
     powers = np.vander(x, POLYNOMIAL + 1, increasing=True)
     fit = np.asarray(np.linalg.pinv(powers), dtype=np.float64)  # from samples to coefficients

@@ -1,7 +1,7 @@
 """The uniform time grid of a run: the log's own samples where they are regular, else a resampling.
 
 Times are integer nanoseconds from the log's first row. Nothing is upsampled in silence, and nothing is
-interpolated across a gap.
+interpolated across a gap, or across a step of a joint that no motion explains.
 """
 
 from __future__ import annotations
@@ -48,6 +48,48 @@ class Grid:
             return values
         return interpolate(self.t_ns, self.source_ns, values)
 
+    def resample_joints(
+        self, values: FloatArray, unresolved: IntArray
+    ) -> tuple[FloatArray, tuple[LogWarning, ...]]:
+        """Return joint values on the grid; NaN inside gaps and between the rows of an unresolved step.
+
+        Args:
+            values: Repolarized values of the rows, shape (n, joints).
+            unresolved: Row before, row after and joint index of steps that no motion explains, shape (u, 3).
+
+        Returns:
+            The values, shape (g, joints), and a warning that counts what was left open.
+        """
+        if self.own or not len(unresolved):
+            return self.resample(values), ()
+        result = self.resample(values)
+        inside = inside_spans(*self._between(unresolved), unresolved[:, 2], result.shape)
+        left = int(np.count_nonzero((inside & ~np.isnan(result)).any(axis=1)))
+        result[inside] = np.nan
+        said = f"{left} grid samples lie inside steps of a joint that no motion explains and have no value"
+        return result, (LogWarning("step-left-open", said),) if left else ()
+
+    def steps(self, rows: IntArray) -> IntArray:
+        """Return the steps of the grid that steps between rows reach into.
+
+        Args:
+            rows: Row before, row after and joint index, shape (b, 3).
+
+        Returns:
+            First and last step of the grid that each reaches into, by the sample before the step, and joint
+            index, shape (m, 3).
+        """
+        if self.own:
+            return np.column_stack((rows[:, 0], rows[:, 1] - 1, rows[:, 2]))
+        first, end = self._between(rows)
+        last = np.minimum(end - 1, len(self.t_ns) - 2)
+        return np.column_stack((first - 1, last, rows[:, 2]))[first - 1 <= last]
+
+    def _between(self, rows: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the first grid sample after each row before, and the first at or after the row after."""
+        first = np.searchsorted(self.t_ns, self.source_ns[rows[:, 0]], side="right")
+        return first, np.searchsorted(self.t_ns, self.source_ns[rows[:, 1]], side="left")
+
 
 def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> FloatArray:
     """Return values at given times: linear between the known ones, NaN outside them and inside gaps.
@@ -68,6 +110,23 @@ def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> Floa
         result[:, i] = np.interp(x, known, column, np.nan, np.nan)
     result[inside_gaps(at_ns, known_ns)] = np.nan
     return result
+
+
+def inside_spans(
+    first: IntArray, end: IntArray, columns: IntArray, shape: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """Return a mask of a table that is true in some spans of rows.
+
+    Args:
+        first: First row of each span, shape (m,).
+        end: The row after its last one, not before `first`, shape (m,).
+        columns: The column it stands in, shape (m,).
+        shape: Rows and columns of the table.
+    """
+    depth = np.zeros((shape[0] + 1, shape[1]), dtype=np.int32)
+    np.add.at(depth, (first, columns), 1)
+    np.add.at(depth, (end, columns), -1)
+    return np.asarray(np.cumsum(depth, axis=0)[:-1] > 0)
 
 
 def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> NDArray[np.bool_]:

@@ -8,19 +8,18 @@ from pathlib import Path
 from typing import Any, get_args
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics import THREADS, PointLog, point_over_log
-from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
+from urmpipe_pipeline.audit import audit_log, turning
 from urmpipe_pipeline.derivatives import Method, derivatives, recorded_agree
 from urmpipe_pipeline.grid import Grid, make_grid
-from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning, seconds
+from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning
 from urmpipe_pipeline.plausibility import implausible
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.recorded_tcp import far_from_recorded
-from urmpipe_pipeline.results import Repolarization, Run
+from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.robot_inference import infer_robot
 from urmpipe_pipeline.sources import ReadOptions, read_log
 
@@ -29,9 +28,6 @@ QUANTISED_DIGITS = 5
 
 EULER_SINGULAR = "euler-singular"
 """The kind of the only warning that rests on the robot."""
-
-LISTED_STEPS = 20
-"""Unexplained steps named one by one; the others are counted."""
 
 
 def ingest_log(
@@ -75,17 +71,16 @@ def ingest_log(
         log = replace(log, inferences=(*log.inferences, because))
     if early:
         early(log)
-    warnings = [*log.warnings, *far_from_recorded(robot, log)]
-    fixed, audit = _repolarized(log, robot)
-    warnings += _unexplained(log, fixed)
+    found = audit_log(log, robot, interval=options.interval, repaired=options.repair)
+    log = replace(log, inferences=(*log.inferences, *found.inferences))
     timed = options.period is not None or any(column.role == "time" for column in log.columns)
-    turning = _turning(log, robot)
-    warnings += implausible(log, fixed.q, robot, turning, fixed.unexplained, timed=timed)
+    doubts = implausible(log, found.q, robot, turning(log, robot), found.broken[:, 1:], timed=timed)
     grid = make_grid(log, tsp)
-    warnings += grid.warnings
-    q = grid.resample(fixed.q)
+    q, left_open = grid.resample_joints(found.q, found.unresolved)
+    warnings = [*log.warnings, *far_from_recorded(robot, log), *found.warnings, *doubts]
+    warnings += [*grid.warnings, *left_open]
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
-    qd, qdd = _rates(log, grid, q, method, warnings)
+    qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
     given = {
         "robot": robot.name if robot else None,
         "tsp": tsp,
@@ -103,7 +98,7 @@ def ingest_log(
         qdd=qdd,
         tcp=None,
         tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
-        repolarizations=tuple(audit),
+        audit=found.entries,
         warnings=tuple(warnings),
         provenance=provenance("ingest", given, log.files),
     )
@@ -120,86 +115,14 @@ def _given(options: ReadOptions) -> dict[str, Any] | None:
     return {name: value for name, value in asdict(options).items() if value != default[name]} or None
 
 
-def _repolarized(log: JointLog, robot: Chain | None) -> tuple[Repolarized, list[Repolarization]]:
-    """Repolarize the joints that turn, on the file's own rows; joint indices are those of the log."""
-    turning = _turning(log, robot)
-    dt = seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
-    limits = np.inf if robot is None else np.array([joint.velocity for joint in robot.moving])[turning]
-    if turning.all():
-        fixed = repolarize(log.q, dt, max_speed=limits)
-    else:
-        which = np.flatnonzero(turning)
-        part = repolarize(log.q[:, which], dt, max_speed=limits)
-        q, unexplained = log.q.copy(), part.unexplained.copy()
-        q[:, which], unexplained[:, 1] = part.q, which[part.unexplained[:, 1]]
-        fixed = part._replace(q=q, joints=which[part.joints], unexplained=unexplained)
-    return fixed, _audit(log, fixed)
-
-
-def _turning(log: JointLog, robot: Chain | None) -> NDArray[np.bool_]:
-    """Tell which joints turn, shape (joints,)."""
-    return np.array([_turns(log, robot, j) for j in range(len(log.joints))], dtype=np.bool_)
-
-
-def _turns(log: JointLog, robot: Chain | None, joint: int) -> bool:
-    """Tell whether a joint turns: the robot says so, or else the column's unit."""
-    if robot is not None:
-        return robot.moving[joint].kind == "revolute"
-    return log.units.get(log.joints[joint]) in ("rad", "deg")
-
-
-def _audit(log: JointLog, fixed: Repolarized) -> list[Repolarization]:
-    """List every repolarization with its place, its instant and its turns."""
-    turns = [0] * len(log.joints)
-    audit = []
-    for row, j, change in zip(fixed.rows.tolist(), fixed.joints.tolist(), fixed.change.tolist(), strict=True):
-        previous = row - 1
-        while np.isnan(log.q[previous, j]):
-            previous -= 1
-        start, end = int(log.t_ns[previous]), int(log.t_ns[row])
-        audit.append(
-            Repolarization(
-                joint=log.joints[j],
-                row=row + 1,
-                t=(start + end) / 2e9,
-                half_period=(end - start) / 2e9,
-                step=float(log.q[row, j] - log.q[previous, j]),
-                before=turns[j],
-                after=turns[j] + change,
-            )
-        )
-        turns[j] += change
-    return audit
-
-
-def _unexplained(log: JointLog, fixed: Repolarized) -> list[LogWarning]:
-    """Warn of steps above a quarter turn that are no repolarization."""
-    places = fixed.unexplained.tolist()
-    limit = np.degrees(FULL_TURN / 4)
-    warnings = [
-        LogWarning(
-            "large-step",
-            f"{log.joints[j]} steps by more than {limit:.0f} deg from the value before, to"
-            f" {log.q[row, j]:.6g} rad, which is no wrap: it stays",
-            row + 1,
-        )
-        for row, j in places[:LISTED_STEPS]
-    ]
-    if len(places) > LISTED_STEPS:
-        warnings.append(
-            LogWarning("large-step", f"{len(places) - LISTED_STEPS} more steps that are no wraps")
-        )
-    return warnings
-
-
 def _rates(
-    log: JointLog, grid: Grid, q: FloatArray, method: Method, warnings: list[LogWarning]
+    log: JointLog, grid: Grid, q: FloatArray, method: Method, broken: IntArray, warnings: list[LogWarning]
 ) -> tuple[FloatArray, FloatArray]:
     """Return q' and q'' on the grid: the recorded ones where they agree with the differences.
 
     Fewer than three samples have no differences that could contradict what was recorded.
     """
-    computed = derivatives(q, grid.tsp, method)
+    computed = derivatives(q, grid.tsp, method, broken)
     recorded = (log.qd, log.qdd)
     result = []
     for values, own, word in zip(computed, recorded, ("rates", "accelerations"), strict=True):

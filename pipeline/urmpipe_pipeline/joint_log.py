@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.orientation import RotationForm, quaternions
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -158,10 +159,14 @@ class JointLog:
 
     @property
     def tcp_quat_xyzw(self) -> FloatArray | None:
-        """Recorded orientation as unit quaternions x, y, z, w [-], shape (n, 4); None without one."""
+        """Recorded orientation as unit quaternions x, y, z, w [-], shape (n, 4); None without one.
+
+        Of q and -q, which are one rotation, each is the nearest to the one before, so that they can be
+        interpolated.
+        """
         if self.tcp_rotation is None or self.rotation_form is None:
             return None
-        return quaternions(self.tcp_rotation, self.rotation_form)
+        return continuous_quaternions(quaternions(self.tcp_rotation, self.rotation_form))
 
     @property
     def rows(self) -> int:

@@ -14,7 +14,10 @@ from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
 
-OutputKind = Literal["recording", "report", "map", "export"]
+OutputKind = Literal["recording", "report", "map", "export", "audit"]
+
+AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")
+"""The header of an audit, by which one of ours is known."""
 
 GENERATOR = re.compile(rb"<meta\s+name=\"generator\"\s+content=\"urmpipe\b", re.IGNORECASE)
 """How a report of ours tells where it comes from."""
@@ -82,7 +85,7 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     if any(one.exists() and path.samefile(one) for one in inputs):
         return f"found an input of this command, allowed: any other name for the {kind}"
     if not path.is_file() or not _is_ours(path, kind):
-        such = f"such {'an' if kind == 'export' else 'a'} {kind}"
+        such = f"such {'an' if kind in ('audit', 'export') else 'a'} {kind}"
         return f"found a file that is no {kind} of urmpipe's, allowed: a new name, or {such} to replace"
     return None
 
@@ -97,6 +100,9 @@ def _is_ours(path: Path, kind: OutputKind) -> bool:
         from urmpipe_pipeline.export.identity import is_export
 
         return is_export(path)
+    if kind == "audit":
+        with path.open("rb") as file:
+            return file.readline(HEAD).strip() == ",".join(AUDIT_COLUMNS).encode()
     from urmpipe_pipeline.recording.identity import is_ours
 
     return is_ours(path)

@@ -26,7 +26,7 @@ HARDEST_STOP = 100.0
 LEAST_ROWS = 10
 """A log of fewer rows tells too little of the motion to call one of them an outlier."""
 
-LEAST_RUNS = 20
+LEAST_RUNS = 10
 """So many runs of repeated rows make a pattern."""
 
 EVEN_SHARE = 0.95
@@ -106,7 +106,7 @@ def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[L
                 f" (other steps: at most {motion.inner[j]:.4g})"
                 for j in joints
             )
-            said = f"row {row + 1} is off the motion of the other rows: {steps}"
+            said = f"an outlier, off the motion of the other rows: {steps}"
             hint = "it stays; take it out of the file if the arm was not there"
             warnings.append(
                 LogWarning("outlier-last" if row else "outlier-first", f"{said}; {hint}", row + 1)

@@ -18,22 +18,32 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Verdict = Literal["pass", "fail"]
+AuditKind = Literal["wrap", "in-between", "repaired", "unexplained", "ambiguous"]
 AXES = ("x", "y", "z", "norm")
 SCHEMA = 1
 
 
 @dataclass(frozen=True, slots=True)
-class Repolarization:
-    """One wrap that was undone.
+class AuditEntry:
+    """One thing that the repolarizer did to a joint, or could not decide.
+
+    kind says which:
+        wrap: a jump of a period that was undone.
+        in-between: a sample that a linear resampling left on a wrap; it stands as it is.
+        repaired: such a sample, put on the line through its neighbours.
+        unexplained: a step above a quarter period that is no wrap; it stays.
+        ambiguous: a gap in which the joint can have turned more than half a period; the nearest is taken.
 
     Attributes:
         joint: Name of the joint.
-        row: Data row of the file, from 1: the first row after the jump.
-        t: Instant t_r in [s], half way between the two samples.
-        half_period: t_r is known to +- this, in [s].
-        step: The jump as it stands in the file, in [rad].
+        row: Data row of the file, from 1: the first row after the step, or the sample itself.
+        t: Instant in [s]: of a step t_r, half way between its two samples; of a sample its time.
+        half_period: t is known to +- this, in [s].
+        step: The step as it stands in the file, in [rad]; of a sample how far it lies from the line
+            through its repolarized neighbours.
         before: Turns k added before it.
         after: Turns k added from it on.
+        kind: What it is.
     """
 
     joint: str
@@ -43,6 +53,7 @@ class Repolarization:
     step: float
     before: int
     after: int
+    kind: AuditKind = "wrap"
 
     @property
     def sample(self) -> int:
@@ -52,8 +63,9 @@ class Repolarization:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the audit."""
         return {
-            "joint": self.joint, "row": self.row, "sample": self.sample, "t": self.t,
-            "half_period": self.half_period, "step": self.step, "from": self.before, "to": self.after,
+            "kind": self.kind, "joint": self.joint, "row": self.row, "sample": self.sample,
+            "t": self.t, "half_period": self.half_period, "step": self.step,
+            "from": self.before, "to": self.after,
         }  # fmt: skip
 
 
@@ -91,7 +103,7 @@ class Run:
         qdd: Second derivatives in [rad/s2] or [m/s2], shape (g, joints).
         tcp: Motion of the tool centre point, or None without a robot.
         tcp_recorded: The position that the log itself recorded, on the grid, in [m], shape (g, 3).
-        repolarizations: Every wrap that was undone.
+        audit: What the repolarizer did and what it could not decide, by row.
         warnings: What a person should know.
         provenance: How to repeat it.
         recording: Where it was written.
@@ -107,7 +119,7 @@ class Run:
     qdd: FloatArray
     tcp: PointLog | None
     tcp_recorded: FloatArray | None
-    repolarizations: tuple[Repolarization, ...]
+    audit: tuple[AuditEntry, ...]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
     recording: Path | None = None
@@ -116,6 +128,11 @@ class Run:
     def t(self) -> FloatArray:
         """Grid times in [s], shape (g,)."""
         return seconds(self.t_ns)
+
+    @property
+    def repolarizations(self) -> tuple[AuditEntry, ...]:
+        """Every wrap that was undone."""
+        return tuple(entry for entry in self.audit if entry.kind == "wrap")
 
     @property
     def duration(self) -> float:
@@ -169,7 +186,8 @@ class Run:
             "robot": self.robot.name if self.robot else None,
             "units": dict(self.log.units),
             "inferences": [asdict(inference) for inference in self.log.inferences],
-            "repolarizations": [item.to_dict() for item in self.repolarizations],
+            "repolarizations": [entry.to_dict() for entry in self.repolarizations],
+            "audit": [entry.to_dict() for entry in self.audit],
             "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 from pathlib import Path
+from typing import NamedTuple
 
 import casadi
 import numpy as np
@@ -26,17 +27,31 @@ def wrap(x: FloatArray, period: float = FULL_TURN) -> FloatArray:
     return x - period * np.floor((x + period / 2.0) / period)
 
 
-def run_steps(
-    q: Iterable[float], dt: Iterable[float], **options: float
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], State]:
+class Stepped(NamedTuple):
+    """What `step` gave, sample by sample; `odd` without the steps to samples told as in-between later."""
+
+    out: FloatArray
+    changes: FloatArray
+    odd: NDArray[np.bool_]
+    in_between: list[int]
+    state: State
+
+
+def run_steps(q: Iterable[float], dt: Iterable[float], **options: float) -> Stepped:
     """Feed a log of one joint to `step`, sample by sample."""
-    state, out, changes, odd = State(), [], [], []
-    for value, elapsed in zip(q, dt, strict=True):
+    state, out, changes, odd, in_between, last = State(), [], [], [], [], -1
+    for i, (value, elapsed) in enumerate(zip(q, dt, strict=True)):
         state, result, flags = step(state, value, elapsed, **options)
         out.append(result)
         changes.append(flags.change)
-        odd.append(flags.unexplained)
-    return np.array(out, dtype=float), np.array(changes, dtype=float), np.array(odd, dtype=bool), state
+        odd.append(bool(flags.unexplained))
+        if flags.in_between:
+            in_between.append(last)
+            odd[last] = False
+        last = last if math.isnan(value) else i
+    return Stepped(
+        np.array(out, dtype=float), np.array(changes, dtype=float), np.array(odd), in_between, state
+    )
 
 
 motions = st_np.arrays(
@@ -54,9 +69,12 @@ def test_unwrapping_a_wrapped_motion_gives_it_back(steps: FloatArray, period: fl
     assert len(result.unexplained) == 0
 
 
+values = st.one_of(st.floats(-7, 7), st.sampled_from([-3.14, -1.57, 0.0, 1.57, 3.14]))  # halves and quarters
+
+
 @given(
-    st_np.arrays(float, st.tuples(st.integers(1, 120), st.integers(1, 3)), elements=st.floats(-7, 7)),
-    st_np.arrays(bool, (120, 3)),
+    st_np.arrays(float, st.tuples(st.integers(1, 120), st.integers(1, 3)), elements=values),
+    st_np.arrays(bool, (120, 3), elements=st.sampled_from([False, False, False, True])),
     st.sampled_from([math.inf, 3.0, 300.0]),
     st.floats(0.001, 0.1),
 )
@@ -66,14 +84,16 @@ def test_the_batch_is_the_steps_bit_for_bit(
 ) -> None:
     q = np.where(missing[: len(q), : q.shape[1]], np.nan, q)
     dt = period_of_samples * (1.0 + np.arange(len(q), dtype=np.float64) % 3)
-    batch = repolarize(q, dt, max_speed=max_speed)
+    periods = np.array([FULL_TURN, 4.0, 2.0 * FULL_TURN])[: q.shape[1]]
+    batch = repolarize(q, dt, period=periods, max_speed=max_speed)
     for j in range(q.shape[1]):
-        out, changes, odd, _ = run_steps(q[:, j], dt, max_speed=max_speed)
-        assert out.tobytes() == np.ascontiguousarray(batch.q[:, j]).tobytes()
+        single = run_steps(q[:, j], dt, period=float(periods[j]), max_speed=max_speed)
+        assert single.out.tobytes() == np.ascontiguousarray(batch.q[:, j]).tobytes()
         mine = batch.joints == j
-        assert np.array_equal(np.flatnonzero(changes), batch.rows[mine])
-        assert np.array_equal(changes[changes != 0], batch.change[mine])
-        assert np.array_equal(np.flatnonzero(odd), batch.unexplained[batch.unexplained[:, 1] == j, 0])
+        assert np.array_equal(np.flatnonzero(single.changes), batch.rows[mine])
+        assert np.array_equal(single.changes[single.changes != 0], batch.change[mine])
+        assert np.array_equal(np.flatnonzero(single.odd), batch.unexplained[batch.unexplained[:, 1] == j, 0])
+        assert single.in_between == batch.in_between[batch.in_between[:, 1] == j, 0].tolist()
 
 
 def test_before_the_first_repolarization_nothing_changes_by_a_bit() -> None:
@@ -110,11 +130,11 @@ def test_a_speed_limit_narrows_what_counts_as_a_wrap() -> None:
 
 
 def test_missing_samples_keep_the_turns_and_give_more_time() -> None:
-    q = np.array([[3.1], [-3.1], [np.nan], [np.nan], [-2.8], [3.1]])
+    q = np.array([[3.1], [-3.1], [np.nan], [np.nan], [-3.13], [2.6]])
     result = repolarize(q, np.full(6, 0.1), max_speed=2.0)
     assert np.isnan(result.q[2:4]).all()
-    np.testing.assert_array_equal(result.q[4], -2.8 + FULL_TURN)
-    assert result.change.tolist() == [1]  # back from -2.8 to 3.1 in 0.1 s would take 3.8 rad/s: not explained
+    np.testing.assert_array_equal(result.q[4], -3.13 + FULL_TURN)
+    assert result.change.tolist() == [1]  # back from -3.13 to 2.6 would take 5.5 rad/s: not explained
     assert result.unexplained.tolist() == [[5, 0]]
 
 
@@ -125,9 +145,9 @@ def test_chatter_on_the_limit_leaves_no_net_turn() -> None:
     assert result.q[-1, 0] == 3.14
 
 
-def test_the_step_remembers_two_samples_back() -> None:
-    *_, state = run_steps([0.1, 0.2, math.nan, 0.4], [TSP] * 4)
-    assert (state.last, state.before, state.elapsed, state.seen) == (0.4, 0.2, 0.0, 2.0)
+def test_the_step_remembers_the_last_step_in_the_turns_of_now() -> None:
+    state = run_steps([3.0, math.nan, -3.0, math.nan], [TSP] * 4).state
+    assert state == State(-3.0, -6.0 + FULL_TURN, 2 * TSP, 1.0, TSP, 1.0)
 
 
 @pytest.mark.parametrize("shape", [(0, 3), (1, 3), (5, 0)])
@@ -137,15 +157,16 @@ def test_empty_logs_pass_through(shape: tuple[int, int]) -> None:
 
 def test_the_step_traces_with_casadi() -> None:
     casadi.GlobalOptions.setNumpyMode(-1)
-    state = State(*casadi.SX.sym("state", 5).elements())
+    state = State(*casadi.SX.sym("state", 6).elements())
     inputs = casadi.SX.sym("input", 4)
     q, dt, period, speed = inputs.elements()
     following, out, flags = step(state, q, dt, period=period, max_speed=speed)
     traced = casadi.Function("step", [casadi.vertcat(*state), inputs],
                              [casadi.vertcat(*following), casadi.vertcat(out, *flags)])  # fmt: skip
     rng = np.random.default_rng(7)
-    memory = State(0.0, 0.0, 0.0, 0.0, 0.0)
-    for value in [*wrap(np.cumsum(rng.uniform(-1.5, 1.5, 300))), math.nan, 1.0, 5.0]:
+    memory = State()
+    on_the_jump = [3.1, 0.2, -3.1, math.nan, 0.1, 3.1]
+    for value in [*wrap(np.cumsum(rng.uniform(-1.5, 1.5, 300))), math.nan, 1.0, 5.0, 2.0, *on_the_jump]:
         expected_state, expected, expected_flags = step(memory, value, TSP, max_speed=1e4)
         got_state, got = traced([float(x) for x in memory], [value, TSP, FULL_TURN, 1e4])
         np.testing.assert_array_equal(np.ravel(got_state), np.array(expected_state, dtype=float))

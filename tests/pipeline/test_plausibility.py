@@ -82,7 +82,7 @@ def test_a_first_row_off_the_motion_is_an_outlier() -> None:
     assert found(q, t) == [
         LogWarning(
             "outlier-first",
-            f"row 1 is off the motion of the other rows: q2 by {step:.4g} rad (other steps: at most"
+            f"an outlier, off the motion of the other rows: q2 by {step:.4g} rad (other steps: at most"
             f" {usual:.4g}); it stays; take it out of the file if the arm was not there",
             1,
         )
@@ -102,7 +102,7 @@ def test_a_last_row_off_the_motion_is_an_outlier() -> None:
     q[-1, 2] -= 0.5
     (warning,) = found(q, t)
     assert (warning.kind, warning.row) == ("outlier-last", 400)
-    assert warning.message.startswith("row 400 is off the motion of the other rows: q3 by 0.")
+    assert warning.message.startswith("an outlier, off the motion of the other rows: q3 by 0.")
 
 
 def test_an_outlier_of_a_resting_arm_is_one() -> None:
@@ -440,7 +440,7 @@ def test_nothing_is_said_of_the_bundled_logs(pattern: str) -> None:
         ("panda-matlab-ascii/q_Traj1_Grad.txt", None),
         ("panda-matlab-ascii/q_Traj1_PI.txt", None),
         ("unitree-z1-noheader/joint_states.csv", None),
-        ("pybotics-ur10-fk/ur10-joints-poses.csv", None),
+        ("pybotics-ur10-fk/ur10-joints-poses.csv", "ur10"),
     ],
 )
 def test_nothing_is_said_of_sound_real_logs(file: str, robot: str | None) -> None:
@@ -454,7 +454,7 @@ def test_the_real_log_with_an_outlier_says_so() -> None:
     (warning,) = [w for w in run.warnings if w.kind in KINDS]
     assert warning == LogWarning(
         "outlier-first",
-        "row 1 is off the motion of the other rows: joint1 by 0.6856 rad (other steps: at most 0.09092);"
+        "an outlier, off the motion of the other rows: joint1 by 0.6856 rad (other steps: at most 0.09092);"
         " it stays; take it out of the file if the arm was not there",
         1,
     )

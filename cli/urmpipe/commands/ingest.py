@@ -22,8 +22,15 @@ from urmpipe.process import tune_pyarrow
 @click.option(
     "--write-map",
     "map_output",
+    metavar="FILE.toml",
     type=click.Path(path_type=Path),
-    help="Save what was inferred as a map (TOML) for --map.",
+    help="Save what was inferred as a map for --map.",
+)
+@click.option(
+    "--audit",
+    metavar="FILE.csv",
+    type=click.Path(path_type=Path),
+    help="Write every wrap, repair and open question, one a line.",
 )
 @log_options
 @output_options
@@ -32,6 +39,7 @@ def ingest(
     output: Path | None,
     explain: bool,
     map_output: Path | None,
+    audit: Path | None,
     as_json: bool,
     quiet: bool,
     **options: Any,
@@ -59,7 +67,9 @@ def ingest(
     robot, read = take_log_options(options)
     shared = {name: options[name] for name in ("tsp", "derivative", "strict")}
     with progress_bar(f"Writing {target}", quiet=quiet or explain) as progress:
-        run = api.ingest(logs, robot=robot, read=read, output=target, progress=progress, **shared)
+        run = api.ingest(
+            logs, robot=robot, read=read, output=target, audit=audit, progress=progress, **shared
+        )
     if map_output:
         api.write_map(run, map_output, inputs=logs, robot=named)
     print_warnings(() if quiet else run.warnings)

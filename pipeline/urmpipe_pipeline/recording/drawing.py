@@ -12,7 +12,7 @@ from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, entity_path, places_of, printable
 from urmpipe_pipeline.recording.scene import Arm, Scene, Way
 from urmpipe_pipeline.recording.summary import summary
-from urmpipe_pipeline.results import Comparison, Deviation, Run
+from urmpipe_pipeline.results import AuditEntry, Comparison, Deviation, Run
 
 if TYPE_CHECKING:
     from rerun import RecordingStream, TimeColumn
@@ -103,20 +103,32 @@ def _ends(ranges: Sequence[IntArray]) -> IntArray:
 
 
 def _draw_events(stream: RecordingStream, place: Place, run: Run, label: str = "") -> None:
-    """List the repolarizations at their instants and the warnings at their rows, or at the first."""
-    turns = [
-        f"{label}{printable(one.joint)} repolarized in row {one.row}: step {one.step:+.4f} rad,"
-        f" {one.before:+d} to {one.after:+d} turns, +-{1e3 * one.half_period:.3g} ms"
-        for one in run.repolarizations
-    ]
-    t_ns = np.array([round(one.t * 1e9) for one in run.repolarizations], dtype=np.int64)
-    _draw_text(stream, f"{place.prefix}events/repolarization", t_ns, turns, "INFO")
+    """List the audit at its instants and the warnings at their rows, or at the first."""
+    told = [f"{label}{printable(one.joint)} {_told(one)}" for one in run.audit]
+    t_ns = np.array([round(one.t * 1e9) for one in run.audit], dtype=np.int64)
+    levels = ["INFO" if one.kind in ("wrap", "repaired") else "WARN" for one in run.audit]
+    _draw_text(stream, f"{place.prefix}events/repolarization", t_ns, told, levels)
     said = [
         f"{label}{printable(one.kind)}{f' in row {one.row}' if one.row else ''}: {printable(one.message)}"
         for one in run.warnings
     ]
     rows = np.clip([(one.row or 1) - 1 for one in run.warnings], 0, run.log.rows - 1).astype(np.int64)
-    _draw_text(stream, f"{place.prefix}events/warning", run.log.t_ns[rows], said, "WARN")
+    _draw_text(stream, f"{place.prefix}events/warning", run.log.t_ns[rows], said, ["WARN"] * len(said))
+
+
+def _told(one: AuditEntry) -> str:
+    """Return what happened to a joint, in which row."""
+    where = f"in row {one.row}"
+    if one.kind == "wrap":
+        turns = f"{one.before:+d} to {one.after:+d} turns"
+        return f"repolarized {where}: step {one.step:+.4f} rad, {turns}, +-{1e3 * one.half_period:.3g} ms"
+    if one.kind in ("in-between", "repaired"):
+        done = "repaired" if one.kind == "repaired" else "left on a wrap"
+        return f"{done} {where}: {one.step:+.4f} rad off the line of its neighbours"
+    why = (
+        "no wrap" if one.kind == "unexplained" else f"a gap of {2e3 * one.half_period:.6g} ms: turns unknown"
+    )
+    return f"{one.kind} {where}: step {one.step:+.4f} rad, {why}"
 
 
 def _draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
@@ -125,11 +137,11 @@ def _draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
     x, y, z, norm = (1e3 * float(value) for value in one.delta[worst])
     said = f"largest deviation of {printable(one.name)}: {norm:.3f} mm (x {x:.3f}, y {y:.3f}, z {z:.3f})"
     level = "INFO" if one.verdict == "pass" else "ERROR"
-    _draw_text(stream, f"{place.prefix}events/deviation", one.t_ns[worst : worst + 1], [said], level)
+    _draw_text(stream, f"{place.prefix}events/deviation", one.t_ns[worst : worst + 1], [said], [level])
 
 
 def _draw_text(
-    stream: RecordingStream, entity: str, t_ns: IntArray, texts: Sequence[str], level: str
+    stream: RecordingStream, entity: str, t_ns: IntArray, texts: Sequence[str], levels: Sequence[str]
 ) -> None:
     """Send lines of the list of events, each beginning with its time: the list's own column is too narrow."""
     import rerun as rr
@@ -137,7 +149,7 @@ def _draw_text(
     if not texts:
         return
     lines = [f"{at / 1e9:.4f} s  {text}" for at, text in zip(t_ns.tolist(), texts, strict=True)]
-    columns = rr.TextLog.columns(text=lines, level=[level] * len(lines))
+    columns = rr.TextLog.columns(text=lines, level=list(levels))
     stream.send_columns(entity, time_columns(t_ns), columns)
 
 

@@ -26,7 +26,7 @@ from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.results import AXES, Comparison, Deviation, Run, Trajectory
 
-LAYOUT_VERSION = 2
+LAYOUT_VERSION = 3
 """Raised when an older reader would misunderstand a newer recording."""
 
 Series = Literal["joints", "xyz", "rotation", "euler", "delta", "flag"]

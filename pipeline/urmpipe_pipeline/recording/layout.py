@@ -57,7 +57,7 @@ def _run_rows(run: Run) -> list[Row]:
     rows: list[Row] = [(view, 3) for view in _joint_views(run, place, "")]
     if motion := _motion_views(run, place):
         rows.append((_tabs(motion), 3))
-    if run.repolarizations or run.warnings:
+    if run.audit or run.warnings:
         rows.append((_events([place]), 2))
     return rows
 

@@ -16,10 +16,10 @@ from urmpipe_models.chain import Chain
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, Block, Place, places_of
 from urmpipe_pipeline.results import (
+    AuditEntry,
     Comparison,
     Deviation,
     Provenance,
-    Repolarization,
     Run,
     Statistics,
     Trajectory,
@@ -64,7 +64,7 @@ def run_fields(data: Mapping[str, Any]) -> dict[str, Any]:
         "name": data["name"],
         "tsp": data["tsp"],
         "robot": _robot(data["robot"]),
-        "repolarizations": tuple(Repolarization(**one) for one in data["repolarizations"]),
+        "audit": tuple(AuditEntry(**one) for one in data["audit"]),
         "warnings": _warnings(data["warnings"]),
         "provenance": provenance_from(data["provenance"]),
     }
@@ -103,7 +103,7 @@ def _run(run: Run, place: Place) -> dict[str, Any]:
         "name": run.name,
         "tsp": run.tsp,
         "robot": _robot_data(run.robot),
-        "repolarizations": [_flat(one) for one in run.repolarizations],
+        "audit": [_flat(one) for one in run.audit],
         "warnings": [_flat(one) for one in run.warnings],
         "provenance": _provenance(run.provenance),
         "log": _log(run.log),

@@ -22,7 +22,7 @@ from urmpipe_pipeline.report.spec import (
     stacked,
     stroke,
 )
-from urmpipe_pipeline.results import AXES, Deviation, Repolarization, Run
+from urmpipe_pipeline.results import AXES, AuditEntry, Deviation, Run
 
 PANEL_PX = 112
 """Height of one plot among some on a common time axis."""
@@ -171,15 +171,15 @@ def _after_marks(run: Run) -> list[Spec]:
     ]
 
 
-def _by_joint(run: Run) -> list[tuple[int, list[Repolarization]]]:
+def _by_joint(run: Run) -> list[tuple[int, list[AuditEntry]]]:
     """Return the repolarizations that are marked, by the index of their joint."""
-    found: dict[int, list[Repolarization]] = {}
+    found: dict[int, list[AuditEntry]] = {}
     for item in run.repolarizations[:MARKED]:
         found.setdefault(run.log.joints.index(item.joint), []).append(item)
     return list(found.items())
 
 
-def _triangles(run: Run, j: int, items: list[Repolarization], values: FloatArray) -> Spec:
+def _triangles(run: Run, j: int, items: list[AuditEntry], values: FloatArray) -> Spec:
     notes = [
         f"repolarization of {label(item.joint)}, row {item.row}: step {item.step:+.4f} rad,"
         f" k {item.before} → {item.after}"

@@ -3,18 +3,29 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.report import text
-from urmpipe_pipeline.results import AXES, Comparison, Deviation, Provenance, Run, Statistics
+from urmpipe_pipeline.results import AXES, AuditKind, Comparison, Deviation, Provenance, Run, Statistics
 
 LONG = 12
 """A table with more rows is folded away."""
 
 MOST = 500
 """Rows of a table at most; what is left out is counted. The JSON output holds them all."""
+
+
+AUDIT_NOTES: dict[AuditKind, str] = {
+    "in-between": "in-between: a sample that a linear resampling left on a wrap, Step rad off the line of its"
+    " neighbours; it stands as it is.",
+    "repaired": "repaired: a sample that a linear resampling left on a wrap, put on the line of its"
+    " neighbours, Step rad away.",
+    "unexplained": "unexplained: a step above a quarter period that is no wrap; it stays.",
+    "ambiguous": "ambiguous: a gap in which the joint can have turned more than half a period.",
+}
+"""What the kinds that are no wraps mean."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -137,15 +148,14 @@ def statistics_table(deviation: Deviation) -> Table:
 
 
 def audit_table(run: Run) -> Table:
-    """Return every repolarization: joint, row, instant, step, turns before and after."""
+    """Return the audit: what was found, joint, row, instant, step, turns before and after."""
     columns = (
-        Column("Joint"),
-        *numbers(
-            "Row", "Instant t_r [s]", "± [s]", "Step in the file [rad]", "Turns k before", "Turns k after"
-        ),
+        *words("What", "Joint"),
+        *numbers("Row", "Instant t_r [s]", "± [s]", "Step [rad]", "Turns k before", "Turns k after"),
     )
-    rows = (
+    rows = [
         (
+            item.kind,
             item.joint,
             str(item.row),
             text.seconds(item.t),
@@ -154,9 +164,13 @@ def audit_table(run: Run) -> Table:
             f"{item.before:+d}" if item.before else "0",
             f"{item.after:+d}" if item.after else "0",
         )
-        for item in run.repolarizations
-    )
-    return listing(f"Repolarizations ({len(run.repolarizations)})", columns, rows)
+        for item in run.audit
+    ]
+    wraps = text.counted(len(run.repolarizations), "wrap")
+    table = listing(f"Audit of the repolarizer ({wraps})", columns, rows)
+    kinds = {item.kind for item in run.audit}
+    said = (table.note, *(note for kind, note in AUDIT_NOTES.items() if kind in kinds))
+    return replace(table, note=" ".join(note for note in said if note))
 
 
 def warnings_table(found: Comparison | Run) -> Table:

@@ -28,6 +28,10 @@ SKIPPED = "skipped-row"
 MOST_SKIPPED = 0.01
 """Share of the rows that may be left out because they cannot be read."""
 
+FEW_REPEATS = 5
+MANY_REPEATS = 0.1
+"""More repeats than these few, and than this share of the rows, are one finding: the clock is too coarse."""
+
 SHOWN_GAPS = 10
 """Gaps that are told one by one; the others are counted."""
 
@@ -184,7 +188,15 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
     valid = np.flatnonzero(times > UNREADABLE)
     steps = np.diff(times[valid])
     begins = _second_logs(times[valid], steps)
-    for k in np.flatnonzero(steps <= 0).tolist():
+    repeats = np.flatnonzero(steps == 0)
+    if len(repeats) > max(FEW_REPEATS, MANY_REPEATS * len(times)):
+        row = int(valid[repeats[0] + 1])
+        shown = clock.shown(int(times[row]))
+        said = f"found {shown} again, as {len(repeats)} of {len(times)} rows repeat a time"
+        hint = "times that increase from row to row, or --time none with --period SECONDS"
+        yield row + 1, name, f"{said}: too coarse for a clock to be rebuilt, allowed: {hint}"
+        repeats = repeats[:0]
+    for k in sorted([*repeats.tolist(), *np.flatnonzero(steps < 0).tolist()]):
         now, before = (clock.shown(int(times[valid[i]])) for i in (k + 1, k))
         found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
         again = ": a second log begins here, from about the same time" if k in begins else ""

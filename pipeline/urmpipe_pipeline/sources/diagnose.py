@@ -10,7 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.errors import Finding
-from urmpipe_pipeline.sources.cells import is_missing, is_text, split_line, to_float, to_nanoseconds
+from urmpipe_pipeline.sources.cells import (
+    is_missing,
+    is_number,
+    is_text,
+    split_line,
+    to_float,
+    to_nanoseconds,
+)
 from urmpipe_pipeline.sources.form import CONFLICT_MARK, RowError, Value
 from urmpipe_pipeline.sources.sniff import COMMENTS, Layout
 from urmpipe_pipeline.sources.table import NO_TIME, REPORTED, ClockColumn, Numbers
@@ -204,7 +211,8 @@ class CarefulReader:
         if len(values) == width - 1 and not names[-1]:
             values.append("")  # a row without the trailing delimiter that the others have
         if len(values) != width and any([*values[width:], len(values) < width]):
-            shown = f" ({_shown(text)})" if len(values) == 1 else ""
+            numbers = any(not isinstance(v, str) or is_number(v, self.layout.decimal) for v in values)
+            shown = "" if numbers else f" ({_shown(text)})"
             plural = "" if len(values) == 1 else "s"
             self._report(f"found {len(values)} cell{plural}{shown}, allowed: {width}")
             return False

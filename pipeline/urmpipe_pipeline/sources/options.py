@@ -27,6 +27,10 @@ class ReadOptions:
         units: Unit of a column by its name or number; by "" that of all joint columns that turn.
         period: Time between rows in [s], of a log without a time column.
         skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
+        interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that
+            of all joints that turn; in the file's own unit.
+        repair: Whether samples that a linear resampling left on a wrap are put on the line through their
+            neighbours.
     """
 
     source: str | None = None
@@ -43,3 +47,5 @@ class ReadOptions:
     units: Mapping[str, str] = field(default_factory=dict)
     period: float | None = None
     skip_bad: bool = False
+    interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    repair: bool = False

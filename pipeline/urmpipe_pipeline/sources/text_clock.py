@@ -71,6 +71,9 @@ class Parts:
         return numbers
 
 
+_UNPADDED = "microseconds not zero-padded"
+
+
 @dataclass(frozen=True, slots=True)
 class Form:
     """One way to write a clock.
@@ -82,6 +85,7 @@ class Form:
         timed: Whether a cell holds a time, not the date alone.
         keys: The units that ask for it where its cells may be of another form as well.
         tail: What the digits behind a third colon count: s (decimals), ms or us.
+        last: Whether it is tried only if the clock runs backwards in every other form.
     """
 
     name: str
@@ -90,6 +94,7 @@ class Form:
     timed: bool = True
     keys: tuple[str, ...] = ()
     tail: str = "s"
+    last: bool = False
 
     @property
     def dated(self) -> bool:
@@ -189,6 +194,7 @@ def _forms() -> tuple[Form, ...]:
     minutes = r"(?P<minute>\d\d)"
     clock = rf"(?P<hour>\d{{1,5}}):{minutes}(?::(?P<second>\d\d){decimals})?"
     counted = rf"(?P<hour>\d{{1,5}}):{minutes}:(?P<second>\d\d):(?P<count>\d{{1,9}})"
+    unpadded = rf"(?P<hour>\d{{1,5}}):{minutes}:(?P<second>\d\d)[.,](?P<count>\d{{1,6}})"
     dense = rf"(?P<hour>\d\d){minutes}(?P<second>\d\d){decimals}"
     half = r"(?: ?(?P<half>[ap])\.?m\.?)?"
     zone = r"(?P<zone> ?(?:z|utc|gmt|(?P<ahead>[+-])(?P<zone_hour>\d\d):?(?P<zone_minute>\d\d)?))?"
@@ -206,17 +212,23 @@ def _forms() -> tuple[Form, ...]:
         found.append(Form(f"date, {style}", DATE, _compiled(date), timed=False, keys=keys))
         whole = _compiled(f"{date}{between}(?:{clock}){half}{zone}")
         found.append(Form(f"date and time, {style}", DATE, whole, keys=keys))
+        name, loose = f"date and time, {style}, {_UNPADDED}", _compiled(date + between + unpadded)
+        found.append(Form(name, DATE, loose, True, keys, "us", last=True))
         for tail, what in _TAILS.items():
             name = f"date and time, {style}, {what} behind the last colon"
             found.append(Form(name, DATE, _compiled(date + between + counted), True, (*keys, tail), tail))
     iso = _compiled(f"{dates['without signs'][0]}{between}{dense}{zone}")
     found.append(Form("date and time, without signs", DATE, iso))
     found.append(Form("time of day", TIME_OF_DAY, _compiled(rf"(?P<sign>[+-]?){clock}{half}")))
+    loose = _compiled(unpadded)
+    found.append(Form(f"time of day, {_UNPADDED}", TIME_OF_DAY, loose, tail="us", last=True))
     for tail, what in _TAILS.items():
         name = f"time of day, {what} behind the last colon"
         found.append(Form(name, TIME_OF_DAY, _compiled(counted), True, (tail,), tail))
     days = rf"(?P<days_sign>[+-]?)(?P<days>\d{{1,6}}) days?(?: \+?{clock})?"
     found.append(Form("days, hours, minutes and seconds", LENGTH, _compiled(days)))
+    short = rf"{minutes}:(?P<second>\d\d)[.,](?P<decimals>\d{{1,9}})"
+    found.append(Form("minutes and seconds", LENGTH, _compiled(short)))
     words = "|".join(_WORDS_NS)
     number = rf"(?P<sign>[+-]?)(?P<whole>\d{{1,15}}){decimals} ?(?P<word>{words})"
     found.append(Form("a number with its unit", LENGTH, _compiled(number)))

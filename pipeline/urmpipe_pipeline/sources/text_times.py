@@ -91,7 +91,10 @@ def read_columns(
         columns: The columns, whose times are added.
         forms: The forms that each may have.
     """
-    readings = [_read(columns, combination) for combination in product(*forms)]
+    usual = [tuple(form for form in known if not form.last) for known in forms]
+    readings = [_read(columns, combination) for combination in product(*usual)]
+    if not any(reading.backwards == reading.unreadable == 0 for reading in readings):
+        readings += [_read(columns, one) for one in product(*forms) if any(form.last for form in one)]
     fewest = min(reading.unreadable for reading in readings)
     readable = [reading for reading in readings if reading.unreadable == fewest]
     least = min(reading.backwards for reading in readable)

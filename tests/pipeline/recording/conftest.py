@@ -15,7 +15,7 @@ from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.results import Comparison, Repolarization, Run
+from urmpipe_pipeline.results import AuditEntry, Comparison, Run
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)
 TILT = math.radians(52.0)
@@ -42,7 +42,7 @@ def motion(t: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
     return q, sway * speed * np.cos(phase) + drift, -sway * speed**2 * np.sin(phase)
 
 
-def repolarizations(raw: FloatArray, t: FloatArray, names: tuple[str, ...]) -> tuple[Repolarization, ...]:
+def repolarizations(raw: FloatArray, t: FloatArray, names: tuple[str, ...]) -> tuple[AuditEntry, ...]:
     """Return the wraps in raw."""
     found = []
     for j, name in enumerate(names):
@@ -51,9 +51,7 @@ def repolarizations(raw: FloatArray, t: FloatArray, names: tuple[str, ...]) -> t
             step = float(raw[row, j] - raw[row - 1, j])
             change = -round(step / (2 * math.pi))
             half = float(t[row] - t[row - 1]) / 2
-            found.append(
-                Repolarization(name, row + 1, float(t[row]) - half, half, step, turns, turns + change)
-            )
+            found.append(AuditEntry(name, row + 1, float(t[row]) - half, half, step, turns, turns + change))
             turns += change
     return tuple(found)
 
@@ -84,7 +82,7 @@ def build_run(
     return Run(
         name=name, log=log, robot=chain, tsp=0.005, t_ns=t_ns, q=q, qd=qd, qdd=qdd,
         tcp=point_over_log(chain, q, qd, qdd), tcp_recorded=None,
-        repolarizations=repolarizations(raw, t, joints), warnings=log.warnings,
+        audit=repolarizations(raw, t, joints), warnings=log.warnings,
         provenance=provenance("ingest", {"robot": "urm6", "tsp": None}, [file]),
     )  # fmt: skip
 

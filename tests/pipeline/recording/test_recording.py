@@ -116,7 +116,7 @@ def path_run(run: Run) -> Run:
     log = replace(run.log, joints=(), q=none, columns=(), tcp_position=run.tcp.position)
     return replace(
         run, log=log, robot=None, q=none, qd=none, qdd=none, tcp=None, tcp_recorded=run.tcp.position,
-        repolarizations=(),
+        audit=(),
     )  # fmt: skip
 
 

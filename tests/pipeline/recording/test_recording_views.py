@@ -18,7 +18,7 @@ from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLO
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.scene import DASHES, MOST, scene_of
 from urmpipe_pipeline.recording.summary import summary
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import AuditEntry, AuditKind, Comparison, Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
@@ -82,6 +82,22 @@ def test_nothing_stands_on_the_clock_of_the_writer(make_comparison: MakeComparis
     path = write_recording(make_comparison(rows=50), tmp_path / "both.rrd")
     timelines = {name for chunk in RrdReader(path).store().stream() for name in chunk.timeline_names}
     assert timelines == {"t", "row", "sample"}
+
+
+def test_events_tell_the_whole_audit(make_run: MakeRun, tmp_path: Path) -> None:
+    kinds: tuple[AuditKind, ...] = ("wrap", "in-between", "repaired", "unexplained", "ambiguous")
+    audit = tuple(AuditEntry("phi1", 2, 0.005, 0.0025, -1.5, 0, 1, kind) for kind in kinds)
+    path = write_recording(replace(make_run(rows=5), audit=audit), tmp_path / "one.rrd")
+    said = [row[0] for row in columns(path, "/events/repolarization", "TextLog:text")]
+    assert [line.removeprefix("0.0050 s  phi1 ") for line in said] == [
+        "repolarized in row 2: step -1.5000 rad, +0 to +1 turns, +-2.5 ms",
+        "left on a wrap in row 2: -1.5000 rad off the line of its neighbours",
+        "repaired in row 2: -1.5000 rad off the line of its neighbours",
+        "unexplained in row 2: step -1.5000 rad, no wrap",
+        "ambiguous in row 2: step -1.5000 rad, a gap of 5 ms: turns unknown",
+    ]
+    levels = [row[0] for row in columns(path, "/events/repolarization", "TextLog:level")]
+    assert levels == ["INFO", "WARN", "INFO", "WARN", "WARN"]
 
 
 def test_events_name_joint_row_and_turns(make_comparison: MakeComparison, tmp_path: Path) -> None:

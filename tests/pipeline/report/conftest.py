@@ -14,7 +14,7 @@ from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.compare import compare_runs
 from urmpipe_pipeline.derivatives import derivatives
 from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
-from urmpipe_pipeline.results import Comparison, Provenance, Repolarization, Run
+from urmpipe_pipeline.results import AuditEntry, Comparison, Provenance, Run
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
 TSP = 0.005
@@ -63,7 +63,7 @@ def ingested(name: str, q: FloatArray, robot: Chain | None, warnings: tuple[LogW
     for row, j, change in zip(fixed.rows.tolist(), fixed.joints.tolist(), fixed.change.tolist(), strict=True):
         step = float(raw[row, j] - raw[row - 1, j])
         t_r = (row - 0.5) * TSP
-        audit.append(Repolarization(JOINTS[j], row + 1, t_r, TSP / 2, step, turns[j], turns[j] + change))
+        audit.append(AuditEntry(JOINTS[j], row + 1, t_r, TSP / 2, step, turns[j], turns[j] + change))
         turns[j] += change
     return Run(
         name=name,
@@ -76,7 +76,7 @@ def ingested(name: str, q: FloatArray, robot: Chain | None, warnings: tuple[LogW
         qdd=qdd,
         tcp=None if robot is None else point_over_log(robot, fixed.q, qd, qdd),
         tcp_recorded=None,
-        repolarizations=tuple(audit),
+        audit=tuple(audit),
         warnings=warnings,
         provenance=Provenance(
             "ingest",
@@ -122,6 +122,6 @@ def hostile() -> Comparison:
     )
     audit = tuple(replace(item, joint=joints[JOINTS.index(item.joint)]) for item in run.repolarizations)
     made = Provenance(HOSTILE, {HOSTILE: HOSTILE}, log.files, {HOSTILE: HOSTILE}, HOSTILE)
-    run = replace(run, log=log, repolarizations=audit, provenance=made)
+    run = replace(run, log=log, audit=audit, provenance=made)
     result = compare_runs(run, [run])
     return replace(result, warnings=(LogWarning(HOSTILE, HOSTILE),), provenance=made)

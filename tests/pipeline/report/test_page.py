@@ -20,7 +20,7 @@ from urmpipe_pipeline.compare import compare_runs
 from urmpipe_pipeline.report import render_report, tables, text, write_report
 from urmpipe_pipeline.report.banner import banner
 from urmpipe_pipeline.report.markup import script_json
-from urmpipe_pipeline.results import AXES, Comparison, Repolarization, Run
+from urmpipe_pipeline.results import AXES, AuditEntry, Comparison, Run
 
 VOID = {"meta", "br", "img", "link", "input", "hr", "path"}
 
@@ -219,13 +219,26 @@ def test_a_banner_without_a_comparison(bare_run: Run) -> None:
 
 
 def test_a_long_audit_is_folded_and_a_very_long_one_cut(bare_run: Run) -> None:
-    item = Repolarization("phi1", 2, 0.0075, 0.0025, -6.28, 0, 1)
-    short = tables.audit_table(replace(bare_run, repolarizations=(item,) * 12))
-    folded = tables.audit_table(replace(bare_run, repolarizations=(item,) * 13))
-    cut = tables.audit_table(replace(bare_run, repolarizations=(item,) * 700))
+    item = AuditEntry("phi1", 2, 0.0075, 0.0025, -6.28, 0, 1)
+    short = tables.audit_table(replace(bare_run, audit=(item,) * 12))
+    folded = tables.audit_table(replace(bare_run, audit=(item,) * 13))
+    cut = tables.audit_table(replace(bare_run, audit=(item,) * 700))
     assert (short.folded, folded.folded, cut.folded) == (False, True, True)
-    assert (cut.title, len(cut.rows)) == ("Repolarizations (700)", 500)
+    assert (cut.title, len(cut.rows)) == ("Audit of the repolarizer (700 wraps)", 500)
     assert cut.note == "200 more; the JSON output lists them all."
+
+
+def test_the_audit_says_what_its_kinds_mean(bare_run: Run) -> None:
+    wrap = AuditEntry("phi1", 2, 0.0075, 0.0025, -6.28, 0, 1)
+    table = tables.audit_table(
+        replace(bare_run, audit=(wrap, replace(wrap, kind="repaired"), replace(wrap, kind="ambiguous")))
+    )
+    assert [row[0].text for row in table.rows] == ["wrap", "repaired", "ambiguous"]
+    assert table.title == "Audit of the repolarizer (1 wrap)"
+    assert table.note == (
+        "repaired: a sample that a linear resampling left on a wrap, put on the line of its neighbours, Step"
+        " rad away. ambiguous: a gap in which the joint can have turned more than half a period."
+    )
 
 
 def test_a_report_of_four_logs_is_small(comparison: Comparison) -> None:
@@ -257,7 +270,7 @@ def test_a_log_of_one_sample_and_a_path_have_pages_too(comparison: Comparison) -
     assert run.robot is not None
     log = replace(run.log, t_ns=run.log.t_ns[:1], q=run.log.q[:1])
     one = point_over_log(run.robot, run.q[:1], run.qd[:1] * np.nan, run.qdd[:1] * np.nan)
-    single = replace(run, log=log, t_ns=run.t_ns[:1], q=run.q[:1], qd=run.qd[:1], tcp=one, repolarizations=())
+    single = replace(run, log=log, t_ns=run.t_ns[:1], q=run.q[:1], qd=run.qd[:1], tcp=one, audit=())
     nothing = np.empty((1, 0))
     path = replace(
         single,

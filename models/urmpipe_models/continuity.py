@@ -1,0 +1,99 @@
+"""Continuity of recorded orientations: the same rotation has many names, and a record jumps between them.
+
+A quaternion q and -q are one rotation, so are a rotation vector v and v (1 + 2 pi k / |v|), and Z-Y-X angles
+(rz, ry, rx), (rz + pi, pi - ry, rx + pi) and any turns more. Each function goes on with the name nearest to
+the one before, so that values can be interpolated and differentiated. The first sample keeps its own; a
+missing one (NaN) is passed over. What they need is that less than a quarter turn of the axis and half a turn
+of the angle lie between two samples.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from urmpipe_models.kinematics import FloatArray
+from urmpipe_models.repolarizer import FULL_TURN
+
+
+def continuous_quaternions(quat_xyzw: FloatArray) -> FloatArray:
+    """Return quaternions with the sign that is nearest to the one before.
+
+    Args:
+        quat_xyzw: Shape (n, 4) [-]; NaN where a sample is missing.
+    """
+    return _of_present(quat_xyzw, lambda q: q * _signs(q)[:, np.newaxis])
+
+
+def continuous_vectors(vectors: FloatArray) -> FloatArray:
+    """Return rotation vectors whose angle goes on past pi instead of flipping to the other side.
+
+    The axis keeps the direction that is nearest to the one before, and the angle about it goes on by the
+    nearest whole turns: v (1 + 2 pi k / |v|). Without an angle the axis stays what it was.
+
+    Args:
+        vectors: Axis times angle in [rad], shape (n, 3); NaN where a sample is missing.
+    """
+    return _of_present(vectors, _vectors)
+
+
+def continuous_euler_zyx(angles: FloatArray) -> FloatArray:
+    """Return Z-Y-X angles of the family, and with the turns, that are nearest to those before.
+
+    Args:
+        angles: rz, ry, rx of Rz(rz) Ry(ry) Rx(rx) in [rad], shape (n, 3); NaN where a sample is missing.
+    """
+    return _of_present(angles, _euler_zyx)
+
+
+def _of_present(values: FloatArray, work: Callable[[FloatArray], FloatArray]) -> FloatArray:
+    """Return a record worked on without its missing samples."""
+    present = ~np.isnan(values).any(axis=1)
+    result = np.full_like(values, np.nan)
+    result[present] = work(values[present])
+    return result
+
+
+def _signs(directions: FloatArray) -> FloatArray:
+    """Return the sign, 1 or -1, with which each direction is nearest to the one before; 1 for the first."""
+    along = np.einsum("ij,ij->i", directions[1:], directions[:-1])
+    return np.cumprod(np.append(1.0, np.where(along < 0.0, -1.0, 1.0)))[: len(directions)]
+
+
+def _nearest_turns(angles: FloatArray) -> FloatArray:
+    """Return the whole turns to add so that no step is above half a turn, shape as the angles', (n, ...)."""
+    turns = np.zeros_like(angles)
+    turns[1:] = -np.cumsum(np.rint(np.diff(angles, axis=0) / FULL_TURN), axis=0)
+    return turns
+
+
+def _vectors(v: FloatArray) -> FloatArray:
+    angle = np.linalg.norm(v, axis=1)
+    turning = np.flatnonzero(angle > 0.0)
+    if not len(turning):
+        return v
+    last = np.maximum.accumulate(np.where(angle > 0.0, np.arange(len(v)), -1))
+    known = np.where(last < 0, turning[0], last)
+    axis = v[known] / angle[known, np.newaxis]
+    signs = _signs(axis)
+    turns = _nearest_turns(signs * angle)
+    more = axis * (signs * turns * FULL_TURN)[:, np.newaxis]
+    return np.where(turns[:, np.newaxis] == 0.0, v, v + more)
+
+
+def _euler_zyx(angles: FloatArray) -> FloatArray:
+    other = angles * np.array([1.0, -1.0, 1.0]) + np.pi
+    own, across = (_distance(one[1:], angles[:-1]) for one in (angles, other))
+    switches = np.append(False, across < own)[: len(angles)]
+    swapped = np.cumsum(switches) % 2 == 1
+    family = np.where(swapped[:, np.newaxis], other, angles)
+    turns = _nearest_turns(family)
+    return np.where(turns == 0.0, family, family + FULL_TURN * turns)
+
+
+def _distance(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return the squared distance of angles, whole turns apart counted as none, shape (n,)."""
+    step = a - b
+    step = step - FULL_TURN * np.rint(step / FULL_TURN)
+    return np.asarray(np.einsum("ij,ij->i", step, step))

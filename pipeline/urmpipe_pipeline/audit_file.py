@@ -1,0 +1,35 @@
+"""The audit of a run as a CSV file: a line for each thing that was undone, repaired, left or not decided."""
+
+from __future__ import annotations
+
+import csv
+from pathlib import Path
+from typing import Any
+
+from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.outputs import AUDIT_COLUMNS
+from urmpipe_pipeline.results import Run
+
+
+def write_audit(run: Run, part: Path, path: Path) -> None:
+    """Write the audit of a run and read it back: joint, row, t [s], kind, step [rad], from, to [turns].
+
+    Args:
+        run: The run.
+        part: Where to write it, as `guarded_output` gives it.
+        path: The name it is to have, for messages.
+
+    Raises:
+        OutputError: If it did not read back as it was written.
+    """
+    rows = [list(AUDIT_COLUMNS), *([str(cell) for cell in _cells(one.to_dict())] for one in run.audit)]
+    with part.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file:
+        csv.writer(file).writerows(rows)
+    with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:
+        if list(csv.reader(file)) != rows:
+            raise OutputError(Finding("reads back otherwise than written", str(path)))
+
+
+def _cells(entry: dict[str, Any]) -> list[Any]:
+    """Return the cells of one entry."""
+    return [entry[name] for name in AUDIT_COLUMNS]

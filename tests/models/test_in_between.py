@@ -1,0 +1,160 @@
+"""In-between samples: k is right whatever their fraction, they are told, and repaired on the line."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from urmpipe_models.in_between import FAR, PERCEPTIBLE, beside_wraps, repair
+from urmpipe_models.kinematics import FloatArray
+from urmpipe_models.repolarizer import FULL_TURN, IntArray, repolarize
+
+TSP = 0.005
+MOVE = 0.01  # rad a sample, 2 rad/s
+FRACTIONS = np.arange(0.001, 1.0, 0.001)
+
+
+def wrap(x: FloatArray) -> FloatArray:
+    return np.asarray(x - FULL_TURN * np.floor((x + np.pi) / FULL_TURN), dtype=np.float64)
+
+
+def with_in_between(fraction: FloatArray | float, direction: float) -> tuple[FloatArray, FloatArray, int]:
+    """A motion over +-pi, its samples in the file, a column a fraction, and the sample on the jump."""
+    x = np.tile(direction * (np.pi + MOVE * (np.arange(20) - 9.5)), (np.size(fraction), 1)).T
+    q = wrap(x)
+    q[10] = q[9] + fraction * (q[11] - q[9])
+    return x, q, 10
+
+
+def found_in_each(
+    q: FloatArray, max_speed: float = math.inf
+) -> tuple[FloatArray, list[list[int]], list[list[int]]]:
+    """Repolarized values, in-between samples of each column by both passes, and unexplained steps."""
+    t = TSP * np.arange(len(q), dtype=np.float64)
+    result = repolarize(q, np.full(len(q), TSP), max_speed=max_speed)
+    told = []
+    for j, column in enumerate(q.T):
+        here = np.flatnonzero(~np.isnan(column))
+        wraps = np.searchsorted(here, result.rows[result.joints == j])
+        beside = here[beside_wraps(column[here], result.q[here, j], t[here], wraps, FULL_TURN)].tolist()
+        told.append(sorted({*result.in_between[result.in_between[:, 1] == j, 0].tolist(), *beside}))
+    return result.q, told, result.unexplained.tolist()
+
+
+def found_by_all(q: FloatArray, max_speed: float = math.inf) -> tuple[FloatArray, list[int], list[list[int]]]:
+    """The same of one column."""
+    out, told, unexplained = found_in_each(q[:, np.newaxis], max_speed)
+    return out[:, 0], told[0], unexplained
+
+
+@pytest.mark.parametrize("max_speed", [math.inf, 4.0])
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+@pytest.mark.parametrize("missing", [(), (9,), (11,), (7, 9, 11, 13), (8, 9), (11, 12)])
+def test_k_is_right_after_the_pair_whatever_the_fraction(
+    max_speed: float, direction: float, missing: tuple[int, ...]
+) -> None:
+    x, q, s = with_in_between(FRACTIONS, direction)
+    q[list(missing)] = np.nan
+    result = repolarize(q, np.full(len(q), TSP), max_speed=max_speed)
+    rest = np.setdiff1d(np.arange(len(q)), [s, *missing])
+    # wrapping and adding P once: a few units in the last place of 3
+    np.testing.assert_allclose(result.q[rest], x[rest], rtol=0, atol=2e-15)
+    assert result.unexplained.tolist() == []
+    assert all(rows in ([], [s]) for rows in found_in_each(q[:, ::25], max_speed)[1])
+
+
+@pytest.mark.parametrize("max_speed", [math.inf, 4.0])
+@pytest.mark.parametrize("direction", [1.0, -1.0])
+def test_an_in_between_sample_is_told_where_it_stands_out_of_the_motion(
+    max_speed: float, direction: float
+) -> None:
+    """By FAR times the motion, from either end of the jump: 4 x 0.01 rad of 6.28, 0.7 % of it."""
+    seen = found_in_each(with_in_between(FRACTIONS, direction)[1], max_speed)[1]
+    share = FAR * MOVE / FULL_TURN
+    clear = np.minimum(FRACTIONS, 1.0 - FRACTIONS) > share + 0.002
+    assert all(told == [10] for told, is_clear in zip(seen, clear, strict=True) if is_clear)
+    assert sum(not told for told in seen) <= 2 * round(1000 * share + 2)
+
+
+def test_the_repolarized_in_between_sample_stays_until_it_is_repaired() -> None:
+    s = 10
+    t = np.cumsum(np.r_[0.0, TSP * (1.0 + np.arange(19) % 3)])  # uneven: the line is one in time
+    x = np.pi + 2.0 * (t - t[s])
+    q = wrap(x)
+    q[s] = q[s - 1] + 0.4 * (q[s + 1] - q[s - 1])
+    result = repolarize(q[:, np.newaxis], np.diff(t, prepend=0.0))
+    assert result.q[s, 0] == q[s]
+    assert result.in_between.tolist() == [[s, 0]]
+    repaired = repair(result.q, t, result.in_between)
+    np.testing.assert_allclose(repaired[:, 0], x, rtol=0, atol=3e-15)  # values of 3: units in the last place
+    others = np.delete(np.arange(20), s)
+    assert repaired[others].tobytes() == result.q[others].tobytes()
+
+
+def test_repair_goes_past_missing_and_other_in_between_samples() -> None:
+    x = np.array([[0.0], [9.0], [np.nan], [9.0], [4.0], [5.0]])
+    repaired = repair(x, np.arange(6.0), np.array([[1, 0], [3, 0]]))
+    np.testing.assert_array_equal(repaired[:, 0], [0.0, 1.0, np.nan, 3.0, 4.0, 5.0])
+
+
+def test_a_wrap_followed_by_a_small_step_counts_once() -> None:
+    q = np.array([3.1, -3.1, -3.0, -2.9, -2.9])
+    out, told, unexplained = found_by_all(q)
+    np.testing.assert_array_equal(out[1:], q[1:] + FULL_TURN)
+    assert (told, unexplained) == ([], [])
+
+
+def test_a_resampled_chatter_leaves_no_net_turn() -> None:
+    q = np.array([3.1, 3.1, 0.0, -3.1, 0.1, 3.1, 0.2, -3.1, -3.1, 0.3, 3.1, 3.1])
+    out, told, unexplained = found_by_all(q)
+    assert out[-1] == 3.1
+    assert told == [2, 4, 6, 9]
+    assert unexplained == []
+
+
+clean = st.tuples(
+    st.floats(1e-6, 0.3), st.floats(0.0, 1.0), st.sampled_from([1.0, -1.0]), st.integers(0, 10**6)
+)
+
+
+@given(clean)
+def test_clean_wraps_and_noise_are_not_told(motion: tuple[float, float, float, int]) -> None:
+    """Even motion at any speed; and noise about +-pi of any size below P / 4 a step."""
+    move, offset, direction, seed = motion
+    x = np.asarray(direction * (np.pi + move * (np.arange(30) - 14.5 + offset)), dtype=np.float64)
+    assert found_by_all(wrap(x))[1:] == ([], [])
+    noise = np.random.default_rng(seed).uniform(np.pi - move, np.pi + move, 30)
+    assert found_by_all(wrap(noise))[2] == []
+
+
+def test_noise_about_the_limit_is_hardly_ever_told() -> None:
+    """Noise is no motion: of 1e5 wraps of pure noise a handful looks like an in-between sample."""
+    rng = np.random.default_rng(5)
+    for spread in (1e-4, 0.01, 0.3):
+        q = wrap(rng.normal(np.pi, spread, 200_000))
+        wraps = len(repolarize(q[:, np.newaxis], np.full(len(q), TSP)).rows)
+        told = found_by_all(q)[1]
+        assert wraps > 90_000
+        assert len(told) < 1e-3 * wraps, (spread, len(told))
+
+
+def test_a_deviation_too_small_to_matter_is_not_told() -> None:
+    q = np.full(20, np.pi - 1e-9)
+    q[10:] = -np.pi + 1e-9
+    q[10] += 0.9 * PERCEPTIBLE * FULL_TURN  # lies between, and nothing moves around it
+    assert found_by_all(q)[1] == []
+    q[10] += 0.2 * PERCEPTIBLE * FULL_TURN
+    assert found_by_all(q)[1] == [10]
+
+
+def indices(*values: int) -> IntArray:
+    return np.array(values, dtype=np.int64)
+
+
+def test_the_ends_of_a_log_have_no_neighbours_to_judge_by() -> None:
+    q = np.array([3.1, -3.1])
+    assert beside_wraps(q, np.array([3.1, 3.18]), np.array([0.0, TSP]), indices(1), FULL_TURN).tolist() == []
