@@ -10,6 +10,8 @@ _OPTIONS = {
     "delimiter": "--delimiter CHAR",
     "decimal sign": "--decimal CHAR",
     "time column": "--time COLUMN, or --time none",
+    "form of the time": "--unit COLUMN=dmy, mdy, s, ms or us",
+    "clock": "--time none with --period SECONDS",
     "period": "--period SECONDS",
     "joint columns": "--joints A,B,C in the robot's order",
     "recorded TCP": "position in a --map",
@@ -36,6 +38,9 @@ def otherwise(inference: Inference) -> str:
         return _OPTIONS[inference.what]
     if inference.what.startswith("form of "):
         return "--rotation FORM"
+    if inference.what.startswith("interval of "):
+        joint = inference.what.removeprefix("interval of ").split(", ")[0]
+        return f"--interval {joint}=LOW:HIGH"
     other = _OTHER_UNIT.get(inference.value)
     if inference.what == "unit of the time" and other:
         return f"{other} with --unit COLUMN={other}"

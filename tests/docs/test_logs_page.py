@@ -5,13 +5,16 @@ from __future__ import annotations
 import ast
 from collections.abc import Iterator
 from fnmatch import fnmatch
+from importlib import import_module
 from pathlib import Path
 
 import pytest
 
+from urmpipe.defaults import defaults_for
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.ingest import ingest_log
+from urmpipe_pipeline.sources import read_map
 
 ROOT = Path(__file__).parents[2]
 PAGE = (ROOT / "docs" / "logs.md").read_text(encoding="utf-8")
@@ -82,6 +85,17 @@ def test_each_row_of_a_warning_has_its_code() -> None:
     assert [row for row in sorted(WARNINGS) if not any(fnmatch(row, kind) for kind in MADE)] == []
 
 
+def test_the_map_and_the_defaults_of_the_page_are_sound(tmp_path: Path) -> None:
+    lab, defaults = (block.split("```")[0] for block in PAGE.split("```toml\n")[1:])
+    (tmp_path / "lab.toml").write_text(lab, encoding="utf-8")
+    said = read_map(tmp_path / "lab.toml")
+    assert (said.robot, said.read.names, said.read.rotation) == ("ur5e", ("shoulder",), "zyx")
+    (tmp_path / "urmpipe.toml").write_text(defaults, encoding="utf-8")
+    command = getattr(import_module("urmpipe.commands.compare"), "compare")  # noqa: B009
+    values = defaults_for(command, tmp_path / "urmpipe.toml", {"compare": command})
+    assert values == {"robot": "ur5e", "log_map": str(tmp_path / "maps/lab.toml"), "tolerance": "0.002"}
+
+
 SPECIMENS = {
     "no log": "",
     "no rows": "t,q1,q2\n",
@@ -95,6 +109,8 @@ SPECIMENS = {
     "no joints": "t,a,b\n0,1,2\n0.1,1,2\n",
     "unknown unit": "t,q1 [furlong],q2 [furlong]\n0,1,2\n0.1,1,2\n",
     "unclear unit": "t,q1,q2\n0,1,200\n0.1,1,201\n",
+    "second log": "t,q1,q2\n0,1,2\n0.1,1,2\nt,q1,q2\n0,1,2\n",
+    "unclear clock": "Time,q1,q2\n10:11:32:100,1,2\n10:11:32:200,1,2\n10:11:33:100,1,2\n",
 }
 
 

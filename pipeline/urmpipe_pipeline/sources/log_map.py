@@ -17,6 +17,7 @@ name = "q1"
 unit = "deg"
 sign = -1                       # q = sign * value + offset, in the unit of the column
 offset = 90
+interval = [-180, 180]          # what the environment limits it to, in the unit of the column
 
 [tcp]
 position = ["X", "Y", "Z"]
@@ -77,6 +78,8 @@ def read_map(path: Path) -> LogMap:
     joints = table.tables("joints") if table.has("joints") else []
     units = table.mapping("units")
     columns = [_joint(joint, units) for joint in joints]
+    names = tuple(name for _, name, _, _ in columns)
+    intervals = zip(names, (_interval(joint) for joint in joints), strict=True)
     time = _text(clock, "column")
     _unit_of(clock, [time] if time else [], "unit", units)
     robot = _text(table, "robot")
@@ -88,13 +91,14 @@ def read_map(path: Path) -> LogMap:
             time=time,
             period=clock.number("period") if clock.has("period") else None,
             joints=tuple(column for column, _, _, _ in columns),
-            names=tuple(name for _, name, _, _ in columns),
+            names=names,
             signs=tuple(sign for _, _, sign, _ in columns),
             offsets=tuple(offset for _, _, _, offset in columns),
             position=_names(tcp, "position"),
             orientation=_names(tcp, "orientation"),
             rotation=tcp.choice("form", FORMS) if tcp.has("form") else None,  # type: ignore[arg-type]
             units=units,
+            interval={name: interval for name, interval in intervals if interval},
         ),
         robot=_beside(path, robot) if robot else None,
         base=_frame(table, "base"),
@@ -152,6 +156,14 @@ def _joint(table: Table, units: dict[str, str]) -> tuple[str, str, int, float]:
         table.fault("sign", f"found {sign:g}, allowed: 1 or -1")
     _unit_of(table, [column], "unit", units)
     return column, table.text("name", column), int(sign), table.number("offset", 0.0)
+
+
+def _interval(table: Table) -> tuple[float, float] | None:
+    """Return the interval of a joint, if the table has one."""
+    if not table.has("interval"):
+        return None
+    low, high = table.numbers("interval", 2)
+    return low, high
 
 
 def _unit_of(table: Table, columns: Sequence[str], key: str, units: dict[str, str]) -> None:

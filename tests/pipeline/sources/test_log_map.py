@@ -44,6 +44,7 @@ name = "base"
 unit = "deg"
 sign = -1
 offset = 90
+interval = [-180, 180]
 
 [tcp]
 position = ["X_Act", "Y_Act", "Z_Act"]
@@ -71,6 +72,7 @@ def test_everything_that_a_map_says(write: Write) -> None:
     assert log.rotation_form == "zyx"
     assert log.tcp_rotation is not None
     np.testing.assert_allclose(np.degrees(log.tcp_rotation[0]), [10, 20, 30], atol=1e-13)
+    assert said.read.interval == {"base": (-180.0, 180.0)}
     assert (said.base, said.tool) == ((0, 0, 0.8), (0, 0, 0.15, 0, 0, 1.5))
     assert Path(said.robot or "").parts[-2:] == ("arms", "arm.toml")
     assert Path(said.robot or "").is_absolute()
