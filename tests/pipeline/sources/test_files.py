@@ -28,6 +28,12 @@ CONTAINERS = {
     ".bag": "a ROS 1 bag, allowed: a text table; rostopic echo -b {name} -p /joint_states > log.csv",
     ".mcap": f"an MCAP recording, allowed: a text table; {ROS2} {{name}}",
     ".db3": f"a ROS 2 bag, allowed: a text table; {ROS2} {{name}}",
+    ".npy": 'a NumPy file, allowed: a text table; python -c "import numpy;'
+    ' numpy.savetxt(\\"log.csv\\", numpy.load(\\"{name}\\"), delimiter=\\",\\")"',
+    ".json": 'JSON, allowed: a text table; python -c "import pandas;'
+    ' pandas.read_json(\\"{name}\\").to_csv(\\"log.csv\\", index=False)"',
+    ".jpg": "a picture, allowed: a text table; the file whose values it shows",
+    ".pdf": "a PDF, allowed: a text table; the file whose values it shows",
     ".gz": "a gzip archive, allowed: a text table; gunzip {name}",
 }
 MAGIC = {
@@ -36,6 +42,10 @@ MAGIC = {
     ".bag": b"#ROSBAG V2.0\n",
     ".mcap": b"\x89MCAP0\r\n",
     ".db3": b"SQLite format 3\x00",
+    ".npy": b"\x93NUMPY\x01\x00",
+    ".json": b'[{"t": 0, "q": [1, 2]}]',
+    ".jpg": b"\xff\xd8\xff\xe0\x00\x10JFIF",
+    ".pdf": b"%PDF-1.7\n",
     ".gz": b"\x1f\x8b\x08\x00",
 }
 
