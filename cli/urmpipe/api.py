@@ -227,11 +227,11 @@ def write_map(run: Run, output: PathLike, inputs: Sequence[PathLike] = (), robot
 
 
 def _offset(frame: Transform) -> tuple[float, ...]:
-    """Return a frame as X, Y, Z, RX, RY, RZ in [m] and [rad], nothing for one that is where it was."""
+    """Return a frame as X, Y, Z in [m], with RX, RY, RZ in [rad] if it turns; nothing for none at all."""
     if frame == Transform():
         return ()
-    x, y, z = (float(value) for value in frame.translation)
-    return (x, y, z, *rpy_of(frame.rotation))
+    turn = () if frame.rotation == Transform().rotation else rpy_of(frame.rotation)
+    return tuple(float(value) + 0.0 for value in (*frame.translation, *turn))  # + 0.0: no -0.0 in the file
 
 
 def export(

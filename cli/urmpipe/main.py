@@ -64,7 +64,8 @@ class LazyGroup(click.Group):
         """Return what urmpipe.toml says for a command, and tell the user that it does."""
         values = defaults_for(command, path, {name: self._load(name) for name in COMMANDS})
         if values:
-            shown = ", ".join(f"{name}={value}" for name, value in values.items())
+            options = {param.name: max(param.opts, key=len).lstrip("-") for param in command.params}
+            shown = ", ".join(f"{options[name]}={_shown(value)}" for name, value in values.items())
             click.echo(f"defaults of {path}: {shown}", err=True)
         return values
 
@@ -72,6 +73,13 @@ class LazyGroup(click.Group):
         """Write the commands with their short help, without loading them."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
+
+
+def _shown(value: Any) -> str:
+    """Return a default as TOML would have it, without quotes."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return ",".join(value) if isinstance(value, list) else str(value)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -149,7 +157,7 @@ def _print_findings(findings: Sequence[Finding], as_json: bool) -> None:
         import json
 
         errors = [
-            {"file": one.file, "row": one.row, "column": one.column, "message": one.message}
+            {name: getattr(one, name) for name in ("file", "line", "row", "column", "message")}
             for one in findings
         ]
         click.echo(json.dumps({"schema": 1, "errors": errors}, ensure_ascii=False))

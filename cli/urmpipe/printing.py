@@ -43,13 +43,14 @@ def print_recording(recording: Path | None) -> None:
     click.echo(f"Recording: {recording}  (open it: {viewer} {recording})")
 
 
-def print_warnings(warnings: Sequence[LogWarning]) -> None:
-    """Print warnings on standard error, one unwrapped line each."""
+def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
+    """Print warnings on standard error, one unwrapped line each, behind the name of their log if given."""
+    named = f"{log}: " if log else ""
     for warning in warnings[:LISTED]:
         place = f"row {warning.row}: " if warning.row is not None else ""
-        click.echo(f"warning: {place}{warning.message}", err=True)
+        click.echo(f"warning: {named}{place}{warning.message}", err=True)
     if len(warnings) > LISTED:
-        click.echo(f"warning: and {len(warnings) - LISTED} more", err=True)
+        click.echo(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
 
 
 def print_run(run: Run, *, alternatives: bool = False) -> None:
@@ -67,10 +68,18 @@ def print_run(run: Run, *, alternatives: bool = False) -> None:
     resampled = any(warning.kind == "resampled" for warning in run.warnings)
     table.add_row("grid", grid, "resampled" if resampled else "the log's own rows")
     if not any(inference.what == "robot" for inference in log.inferences):
-        because = run.robot.description if run.robot else "not given: no kinematics (--robot NAME|FILE)"
-        table.add_row("robot", run.robot.name if run.robot else "none", because)
+        table.add_row("robot", run.robot.name if run.robot else "none", _why_robot(run))
     console.print(table)
     _print_audit(console, run)
+
+
+def _why_robot(run: Run) -> str:
+    """Say why a run has the robot that it has, where it was not inferred."""
+    if run.robot:
+        return run.robot.description
+    tried = run.log.joints and run.log.tcp_position is not None
+    why = "not given, and none of the catalogue alone fits the recorded TCP" if tried else "not given"
+    return f"{why}: no kinematics (--robot NAME|FILE)"
 
 
 def _print_audit(console: Console, run: Run) -> None:
@@ -79,17 +88,16 @@ def _print_audit(console: Console, run: Run) -> None:
         console.print("No repolarization.")
         return
     wraps = len(run.repolarizations)
-    others = f", {len(run.audit) - wraps} other findings" if len(run.audit) > wraps else ""
-    audit = new_table(
-        "What", "Joint", "Row", "t_r [s]", "Step [rad]", "Turns", title=f"{wraps} repolarizations{others}"
-    )
+    others = f", {count(len(run.audit) - wraps, 'other finding')}" if len(run.audit) > wraps else ""
+    title = f"{count(wraps, 'repolarization')}{others}"
+    audit = new_table("What", "Joint", "Row", "t_r [s]", "Step [rad]", "Turns", title=title)
     for one in run.audit[:LISTED]:
         instant = f"{one.t:.6g} ± {one.half_period:.4g}"
         turns = f"{one.before:+d} → {one.after:+d}"
         audit.add_row(one.kind, one.joint, str(one.row), instant, f"{one.step:+.5f}", turns)
     console.print(audit)
     if len(run.audit) > LISTED:
-        console.print(f"... and {len(run.audit) - LISTED} more")
+        console.print(f"... and {len(run.audit) - LISTED} more; --audit FILE.csv lists all")
 
 
 def print_comparison(result: Comparison) -> None:
@@ -121,6 +129,11 @@ def print_comparison(result: Comparison) -> None:
             f" {run.start[3] * 1e3:.4f} mm at the start"
         )
         console.print(_verdict(run.verdict).append(said, style="not bold default"), soft_wrap=True)
+
+
+def count(number: int, noun: str) -> str:
+    """Return a number of things, in the singular if it is one."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 @contextmanager

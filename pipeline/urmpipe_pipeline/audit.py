@@ -16,8 +16,11 @@ from urmpipe_pipeline.interval import Interval, double_turns, given_periods, sai
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, JointLog, LogWarning, seconds
 from urmpipe_pipeline.results import AuditEntry, AuditKind
 
-LISTED = 20
-"""Warnings of a kind that are told one by one; the others are counted."""
+LISTED = 8
+"""Warnings of a kind that are told one by one; the others are counted, and listed by the audit."""
+
+ALL = "; ingest --audit FILE.csv lists all"
+"""Where the others are."""
 
 MOST = 10_000
 """Entries of a kind that are no wraps: a log with more of them is none of joints; a warning counts all."""
@@ -304,7 +307,7 @@ def _warn_unexplained(log: JointLog, odd: _Places, periods: FloatArray) -> Itera
         )
         yield LogWarning("large-step", said, row + 1)
     if len(odd.rows) > LISTED:
-        yield LogWarning("large-step", f"{len(odd.rows) - LISTED} more steps that are no wraps")
+        yield LogWarning("large-step", f"{len(odd.rows) - LISTED} more steps that are no wraps{ALL}")
 
 
 def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
@@ -316,7 +319,7 @@ def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
         )
         yield LogWarning("in-between", said, row + 1)
     if len(between.rows) > LISTED:
-        yield LogWarning("in-between", f"{len(between.rows) - LISTED} more samples on wraps")
+        yield LogWarning("in-between", f"{len(between.rows) - LISTED} more samples on wraps{ALL}")
 
 
 def _warn_ambiguous(
@@ -333,4 +336,4 @@ def _warn_ambiguous(
         yield LogWarning("ambiguous-turn", said, row + 1)
     if len(unsure.rows) > LISTED:
         left = len(unsure.rows) - LISTED
-        yield LogWarning("ambiguous-turn", f"{left} more gaps in which a joint can have turned")
+        yield LogWarning("ambiguous-turn", f"{left} more gaps in which a joint can have turned{ALL}")

@@ -14,6 +14,7 @@ from urmpipe_models.kinematics import positions_over_log
 from urmpipe_pipeline.grid import interpolate
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning, seconds
 from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.recorded_tcp import lacking_tool
 from urmpipe_pipeline.results import Comparison, Deviation, Run, Trajectory
 from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE, describe, overall
 
@@ -108,9 +109,10 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         )
     recorded = Trajectory(f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files)
     computed = Trajectory(run.name, log.t_ns, positions_over_log(run.robot, log.q), log.files)
-    return _comparison(
-        recorded, [_deviation(run.name, run, recorded, computed, replace(chosen, sync_offset=0.0))], chosen
-    )
+    deviation = _deviation(run.name, run, recorded, computed, replace(chosen, sync_offset=0.0))
+    found = _comparison(recorded, [deviation], chosen)
+    doubts = lacking_tool(run.robot, log) if deviation.verdict == "fail" else []
+    return replace(found, warnings=(*found.warnings, *doubts))
 
 
 def _comparison(

@@ -12,7 +12,7 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import positions_over_log
 from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning
-from urmpipe_pipeline.sources.evidence import CLOSE_WITH_TOOL, fit, spread
+from urmpipe_pipeline.sources.evidence import CLEARLY, CLOSE_WITH_TOOL, fit, spread
 
 FAR = 0.03
 """Root mean square distance in [m] that no calibration and no rounding explain."""
@@ -42,6 +42,31 @@ def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     unknown = "robot, base, units, signs or order of the joints may differ"
     remedy = next(_remedies(robot, log, q, recorded), unknown)
     return [LogWarning("recorded-tcp-far", f"{said}: {remedy}")]
+
+
+def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
+    """Return a warning if kinematics and recorded tool centre point lie apart by what a tool explains.
+
+    Args:
+        robot: The arm.
+        log: The log, in SI, with a recorded position.
+    """
+    if log.tcp_position is None:
+        return []
+    rows = spread(log.rows)
+    q, recorded = log.q[rows], log.tcp_position[rows]
+    found, bare = fit(robot, q, recorded), fit(replace(robot, tool=Transform()), q, recorded)
+    if found is None or bare is None or found.distance <= CLOSE_WITH_TOOL:
+        return []
+    apart = f"the kinematics of {robot.name} stay {found.distance * 1e3:.1f} mm (rms) from the recorded TCP"
+    if not np.isfinite(found.with_tool):
+        said = f"{apart}, and the log moves too little to tell why: is a --tool or a --base missing?"
+    elif CLEARLY * found.with_tool <= found.distance and found.with_tool <= CLOSE_WITH_TOOL:
+        tool = ",".join(f"{round(value, 4) + 0.0:.4f}" for value in bare.tool)  # + 0.0: no -0.0
+        said = f"{apart}, but {found.with_tool * 1e3:.2f} mm with --tool {tool}"
+    else:
+        return []
+    return [LogWarning("recorded-tcp-tool", said)]
 
 
 def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[str]:

@@ -314,6 +314,7 @@ class Deviation:
             "out_of_tolerance": int(np.count_nonzero(self.outside)),
             "share_out": self.share_out,
             "verdict": self.verdict,
+            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.run.warnings],
         }
 
 

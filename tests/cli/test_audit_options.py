@@ -54,6 +54,14 @@ def test_the_audit_is_a_table_with_a_line_for_each_entry(
     assert {"large-step", "in-between", "ambiguous-turn"} <= {one["kind"] for one in answer["warnings"]}
 
 
+def test_what_is_told_of_an_audit_counts_its_lines(urmpipe: RunCommand, log: Path) -> None:
+    ran = urmpipe("ingest", log, "--audit", "audit.csv")
+    assert "1 repolarization, 3 other findings\n" in "".join(
+        f"{line.rstrip()}\n" for line in ran.out.splitlines()
+    )
+    assert "Audit: audit.csv  (4 lines)\n" in ran.out
+
+
 def test_an_audit_replaces_only_an_audit(urmpipe: RunCommand, log: Path, tmp_path: Path) -> None:
     target = tmp_path / "audit.csv"
     target.write_text("my notes\n")

@@ -43,7 +43,7 @@ def test_defaults_of_a_folder_above_hold_and_are_told(lab: Path, capsys: Capture
     out, err = capsys.readouterr()
     found = json.loads(out)
     assert (found["robot"], found["units"]["a"]) == ("ur5e", "deg")
-    assert err == f"defaults of {lab}/urmpipe.toml: robot=ur5e, units=['deg'], strict=True\n"
+    assert err == f"defaults of {lab}/urmpipe.toml: robot=ur5e, unit=deg, strict=true\n"
 
 
 def test_the_command_line_comes_before_the_defaults(lab: Path, capsys: Captured) -> None:

@@ -77,7 +77,7 @@ def test_an_error_is_one_line_and_json_if_asked_for(urmpipe: RunCommand) -> None
     assert ran.code == 2
     answer = json.loads(ran.out)
     assert answer["schema"] == 1
-    assert answer["errors"][0].keys() == {"file", "row", "column", "message"}
+    assert answer["errors"][0].keys() == {"file", "line", "row", "column", "message"}
     assert answer["errors"][0]["file"] == "missing.csv"
 
 

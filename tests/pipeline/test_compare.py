@@ -8,6 +8,7 @@ import pytest
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics import point_over_log, positions_over_log
+from urmpipe_models.transform import translation
 from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import derivatives
@@ -129,6 +130,15 @@ def test_one_log_is_held_against_what_it_recorded_itself(q: FloatArray) -> None:
     assert result.runs[0].left_out == 1
 
 
+def test_a_verdict_that_fails_for_want_of_a_tool_says_so(q: FloatArray) -> None:
+    recorded = positions_over_log(URM6.placed(tool=translation(0.0, 0.0, 0.15)), q)
+    result = compare_recorded(arm_run(q, recorded=recorded))
+    assert result.runs[0].verdict == "fail"
+    assert [warning.kind for warning in result.warnings] == ["recorded-tcp-tool"]
+    told = arm_run(q, robot=URM6.placed(tool=translation(0.0, 0.0, 0.15)), recorded=recorded)
+    assert compare_recorded(told).warnings == ()
+
+
 def test_what_is_lacking_is_named(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     with pytest.raises(LogError) as error:
@@ -157,7 +167,7 @@ def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
     assert as_dict["tolerance"] == {"axis": 0.0035}
     one = as_dict["runs"][0]
     assert set(one) >= {"name", "samples", "left_out", "duration", "sync_offset", "delta", "worst",
-                        "out_of_tolerance", "share_out", "verdict"}  # fmt: skip
+                        "out_of_tolerance", "share_out", "verdict", "warnings"}  # fmt: skip
     assert set(one["delta"]["x"]) == {"max", "rms", "mean", "std", "p95", "t_max", "sample_max", "verdict"}
     assert one["share_out"] == 1.0
 

@@ -11,7 +11,7 @@ from urmpipe_models.catalogue import load_robot
 from urmpipe_models.kinematics import positions_over_log
 from urmpipe_models.transform import from_offset, translation
 from urmpipe_pipeline.joint_log import FloatArray, JointLog
-from urmpipe_pipeline.recorded_tcp import far_from_recorded
+from urmpipe_pipeline.recorded_tcp import far_from_recorded, lacking_tool
 
 UR5E = load_robot("ur5e")
 T = np.linspace(0, 1, 60)[:, None]
@@ -66,3 +66,26 @@ def test_nothing_is_said_without_motion_robot_or_recorded_tcp() -> None:
     assert far_from_recorded(UR5E, log(np.ascontiguousarray(still), np.full((60, 3), 0.5))) == []
     assert far_from_recorded(None, log(Q, np.full((60, 3), 0.5))) == []
     assert far_from_recorded(UR5E, JointLog("log", "table", (), np.arange(60), tuple("abcdef"), Q)) == []
+
+
+def test_a_tool_that_was_not_told_is_found() -> None:
+    recorded = positions_over_log(UR5E.placed(tool=translation(0.02, 0.0, 0.15)), Q)
+    (warning,) = lacking_tool(UR5E, log(Q, recorded))
+    assert warning.kind == "recorded-tcp-tool"
+    assert warning.message == (
+        "the kinematics of ur5e stay 151.3 mm (rms) from the recorded TCP,"
+        " but 0.00 mm with --tool 0.0200,0.0000,0.1500"
+    )
+    assert lacking_tool(UR5E.placed(tool=translation(0.02, 0.0, 0.15)), log(Q, recorded)) == []
+    (other,) = lacking_tool(UR5E.placed(tool=translation(0.0, 0.0, 0.1)), log(Q, recorded))
+    assert other.message.endswith("with --tool 0.0200,0.0000,0.1500")  # the whole tool, not what is lacking
+
+
+def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool() -> None:
+    still = np.repeat(Q[:1], len(Q), axis=0)
+    (warning,) = lacking_tool(UR5E, log(still, positions_over_log(UR5E, still) + np.array([0.0, 0.0, 0.15])))
+    assert warning.message == (
+        "the kinematics of ur5e stay 150.0 mm (rms) from the recorded TCP, and the log moves too little to"
+        " tell why: is a --tool or a --base missing?"
+    )
+    assert lacking_tool(UR5E, log(Q, 1.3 * positions_over_log(UR5E, Q) + np.sin(9 * T))) == []

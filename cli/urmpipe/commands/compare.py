@@ -92,7 +92,7 @@ def compare(
         )
     if not quiet:
         for one in result.runs:
-            print_warnings(one.run.warnings)
+            print_warnings(one.run.warnings, one.name)
         print_warnings(result.warnings)
     if as_json:
         print_json(result.to_dict())

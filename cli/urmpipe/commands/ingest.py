@@ -60,7 +60,7 @@ def ingest(
     """
     tune_pyarrow()
     from urmpipe import api
-    from urmpipe.printing import print_json, print_recording, print_run, print_warnings, progress_bar
+    from urmpipe.printing import count, print_json, print_recording, print_run, print_warnings, progress_bar
 
     target = None if explain else output or Path(default_name(logs))
     named = options["robot"]
@@ -79,6 +79,8 @@ def ingest(
         print_run(run, alternatives=explain)
         if run.recording:
             print_recording(run.recording)
+        if audit:
+            click.echo(f"Audit: {audit}  ({count(len(run.audit), 'line')})")
         if map_output:
             click.echo(f"Map: {map_output}  (use it: urmpipe ingest LOG --map {map_output})")
     return 0

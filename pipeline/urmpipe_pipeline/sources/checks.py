@@ -152,7 +152,7 @@ def missing_samples(values: FloatArray, names: Sequence[str]) -> list[LogWarning
         missing = np.flatnonzero(np.isnan(values[:, j]))
         if len(missing):
             first = int(missing[0]) + 1
-            said = f"{names[j]} has no value in {len(missing)} of {len(values)} rows, first in row {first}"
+            said = f"{names[j]} has no value in {len(missing)} of {len(values)} rows, first in this one"
             warnings.append(LogWarning("missing", said, first))
     return warnings
 
@@ -240,7 +240,7 @@ def gaps(t_ns: IntArray) -> list[LogWarning]:
     warnings = [
         LogWarning(
             "gap",
-            f"{steps[k] / 1e9:.6g} s pass before row {k + 2}, the median period is {period / 1e9:.6g} s",
+            f"{steps[k] / 1e9:.6g} s pass before this row, the median period is {period / 1e9:.6g} s",
             k + 2,
         )
         for k in places[:SHOWN_GAPS]
@@ -248,5 +248,5 @@ def gaps(t_ns: IntArray) -> list[LogWarning]:
     if len(places) > SHOWN_GAPS:
         longest = max(places, key=lambda k: steps[k])
         more = f"{len(places) - SHOWN_GAPS} more gaps; the longest of all is {steps[longest] / 1e9:.6g} s"
-        warnings.append(LogWarning("gap", f"{more}, before row {longest + 2}", longest + 2))
+        warnings.append(LogWarning("gap", f"{more}, before this row", longest + 2))
     return warnings

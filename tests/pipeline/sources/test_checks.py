@@ -114,8 +114,8 @@ def test_missing_samples(read: Read) -> None:
     np.testing.assert_array_equal(np.isnan(log.q[:, 0]), [True, True, True, False])
     np.testing.assert_array_equal(np.isnan(log.q[:, 1]), [False, False, True, False])
     assert [(w.kind, w.row, w.message) for w in log.warnings if w.kind == "missing"] == [
-        ("missing", 1, "q1 has no value in 3 of 4 rows, first in row 1"),
-        ("missing", 3, "q2 has no value in 1 of 4 rows, first in row 3"),
+        ("missing", 1, "q1 has no value in 3 of 4 rows, first in this one"),
+        ("missing", 3, "q2 has no value in 1 of 4 rows, first in this one"),
     ]
 
 
@@ -124,7 +124,8 @@ def test_missing_samples_of_the_fast_way(read: Read) -> None:
     log = read("\n".join(["t,q1,q2", *rows]))
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(log.q[:, 0])), np.arange(7, 20_000, 1000))
     assert not np.isnan(log.q[:, 1]).any()
-    assert log.warnings[-1].message == "q1 has no value in 20 of 20000 rows, first in row 8"
+    assert log.warnings[-1].message == "q1 has no value in 20 of 20000 rows, first in this one"
+    assert log.warnings[-1].row == 8
 
 
 def test_a_joint_without_any_value(wrong: Wrong) -> None:

@@ -147,8 +147,8 @@ def test_gaps(read: Read) -> None:
     times = np.cumsum([0, *[0.01] * 10, 0.031, *[0.01] * 5, 5.0, *[0.01] * 3])
     log = read(clocked("t", *(f"{time:.3f}" for time in times)))
     assert [(w.kind, w.row, w.message) for w in log.warnings if w.kind == "gap"] == [
-        ("gap", 12, "0.031 s pass before row 12, the median period is 0.01 s"),
-        ("gap", 18, "5 s pass before row 18, the median period is 0.01 s"),
+        ("gap", 12, "0.031 s pass before this row, the median period is 0.01 s"),
+        ("gap", 18, "5 s pass before this row, the median period is 0.01 s"),
     ]
 
 
@@ -158,7 +158,8 @@ def test_many_gaps_are_counted(read: Read) -> None:
     log = read(clocked("t", *(f"{time:.3f}" for time in times)))
     gaps = [warning for warning in log.warnings if warning.kind == "gap"]
     assert len(gaps) == 11
-    assert gaps[-1].message == "41 more gaps; the longest of all is 1.01 s, before row 151"
+    assert gaps[-1].message == "41 more gaps; the longest of all is 1.01 s, before this row"
+    assert gaps[-1].row == 151
 
 
 def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:

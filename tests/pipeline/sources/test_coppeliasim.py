@@ -43,7 +43,7 @@ def test_joints_and_tip_in_two_graphs(read: Read, text: str, newline: str) -> No
     assert log.units == {"Time": "s", "joint 1": "deg", "joint 2": "deg", "x": "m", "y": "m", "z": "m"}
     assert log.digits == 4
     assert [(w.kind, w.row) for w in log.warnings] == [("missing", 2)]
-    assert log.warnings[0].message == "joint 2 has no value in 1 of 3 rows, first in row 2"
+    assert log.warnings[0].message == "joint 2 has no value in 1 of 3 rows, first in this one"
 
 
 def test_first_line_is_that_of_the_joints_graph(read: Read) -> None:

@@ -28,6 +28,10 @@ CONTAINERS = {
     ".bag": "a ROS 1 bag, allowed: a text table; rostopic echo -b {name} -p /joint_states > log.csv",
     ".mcap": f"an MCAP recording, allowed: a text table; {ROS2} {{name}}",
     ".db3": f"a ROS 2 bag, allowed: a text table; {ROS2} {{name}}",
+    ".npy": 'a NumPy file, allowed: a text table; python -c "import numpy;'
+    ' numpy.savetxt(\\"log.csv\\", numpy.load(\\"{name}\\"), delimiter=\\",\\")"',
+    ".jpg": "a picture, allowed: a text table; the file whose values it shows",
+    ".pdf": "a PDF, allowed: a text table; the file whose values it shows",
     ".gz": "a gzip archive, allowed: a text table; gunzip {name}",
 }
 MAGIC = {
@@ -36,6 +40,9 @@ MAGIC = {
     ".bag": b"#ROSBAG V2.0\n",
     ".mcap": b"\x89MCAP0\r\n",
     ".db3": b"SQLite format 3\x00",
+    ".npy": b"\x93NUMPY\x01\x00",
+    ".jpg": b"\xff\xd8\xff\xe0\x00\x10JFIF",
+    ".pdf": b"%PDF-1.7\n",
     ".gz": b"\x1f\x8b\x08\x00",
 }
 
@@ -48,6 +55,13 @@ def test_containers_by_suffix_and_by_their_first_bytes(wrong: Wrong, suffix: str
         (f"log{suffix.upper()}", b""),
     ):
         assert wrong(content, name=name) == [f"{name}: found {CONTAINERS[suffix].format(name=name)}"]
+
+
+def test_a_json_array_is_known_by_its_first_bytes(wrong: Wrong) -> None:
+    assert wrong(b'[{"t": 0, "q": [1, 2]}]') == [
+        'log.csv: found a JSON array, allowed: a text table; python -c "import pandas;'
+        ' pandas.read_json(\\"log.csv\\").to_csv(\\"table.csv\\", index=False)"'
+    ]
 
 
 def test_real_containers_are_known(tmp_path: Path) -> None:

@@ -77,8 +77,8 @@ def test_plotjuggler_with_empty_cells() -> None:
     assert np.isnan(log.q[0, 0])
     assert log.q[0, 1] == -1.286809
     assert log.q[6, 0] == 2.0
-    assert [w.message for w in log.warnings if w.kind == "missing"] == [
-        f"{name} has no value in {np.isnan(log.q[:, j]).sum()} of 563 rows, first in row {first}"
+    assert [(w.row, w.message) for w in log.warnings if w.kind == "missing"] == [
+        (first, f"{name} has no value in {np.isnan(log.q[:, j]).sum()} of 563 rows, first in this one")
         for j, (name, first) in enumerate(zip(log.joints, (1, 7), strict=True))
     ]
 

@@ -185,7 +185,7 @@ WRONG = [
     Wrong("time_missing", [r"^log:7, column t: found no time, allowed: a time in every row"]),
     Wrong("time_of_one_second", [r"(?=.*rows repeat a time)(?=.*--period)"]),
     Wrong("time_in_steps", [r"15\.6\d* ms|0\.0156\d* s"], stops=False),
-    Wrong("gap_of_two_seconds", [r"2\.02 s.*row 16"], stops=False),
+    Wrong("gap_of_two_seconds", [r"row 16: 2\.02 s"], stops=False),
     Wrong("gap_with_a_possible_turn", [r"(?=.*q5)(?=.*\b16\b)(?=.*(ambiguous|turn))"], stops=False),
     # the samples
     Wrong("repeated_samples", [r"(?=.*(repeat|same|held))(?=.*(40 ms|0\.04 s|\b4\b|\b36\b))"], stops=False),
