@@ -14,6 +14,9 @@ from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning
 from urmpipe_pipeline.sources.evidence import CLEARLY, CLOSE_WITH_TOOL, fit, spread
 
+LACKING_TOOL = "recorded-tcp-tool"
+"""The kind of a hint beside a verdict of fail: it says nothing against the log."""
+
 FAR = 0.03
 """Root mean square distance in [m] that no calibration and no rounding explain."""
 
@@ -66,7 +69,7 @@ def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
         said = f"{apart}, but {found.with_tool * 1e3:.2f} mm with --tool {tool}"
     else:
         return []
-    return [LogWarning("recorded-tcp-tool", said)]
+    return [LogWarning(LACKING_TOOL, said)]
 
 
 def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[str]:
