@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,7 @@ from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.operands import load_run, log_files
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import OutputKind, guarded_output
 from urmpipe_pipeline.recording import is_recording, read_recording, record
 from urmpipe_pipeline.results import Comparison, Run
 from urmpipe_pipeline.sources import ReadOptions, map_of, read_map
@@ -73,9 +74,12 @@ def ingest(
     strict: bool = False,
     output: PathLike | None = None,
     audit: PathLike | None = None,
+    log_map: PathLike | None = None,
+    map_robot: str | None = None,
+    inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Turn one log into a run, and write its recording if an output is named.
+    """Turn one log into a run, and write its recording, audit and map if they are named: all or none.
 
     Args:
         log: The log's file; several files, or a folder of them, if its source writes one a plot.
@@ -88,6 +92,9 @@ def ingest(
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write.
         audit: A CSV file to write the repolarizer's audit to.
+        log_map: A TOML file to write the map to, by which further logs read as this one was read.
+        map_robot: Name or file of the arm in that map; default: its name, if it is one of the catalogue.
+        inputs: Files besides the log that are never replaced, such as the map it was read by.
         progress: Told the share of the recording that is written, 0..1.
 
     Returns:
@@ -104,19 +111,29 @@ def ingest(
     arm = place_robot(robot, base, tool)
     name = given[0].resolve().name if given[0].is_dir() else None
 
-    def make(early: Callable[[JointLog | Run], None] | None) -> Run:
-        run = ingest_log(files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name, early=early)
-        _refuse_warnings(strict, run.warnings)
-        return run
+    named: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": log_map}
+    targets = {kind: Path(path) for kind, path in named.items() if path is not None}
+    _refuse_shared(targets)
+    kept = [*files, *map(Path, inputs)]
+    with ExitStack() as stack:
+        parts = {
+            kind: stack.enter_context(guarded_output(path, kept, kind))
+            for kind, path in targets.items()
+            if kind != "recording"
+        }
 
-    if audit is None:
-        return make(None) if output is None else record(make, Path(output), files, progress)
-    if output is not None and Path(audit).resolve() == Path(output).resolve():
-        raise OptionError(f"found {audit} as recording and as audit; allowed: a name for each")
-    with guarded_output(Path(audit), files, "audit") as part:
-        run = make(None) if output is None else record(make, Path(output), files, progress)
-        write_audit(run, part, Path(audit))
-    return run
+        def make(early: Callable[[JointLog | Run], None] | None) -> Run:
+            run = ingest_log(
+                files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name, early=early
+            )
+            _refuse_warnings(strict, run.warnings)
+            if "audit" in parts:
+                write_audit(run, parts["audit"], targets["audit"])
+            if "map" in parts:
+                _write_map(run, parts["map"], targets["map"], map_robot)
+            return run
+
+        return make(None) if output is None else record(make, Path(output), kept, progress)
 
 
 def compare(
@@ -213,17 +230,32 @@ def write_map(run: Run, output: PathLike, inputs: Sequence[PathLike] = (), robot
         UrmpipeError: If it may not be written there.
     """
     path = Path(output)
+    with guarded_output(path, [Path(one) for one in inputs], "map") as part:
+        _write_map(run, part, path, robot)
+    return path
+
+
+def _write_map(run: Run, part: Path, path: Path, robot: str | None) -> None:
+    """Write the map of a run to a part that is to have a name, and read it back."""
     arm = run.robot
     if robot is None:
         robot = arm.name if arm and arm.name in robot_names() else None
     elif Path(robot).suffix:
         robot = os.path.relpath(robot, path.parent)
     frames = (arm.base, arm.tool) if arm else ()
-    text = map_of(run.log, robot, *(_offset(frame) for frame in frames))
-    with guarded_output(path, [Path(one) for one in inputs], "map") as part:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        read_map(part)
-    return path
+    given = run.provenance.options.get("read") or {}
+    text = map_of(run.log, robot, *(_offset(frame) for frame in frames), given=given)
+    part.write_text(text, encoding="utf-8", newline="\n")
+    read_map(part)
+
+
+def _refuse_shared(targets: Mapping[OutputKind, Path]) -> None:
+    """Raise an `OptionError` if two outputs have one name."""
+    places: dict[Path, OutputKind] = {}
+    for kind, path in targets.items():
+        other = places.setdefault(path.resolve(), kind)
+        if other != kind:
+            raise OptionError(f"found {path} as {other} and as {kind}; allowed: a name for each")
 
 
 def _offset(frame: Transform) -> tuple[float, ...]:

@@ -149,7 +149,8 @@ FORMS = ["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", 
 def take_log_options(options: dict[str, Any]) -> tuple[Chain | None, ReadOptions]:
     """Take robot, map and reading options out of some others; return the arm and how to read a log.
 
-    What is given on the command line comes before what the map says.
+    What is given on the command line comes before what the map says. The arm's name or file stays among the
+    options as `robot_named`.
 
     Raises:
         UrmpipeError: With everything that is wrong with the robot or the map.
@@ -160,7 +161,7 @@ def take_log_options(options: dict[str, Any]) -> tuple[Chain | None, ReadOptions
 
     path = options.pop("log_map")
     log_map = read_map(path) if path else LogMap()
-    options["robot"] = options["robot"] or log_map.robot
+    options["robot"] = options["robot_named"] = options["robot"] or log_map.robot
     for name, frame in (("base", log_map.base), ("tool", log_map.tool)):
         if options[name] is None and frame:
             options[name] = from_offset(frame)
