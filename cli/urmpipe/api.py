@@ -190,9 +190,8 @@ def compare(
 
     first, others = run_of(reference), [run_of(log) for log in logs]
     result = compare_runs(first, others, options) if others else compare_recorded(first, options)
-    _refuse_warnings(
-        strict, (*first.warnings, *(w for run in others for w in run.warnings), *result.warnings)
-    )
+    judged = others or [first]  # the reference's own stand among those of the comparison
+    _refuse_warnings(strict, (*(w for run in judged for w in run.warnings), *result.warnings))
     if output is None:
         return result
     inputs = [Path(operand) for operand in (reference, *logs) if not isinstance(operand, Run)]
@@ -349,13 +348,16 @@ def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None
 
     Args:
         values: Options by name, others among them.
-        otherwise: What holds where nothing is given, such as that of a map. Units of single columns add up;
-            joints given anew leave behind what belonged to the others: names, signs and offsets.
+        otherwise: What holds where nothing is given, such as that of a map. Units of single columns and
+            intervals of single joints add up; joints given anew leave behind what belonged to the others:
+            names, signs, offsets and intervals.
     """
     base = otherwise or ReadOptions()
     known = {field.name for field in fields(ReadOptions)}
     given = {name: value for name, value in values.items() if name in known and value is not None}
     given["units"] = {**base.units, **given.get("units", {})}
     if "joints" in given:
-        given = {"names": (), "signs": (), "offsets": (), **given}
+        given = {"names": (), "signs": (), "offsets": (), "interval": {}, **given}
+    elif "" not in given.get("interval", {"": None}):
+        given["interval"] = {**base.interval, **given["interval"]}
     return replace(base, **given)

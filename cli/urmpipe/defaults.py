@@ -20,6 +20,9 @@ import click
 
 NAME = "urmpipe.toml"
 
+EACH_TIME = ("--output", "--audit", "--write-map", "--explain", "--json")
+"""Options of what one call is to give: no file says them for all."""
+
 FILES = ("robot", "map")
 """Options whose value may be a file."""
 
@@ -72,7 +75,7 @@ def _options(command: click.Command) -> dict[str, click.Option]:
     for param in command.params:
         if isinstance(param, click.Option) and param.expose_value:
             for name in (*param.opts, *param.secondary_opts):
-                if name.startswith("--") and name not in ("--output", "--explain", "--write-map"):
+                if name.startswith("--") and name not in EACH_TIME:
                     found[name.removeprefix("--")] = param
     return found
 

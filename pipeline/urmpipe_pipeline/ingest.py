@@ -26,6 +26,9 @@ from urmpipe_pipeline.sources import ReadOptions, read_log
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
 
+LONGEST_TSP = 1e9
+"""Periods in [s] from this one on are no times that integers of 64 bits hold in [ns]."""
+
 EULER_SINGULAR = "euler-singular"
 """The kind of the only warning that rests on the robot."""
 
@@ -60,8 +63,8 @@ def ingest_log(
         OptionError: If an option's value makes no sense.
     """
     options = read or ReadOptions()
-    if tsp is not None and not (np.isfinite(tsp) and tsp > 0):
-        raise OptionError(f"--tsp: found {tsp:g} s, allowed: a positive time")
+    if tsp is not None and not 0 < tsp < LONGEST_TSP:
+        raise OptionError(f"--tsp: found {tsp:g} s, allowed: a positive time below {LONGEST_TSP:g} s")
     if derivative is not None and derivative not in get_args(Method):
         raise OptionError(f"--derivative: found {derivative}, allowed: {', '.join(get_args(Method))}")
     log = read_log(files, options, robot)
@@ -73,12 +76,16 @@ def ingest_log(
         early(log)
     found = audit_log(log, robot, interval=options.interval, repaired=options.repair)
     log = replace(log, inferences=(*log.inferences, *found.inferences))
-    timed = options.period is not None or any(column.role == "time" for column in log.columns)
+    clocked = any(column.role == "time" for column in log.columns)
+    timed = options.period is not None or clocked
     doubts = implausible(log, found.q, robot, turning(log, robot), found.broken[:, 1:], timed=timed)
     grid = make_grid(log, tsp)
     q, left_open = grid.resample_joints(found.q, found.unresolved)
     warnings = [*log.warnings, *far_from_recorded(robot, log), *found.warnings, *doubts]
     warnings += [*grid.warnings, *left_open]
+    if clocked and options.period is not None:
+        said = "--period is not used, since the log has a clock; --time none leaves that out"
+        warnings.append(LogWarning("period-not-used", said))
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
     given = {

@@ -135,6 +135,8 @@ def said_intervals(
         interval = given.get(log.joints[j], given.get(""))
         if interval is not None:
             groups.setdefault((_shown(interval, column), True), []).append(j)
+            if periods[j] != _turns(periods[j]) * FULL_TURN:
+                warnings.append(_no_turns(column, interval, float(periods[j])))
         elif (fixed.joints == j).any():
             if np.isnan(least[j]):  # slower, but deaf to NaN
                 least[j], most[j] = np.nanmin(log.q[:, j]), np.nanmax(log.q[:, j])
@@ -164,11 +166,20 @@ def _column(log: JointLog, joint: int) -> LogColumn:
     return next(named, LogColumn(log.joints[joint], log.joints[joint], "joint", joint, "rad"))
 
 
+def _turns(width: float) -> int:
+    """Return the nearest number of turns."""
+    return round(width / FULL_TURN)
+
+
 def _whole_turns(width: float) -> float:
     """Return a width as exact whole turns where it is meant as such."""
-    turns = round(width / FULL_TURN)
-    whole = turns * FULL_TURN
-    return whole if turns and abs(width - whole) <= ROUNDED * whole else width
+    whole = _turns(width) * FULL_TURN
+    return whole if whole and abs(width - whole) <= ROUNDED * whole else width
+
+
+def _no_turns(column: LogColumn, interval: Interval, period: float) -> LogWarning:
+    said = f"{column.name}: the interval {_shown(interval, column)} is {period / FULL_TURN:.6g} turns wide"
+    return LogWarning("interval", f"{said}: angles wrap by whole turns; check the unit and --interval")
 
 
 def _outside(

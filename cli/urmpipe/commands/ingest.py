@@ -17,7 +17,9 @@ from urmpipe.process import tune_pyarrow
     "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: LOG.rrd here]."
 )
 @click.option(
-    "--explain", is_flag=True, help="Print each decision with its evidence and alternative; write no recording."
+    "--explain",
+    is_flag=True,
+    help="Print each decision with its evidence and alternative; write no recording.",
 )
 @click.option(
     "--write-map",
@@ -63,7 +65,9 @@ def ingest(
     from urmpipe.printing import print_json, print_recording, print_run, print_warnings, progress_bar
 
     if explain and output:
-        raise click.UsageError(f"-o: found {output} with --explain, which writes no recording, allowed: one of both")
+        raise click.UsageError(
+            f"-o: found {output} with --explain, which writes no recording, allowed: one of both"
+        )
     target = None if explain else output or Path(default_name(logs))
     map_input = options["log_map"]
     robot, read = take_log_options(options)

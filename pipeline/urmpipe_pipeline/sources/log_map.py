@@ -45,7 +45,6 @@ from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.rotation import PURE
 
-
 TURNING = ("rad", "deg")
 """Units of joints that turn: they alone have an interval."""
 
