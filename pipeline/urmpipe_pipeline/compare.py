@@ -91,12 +91,22 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         _deviation(name, run, wanted, trajectory(run, chosen.tcp), chosen)
         for name, run in zip(_unique([run.name for run in runs]), runs, strict=True)
     ]
-    return _comparison(wanted, deviations, chosen, _told_of(reference))
+    told = [*_told_of(reference), *_differing_robots([reference, *runs], chosen.tcp)]
+    return _comparison(wanted, deviations, chosen, told)
 
 
 def _told_of(reference: Run) -> list[LogWarning]:
     """Return the warnings of a reference, which a comparison holds as a trajectory alone."""
     return [replace(one, message=f"{reference.name}: {one.message}") for one in reference.warnings]
+
+
+def _differing_robots(runs: Sequence[Run], tcp: Tcp) -> list[LogWarning]:
+    """Return a warning if the runs were held against each other by the kinematics of different arms."""
+    arms = {run.name: run.robot.name for run in runs if tcp == "fk" and run.log.joints and run.robot}
+    if len(set(arms.values())) < 2:
+        return []
+    said = ", ".join(f"{name} as {arm}" for name, arm in arms.items())
+    return [LogWarning("robots-differ", f"the kinematics are those of different robots: {said}")]
 
 
 def compare_recorded(run: Run, options: CompareOptions | None = None) -> Comparison:

@@ -14,6 +14,7 @@ import numpy as np
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, JointLog, LogColumn, LogWarning
+from urmpipe_pipeline.joint_motion import over_rows
 
 Interval = tuple[float, float]
 
@@ -129,7 +130,7 @@ def said_intervals(
     ends: dict[int, Interval] = {}
     least = most = np.empty(0)
     if len(fixed.rows):
-        least, most = log.q.min(axis=0), log.q.max(axis=0)
+        least, most = over_rows(np.minimum, log.q), over_rows(np.maximum, log.q)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
         column = _column(log, j)
         interval = given.get(log.joints[j], given.get(""))

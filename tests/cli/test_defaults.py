@@ -194,6 +194,6 @@ def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Ca
     )
     mixed = ["compare", "log.rrd", "log.csv", "--robot", "ur5e", "--unit", "deg", "--joints", "a,b,c,d,e,f"]
     assert run(mixed) == 0
-    assert "note: --unit, --joints of the logs alone: log.rrd as ingested\n" in capsys.readouterr().err
+    assert "note: --joints, --unit of the logs alone: log.rrd as ingested\n" in capsys.readouterr().err
     (lab / "urmpipe.toml").write_text("unit = 'deg'\n")
     assert run(["compare", "log.rrd", "log.rrd", "-q"]) == 0

@@ -198,3 +198,13 @@ def test_a_log_alone_is_compared_as_it_was_repaired() -> None:
     # A straight line between samples 5 ms apart misses a sine of 1 rad/s2 by 1e-5 rad at the most.
     assert compare_recorded(run).runs[0].delta.max() < 1e-5
     assert compare_recorded(replace(run, audit=())).runs[0].delta.max() > 0.1
+
+
+def test_kinematics_of_different_robots_are_told(q: FloatArray) -> None:
+    other = replace(URM6, name="urm6b")
+    result = compare_runs(arm_run(q, name="a"), [arm_run(q, name="b", robot=other)])
+    assert result.warnings == (
+        LogWarning("robots-differ", "the kinematics are those of different robots: a as urm6, b as urm6b"),
+    )
+    path = path_run(positions_over_log(URM6, q))
+    assert not compare_runs(path, [arm_run(q)]).warnings
