@@ -103,14 +103,8 @@ def ingest(
     Raises:
         UrmpipeError: With everything that is wrong with the input or the output.
     """
-    given = [Path(log)] if isinstance(log, (str, Path)) else [Path(one) for one in log]
-    recordings = [str(path) for path in given if path.is_file() and is_recording(path)]
-    if recordings:
-        raise LogError(*(Finding("found a recording, allowed: a log (CSV)", file) for file in recordings))
-    files = [file for path in given for file in log_files(path)]
+    files, name = _files_and_name(log)
     arm = place_robot(robot, base, tool)
-    name = given[0].resolve().name if given[0].is_dir() else None
-
     named: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": log_map}
     targets = {kind: Path(path) for kind, path in named.items() if path is not None}
     _refuse_shared(targets)
@@ -246,6 +240,16 @@ def _write_map(run: Run, part: Path, path: Path, robot: str | None) -> None:
     text = map_of(run.log, robot, *(_offset(frame) for frame in frames), given=given)
     part.write_text(text, encoding="utf-8", newline="\n")
     read_map(part)
+
+
+def _files_and_name(log: PathLike | Sequence[PathLike]) -> tuple[list[Path], str | None]:
+    """Return the files of one log, and its name where that is a folder's."""
+    given = [Path(log)] if isinstance(log, (str, Path)) else [Path(one) for one in log]
+    recordings = [str(path) for path in given if path.is_file() and is_recording(path)]
+    if recordings:
+        raise LogError(*(Finding("found a recording, allowed: a log (CSV)", file) for file in recordings))
+    name = given[0].resolve().name if given[0].is_dir() else None
+    return [file for path in given for file in log_files(path)], name
 
 
 def _refuse_shared(targets: Mapping[OutputKind, Path]) -> None:

@@ -66,3 +66,17 @@ def test_nothing_is_said_without_motion_robot_or_recorded_tcp() -> None:
     assert far_from_recorded(UR5E, log(np.ascontiguousarray(still), np.full((60, 3), 0.5))) == []
     assert far_from_recorded(None, log(Q, np.full((60, 3), 0.5))) == []
     assert far_from_recorded(UR5E, JointLog("log", "table", (), np.arange(60), tuple("abcdef"), Q)) == []
+
+
+def test_a_recorded_rotation_vector_goes_on_past_pi() -> None:
+    recorded = np.array([[0.0, 0.0, 3.1], [np.nan] * 3, [0.0, 0.0, 3.2 - 2 * np.pi]])
+    nothing = np.empty((3, 0))
+    log = JointLog(
+        "log", "table", (), np.arange(3), (), nothing, tcp_rotation=recorded, rotation_form="vector"
+    )
+    found = log.tcp_rotation_continuous
+    assert found is not None
+    # 2 pi is taken away and added again: two roundings of 4e-16
+    np.testing.assert_allclose(found[[0, 2]], [[0.0, 0.0, 3.1], [0.0, 0.0, 3.2]], rtol=0, atol=1e-15)
+    assert np.isnan(found[1]).all()
+    assert bare.tcp_rotation_continuous is None
