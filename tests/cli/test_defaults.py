@@ -197,3 +197,15 @@ def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Ca
     assert "note: --joints, --unit of the logs alone: log.rrd as ingested\n" in capsys.readouterr().err
     (lab / "urmpipe.toml").write_text("unit = 'deg'\n")
     assert run(["compare", "log.rrd", "log.rrd", "-q"]) == 0
+
+
+def test_tables_and_truths_are_no_values(lab: Path, capsys: Captured) -> None:
+    (lab / "urmpipe.toml").write_text("[robot]\n")
+    assert run([*INGEST, "-q"]) == 0
+    assert capsys.readouterr().err == ""
+    (lab / "urmpipe.toml").write_text("unit = {a = 'deg'}\n")
+    assert run([*INGEST]) == 2
+    assert "key unit: found a table, allowed: a value" in capsys.readouterr().err
+    (lab / "urmpipe.toml").write_text("robot = true\n")
+    assert run([*INGEST]) == 2
+    assert "error: unknown robot 'True'; allowed: " in capsys.readouterr().err

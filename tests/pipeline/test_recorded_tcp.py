@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -71,10 +72,8 @@ def test_nothing_is_said_without_motion_robot_or_recorded_tcp() -> None:
 def test_a_recorded_rotation_vector_goes_on_past_pi() -> None:
     recorded = np.array([[0.0, 0.0, 3.1], [np.nan] * 3, [0.0, 0.0, 3.2 - 2 * np.pi]])
     nothing = np.empty((3, 0))
-    log = JointLog(
-        "log", "table", (), np.arange(3), (), nothing, tcp_rotation=recorded, rotation_form="vector"
-    )
-    found = log.tcp_rotation_continuous
+    bare = JointLog("log", "table", (), np.arange(3), (), nothing)
+    found = replace(bare, tcp_rotation=recorded, rotation_form="vector").tcp_rotation_continuous
     assert found is not None
     # 2 pi is taken away and added again: two roundings of 4e-16
     np.testing.assert_allclose(found[[0, 2]], [[0.0, 0.0, 3.1], [0.0, 0.0, 3.2]], rtol=0, atol=1e-15)
