@@ -102,10 +102,10 @@ def _told_of(reference: Run) -> list[LogWarning]:
 
 def _differing_robots(runs: Sequence[Run], tcp: Tcp) -> list[LogWarning]:
     """Return a warning if the runs were held against each other by the kinematics of different arms."""
-    arms = {run.name: run.robot.name for run in runs if tcp == "fk" and run.log.joints and run.robot}
-    if len(set(arms.values())) < 2:
+    arms = [(run.name, run.robot.name) for run in runs if tcp == "fk" and run.log.joints and run.robot]
+    if len({arm for _, arm in arms}) < 2:
         return []
-    said = ", ".join(f"{name} as {arm}" for name, arm in arms.items())
+    said = ", ".join(f"{name} as {arm}" for name, arm in arms)
     return [LogWarning("robots-differ", f"the kinematics are those of different robots: {said}")]
 
 

@@ -206,5 +206,6 @@ def test_kinematics_of_different_robots_are_told(q: FloatArray) -> None:
     assert result.warnings == (
         LogWarning("robots-differ", "the kinematics are those of different robots: a as urm6, b as urm6b"),
     )
+    assert compare_runs(arm_run(q), [arm_run(q, robot=other)]).warnings  # logs of one name are two logs
     path = path_run(positions_over_log(URM6, q))
     assert not compare_runs(path, [arm_run(q)]).warnings
