@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +19,8 @@ from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.operands import load_run, log_files
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import OutputKind, guarded_output
+from urmpipe_pipeline.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.recording import is_recording, read_recording, record
 from urmpipe_pipeline.results import Comparison, Run
 from urmpipe_pipeline.sources import ReadOptions, map_of, read_map
@@ -73,9 +75,12 @@ def ingest(
     strict: bool = False,
     output: PathLike | None = None,
     audit: PathLike | None = None,
+    log_map: PathLike | None = None,
+    map_robot: str | None = None,
+    inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Turn one log into a run, and write its recording if an output is named.
+    """Turn one log into a run, and write its recording, audit and map if they are named: all or none.
 
     Args:
         log: The log's file; several files, or a folder of them, if its source writes one a plot.
@@ -88,6 +93,9 @@ def ingest(
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write.
         audit: A CSV file to write the repolarizer's audit to.
+        log_map: A TOML file to write the map to, by which further logs read as this one was read.
+        map_robot: Name or file of the arm in that map; default: its name, if it is one of the catalogue.
+        inputs: Files besides the log that are never replaced, such as the map it was read by.
         progress: Told the share of the recording that is written, 0..1.
 
     Returns:
@@ -96,27 +104,31 @@ def ingest(
     Raises:
         UrmpipeError: With everything that is wrong with the input or the output.
     """
-    given = [Path(log)] if isinstance(log, (str, Path)) else [Path(one) for one in log]
-    recordings = [str(path) for path in given if path.is_file() and is_recording(path)]
-    if recordings:
-        raise LogError(*(Finding("found a recording, allowed: a log (CSV)", file) for file in recordings))
-    files = [file for path in given for file in log_files(path)]
+    files, name = _files_and_name(log)
     arm = place_robot(robot, base, tool)
-    name = given[0].resolve().name if given[0].is_dir() else None
+    named: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": log_map}
+    targets = {kind: Path(path) for kind, path in named.items() if path is not None}
+    _refuse_shared(targets)
+    kept = [*files, *map(Path, inputs)]
+    with ExitStack() as stack:
+        parts = {
+            kind: stack.enter_context(guarded_output(path, kept, kind))
+            for kind, path in targets.items()
+            if kind != "recording"
+        }
 
-    def make(early: Callable[[JointLog | Run], None] | None) -> Run:
-        run = ingest_log(files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name, early=early)
-        _refuse_warnings(strict, run.warnings)
-        return run
+        def make(early: Callable[[JointLog | Run], None] | None) -> Run:
+            run = ingest_log(
+                files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name, early=early
+            )
+            _refuse_warnings(strict, run.warnings)
+            if "audit" in parts:
+                write_audit(run, parts["audit"], targets["audit"])
+            if "map" in parts:
+                _write_map(run, parts["map"], targets["map"], map_robot)
+            return run
 
-    if audit is None:
-        return make(None) if output is None else record(make, Path(output), files, progress)
-    if output is not None and Path(audit).resolve() == Path(output).resolve():
-        raise OptionError(f"found {audit} as recording and as audit; allowed: a name for each")
-    with guarded_output(Path(audit), files, "audit") as part:
-        run = make(None) if output is None else record(make, Path(output), files, progress)
-        write_audit(run, part, Path(audit))
-    return run
+        return make(None) if output is None else record(make, Path(output), kept, progress)
 
 
 def compare(
@@ -173,9 +185,9 @@ def compare(
 
     first, others = run_of(reference), [run_of(log) for log in logs]
     result = compare_runs(first, others, options) if others else compare_recorded(first, options)
-    _refuse_warnings(
-        strict, (*first.warnings, *(w for run in others for w in run.warnings), *result.warnings)
-    )
+    judged = others or [first]  # the reference's own stand among those of the comparison
+    doubts = [w for w in result.warnings if w.kind != LACKING_TOOL]  # that one explains a verdict of fail
+    _refuse_warnings(strict, (*(w for run in judged for w in run.warnings), *doubts))
     if output is None:
         return result
     inputs = [Path(operand) for operand in (reference, *logs) if not isinstance(operand, Run)]
@@ -213,17 +225,42 @@ def write_map(run: Run, output: PathLike, inputs: Sequence[PathLike] = (), robot
         UrmpipeError: If it may not be written there.
     """
     path = Path(output)
+    with guarded_output(path, [Path(one) for one in inputs], "map") as part:
+        _write_map(run, part, path, robot)
+    return path
+
+
+def _write_map(run: Run, part: Path, path: Path, robot: str | None) -> None:
+    """Write the map of a run to a part that is to have a name, and read it back."""
     arm = run.robot
     if robot is None:
         robot = arm.name if arm and arm.name in robot_names() else None
     elif Path(robot).suffix:
         robot = os.path.relpath(robot, path.parent)
     frames = (arm.base, arm.tool) if arm else ()
-    text = map_of(run.log, robot, *(_offset(frame) for frame in frames))
-    with guarded_output(path, [Path(one) for one in inputs], "map") as part:
-        part.write_text(text, encoding="utf-8", newline="\n")
-        read_map(part)
-    return path
+    given = run.provenance.options.get("read") or {}
+    text = map_of(run.log, robot, *(_offset(frame) for frame in frames), given=given)
+    part.write_text(text, encoding="utf-8", newline="\n")
+    read_map(part)
+
+
+def _files_and_name(log: PathLike | Sequence[PathLike]) -> tuple[list[Path], str | None]:
+    """Return the files of one log, and its name where that is a folder's."""
+    given = [Path(log)] if isinstance(log, (str, Path)) else [Path(one) for one in log]
+    recordings = [str(path) for path in given if path.is_file() and is_recording(path)]
+    if recordings:
+        raise LogError(*(Finding("found a recording, allowed: a log (CSV)", file) for file in recordings))
+    name = given[0].resolve().name if given[0].is_dir() else None
+    return [file for path in given for file in log_files(path)], name
+
+
+def _refuse_shared(targets: Mapping[OutputKind, Path]) -> None:
+    """Raise an `OptionError` if two outputs have one name."""
+    places: dict[Path, OutputKind] = {}
+    for kind, path in targets.items():
+        other = places.setdefault(path.resolve(), kind)
+        if other != kind:
+            raise OptionError(f"found {path} as {other} and as {kind}; allowed: a name for each")
 
 
 def _offset(frame: Transform) -> tuple[float, ...]:
@@ -317,13 +354,16 @@ def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None
 
     Args:
         values: Options by name, others among them.
-        otherwise: What holds where nothing is given, such as that of a map. Units of single columns add up;
-            joints given anew leave behind what belonged to the others: names, signs and offsets.
+        otherwise: What holds where nothing is given, such as that of a map. Units of single columns and
+            intervals of single joints add up; joints given anew leave behind what belonged to the others:
+            names, signs, offsets and intervals.
     """
     base = otherwise or ReadOptions()
     known = {field.name for field in fields(ReadOptions)}
     given = {name: value for name, value in values.items() if name in known and value is not None}
     given["units"] = {**base.units, **given.get("units", {})}
     if "joints" in given:
-        given = {"names": (), "signs": (), "offsets": (), **given}
+        given = {"names": (), "signs": (), "offsets": (), "interval": {}, **given}
+    elif "" not in given.get("interval", {"": None}):
+        given["interval"] = {**base.interval, **given["interval"]}
     return replace(base, **given)

@@ -20,6 +20,9 @@ import click
 
 NAME = "urmpipe.toml"
 
+EACH_TIME = ("--output", "--audit", "--write-map", "--explain", "--json")
+"""Options of what one call is to give: no file says them for all."""
+
 FILES = ("robot", "map")
 """Options whose value may be a file."""
 
@@ -51,8 +54,11 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
     faults = []
     for key, value in data.items():
         own = _options(commands[key]) if key in commands and isinstance(value, Mapping) else None
-        places = [("", key, every)] if own is None else [(f"{key}.", inner, sorted(own)) for inner in value]
-        for place, name, allowed in places:
+        values = {key: value} if own is None else value
+        place, allowed = ("", every) if own is None else (f"{key}.", sorted(own))
+        for name, inner in values.items():
+            if isinstance(inner, Mapping) and name in allowed:
+                faults.append(Finding(f"key {place}{name}: found a table, allowed: a value", str(path)))
             if name not in allowed:
                 near = get_close_matches(name, allowed, 1)
                 hint = f" (did you mean {near[0]}?)" if near else ""
@@ -61,7 +67,7 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
     if faults:
         raise OptionError(*faults)
     own = _options(command)
-    given = {key: value for key, value in data.items() if key in own}
+    given = {key: value for key, value in data.items() if key in own and not isinstance(value, Mapping)}
     given |= data.get(command.name or "", {})
     return {own[key].name or key: _text(key, value, own[key], path.parent) for key, value in given.items()}
 
@@ -72,7 +78,7 @@ def _options(command: click.Command) -> dict[str, click.Option]:
     for param in command.params:
         if isinstance(param, click.Option) and param.expose_value:
             for name in (*param.opts, *param.secondary_opts):
-                if name.startswith("--") and name not in ("--output", "--explain", "--write-map"):
+                if name.startswith("--") and name not in EACH_TIME:
                     found[name.removeprefix("--")] = param
     return found
 
@@ -85,4 +91,4 @@ def _text(key: str, value: Any, option: click.Option, folder: Path) -> Any:
         return [str(one) for one in value] if isinstance(value, list) else [str(value)]
     if isinstance(value, list):
         return ",".join(map(str, value))
-    return value if isinstance(value, bool) else str(value)
+    return value if option.is_flag else str(value)

@@ -50,7 +50,7 @@ class LazyGroup(click.Group):
         command = self._load(cmd_name)
         path = None if isinstance(command, click.Group) else find_defaults()
         if path is not None:
-            ctx.default_map = {cmd_name: self._defaults(command, path)}
+            ctx.default_map = {cmd_name: self._defaults(ctx, command, path)}
         return command
 
     def _load(self, name: str) -> click.Command:
@@ -60,13 +60,13 @@ class LazyGroup(click.Group):
             raise TypeError(f"urmpipe.commands.{name} defines no command of its name")
         return command
 
-    def _defaults(self, command: click.Command, path: Path) -> dict[str, Any]:
-        """Return what urmpipe.toml says for a command, and tell the user that it does."""
+    def _defaults(self, ctx: click.Context, command: click.Command, path: Path) -> dict[str, Any]:
+        """Return what urmpipe.toml says for a command, and leave what -q does not suppress in the context."""
         values = defaults_for(command, path, {name: self._load(name) for name in COMMANDS})
         if values:
             options = {param.name: max(param.opts, key=len).lstrip("-") for param in command.params}
             shown = ", ".join(f"{options[name]}={_shown(value)}" for name, value in values.items())
-            click.echo(f"defaults of {path}: {shown}", err=True)
+            ctx.obj = f"defaults of {path}: {shown}"
         return values
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:

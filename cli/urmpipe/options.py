@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
+from click.core import ParameterSource
 from click.shell_completion import CompletionItem
 
 from urmpipe import __version__
@@ -142,6 +143,12 @@ def take_robot(options: dict[str, Any]) -> Chain | None:
     return place_robot(robot, base, tool, base_link=base_link, tip_link=tip)
 
 
+READING = (
+    "source", "log_map", "rotation", "delimiter", "decimal", "time", "joints", "units", "period", "interval",
+    "repair", "tsp", "derivative", "skip_bad",
+)  # fmt: skip
+"""Parameters of `log_options` that say how a log becomes a run: a recording is one already."""
+
 FORMS = ["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", "matrix"]
 """Forms of a recorded orientation (a test holds them against those of the models)."""
 
@@ -149,7 +156,8 @@ FORMS = ["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", 
 def take_log_options(options: dict[str, Any]) -> tuple[Chain | None, ReadOptions]:
     """Take robot, map and reading options out of some others; return the arm and how to read a log.
 
-    What is given on the command line comes before what the map says.
+    What is given on the command line comes before what the map says. The arm's name or file stays among the
+    options as `robot_named`.
 
     Raises:
         UrmpipeError: With everything that is wrong with the robot or the map.
@@ -160,7 +168,7 @@ def take_log_options(options: dict[str, Any]) -> tuple[Chain | None, ReadOptions
 
     path = options.pop("log_map")
     log_map = read_map(path) if path else LogMap()
-    options["robot"] = options["robot"] or log_map.robot
+    options["robot"] = options["robot_named"] = options["robot"] or log_map.robot
     for name, frame in (("base", log_map.base), ("tool", log_map.tool)):
         if options[name] is None and frame:
             options[name] = from_offset(frame)
@@ -218,12 +226,53 @@ def log_options(command: Command) -> Command:
     return robot_options(command)
 
 
+def _tell_defaults(ctx: click.Context, param: click.Parameter, quiet: bool) -> bool:
+    """Tell what urmpipe.toml says for the command, before anything in it can be found to be wrong."""
+    if ctx.obj and not quiet:
+        click.echo(ctx.obj, err=True)
+    return quiet
+
+
+def about_recordings(ctx: click.Context, operands: Sequence[Path]) -> str | None:
+    """Return what is to be said of options that say how a log is read, and of recordings among the operands.
+
+    Args:
+        ctx: The command's context, which knows what was given on the command line.
+        operands: Recordings, logs and folders of them.
+
+    Raises:
+        UsageError: If no operand is a log.
+    """
+    from urmpipe_pipeline.recording import is_recording
+
+    given = [
+        max(param.opts, key=len)
+        for param in ctx.command.params
+        if param.name in READING and ctx.get_parameter_source(param.name) == ParameterSource.COMMANDLINE
+    ]
+    recordings = [str(path) for path in operands if path.is_file() and is_recording(path)]
+    if not given or not recordings:
+        return None
+    options, files = ", ".join(given), ", ".join(recordings)
+    if len(recordings) == len(operands):
+        allowed = "with a log among them; a recording stands as it was ingested"
+        raise click.UsageError(f"{options}: found with recordings alone ({files}), allowed: {allowed}")
+    return f"{options} of the logs alone: {files} as ingested"
+
+
 def output_options(command: Command) -> Command:
     """Add --json, -q, --debug and --version."""
     for option in (
         click.version_option(__version__, prog_name="urmpipe"),
         click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error."),
-        click.option("-q", "--quiet", is_flag=True, help="Print nothing but errors."),
+        click.option(
+            "-q",
+            "--quiet",
+            is_flag=True,
+            is_eager=True,
+            callback=_tell_defaults,
+            help="Print nothing but errors.",
+        ),
         click.option("--json", "as_json", is_flag=True, help="Print one JSON object on standard output."),
     ):
         command = option(command)

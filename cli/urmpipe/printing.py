@@ -123,8 +123,9 @@ def print_comparison(result: Comparison) -> None:
     for run in result.runs:
         worst = run.worst
         left_out = f", {run.left_out} left out" if run.left_out else ""
+        arm = f", robot {run.run.robot.name}" if run.run.robot else ""
         said = (
-            f" {run.name}: {len(run.sample)} samples compared{left_out}, {run.share_out:.2%} out of"
+            f" {run.name}{arm}: {len(run.sample)} samples compared{left_out}, {run.share_out:.2%} out of"
             f" tolerance, worst |Δ| {run.delta[worst, 3] * 1e3:.4f} mm at t = {run.t[worst]:.4g} s,"
             f" {run.start[3] * 1e3:.4f} mm at the start"
         )

@@ -1,10 +1,10 @@
 """Continuity of recorded orientations: the same rotation has many names, and a record jumps between them.
 
-A quaternion q and -q are one rotation, so are a rotation vector v and v (1 + 2 pi k / |v|), and Z-Y-X angles
-(rz, ry, rx), (rz + pi, pi - ry, rx + pi) and any turns more. Each function goes on with the name nearest to
-the one before, so that values can be interpolated and differentiated. The first sample keeps its own; a
-missing one (NaN) is passed over. What they need is that less than a quarter turn of the axis and half a turn
-of the angle lie between two samples.
+A quaternion q and -q are one rotation, so are a rotation vector v and v (1 + 2 pi k / |v|), and Euler angles
+(a, b, c), (a + pi, pi - b, c + pi) - of one axis twice (a + pi, -b, c + pi) - and any turns more. Each
+function goes on with the name nearest to the one before, so that values can be interpolated and
+differentiated. The first sample keeps its own; a missing one (NaN) is passed over. What they need is that
+less than a quarter turn of the axis and half a turn of the angle lie between two samples.
 """
 
 from __future__ import annotations
@@ -14,6 +14,7 @@ from collections.abc import Callable
 import numpy as np
 
 from urmpipe_models.kinematics import FloatArray
+from urmpipe_models.orientation import RotationForm
 from urmpipe_models.repolarizer import FULL_TURN
 
 
@@ -38,13 +39,31 @@ def continuous_vectors(vectors: FloatArray) -> FloatArray:
     return _of_present(vectors, _vectors)
 
 
-def continuous_euler_zyx(angles: FloatArray) -> FloatArray:
-    """Return Z-Y-X angles of the family, and with the turns, that are nearest to those before.
+def continuous_euler(angles: FloatArray, *, proper: bool = False) -> FloatArray:
+    """Return Euler angles of the family, and with the turns, that are nearest to those before.
 
     Args:
-        angles: rz, ry, rx of Rz(rz) Ry(ry) Rx(rx) in [rad], shape (n, 3); NaN where a sample is missing.
+        angles: Three angles about axes in turn in [rad], shape (n, 3); NaN where a sample is missing.
+        proper: Whether the first and the last axis are the same, as in Z-Y-Z; else all three differ.
     """
-    return _of_present(angles, _euler_zyx)
+    middle = 0.0 if proper else np.pi
+    return _of_present(angles, lambda present: _euler(present, np.array([np.pi, middle, np.pi])))
+
+
+def continuous_rotations(rotation: FloatArray, form: RotationForm) -> FloatArray:
+    """Return recorded orientations in their own form, without jumps between the names of one rotation.
+
+    Args:
+        rotation: As recorded, in [rad] or [-], shape (n, width); NaN where a sample is missing.
+        form: What its columns are. A matrix is the only name of its rotation and stays.
+    """
+    if form == "matrix":
+        return rotation
+    if form in ("quat_xyzw", "quat_wxyz"):
+        return continuous_quaternions(rotation)
+    if form == "vector":
+        return continuous_vectors(rotation)
+    return continuous_euler(rotation, proper=form in ("zyz", "zxz"))
 
 
 def _of_present(values: FloatArray, work: Callable[[FloatArray], FloatArray]) -> FloatArray:
@@ -82,8 +101,8 @@ def _vectors(v: FloatArray) -> FloatArray:
     return np.where(turns[:, np.newaxis] == 0.0, v, v + more)
 
 
-def _euler_zyx(angles: FloatArray) -> FloatArray:
-    other = angles * np.array([1.0, -1.0, 1.0]) + np.pi
+def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
+    other = angles * np.array([1.0, -1.0, 1.0]) + apart
     own, across = (_distance(one[1:], angles[:-1]) for one in (angles, other))
     switches = np.append(False, across < own)[: len(angles)]
     swapped = np.cumsum(switches) % 2 == 1

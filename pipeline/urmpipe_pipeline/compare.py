@@ -11,6 +11,7 @@ import numpy as np
 from urmpipe_models.delta import Delta, delta, outside
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.kinematics import positions_over_log
+from urmpipe_pipeline.audit import audit_log
 from urmpipe_pipeline.grid import interpolate
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning, seconds
 from urmpipe_pipeline.provenance import provenance
@@ -19,6 +20,9 @@ from urmpipe_pipeline.results import Comparison, Deviation, Run, Trajectory
 from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE, describe, overall
 
 Tcp = Literal["fk", "recorded"]
+
+LONGEST_OFFSET = 1e9
+"""Offset in [s] that integers of 64 bits in [ns] hold beside any time of a log: 30 years."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,8 +45,10 @@ class CompareOptions:
             raise OptionError(f"--tolerance: found {self.tolerance}, allowed: a positive length in m")
         if self.tcp not in get_args(Tcp):
             raise OptionError(f"--tcp: found {self.tcp}, allowed: {', '.join(get_args(Tcp))}")
-        if not np.isfinite(self.sync_offset):
-            raise OptionError(f"--sync: found {self.sync_offset}, allowed: start, or a time in s")
+        if not abs(self.sync_offset) < LONGEST_OFFSET:
+            raise OptionError(
+                f"--sync: found {self.sync_offset}, allowed: start, or a time in s below {LONGEST_OFFSET:g}"
+            )
 
 
 def trajectory(run: Run, tcp: Tcp = "fk") -> Trajectory:
@@ -86,13 +92,29 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         _deviation(name, run, wanted, trajectory(run, chosen.tcp), chosen)
         for name, run in zip(_unique([run.name for run in runs]), runs, strict=True)
     ]
-    return _comparison(wanted, deviations, chosen)
+    told = [*_told_of(reference), *_differing_robots([reference, *runs], chosen.tcp)]
+    return _comparison(wanted, deviations, chosen, told)
+
+
+def _told_of(reference: Run) -> list[LogWarning]:
+    """Return the warnings of a reference, which a comparison holds as a trajectory alone."""
+    return [replace(one, message=f"{reference.name}: {one.message}") for one in reference.warnings]
+
+
+def _differing_robots(runs: Sequence[Run], tcp: Tcp) -> list[LogWarning]:
+    """Return a warning if the runs were held against each other by the kinematics of different arms."""
+    arms = [(run.name, run.robot.name) for run in runs if tcp == "fk" and run.log.joints and run.robot]
+    if len({arm for _, arm in arms}) < 2:
+        return []
+    said = ", ".join(f"{name} as {arm}" for name, arm in arms)
+    return [LogWarning("robots-differ", f"the kinematics are those of different robots: {said}")]
 
 
 def compare_recorded(run: Run, options: CompareOptions | None = None) -> Comparison:
     """Hold the forward kinematics of a log against the tool centre point that the same log recorded.
 
     Both stand in the same rows of one file: nothing is resampled; samples are rows, from 0.
+    Where samples left on a wrap were repaired, the repaired ones count.
 
     Raises:
         LogError: If the log has no joints, no robot, or recorded no position.
@@ -108,24 +130,39 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
             _lacking(run, "one log, which recorded no tool centre point; allowed: a reference before the log")
         )
     recorded = Trajectory(f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files)
-    computed = Trajectory(run.name, log.t_ns, positions_over_log(run.robot, log.q), log.files)
+    computed = Trajectory(run.name, log.t_ns, positions_over_log(run.robot, _on_rows(run)), log.files)
     deviation = _deviation(run.name, run, recorded, computed, replace(chosen, sync_offset=0.0))
     found = _comparison(recorded, [deviation], chosen)
     doubts = lacking_tool(run.robot, log) if deviation.verdict == "fail" else []
     return replace(found, warnings=(*found.warnings, *doubts))
 
 
+def _on_rows(run: Run) -> FloatArray:
+    """Return the joints on the file's own rows: as they stand there, or repaired as the run was."""
+    if not any(entry.kind == "repaired" for entry in run.audit):
+        return run.log.q
+    read = run.provenance.options.get("read") or {}
+    intervals = {name: (low, high) for name, (low, high) in read.get("interval", {}).items()}
+    return audit_log(run.log, run.robot, interval=intervals, repaired=True).q
+
+
 def _comparison(
-    reference: Trajectory, deviations: Sequence[Deviation], options: CompareOptions
+    reference: Trajectory,
+    deviations: Sequence[Deviation],
+    options: CompareOptions,
+    told: Sequence[LogWarning] = (),
 ) -> Comparison:
     warnings = [
-        LogWarning(
-            "left-out",
-            f"{one.name}: {one.left_out} of {one.left_out + len(one.sample)} samples have no reference"
-            " or no value",
-        )
-        for one in deviations
-        if one.left_out
+        *told,
+        *(
+            LogWarning(
+                "left-out",
+                f"{one.name}: {one.left_out} of {one.left_out + len(one.sample)} samples have no reference"
+                " or no value",
+            )
+            for one in deviations
+            if one.left_out
+        ),
     ]
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
     given = {"tolerance": options.tolerance, "tcp": options.tcp, "sync_offset": options.sync_offset}

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning
 from urmpipe_pipeline.quantised import Regular, behind_rounded
 
@@ -22,6 +23,11 @@ GAP = 3.0
 
 ROUNDING_NS = 1000
 """Clocks are printed to the microsecond or finer: so much beyond the last known time is still at it."""
+
+
+MOST = 20_000_000
+"""Samples of a grid, where a log does not have as many rows: more come of a broken clock or a mistyped period
+and would fill the memory."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -146,6 +152,9 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
         log: The log, its times strictly increasing.
         tsp: The period wanted in [s]; None for the log's own, which is its rows where they are
             regular (as far as the resolution of their clock tells) and else its median period.
+
+    Raises:
+        LogError: If it would have more samples than fit in memory.
     """
     t = log.t_ns
     if len(t) < 2:
@@ -163,9 +172,21 @@ def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     if regular and abs(wanted - mean) <= REGULAR * mean / len(t):
         return Grid(t, mean / 1e9, True, t, ())
     count = int((t[-1] - t[0]) / wanted + 1e-6) + 1
+    _refuse_endless(log, wanted, count)
     grid = np.rint(np.arange(count) * wanted).astype(np.int64) + t[0]
     in_gap = inside_gaps(grid, t)
     return Grid(grid, wanted / 1e9, False, t, tuple(_changes(log, wanted, count, in_gap)))
+
+
+def _refuse_endless(log: JointLog, wanted: float, count: int) -> None:
+    """Raise a `LogError` if a grid has more samples than fit in memory."""
+    if count > max(MOST, log.rows):
+        steps = np.diff(log.t_ns)
+        row = int(np.argmax(steps)) + 2
+        found = f"found {count} samples every {wanted / 1e6:.6g} ms for {log.rows} rows"
+        gap = f"{float(steps.max()) / 1e9:.6g} s pass before row {row}"
+        message = f"{found}, {gap}, allowed: {MOST} samples; a clock without such a gap, or --tsp SECONDS"
+        raise LogError(Finding(message, log.files[0].name if log.files else log.name, row=row))
 
 
 def _rounded(clock: Regular) -> LogWarning:

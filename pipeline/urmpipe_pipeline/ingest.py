@@ -26,6 +26,13 @@ from urmpipe_pipeline.sources import ReadOptions, read_log
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
 
+LONGEST_TSP = 1e9
+"""Periods in [s] from this one on are no times that integers of 64 bits hold in [ns]."""
+
+UNUSED_PERIOD = LogWarning(
+    "period-not-used", "--period is not used, since the log has a clock; --time none leaves that out"
+)
+
 EULER_SINGULAR = "euler-singular"
 """The kind of the only warning that rests on the robot."""
 
@@ -60,10 +67,7 @@ def ingest_log(
         OptionError: If an option's value makes no sense.
     """
     options = read or ReadOptions()
-    if tsp is not None and not (np.isfinite(tsp) and tsp > 0):
-        raise OptionError(f"--tsp: found {tsp:g} s, allowed: a positive time")
-    if derivative is not None and derivative not in get_args(Method):
-        raise OptionError(f"--derivative: found {derivative}, allowed: {', '.join(get_args(Method))}")
+    _refuse_senseless(tsp, derivative)
     log = read_log(files, options, robot)
     inferred = infer_robot(log) if robot is None else None
     if inferred:
@@ -73,12 +77,13 @@ def ingest_log(
         early(log)
     found = audit_log(log, robot, interval=options.interval, repaired=options.repair)
     log = replace(log, inferences=(*log.inferences, *found.inferences))
-    timed = options.period is not None or any(column.role == "time" for column in log.columns)
+    clocked = any(column.role == "time" for column in log.columns)
+    timed = options.period is not None or clocked
     doubts = implausible(log, found.q, robot, turning(log, robot), found.broken[:, 1:], timed=timed)
     grid = make_grid(log, tsp)
     q, left_open = grid.resample_joints(found.q, found.unresolved)
     warnings = [*log.warnings, *far_from_recorded(robot, log), *found.warnings, *doubts]
-    warnings += [*grid.warnings, *left_open]
+    warnings += [*grid.warnings, *left_open, *([UNUSED_PERIOD] if clocked and options.period else [])]
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
     given = {
@@ -107,6 +112,14 @@ def ingest_log(
     # The joints are being written meanwhile: that takes a core of its own.
     tcp, noticed = kinematics(robot, q, qd, qdd, threads=1 if early else THREADS)
     return replace(run, tcp=tcp, warnings=(*warnings, *noticed))
+
+
+def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
+    """Raise an `OptionError` for a period or a method that makes no sense."""
+    if tsp is not None and not 0 < tsp < LONGEST_TSP:
+        raise OptionError(f"--tsp: found {tsp:g} s, allowed: a positive time below {LONGEST_TSP:g} s")
+    if derivative is not None and derivative not in get_args(Method):
+        raise OptionError(f"--derivative: found {derivative}, allowed: {', '.join(get_args(Method))}")
 
 
 def _given(options: ReadOptions) -> dict[str, Any] | None:

@@ -14,6 +14,7 @@ import numpy as np
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, JointLog, LogColumn, LogWarning
+from urmpipe_pipeline.joint_motion import over_rows
 
 Interval = tuple[float, float]
 
@@ -129,12 +130,14 @@ def said_intervals(
     ends: dict[int, Interval] = {}
     least = most = np.empty(0)
     if len(fixed.rows):
-        least, most = log.q.min(axis=0), log.q.max(axis=0)
+        least, most = over_rows(np.minimum, log.q), over_rows(np.maximum, log.q)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
         column = _column(log, j)
         interval = given.get(log.joints[j], given.get(""))
         if interval is not None:
             groups.setdefault((_shown(interval, column), True), []).append(j)
+            if periods[j] != _turns(periods[j]) * FULL_TURN:
+                warnings.append(_no_turns(column, interval, float(periods[j])))
         elif (fixed.joints == j).any():
             if np.isnan(least[j]):  # slower, but deaf to NaN
                 least[j], most[j] = np.nanmin(log.q[:, j]), np.nanmax(log.q[:, j])
@@ -164,11 +167,20 @@ def _column(log: JointLog, joint: int) -> LogColumn:
     return next(named, LogColumn(log.joints[joint], log.joints[joint], "joint", joint, "rad"))
 
 
+def _turns(width: float) -> int:
+    """Return the nearest number of turns."""
+    return round(width / FULL_TURN)
+
+
 def _whole_turns(width: float) -> float:
     """Return a width as exact whole turns where it is meant as such."""
-    turns = round(width / FULL_TURN)
-    whole = turns * FULL_TURN
-    return whole if turns and abs(width - whole) <= ROUNDED * whole else width
+    whole = _turns(width) * FULL_TURN
+    return whole if whole and abs(width - whole) <= ROUNDED * whole else width
+
+
+def _no_turns(column: LogColumn, interval: Interval, period: float) -> LogWarning:
+    said = f"{column.name}: the interval {_shown(interval, column)} is {period / FULL_TURN:.6g} turns wide"
+    return LogWarning("interval", f"{said}: angles wrap by whole turns; check the unit and --interval")
 
 
 def _outside(

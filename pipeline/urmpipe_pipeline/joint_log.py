@@ -8,7 +8,7 @@ from typing import Literal, TypeAlias, get_args
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.continuity import continuous_quaternions
+from urmpipe_models.continuity import continuous_quaternions, continuous_rotations
 from urmpipe_models.orientation import RotationForm, quaternions
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -167,6 +167,17 @@ class JointLog:
         if self.tcp_rotation is None or self.rotation_form is None:
             return None
         return continuous_quaternions(quaternions(self.tcp_rotation, self.rotation_form))
+
+    @property
+    def tcp_rotation_continuous(self) -> FloatArray | None:
+        """Recorded orientation in its own form [rad] or [-], shape (n, k); None without one.
+
+        Of the names of one rotation each is the nearest to the one before: rotation vectors go on past pi,
+        Euler angles past their limits. So they can be plotted, interpolated and differentiated.
+        """
+        if self.tcp_rotation is None or self.rotation_form is None:
+            return None
+        return continuous_rotations(self.tcp_rotation, self.rotation_form)
 
     @property
     def rows(self) -> int:

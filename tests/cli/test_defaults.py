@@ -128,3 +128,84 @@ def test_a_map_replaces_only_a_map(lab: Path, capsys: Captured) -> None:
     assert Path("notes.toml").read_text() == "mine = 1\n"
     for _ in range(2):
         assert run([*INGEST, "-q", "--write-map", "m.toml"]) == 0
+
+
+def test_a_quiet_command_tells_no_defaults(lab: Path, capsys: Captured) -> None:
+    (lab / "urmpipe.toml").write_text("period = 0.01\n")
+    assert run([*INGEST, "-q"]) == 0
+    assert capsys.readouterr().err == ""
+    (lab / "urmpipe.toml").write_text("quiet = true\n")
+    assert run([*INGEST]) == 0
+    assert capsys.readouterr() == ("", "")
+
+
+@pytest.mark.parametrize("name", ["json", "audit", "write-map", "output", "explain"])
+def test_what_one_call_is_to_give_is_no_default(lab: Path, capsys: Captured, name: str) -> None:
+    (lab / "urmpipe.toml").write_text(f"{name} = 'x'\n")
+    assert run([*INGEST]) == 2
+    assert f"key {name}: unknown" in capsys.readouterr().err
+
+
+def test_a_map_keeps_intervals_and_the_form_of_dates(lab: Path, capsys: Captured) -> None:
+    head, *rows = LOG.splitlines()
+    dated = [f"03.04.2021 10:00:00.{k:03d},{row.partition(',')[2]}" for k, row in enumerate(rows)]
+    Path("dates.csv").write_text("\n".join([head.replace("t [s]", "time"), *dated]) + "\n")
+    given = ["--unit", "time=dmy", "--unit", "deg", "--joints", "a,b,c,d,e,f", "--interval", "b=0:360"]
+    assert run(["ingest", "dates.csv", *given, "--write-map", "m.toml", "-q"]) == 0
+    assert run(["ingest", "dates.csv", "--map", "m.toml", "--json", "--interval", "c=-180:180"]) == 0
+    found = result(capsys)
+    assert found["clock_start"] == 1617444000.0
+    said = {one["what"]: one["value"] for one in found["inferences"]}  # type: ignore[attr-defined]
+    assert said["interval of b"] == "0..360 deg"
+    assert said["interval of c"] == "-180..180 deg"
+
+
+def test_all_outputs_are_written_or_none(lab: Path, capsys: Captured) -> None:
+    assert run([*INGEST, "--audit", "a.csv", "--write-map", "missing/m.toml", "--json"]) == 2
+    assert "found no folder missing" in capsys.readouterr().err
+    assert sorted(path.name for path in Path.cwd().iterdir()) == ["log.csv"]
+    assert run([*INGEST, "--audit", "a.csv", "--write-map", "./a.csv"]) == 2
+    assert capsys.readouterr().err == "error: found a.csv as audit and as map; allowed: a name for each\n"
+    assert run([*INGEST, "--explain", "-o", "a.rrd"]) == 2
+    assert "-o: found a.rrd with --explain" in capsys.readouterr().err
+    assert run([*INGEST, "--audit", "a.csv", "--write-map", "m.toml"]) == 0
+    assert "Audit: a.csv  (0 lines)" in capsys.readouterr().out
+    assert sorted(path.name for path in Path.cwd().iterdir()) == ["a.csv", "log.csv", "log.rrd", "m.toml"]
+
+
+def test_a_map_is_never_replaced_by_the_map_that_it_led_to(lab: Path, capsys: Captured) -> None:
+    assert run([*INGEST, "-q", "--write-map", "m.toml"]) == 0
+    assert run(["ingest", "log.csv", "-q", "--map", "m.toml", "--write-map", "m.toml"]) == 2
+    assert capsys.readouterr().err.startswith("error: m.toml: found an input of this command, allowed: ")
+
+
+def test_a_period_beside_a_clock_is_said_not_to_be_used(lab: Path, capsys: Captured) -> None:
+    assert run([*INGEST, "--period", "8ms", "--explain"]) == 0
+    assert "--period is not used, since the log has a clock; --time none" in capsys.readouterr().err
+
+
+def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Captured) -> None:
+    assert run([*INGEST, "-q", "--robot", "ur5e"]) == 0
+    both = ["compare", "log.rrd", "log.rrd", "--unit", "rad", "--repair"]
+    assert run(both) == 2
+    assert (
+        "--unit, --repair: found with recordings alone (log.rrd, log.rrd), allowed: "
+        in capsys.readouterr().err
+    )
+    mixed = ["compare", "log.rrd", "log.csv", "--robot", "ur5e", "--unit", "deg", "--joints", "a,b,c,d,e,f"]
+    assert run(mixed) == 0
+    assert "note: --joints, --unit of the logs alone: log.rrd as ingested\n" in capsys.readouterr().err
+    (lab / "urmpipe.toml").write_text("unit = 'deg'\n")
+    assert run(["compare", "log.rrd", "log.rrd", "-q"]) == 0
+
+
+def test_tables_and_truths_are_no_values(lab: Path, capsys: Captured) -> None:
+    (lab / "urmpipe.toml").write_text("[robot]\n")
+    assert run([*INGEST, "-q"]) == 0
+    assert capsys.readouterr().err == ""
+    (lab / "urmpipe.toml").write_text("unit = {a = 'deg'}\n")
+    assert run([*INGEST]) == 2
+    assert "key unit: found a table, allowed: a value" in capsys.readouterr().err
+    (lab / "urmpipe.toml").write_text("robot = true\n")
+    assert run([*INGEST]) == 2
+    assert "error: unknown robot 'True'; allowed: " in capsys.readouterr().err

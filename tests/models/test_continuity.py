@@ -7,9 +7,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.continuity import continuous_euler_zyx, continuous_quaternions, continuous_vectors
+from urmpipe_models.continuity import (
+    continuous_euler,
+    continuous_quaternions,
+    continuous_rotations,
+    continuous_vectors,
+)
 from urmpipe_models.kinematics import FloatArray
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.orientation import FORMS, RotationForm, quaternions
 from urmpipe_models.transform import from_rpy
 
 SIZE = 1e-13
@@ -73,10 +78,10 @@ def test_euler_angles_of_either_family_become_continuous(
     recorded = wrap(np.where(swapped, true * [1.0, -1.0, 1.0] + np.pi, true))
     recorded[0] = true[0]
     np.testing.assert_allclose(matrices(recorded), matrices(true), rtol=0, atol=SIZE)
-    np.testing.assert_allclose(continuous_euler_zyx(recorded), true, rtol=0, atol=SIZE)
+    np.testing.assert_allclose(continuous_euler(recorded), true, rtol=0, atol=SIZE)
     if 0 < missing < len(true):  # steps of up to 0.6 then, still below the quarter turn between the families
         recorded[missing] = true[missing] = np.nan
-        np.testing.assert_allclose(continuous_euler_zyx(recorded), true, rtol=0, atol=SIZE)
+        np.testing.assert_allclose(continuous_euler(recorded), true, rtol=0, atol=SIZE)
 
 
 def test_euler_angles_go_straight_through_the_vertical() -> None:
@@ -85,14 +90,39 @@ def test_euler_angles_go_straight_through_the_vertical() -> None:
     true = np.column_stack((np.full_like(ry, 0.3), ry, np.full_like(ry, -0.2)))
     beyond = (ry > np.pi / 2)[:, np.newaxis]
     recorded = np.where(beyond, wrap(true * [1.0, -1.0, 1.0] + np.pi), true)
-    np.testing.assert_allclose(continuous_euler_zyx(recorded), true, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(continuous_euler(recorded), true, rtol=0, atol=1e-14)
 
 
 @pytest.mark.parametrize(
-    ("work", "width"), [(continuous_quaternions, 4), (continuous_vectors, 3), (continuous_euler_zyx, 3)]
+    ("work", "width"), [(continuous_quaternions, 4), (continuous_vectors, 3), (continuous_euler, 3)]
 )
 def test_records_without_samples_pass_through(work: object, width: int) -> None:
     assert callable(work)
     assert work(np.empty((0, width))).shape == (0, width)
     assert np.isnan(work(np.full((3, width), np.nan))).all()
     assert work(np.zeros((2, width))).tolist() == np.zeros((2, width)).tolist()
+
+
+FLIPPED: dict[RotationForm, list[list[float]]] = {
+    "vector": [[0.0, 0.0, 3.1], [0.0, 0.0, 3.1 - 2 * np.pi]],
+    "rpy": [[0.1, 0.2, 0.3], [0.1 - np.pi, np.pi - 0.2, 0.3 - np.pi]],
+    "zyx": [[0.1, 1.5, 0.3], [0.1 + np.pi, np.pi - 1.5, 0.3 - np.pi]],
+    "xyz": [[0.1, -1.5, 0.3], [0.1 + np.pi, np.pi + 1.5, 0.3 + np.pi]],
+    "zyz": [[0.1, 0.2, 0.3], [0.1 + np.pi, -0.2, 0.3 - np.pi]],
+    "zxz": [[0.1, -0.2, 0.3], [0.1 - np.pi, 0.2, 0.3 + np.pi]],
+    "quat_xyzw": [[0.5, -0.5, 0.5, -0.5], [-0.5, 0.5, -0.5, 0.5]],
+    "quat_wxyz": [[0.6, 0.0, 0.8, 0.0], [-0.6, 0.0, -0.8, 0.0]],
+    "matrix": [[0.0, -1.0, 0.0, 1.0, 0.0, 0.0, 0.0, 0.0, 1.0]] * 2,
+}
+"""Two names of one rotation in each form."""
+
+
+@pytest.mark.parametrize("form", FORMS)
+def test_two_names_of_one_rotation_become_one_in_every_form(form: RotationForm) -> None:
+    recorded = np.array(FLIPPED[form])
+    before = quaternions(recorded, form)
+    # what stands in the table are two names of one rotation: the quaternions agree but for their sign
+    np.testing.assert_allclose(np.abs(before[0] @ before[1]), 1.0, rtol=0, atol=1e-15)
+    found = continuous_rotations(recorded, form)
+    # pi is added and taken away: a few roundings of 4e-16
+    np.testing.assert_allclose(found, recorded[[0, 0]], rtol=0, atol=3e-15)

@@ -278,3 +278,15 @@ def test_resampling_leaves_an_unexplained_step_open_and_counts_it(tmp_path: Path
         "4 grid samples lie inside steps of a joint that no motion explains and have no value"
     )
     assert np.nanmax(np.abs(run.qd[:, 0])) < 10.1
+
+
+def test_an_interval_that_is_no_whole_turns_is_told() -> None:
+    """Degrees said of a log in rad: nothing would wrap, and nothing would be unexplained."""
+    found = audit_log(log_of(wrap(moving())), interval={"": (-180.0, 180.0)})
+    assert [(warning.kind, warning.message) for warning in found.warnings] == [
+        (
+            "interval",
+            "q1: the interval -180..180 rad is 57.2958 turns wide: angles wrap by whole turns; check the unit"
+            " and --interval",
+        )
+    ]

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -10,13 +12,15 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics import point_over_log, positions_over_log
 from urmpipe_models.transform import translation
 from urmpipe_models.urm import urm_chain
+from urmpipe_pipeline.audit import audit_log
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import derivatives
-from urmpipe_pipeline.joint_log import FloatArray, JointLog, SourceFile
+from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.results import Provenance, Run
 
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
 TSP = 0.005
+COLUMNS = tuple(LogColumn(f"q{i + 1}", f"q{i + 1}", "joint", i, "rad") for i in range(6))
 PROVENANCE = Provenance("ingest", {}, (), {}, "")
 
 
@@ -176,3 +180,42 @@ def test_an_unknown_tool_centre_point_is_refused() -> None:
     with pytest.raises(OptionError) as error:
         CompareOptions(tcp="x")  # type: ignore[arg-type]
     assert str(error.value) == "--tcp: found x, allowed: fk, recorded"
+
+
+def test_what_is_wrong_with_the_reference_is_told(q: FloatArray) -> None:
+    doubt = LogWarning("assumed-unit", "taken as m", 3)
+    reference = replace(path_run(positions_over_log(URM6, q)), warnings=(doubt,))
+    result = compare_runs(reference, [arm_run(q)])
+    assert result.warnings == (LogWarning("assumed-unit", "path: taken as m", 3),)
+
+
+def test_an_offset_that_no_clock_holds_is_refused() -> None:
+    for offset in (1e300, -1e9, float("inf")):
+        with pytest.raises(OptionError, match=r"allowed: start, or a time in s below 1e\+09"):
+            CompareOptions(sync_offset=offset)
+
+
+def test_a_log_alone_is_compared_as_it_was_repaired() -> None:
+    t = TSP * np.arange(200)
+    true = np.column_stack([np.pi + 0.5 * (t - 0.5024), *(0.1 * np.sin(t + k) for k in range(5))])
+    there = (true + np.pi) % (2 * np.pi) - np.pi
+    wrap = int(np.argmax(np.abs(np.diff(there[:, 0])))) + 1
+    there[wrap, 0] = (there[wrap - 1, 0] + there[wrap + 1, 0]) / 2
+    log = replace(arm_run(there, recorded=positions_over_log(URM6, true)).log, columns=COLUMNS)
+    found = audit_log(log, URM6, repaired=True)
+    assert [entry.kind for entry in found.entries] == ["repaired", "wrap"]
+    run = replace(arm_run(found.q), log=log, audit=found.entries)
+    # A straight line between samples 5 ms apart misses a sine of 1 rad/s2 by 1e-5 rad at the most.
+    assert compare_recorded(run).runs[0].delta.max() < 1e-5
+    assert compare_recorded(replace(run, audit=())).runs[0].delta.max() > 0.1
+
+
+def test_kinematics_of_different_robots_are_told(q: FloatArray) -> None:
+    other = replace(URM6, name="urm6b")
+    result = compare_runs(arm_run(q, name="a"), [arm_run(q, name="b", robot=other)])
+    assert result.warnings == (
+        LogWarning("robots-differ", "the kinematics are those of different robots: a as urm6, b as urm6b"),
+    )
+    assert compare_runs(arm_run(q), [arm_run(q, robot=other)]).warnings  # logs of one name are two logs
+    path = path_run(positions_over_log(URM6, q))
+    assert not compare_runs(path, [arm_run(q)]).warnings

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -89,3 +90,15 @@ def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool(
         " tell why: is a --tool or a --base missing?"
     )
     assert lacking_tool(UR5E, log(Q, 1.3 * positions_over_log(UR5E, Q) + np.sin(9 * T))) == []
+
+
+def test_a_recorded_rotation_vector_goes_on_past_pi() -> None:
+    recorded = np.array([[0.0, 0.0, 3.1], [np.nan] * 3, [0.0, 0.0, 3.2 - 2 * np.pi]])
+    nothing = np.empty((3, 0))
+    bare = JointLog("log", "table", (), np.arange(3), (), nothing)
+    found = replace(bare, tcp_rotation=recorded, rotation_form="vector").tcp_rotation_continuous
+    assert found is not None
+    # 2 pi is taken away and added again: two roundings of 4e-16
+    np.testing.assert_allclose(found[[0, 2]], [[0.0, 0.0, 3.1], [0.0, 0.0, 3.2]], rtol=0, atol=1e-15)
+    assert np.isnan(found[1]).all()
+    assert bare.tcp_rotation_continuous is None

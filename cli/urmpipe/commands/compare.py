@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from urmpipe.options import LENGTH, log_options, output_options, take_log_options
+from urmpipe.options import LENGTH, about_recordings, log_options, output_options, take_log_options
 from urmpipe.process import tune_pyarrow
 
 TOLERANCE = 0.0035
@@ -55,8 +55,16 @@ def _sync(ctx: click.Context, param: click.Parameter, value: str) -> float:
 )
 @log_options
 @output_options
+@click.pass_context
 def compare(
-    reference: Path, logs: tuple[Path, ...], output: Path | None, as_json: bool, quiet: bool, **options: Any
+    ctx: click.Context,
+    /,
+    reference: Path,
+    logs: tuple[Path, ...],
+    output: Path | None,
+    as_json: bool,
+    quiet: bool,
+    **options: Any,
 ) -> int:
     """Hold logs against a reference: deviation, statistics, verdict.
 
@@ -76,6 +84,9 @@ def compare(
     from urmpipe import api
     from urmpipe.printing import print_comparison, print_json, print_recording, print_warnings, progress_bar
 
+    said = about_recordings(ctx, (reference, *logs))
+    if said and not quiet:
+        click.echo(f"note: {said}", err=True)
     robot, read = take_log_options(options)
     names = ("tsp", "derivative", "strict", "tolerance", "tcp", "sync_offset")
     shared = {name: options.pop(name) for name in names}

@@ -17,7 +17,9 @@ from urmpipe.process import tune_pyarrow
     "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: LOG.rrd here]."
 )
 @click.option(
-    "--explain", is_flag=True, help="Print each decision with its evidence and alternative; write nothing."
+    "--explain",
+    is_flag=True,
+    help="Print each decision with its evidence and alternative; write no recording.",
 )
 @click.option(
     "--write-map",
@@ -62,16 +64,27 @@ def ingest(
     from urmpipe import api
     from urmpipe.printing import count, print_json, print_recording, print_run, print_warnings, progress_bar
 
+    if explain and output:
+        raise click.UsageError(
+            f"-o: found {output} with --explain, which writes no recording, allowed: one of both"
+        )
     target = None if explain else output or Path(default_name(logs))
-    named = options["robot"]
+    map_input = options["log_map"]
     robot, read = take_log_options(options)
     shared = {name: options[name] for name in ("tsp", "derivative", "strict")}
     with progress_bar(f"Writing {target}", quiet=quiet or explain) as progress:
         run = api.ingest(
-            logs, robot=robot, read=read, output=target, audit=audit, progress=progress, **shared
+            logs,
+            robot=robot,
+            read=read,
+            output=target,
+            audit=audit,
+            log_map=map_output,
+            map_robot=options["robot_named"],
+            inputs=[map_input] if map_input else [],
+            progress=progress,
+            **shared,
         )
-    if map_output:
-        api.write_map(run, map_output, inputs=logs, robot=named)
     print_warnings(() if quiet else run.warnings)
     if as_json:
         print_json(run.to_dict())

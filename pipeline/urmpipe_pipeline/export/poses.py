@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.kinematics import poses_over_log
 from urmpipe_pipeline.compare import Tcp
@@ -48,19 +49,6 @@ def poses_of(result: Run | Comparison, options: ExportOptions) -> tuple[list[Pos
     return found, [LogWarning("no-orientation", said)]
 
 
-def continuous(quat: FloatArray) -> FloatArray:
-    """Return quaternions with signs such that each is in the hemisphere of the one before.
-
-    q and -q are one orientation; without jumps between them they can be interpolated.
-
-    Args:
-        quat: Shape (n, 4), without NaN.
-    """
-    dots = np.einsum("ij,ij->i", quat[1:], quat[:-1])
-    signs = np.cumprod(np.concatenate(([1.0], np.where(dots < 0.0, -1.0, 1.0))))
-    return quat * signs[: len(quat), np.newaxis]
-
-
 def _run_poses(run: Run, tcp: Tcp, rows: Rows) -> Poses:
     if tcp == "recorded":
         return _recorded_poses(run)
@@ -76,7 +64,7 @@ def _run_poses(run: Run, tcp: Tcp, rows: Rows) -> Poses:
     position, rotation = poses_over_log(run.robot, q[there])
     quat = np.asarray(Rotation.from_matrix(rotation).as_quat(), dtype=np.float64)
     clock = run.log.clock_start_ns + t_ns[there]
-    return Poses("", clock, position, continuous(quat), len(q) - len(there))
+    return Poses("", clock, position, continuous_quaternions(quat), len(q) - len(there))
 
 
 def _recorded_poses(run: Run) -> Poses:
@@ -88,7 +76,7 @@ def _recorded_poses(run: Run) -> Poses:
     there = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(quat).all(axis=1))
     _refuse_none(run, there)
     clock = run.log.clock_start_ns + run.log.t_ns[there]
-    return Poses("", clock, position[there], continuous(quat[there]), len(position) - len(there))
+    return Poses("", clock, position[there], quat[there], len(position) - len(there))
 
 
 def _deviation_poses(one: Deviation, *, alone: bool) -> list[Poses]:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_pipeline.export.originals import originals
-from urmpipe_pipeline.export.times import Times, shares
+from urmpipe_pipeline.export.times import DATE, DAY, TIME_OF_DAY, Times, shares
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.results import AXES, Comparison, Run
@@ -86,13 +86,19 @@ def file_table(log: JointLog, *, units_told: bool = True) -> Table:
     names = _names(kept)
     clock_ns = log.clock_start_ns + log.t_ns
     timed = [column.unit for column in kept if column.role == "time"]
-    clock = iter(shares(clock_ns, timed))
+    clock = iter(shares(_as_told(log, clock_ns, timed), timed))
     columns = [
         Column(name, column.unit, next(clock) if column.role == "time" else _numbers(log, column))
         for name, column in zip(names, kept, strict=True)
     ]
     warnings = [*_lost(log, kept), *([] if units_told else _unsaid_units(kept))]
     return Table(tuple(columns), clock_ns if timed else None, tuple(warnings))
+
+
+def _as_told(log: JointLog, clock_ns: IntArray, timed: Sequence[str]) -> IntArray:
+    """Return the clock as its columns tell it: a time of day that passed midnight began anew there."""
+    began_anew = any(inference.what == "nights passed" for inference in log.inferences)
+    return clock_ns % DAY if began_anew and timed == [TIME_OF_DAY] else clock_ns
 
 
 def grid_table(run: Run) -> Table:
@@ -176,6 +182,15 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
         if inference.what == "columns not used":
             said = f"{inference.value}: not ingested ({inference.evidence}), so they cannot leave"
             yield LogWarning("not-exported", said)
+    for warning in log.warnings:
+        if warning.kind == "clock-rebuilt":
+            said = f"the file's own times, which were not kept: {warning.message}"
+            yield LogWarning("not-exported", said, warning.row)
+        elif warning.kind in ("skipped-row", "other-lines"):
+            yield LogWarning("not-exported", warning.message, warning.row)
+    form = next((one for one in log.inferences if one.what == "form of the time"), None)
+    if form and "without a time zone" not in form.evidence and any(one.unit == DATE for one in kept):
+        yield LogWarning("clock-in-utc", f"{form.value} with a time zone: the dates leave in UTC")
 
 
 def _unsaid_units(columns: Sequence[LogColumn]) -> list[LogWarning]:

@@ -16,7 +16,10 @@ EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 DATE, TIME_OF_DAY = "date", "time of day"
 """Units of clocks that are text."""
 
-DAY = 86_400 * 10**9
+HOUR = 3_600 * 10**9
+"""An hour in [ns]."""
+
+DAY = 24 * HOUR
 """A day in [ns]."""
 
 _FINENESS = ((10**9, "s"), (10**6, "ms"), (10**3, "us"), (1, "ns"))
@@ -40,17 +43,21 @@ class Times:
         if self.unit == DATE:
             return _dates(self.ns, common)
         if self.unit == TIME_OF_DAY:
-            return _times_of_day(self.ns % DAY, common)
+            return _times_of_day(self.ns, common)
         return _decimals(self.ns, EXPONENTS[self.unit], common)
 
     def typed(self) -> Any:
-        """Return an Arrow array of a type for it; [s], [ms] and [us] are doubles, rounded once."""
+        """Return an Arrow array of a type for it; [s], [ms] and [us] are doubles, rounded once.
+
+        Times of day are durations where some lie outside of a day.
+        """
         import pyarrow as pa
 
         if self.unit == DATE:
             return pa.array(self.ns).cast(pa.timestamp("ns"))
         if self.unit == TIME_OF_DAY:
-            return pa.array(self.ns % DAY).cast(pa.time64("ns"))
+            within = self.ns.min(initial=0) >= 0 and self.ns.max(initial=0) < DAY
+            return pa.array(self.ns).cast(pa.time64("ns") if within else pa.duration("ns"))
         if self.unit == "ns":
             return pa.array(self.ns)
         return pa.array(np.true_divide(self.ns, 10.0 ** EXPONENTS[self.unit], dtype=np.float64))
@@ -102,12 +109,19 @@ def _dates(ns: IntArray, common: int) -> Any:
 
 
 def _times_of_day(ns: IntArray, common: int) -> Any:
-    """Return times from midnight as hh:mm:ss and the decimals needed."""
+    """Return times from midnight as hh:mm:ss, with as many hours and decimals as needed."""
     import pyarrow as pa
+    import pyarrow.compute as pc
 
     unit = _fineness(common)
     kind = pa.time32(unit) if unit in ("s", "ms") else pa.time64(unit)
-    return pa.array(ns).cast(pa.time64("ns")).cast(kind).cast(pa.string())
+    hours, rest = np.divmod(np.abs(ns), HOUR)
+    minutes = pa.array(rest).cast(pa.time64("ns")).cast(kind).cast(pa.string())  # 00:mm:ss
+    sign = pc.if_else(pa.array(ns < 0), "-", "")
+    signed = pc.binary_join_element_wise(
+        sign, pc.utf8_lpad(pa.array(hours).cast(pa.string()), width=2, padding="0"), ""
+    )
+    return pc.binary_join_element_wise(signed, pc.utf8_slice_codeunits(minutes, 2), "")
 
 
 def _fineness(common: int) -> str:

@@ -31,7 +31,7 @@ A = "deg"
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -44,6 +44,9 @@ from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.rotation import PURE
+
+TURNING = ("rad", "deg")
+"""Units of joints that turn: they alone have an interval."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,7 +115,12 @@ def read_map(path: Path) -> LogMap:
 
 
 def map_of(
-    log: JointLog, robot: str | None = None, base: Sequence[float] = (), tool: Sequence[float] = ()
+    log: JointLog,
+    robot: str | None = None,
+    base: Sequence[float] = (),
+    tool: Sequence[float] = (),
+    *,
+    given: Mapping[str, Any] | None = None,
 ) -> str:
     """Return the map by which a log reads as it was read, as TOML.
 
@@ -121,7 +129,11 @@ def map_of(
         robot: Name or file of the arm.
         base: Where it stands, in [m] and [rad]; nothing for the origin.
         tool: Its tool centre point, in the same form; nothing for the tip.
+        given: Fields of the `ReadOptions` it was read with; the intervals and the units of the clock stand
+            nowhere else.
     """
+    asked = given or {}
+    intervals = asked.get("interval", {})
     found = {inference.what: inference.value for inference in log.inferences}
     top = {
         "source": log.source,
@@ -131,11 +143,13 @@ def map_of(
         "base": list(base) or None,
         "tool": list(tool) or None,
     }
-    lines = [MAP_HEADER, "", *toml_lines(top), "", "[clock]", *toml_lines(_clock(log))]
+    lines = [MAP_HEADER, "", *toml_lines(top), "", "[clock]", *toml_lines(_clock(log, found))]
     for column, name in zip(_of(log, "joint"), log.joints, strict=True):
         said: dict[str, Any] = {"column": _called(log, column), "name": name, "unit": column.unit}
         corrected = {"sign": column.sign, "offset": column.offset}
         said |= corrected if corrected != {"sign": 1, "offset": 0.0} else {}
+        interval = intervals.get(name, intervals.get(""))
+        said |= {"interval": list(interval)} if interval and column.unit in TURNING else {}
         lines += ["", "[[joints]]", *toml_lines(said)]
     position, orientation = _of(log, "position"), _of(log, "rotation")
     if position:
@@ -143,6 +157,8 @@ def map_of(
         turned = {"orientation": [_called(log, column) for column in orientation], "form": log.rotation_form}
         lines += ["", "[tcp]", *toml_lines(said | turned if orientation else said)]
     units = {_called(log, c): c.unit for c in (*position, *orientation) if c.unit != PURE.name}
+    clock = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}
+    units |= {name: unit for name, unit in asked.get("units", {}).items() if name in clock}
     if units:
         lines += ["", "[units]", *(f"{toml_text(one)} = {toml_text(unit)}" for one, unit in units.items())]
     return "\n".join(lines) + "\n"
@@ -207,9 +223,11 @@ def _called(log: JointLog, column: LogColumn) -> str:
     return column.header if column.header and len(twins) == 1 else str(column.number)
 
 
-def _clock(log: JointLog) -> dict[str, Any]:
-    """Return what the table of the clock says; seconds and nanoseconds apart are found by themselves."""
+def _clock(log: JointLog, found: Mapping[str, str]) -> dict[str, Any]:
+    """Return what the table of the clock says: two columns and the form of a text are found by themselves."""
     columns = _of(log, "time")
     if not columns:
         return {"column": "none", "period": log.period}
-    return {"column": _called(log, columns[0]), "unit": columns[0].unit} if len(columns) == 1 else {}
+    if len(columns) > 1:
+        return {}
+    return {"column": _called(log, columns[0]), "unit": found.get("unit of the time")}

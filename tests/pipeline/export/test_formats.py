@@ -16,7 +16,6 @@ from scipy.spatial.transform import Rotation
 
 from urmpipe_models.kinematics import poses_over_log
 from urmpipe_pipeline.export import FORMATS, ExportOptions, Format, Rows, export_result
-from urmpipe_pipeline.export.poses import continuous
 from urmpipe_pipeline.results import Comparison, Run
 
 START_NS = 1_700_000_000_123_456_789
@@ -172,16 +171,6 @@ def test_tum_of_the_file_has_its_rows(run: Run, tmp_path: Path) -> None:
     rows = np.loadtxt(path)
     assert run.robot is not None
     np.testing.assert_array_equal(rows[:, 1:4], poses_over_log(run.robot, run.log.q)[0])
-
-
-def test_quaternions_stay_in_one_hemisphere_and_of_the_same_rotation() -> None:
-    angles = np.linspace(0, 12 * np.pi, 50)
-    quat = Rotation.from_euler("x", angles[:, np.newaxis]).as_quat(canonical=True)
-    smooth = continuous(quat)
-    assert (np.einsum("ij,ij->i", quat[1:], quat[:-1]) < 0).any()
-    assert (np.einsum("ij,ij->i", smooth[1:], smooth[:-1]) > 0).all()
-    np.testing.assert_array_equal(np.abs(smooth), np.abs(quat))
-    np.testing.assert_array_equal(continuous(quat[:1]), quat[:1])
 
 
 def test_a_comparison_is_one_table(comparison: Comparison, tmp_path: Path) -> None:

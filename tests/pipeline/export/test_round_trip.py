@@ -240,3 +240,51 @@ def test_the_grid_is_a_log_again(tmp_path: Path) -> None:
     assert again.log.joints == run.log.joints
     for name in ("q", "qd", "qdd", "t_ns"):
         assert (getattr(again, name) == getattr(run, name)).all()
+
+
+LOG_OF_TIMES = "time,q1 [rad]\n{},0.5\n{},0.75\n{},0.875\n"
+
+
+@pytest.mark.parametrize(
+    "times",
+    [
+        ("23:59:59.500", "00:00:00.000", "00:00:00.500"),
+        ("25:10:00.000", "25:10:00.005", "25:10:00.010"),
+        ("-00:00:01", "00:00:00", "00:00:01"),
+    ],
+)
+def test_times_of_day_leave_as_the_file_counts_them(tmp_path: Path, times: tuple[str, ...]) -> None:
+    (tmp_path / "log.csv").write_text(LOG_OF_TIMES.format(*times))
+    result = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
+    assert (tmp_path / "again.csv").read_text() == (tmp_path / "log.csv").read_text()
+    assert not result.warnings
+
+
+def test_dates_with_a_time_zone_are_said_to_leave_in_utc(tmp_path: Path) -> None:
+    zoned = [f"2021-04-11T23:59:5{k}+02:00" for k in range(3)]
+    (tmp_path / "log.csv").write_text(LOG_OF_TIMES.format(*zoned))
+    result = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "again.csv", rows="file")
+    assert [warning.message for warning in result.warnings] == [
+        "date and time, year first with a time zone: the dates leave in UTC"
+    ]
+    assert pd.read_csv(tmp_path / "again.csv")["time"][0] == "2021-04-11T21:59:50"
+    (tmp_path / "plain.csv").write_text(LOG_OF_TIMES.format(*(one[:19] for one in zoned)))
+    assert not urmpipe.export(
+        urmpipe.ingest(tmp_path / "plain.csv"), tmp_path / "b.csv", rows="file"
+    ).warnings
+
+
+def test_times_that_were_rebuilt_and_rows_that_were_left_out_are_said(tmp_path: Path) -> None:
+    lines = [f"{k // 10},{k * 0.001}" for k in range(200)]
+    (tmp_path / "log.csv").write_text("\n".join(["t [s],q1 [rad]", *lines]) + "\n")
+    rebuilt = urmpipe.export(urmpipe.ingest(tmp_path / "log.csv"), tmp_path / "a.csv", rows="file")
+    assert [warning.message for warning in rebuilt.warnings] == [
+        "the file's own times, which were not kept: times in steps of 1 s stand in 10 rows each: a regular"
+        " clock of 0.1 s is taken in their place"
+    ]
+    bad = [f"{k * 0.1:.1f},{'oops' if k == 50 else k * 0.001}" for k in range(200)]
+    (tmp_path / "bad.csv").write_text("\n".join(["t [s],q1 [rad]", *bad]) + "\n")
+    run = urmpipe.ingest(tmp_path / "bad.csv", read=ReadOptions(skip_bad=True))
+    left = urmpipe.export(run, tmp_path / "b.csv", rows="file").warnings
+    assert [(warning.kind, warning.row) for warning in left] == [("not-exported", 51)]
+    assert left[0].message.startswith("data row 51 of the file is left out: ")

@@ -45,9 +45,10 @@ def test_dates_are_iso_8601_and_read_back_by_python() -> None:
     assert text([-(10**9)], "date") == ["1969-12-31T23:59:59"]
 
 
-def test_times_of_day_begin_again_at_midnight() -> None:
+def test_times_of_day_count_on_past_a_day_and_below_midnight() -> None:
     assert text([0, 80_841_573_000_000], "time of day") == ["00:00:00.000", "22:27:21.573"]
-    assert text([DAY + 3 * 10**9], "time of day") == ["00:00:03"]
+    assert text([DAY + 3 * 10**9], "time of day") == ["24:00:03"]
+    assert text([-5 * 10**9, 123 * 3600 * 10**9 + 10**7], "time of day") == ["-00:00:05.000", "123:00:00.010"]
     assert text([1_500], "time of day") == ["00:00:00.000001500"]
 
 
