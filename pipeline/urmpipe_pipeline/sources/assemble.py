@@ -20,7 +20,8 @@ from urmpipe_pipeline.joint_log import (
 )
 from urmpipe_pipeline.sources.cells import is_number, plain, significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
-from urmpipe_pipeline.sources.clock import EXPONENTS, even_clock
+from urmpipe_pipeline.sources.clock import even_clock
+from urmpipe_pipeline.sources.clock_units import EXPONENTS
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.content import Content
 from urmpipe_pipeline.sources.kinematic_units import by_kinematics

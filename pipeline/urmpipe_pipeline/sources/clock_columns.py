@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from urmpipe_pipeline.sources.cells import count_up, to_float
+from urmpipe_pipeline.sources.cells import count_up, is_missing, to_float
 from urmpipe_pipeline.sources.columns import Column, find_column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.sniff import Layout
@@ -40,28 +40,38 @@ def time_columns(
         found = _without_header(columns, layout, joints) or _texts(columns, layout)
         return found or ((), "there is no header")
     return (
-        _by_name(columns)
+        _by_name(columns, layout)
         or _by_content(columns, layout)
         or _texts(columns, layout)
         or ((), "no column is named like a time")
     )
 
 
-def _by_name(columns: Sequence[Column]) -> tuple[tuple[Column, ...], str] | None:
+def _by_name(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column, ...], str] | None:
     """Return a column of numbers that is named like a time, or seconds and nanoseconds apart."""
-    words = vocabulary()
+    halves = dict(_halves(columns, layout))
+    whole = {half: pair for pair in halves.items() for half in pair}
     numeric = [column for column in columns if not column.text]
-    for pattern in words.time:
-        for column in numeric:
-            if pattern.search(column.key):
-                return (column,), "its name"
-    for seconds, nanoseconds in words.time_pairs:
+    named = (c for pattern in vocabulary().time for c in numeric if pattern.search(c.key))
+    found = next(named, None)
+    if found is not None and found not in whole:
+        return (found,), "its name"
+    if not whole:
+        return None
+    pair = whole[found] if found is not None else next(iter(halves.items()))
+    return pair, "their names: seconds and nanoseconds apart"
+
+
+def _halves(columns: Sequence[Column], layout: Layout) -> Iterator[tuple[Column, Column]]:
+    """Yield columns of whole seconds, each with that of the nanoseconds that go on from them."""
+    for seconds, nanoseconds in vocabulary().time_pairs:
         for first in (column for column in columns if seconds.search(column.key)):
             stem = seconds.sub("", first.key)
             for second in columns:
-                if nanoseconds.search(second.key) and nanoseconds.sub("", second.key) == stem:
-                    return (first, second), "their names: seconds and nanoseconds apart"
-    return None
+                same = nanoseconds.search(second.key) and nanoseconds.sub("", second.key) == stem
+                whole = all(cell.isdigit() for cell in layout.cells(first.index) if not is_missing(cell))
+                if same and whole and max(times_of(layout.cells(second.index), layout), default=0) < 1e9:
+                    yield first, second
 
 
 def _texts(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column, ...], str] | None:
