@@ -207,7 +207,7 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
 
 def _folds(times: IntArray, clock: Clock) -> Iterable[tuple[int, str, str]]:
     """Yield where numbers go on as times of day written hhmmss do: 101159 is followed by 101200."""
-    if clock.given or clock.unit not in EXPONENTS or len(times) < 3 or times.min() <= UNREADABLE:
+    if clock.told or clock.unit not in EXPONENTS or len(times) < 3 or times.min() <= UNREADABLE:
         return
     one = 10 ** EXPONENTS[clock.unit]
     second, minute = times // one % 100, times // (100 * one) % 100

@@ -41,7 +41,7 @@ class Clock:
         columns: One column, or seconds and nanoseconds apart; none if the table has no time.
         parts: The same for the reader.
         unit: Its unit: s, ms, us, ns, or where it is text "date" or "time of day".
-        given: Whether the user told that unit.
+        told: Whether the user or the name of its column tells that unit.
         inferences: What was found out.
         warnings: What a person should know.
     """
@@ -49,7 +49,7 @@ class Clock:
     columns: tuple[Column, ...] = ()
     parts: tuple[ClockColumn, ...] = ()
     unit: str = "s"
-    given: bool = False
+    told: bool = False
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
 
@@ -139,7 +139,8 @@ def clock_of(
     _refuse_ages(time, layout, unit)
     parts = (ClockColumn(time.index, EXPONENTS[unit]),)
     said = (found, Inference("unit of the time", unit, evidence))
-    return Clock(chosen, parts, unit, time.number in units, said, warnings)
+    told = time.number in units or time.unit is not None
+    return Clock(chosen, parts, unit, told, said, warnings)
 
 
 def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> ClockColumn:
