@@ -69,7 +69,7 @@ def assemble(
     seconds = finder.derivatives(roles.accelerations, units, 2)
     lengths = finder.positions(roles.position, tcp) if roles.position else []
     q = _in_si(q, units)
-    told = finder.rotations(roles.rotation)
+    told = finder.rotations(roles.rotation, roles.forms)
     turned = settle_rotation(roles.rotation, roles.forms, rotation, told, (robot, q) if robot else None)
     used = (
         (roles.joints, q, units),
@@ -157,8 +157,9 @@ def _corrected(values: FloatArray, signs: Sequence[int], offsets: Sequence[float
 
 
 def _header(plan: Plan, column: Column) -> str:
-    """Return the name of a column as its file has it; empty if the file has no header."""
-    return "" if plan.tables.layouts[column.table].header is None else column.header
+    """Return the name of a column as its file has it; empty if the file has no line of names."""
+    layout = plan.tables.layouts[column.table]
+    return "" if layout.header in (None, layout.first_line) else column.header
 
 
 def _time_columns(plan: Plan) -> Iterator[LogColumn]:

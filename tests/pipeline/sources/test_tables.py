@@ -311,3 +311,12 @@ def test_an_infinite_time_among_the_first_rows_is_named(wrong: Wrong) -> None:
     said = wrong("t,q1\n0,1\n1.#INF,2\n0.2,3\n")
     assert len(said) == 1
     assert said[0].startswith("log.csv:3, column t: found '1.#INF', allowed: ")
+
+
+def test_names_that_a_file_does_not_have_are_no_headers(read: Read) -> None:
+    echo = "7,0,,a,b,0.5,1.5,0,0,0,0\n7,5000000,,a,b,0.6,1.6,0,0,0,0\n"
+    labels = "Time: 0.1  q values: [0.5, 1.5]\nTime: 0.2  q values: [0.6, 1.6]\n"
+    for text in (echo, labels):
+        log = read(text)
+        assert log.q.tolist() == [[0.5, 1.5], [0.6, 1.6]]
+        assert {column.header for column in log.columns} == {""}
