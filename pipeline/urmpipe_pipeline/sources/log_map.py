@@ -44,6 +44,8 @@ from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.rotation import PURE
+from urmpipe_pipeline.sources.time_file import NOTHING_BUT
+from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
 
 @dataclass(frozen=True, slots=True)
@@ -208,8 +210,16 @@ def _called(log: JointLog, column: LogColumn) -> str:
 
 
 def _clock(log: JointLog) -> dict[str, Any]:
-    """Return what the table of the clock says; seconds and nanoseconds apart are found by themselves."""
+    """Return what the table of the clock says; a stamp in halves and a file of times are found by themselves.
+
+    The unit is left out where the cells or the name of the column say it.
+    """
     columns = _of(log, "time")
     if not columns:
-        return {"column": "none", "period": log.period}
-    return {"column": _called(log, columns[0]), "unit": columns[0].unit} if len(columns) == 1 else {}
+        return {"column": "none", "period": log.period or None}
+    apart = any(one.what == "time column" and NOTHING_BUT in one.evidence for one in log.inferences)
+    if len(columns) > 1 or apart:
+        return {}
+    text = any(inference.what == "form of the time" for inference in log.inferences)
+    said = text or vocabulary().unit(split_unit(columns[0].header)[1] or "") is not None
+    return {"column": _called(log, columns[0]), "unit": None if said else columns[0].unit}
