@@ -210,8 +210,10 @@ def _folds(times: IntArray, clock: Clock) -> Iterable[tuple[int, str, str]]:
     if clock.told or clock.unit not in EXPONENTS or len(times) < 3 or times.min() <= UNREADABLE:
         return
     one = 10 ** EXPONENTS[clock.unit]
-    second, minute = times // one % 100, times // (100 * one) % 100
     steps = np.diff(times)
+    if steps.max() <= 40 * one:
+        return
+    second, minute = times // one % 100, times // (100 * one) % 100
     late = np.where(steps < 4040 * one, steps - 40 * one, steps - 4040 * one)  # 60 s are 100, 3600 s 10000
     jumps = (late > 0) & (late <= GAP * np.median(steps)) & (second[1:] < second[:-1])
     if not jumps.any() or (second >= 60).any() or (minute >= 60).any():
