@@ -74,12 +74,14 @@ def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
 
 def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[str]:
     """Yield what brings kinematics and recorded points together."""
+    columns = [column for column in log.columns if column.role == "joint"]
+    called = [column.header or str(column.number) for column in columns] or log.joints
     for first, second in combinations(range(q.shape[1]), 2):
         order = list(range(q.shape[1]))
         order[first], order[second] = second, first
         found = fit(robot, q[:, order], recorded)
         if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
-            names = ",".join(log.joints[j] for j in order)
+            names = ",".join(called[j] for j in order)
             yield f"with {log.joints[first]} and {log.joints[second]} exchanged they agree (--joints {names})"
     base, distance = _base(robot, q, recorded)
     if distance <= CLOSE_WITH_TOOL:

@@ -11,7 +11,7 @@ import pytest
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.kinematics import positions_over_log
 from urmpipe_models.transform import from_offset, translation
-from urmpipe_pipeline.joint_log import FloatArray, JointLog
+from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogColumn
 from urmpipe_pipeline.recorded_tcp import far_from_recorded, lacking_tool
 
 UR5E = load_robot("ur5e")
@@ -43,6 +43,17 @@ def test_exchanged_joints_are_found() -> None:
         r"the kinematics of ur5e stay \d+\.\d mm \(rms\) from the recorded TCP \(\d+\.\d mm ", message
     )
     assert message.endswith(": with q2 and q3 exchanged they agree (--joints q1,q3,q2,q4,q5,q6)")
+
+
+def test_exchanged_joints_are_named_as_the_file_names_its_columns() -> None:
+    exchanged = log(Q[:, [0, 2, 1, 3, 4, 5]], positions_over_log(UR5E, Q))
+    for headers, option in ((["A"] + [""] * 5, "A,9,8,10,11,12"), (list("ABCDEF"), "A,C,B,D,E,F")):
+        columns = tuple(
+            LogColumn(exchanged.joints[k], header, "joint", k, "rad", number=k + 7)
+            for k, header in enumerate(headers)
+        )
+        (warning,) = far_from_recorded(UR5E, replace(exchanged, columns=columns))
+        assert warning.message.endswith(f"(--joints {option})")
 
 
 def test_another_base_is_found_and_its_option_helps() -> None:

@@ -20,7 +20,8 @@ from urmpipe_pipeline.joint_log import (
 )
 from urmpipe_pipeline.sources.cells import is_number, plain, significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
-from urmpipe_pipeline.sources.clock import EXPONENTS, even_clock
+from urmpipe_pipeline.sources.clock import even_clock
+from urmpipe_pipeline.sources.clock_units import EXPONENTS
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.content import Content
 from urmpipe_pipeline.sources.kinematic_units import by_kinematics
@@ -68,7 +69,7 @@ def assemble(
     seconds = finder.derivatives(roles.accelerations, units, 2)
     lengths = finder.positions(roles.position, tcp) if roles.position else []
     q = _in_si(q, units)
-    told = finder.rotations(roles.rotation)
+    told = finder.rotations(roles.rotation, roles.forms)
     turned = settle_rotation(roles.rotation, roles.forms, rotation, told, (robot, q) if robot else None)
     used = (
         (roles.joints, q, units),
@@ -156,8 +157,9 @@ def _corrected(values: FloatArray, signs: Sequence[int], offsets: Sequence[float
 
 
 def _header(plan: Plan, column: Column) -> str:
-    """Return the name of a column as its file has it; empty if the file has no header."""
-    return "" if plan.tables.layouts[column.table].header is None else column.header
+    """Return the name of a column as its file has it; empty if the file has no line of names."""
+    layout = plan.tables.layouts[column.table]
+    return "" if layout.header in (None, layout.first_line) else column.header
 
 
 def _time_columns(plan: Plan) -> Iterator[LogColumn]:

@@ -11,6 +11,7 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
 from urmpipe_pipeline.quantised import behind_repeated
 from urmpipe_pipeline.sources.clock import Clock
+from urmpipe_pipeline.sources.clock_units import EXPONENTS
 from urmpipe_pipeline.sources.diagnose import SHOWN_FINDINGS, lines_of_rows
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.table import NO_TIME, UNREADABLE, Numbers
@@ -178,6 +179,7 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
     if times is None or not len(times) or not clock.columns:
         return
     name = clock.columns[0].header
+    yield from _folds(times, clock)
     if times.min() > UNREADABLE and (np.diff(times) > 0).all():
         return
     for index in np.flatnonzero(times == NO_TIME).tolist():
@@ -201,6 +203,26 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
         found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
         again = ": a second log begins here, from about the same time" if k in begins else ""
         yield int(valid[k + 1]) + 1, name, f"{found}, allowed: times that increase from row to row{again}"
+
+
+def _folds(times: IntArray, clock: Clock) -> Iterable[tuple[int, str, str]]:
+    """Yield where numbers go on as times of day written hhmmss do: 101159 is followed by 101200."""
+    if clock.told or clock.unit not in EXPONENTS or len(times) < 3 or times.min() <= UNREADABLE:
+        return
+    one = 10 ** EXPONENTS[clock.unit]
+    steps = np.diff(times)
+    if steps.max() <= 40 * one:
+        return
+    second, minute = times // one % 100, times // (100 * one) % 100
+    late = np.where(steps < 4040 * one, steps - 40 * one, steps - 4040 * one)  # 60 s are 100, 3600 s 10000
+    jumps = (late > 0) & (late <= GAP * np.median(steps)) & (second[1:] < second[:-1])
+    if not jumps.any() or (second >= 60).any() or (minute >= 60).any():
+        return
+    row = int(np.flatnonzero(jumps)[0])
+    after, before = (f"{times[k] / one:.15g}" for k in (row + 1, row))
+    said = f"found {after} after {before}, as a time of day hhmmss goes on, allowed: a clock of one unit"
+    hint = f"write it as hh:mm:ss, or say that it is no time of day with --unit {clock.columns[0].name}"
+    yield row + 2, clock.columns[0].header, f"{said}; {hint}={clock.unit}"
 
 
 def _second_logs(times: IntArray, steps: IntArray) -> set[int]:

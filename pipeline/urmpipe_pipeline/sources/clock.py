@@ -12,7 +12,8 @@ import numpy as np
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline.joint_log import Inference, IntArray, LogWarning
 from urmpipe_pipeline.sources.cells import LONGEST_NS
-from urmpipe_pipeline.sources.clock_columns import steps_of, time_columns, times_of
+from urmpipe_pipeline.sources.clock_columns import time_columns, times_of
+from urmpipe_pipeline.sources.clock_units import EXPONENTS, unit_of
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.sniff import Layout
@@ -24,16 +25,12 @@ from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
 PAPER_PERIOD = 0.005
 """Tsp of the paper in [s]: taken where nothing tells the time. Source: [UrmArm2021]_ eq. 22."""
 
-EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
-"""Powers of ten from a unit to [ns]."""
-
 FORMS_TOLD = "numbers in s, ms, us or ns, or times such as 2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec"
 """What a clock may look like, for errors."""
 
-SHORTEST, LONGEST = 0.0005, 1.0
-"""Usual periods of a log in [s]: they tell the unit of a clock that does not say it."""
 
-_EPOCH = (946_684_800.0, 4_102_444_800.0)  # 2000 to 2100 as Unix time in [s]
+_DATES = (19_700_101_000_000, 21_000_101_000_000)
+"""Dates written as numbers, YYYYMMDDhhmmss."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,6 +41,7 @@ class Clock:
         columns: One column, or seconds and nanoseconds apart; none if the table has no time.
         parts: The same for the reader.
         unit: Its unit: s, ms, us, ns, or where it is text "date" or "time of day".
+        told: Whether the user or the name of its column tells that unit.
         inferences: What was found out.
         warnings: What a person should know.
     """
@@ -51,6 +49,7 @@ class Clock:
     columns: tuple[Column, ...] = ()
     parts: tuple[ClockColumn, ...] = ()
     unit: str = "s"
+    told: bool = False
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
 
@@ -131,15 +130,17 @@ def clock_of(
     found = Inference("time column", " and ".join(column.name for column in chosen), why)
     if chosen[0].text:
         parts = tuple(_text_part(column, layout, units) for column in chosen)
-        return Clock(chosen, parts, _unit_of(parts[0]), (found,))
+        return Clock(chosen, parts, _unit_of(parts[0]), inferences=(found,))
     if len(chosen) == 2:
         both = (ClockColumn(chosen[0].index, 9), ClockColumn(chosen[1].index, 0))
-        return Clock(chosen, both, "s", (found,))
+        return Clock(chosen, both, "s", inferences=(found,))
     time = chosen[0]
-    unit, evidence, warnings = _unit(time, layout, source, units)
+    unit, evidence, warnings = unit_of(time, layout, source, units)
     _refuse_ages(time, layout, unit)
     parts = (ClockColumn(time.index, EXPONENTS[unit]),)
-    return Clock(chosen, parts, unit, (found, Inference("unit of the time", unit, evidence)), warnings)
+    said = (found, Inference("unit of the time", unit, evidence))
+    told = time.number in units or time.unit is not None
+    return Clock(chosen, parts, unit, told, said, warnings)
 
 
 def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> ClockColumn:
@@ -163,6 +164,8 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
             message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
             hint = f"say the unit with --unit {time.name}=ns"
+            if unit == "s" and _DATES[0] <= value < _DATES[1]:
+                hint = "a date is read if it is written as 2021-04-11 22:27:21.5"
             raise LogError(
                 Finding(f"{message}; {hint}", str(layout.segment.path), layout.first_line, 1, time.header)
             )
@@ -189,45 +192,3 @@ def even_clock(rows: int, period: float | None) -> tuple[IntArray, tuple[Inferen
         return times, (Inference("period", f"{step:g} s", "given as an option"),), []
     said = "no time column: the rows are taken as 5 ms apart; --period S says otherwise"
     return times, (Inference("period", "0.005 s", "assumed"),), [LogWarning("assumed-period", said)]
-
-
-def _unit(
-    time: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]
-) -> tuple[str, str, tuple[LogWarning, ...]]:
-    """Return the unit of a time column, why, and a warning if it is assumed."""
-    given = units.get(time.number)
-    if given is not None:
-        if given.name not in EXPONENTS:
-            raise OptionError(
-                f"--unit: found {given.name} for the time {time.name!r}, allowed: s, ms, us, ns"
-            )
-        return given.name, "given as an option", ()
-    if time.unit is not None and time.unit.name in EXPONENTS:
-        return time.unit.name, "its name", ()
-    if source is not None and "time" in source.units:
-        return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()
-    return _unit_from_values(time, layout)
-
-
-def _unit_from_values(time: Column, layout: Layout) -> tuple[str, str, tuple[LogWarning, ...]]:
-    """Tell the unit by the year that the times give, or else by their steps."""
-    cells = layout.cells(time.index)
-    start = next(iter(times_of(cells, layout)), 0.0)
-    steps = sorted(step for step in steps_of(cells, layout) if step > 0)
-    step = steps[len(steps) // 2] if steps else 0.0
-    for unit, exponent in EXPONENTS.items():
-        scale = 10.0 ** (exponent - 9)
-        if _EPOCH[0] <= start * scale <= _EPOCH[1] and step * scale <= 20 * LONGEST:
-            return unit, "it counts from 1970, so as Unix time it is of our years", ()
-    if step <= SHORTEST:
-        return "s", "the usual unit", ()
-    likely = [u for u, e in EXPONENTS.items() if SHORTEST < step * 10.0 ** (e - 9) <= LONGEST]
-    evidence = f"its steps of {step:g}"
-    if len(likely) == 1:
-        return likely[0], evidence, ()
-    if "s" in likely:
-        warning = LogWarning("assumed-unit", f"the time {time.name!r} steps by {step:g}: taken as s")
-        return "s", evidence, (warning,)
-    names = " or ".join(likely) or "s, ms, us or ns"
-    message = f"found steps of {step:g}, which may be {names}: say which with --unit {time.name}=ms"
-    raise LogError(Finding(message, str(layout.segment.path), layout.first_line, 1, time.header))

@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
-from urmpipe_pipeline.sources.cells import count_up, to_float
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.sources.cells import count_up, is_missing, to_float
 from urmpipe_pipeline.sources.columns import Column, find_column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.stamps import known_forms
+from urmpipe_pipeline.sources.tables import PATH
 from urmpipe_pipeline.sources.text_clock import DATE, TIME_OF_DAY
 from urmpipe_pipeline.sources.vocabulary import vocabulary
 
@@ -29,7 +31,8 @@ def time_columns(
         joints: How many joints the robot has, if there is one.
 
     Raises:
-        LogError: If the column that the user names is not there.
+        LogError: If the column that the user names is not there, or the first one of a table without a
+            header may be the time or not.
     """
     if options.time is not None:
         if options.time.lower() == "none":
@@ -38,30 +41,43 @@ def time_columns(
         return _with_other_half(column, columns, layout), "given as an option"
     if layout.header is None:
         found = _without_header(columns, layout, joints) or _texts(columns, layout)
+        xyz = options.source == PATH and len(columns) == 3
+        if not (found or xyz or options.joints or len(columns) in (1, joints)):
+            _refuse_unclear(columns, layout, joints)
         return found or ((), "there is no header")
     return (
-        _by_name(columns)
+        _by_name(columns, layout)
         or _by_content(columns, layout)
         or _texts(columns, layout)
         or ((), "no column is named like a time")
     )
 
 
-def _by_name(columns: Sequence[Column]) -> tuple[tuple[Column, ...], str] | None:
+def _by_name(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column, ...], str] | None:
     """Return a column of numbers that is named like a time, or seconds and nanoseconds apart."""
-    words = vocabulary()
+    halves = dict(_halves(columns, layout))
+    whole = {half: pair for pair in halves.items() for half in pair}
     numeric = [column for column in columns if not column.text]
-    for pattern in words.time:
-        for column in numeric:
-            if pattern.search(column.key):
-                return (column,), "its name"
-    for seconds, nanoseconds in words.time_pairs:
+    named = (c for pattern in vocabulary().time for c in numeric if pattern.search(c.key))
+    found = next(named, None)
+    if found is not None and found not in whole:
+        return (found,), "its name"
+    if not whole:
+        return None
+    pair = whole[found] if found is not None else next(iter(halves.items()))
+    return pair, "their names: seconds and nanoseconds apart"
+
+
+def _halves(columns: Sequence[Column], layout: Layout) -> Iterator[tuple[Column, Column]]:
+    """Yield columns of whole seconds, each with that of the nanoseconds that go on from them."""
+    for seconds, nanoseconds in vocabulary().time_pairs:
         for first in (column for column in columns if seconds.search(column.key)):
             stem = seconds.sub("", first.key)
             for second in columns:
-                if nanoseconds.search(second.key) and nanoseconds.sub("", second.key) == stem:
-                    return (first, second), "their names: seconds and nanoseconds apart"
-    return None
+                same = nanoseconds.search(second.key) and nanoseconds.sub("", second.key) == stem
+                whole = all(cell.isdigit() for cell in layout.cells(first.index) if not is_missing(cell))
+                if same and whole and max(times_of(layout.cells(second.index), layout), default=0) < 1e9:
+                    yield first, second
 
 
 def _texts(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column, ...], str] | None:
@@ -118,6 +134,25 @@ def _without_header(
     return None
 
 
+def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | None) -> None:
+    """Raise if the first column of a table without a header may be a time, a counter or a joint.
+
+    It may if it increases from row to row, and there is one column more than the robot has joints, or it
+    begins at 0, as clocks and counters do and joints seldom, and keeps near a straight line.
+    """
+    times = times_of(layout.cells(columns[0].index), layout)
+    one_more = joints is not None and len(columns) == joints + 1
+    if columns[0].text or not _increases(layout.cells(columns[0].index), layout):
+        return
+    if not one_more and (len(times) < 3 or times[0] != 0.0 or not _keeps_near_a_line(times)):
+        return
+    message = (
+        "found a first column that increases from row to row, which may be the time, a counter or a joint:"
+        " say --time 1 or --time none, or name the joint columns with --joints 2,3,..."
+    )
+    raise LogError(Finding(message, str(layout.segment.path), layout.first_line, 1))
+
+
 def steps_of(cells: Sequence[str], layout: Layout) -> list[float]:
     """Return the steps between sampled times.
 
@@ -138,6 +173,12 @@ def times_of(cells: Sequence[str], layout: Layout) -> list[float]:
     """
     values = (to_float(cell, layout.decimal) for cell in cells)
     return [value for value in values if value is not None and math.isfinite(value)]
+
+
+def _keeps_near_a_line(times: Sequence[float]) -> bool:
+    """Return whether times that increase stay within a mean step of the line from the first to the last."""
+    step = (times[-1] - times[0]) / (len(times) - 1)
+    return all(abs(time - times[0] - k * step) <= step for k, time in enumerate(times))
 
 
 def _increases(cells: Sequence[str], layout: Layout) -> bool:

@@ -44,6 +44,8 @@ from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.rotation import PURE
+from urmpipe_pipeline.sources.time_file import NOTHING_BUT
+from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
 TURNING = ("rad", "deg")
 """Units of joints that turn: they alone have an interval."""
@@ -224,10 +226,15 @@ def _called(log: JointLog, column: LogColumn) -> str:
 
 
 def _clock(log: JointLog, found: Mapping[str, str]) -> dict[str, Any]:
-    """Return what the table of the clock says: two columns and the form of a text are found by themselves."""
+    """Return what the table of the clock says; a stamp in halves and a file of times are found by themselves.
+
+    The unit is left out where the cells or the name of the column say it.
+    """
     columns = _of(log, "time")
     if not columns:
-        return {"column": "none", "period": log.period}
-    if len(columns) > 1:
+        return {"column": "none", "period": log.period or None}
+    apart = any(one.what == "time column" and NOTHING_BUT in one.evidence for one in log.inferences)
+    if len(columns) > 1 or apart:
         return {}
-    return {"column": _called(log, columns[0]), "unit": found.get("unit of the time")}
+    named = vocabulary().unit(split_unit(columns[0].header)[1] or "") is not None
+    return {"column": _called(log, columns[0]), "unit": None if named else found.get("unit of the time")}

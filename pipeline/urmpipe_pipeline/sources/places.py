@@ -12,7 +12,7 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.options import ReadOptions
-from urmpipe_pipeline.sources.pose import Pose, chosen_pose, trailing_matrix
+from urmpipe_pipeline.sources.pose import Pose, chosen_pose, trailing_matrix, trailing_quaternion, with_form
 from urmpipe_pipeline.sources.roles import OPTION, Roles, about_pose, check_count
 from urmpipe_pipeline.sources.sniff import Layout
 
@@ -22,7 +22,8 @@ def without_header(
 ) -> Roles:
     """Return the roles of the columns of a table without a header: joints in order, as many as the robot has.
 
-    The last 16 or 12 columns may be a pose: that they are a homogeneous transform shows in their numbers.
+    The last 16 or 12 columns may be a pose: that they are a homogeneous transform shows in their numbers;
+    and so may the last seven: x, y, z and a quaternion, whose length is 1 (a trajectory in TUM's form).
 
     Args:
         columns: The columns, without the clock.
@@ -53,14 +54,23 @@ def without_header(
         return Roles(position=tuple(columns[:3]), inferences=(said,))
     if not columns:
         raise LogError(Finding("found no column beside the time, allowed: the joints", file=file))
-    matrix = None if pose else trailing_matrix(columns, (layout,))
-    pose = pose or matrix or Pose()
-    free = columns[: columns.index(matrix.rotation[0])] if matrix else columns
-    free = [column for column in free if column not in (*pose.position, *pose.rotation)]
+    behind = None if pose else _trailing_pose(columns, layout, robot)
+    pose = with_form(pose or behind or Pose(), options.rotation)
+    used = (*pose.position, *pose.rotation)
+    start = min(map(columns.index, used)) if behind else len(columns)
+    free = [column for column in columns[:start] if column not in used]
     joints = tuple(free[: len(robot.coordinates)] if robot else free)
     check_count(joints, file, robot)
     many = ", as many as the robot has" if robot else ""
     return _by_place(joints, columns, robot, f"no header: joints in order{many}", pose)
+
+
+def _trailing_pose(columns: Sequence[Column], layout: Layout, robot: Chain | None) -> Pose | None:
+    """Return the pose that stands behind the joints, or alone in a table, by what its numbers are."""
+    found = trailing_matrix(columns, (layout,))
+    joints = len(robot.coordinates) if robot else 0
+    fits = len(columns) == 7 if robot is None else len(columns) >= joints + 7
+    return found or (trailing_quaternion(columns, (layout,)) if fits else None)
 
 
 def one_plot_a_file(

@@ -76,7 +76,7 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
     if apart is not None:
         found = clock_of_file(tables, columns, apart, units)
         rest = [column for column in columns if column.table != apart]
-        roles = _roles(rest, tables, options, robot, only=1 - apart)
+        roles = _renamed(_roles(rest, tables, options, robot, only=1 - apart), options.names)
         return Plan(tables, tuple(found if i == apart else Clock() for i in (0, 1)), roles, units, apart)
     clocks = tuple(
         find_clock([c for c in columns if c.table == i], layout, options, tables.known, units, joints)

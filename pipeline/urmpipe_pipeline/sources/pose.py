@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -19,6 +20,12 @@ from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 ORTHOGONAL = 1e-2
 """Entries of R R^T may differ from those of I by this: matrices are printed with three digits or more."""
+
+
+_LIKE_JOINT = re.compile(r"q_?\d")
+"""Names that quaternions and joints have."""
+
+_UNIT_LENGTH = 1e-2
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,6 +139,20 @@ def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout]) -> Pose | 
     return None
 
 
+def trailing_quaternion(columns: Sequence[Column], layouts: Sequence[Layout]) -> Pose | None:
+    """Return the pose in the last seven columns without names, if four of length 1 follow three others."""
+    if len(columns) < 7 or not _is_unit(columns[-4:], layouts):
+        return None
+    evidence = "the last four of seven numbers have length 1"
+    return Pose(tuple(columns[-7:-4]), tuple(columns[-4:]), ("quat_xyzw", "quat_wxyz"), evidence)
+
+
+def _is_unit(columns: Sequence[Column], layouts: Sequence[Layout]) -> bool:
+    """Return whether the numbers of each of three rows or more have length 1, as those of quaternions."""
+    values = _sampled(columns, layouts)
+    return len(values) > 2 and bool((np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH).all())
+
+
 def _sampled(columns: Sequence[Column], layouts: Sequence[Layout]) -> FloatArray:
     """Return the sampled rows in which all of these columns have a number."""
     cells = [layouts[c.table].cells(c.index) for c in columns]
@@ -154,6 +175,8 @@ def _orthogonal(r: FloatArray) -> bool:
 
 def _position(numeric: Sequence[Column], file: str | None) -> tuple[Column, ...]:
     """Return the columns x, y, z; none if there are several and these need not be known."""
+    forces = any(column.key in ("fx", "f_x") for column in numeric)  # tx, ty, tz beside them are torques
+    numeric = [c for c in numeric if not (forces and c.key.startswith("t") and len(c.key) <= len("t_x"))]
     found = [f for f in families(numeric, vocabulary().tcp_position, 0) if _numbers(f) == range(3)]
     best = [family for family in found if family.rank == found[0].rank]
     if len(best) > 1 and file is not None:
@@ -169,8 +192,11 @@ def _rotation(
     for words in vocabulary().tcp_rotations:
         wanted = range(4) if words.forms[0].startswith("quat") else range(3)
         found = [f for f in families(rest, words.patterns, 0) if _numbers(f) == wanted]
-        if len(found) == 1:
-            return found[0].ordered(), words.forms
+        if len(found) != 1:
+            continue
+        columns = found[0].ordered()
+        if not _LIKE_JOINT.fullmatch(columns[0].key) or _is_unit(columns, layouts):
+            return columns, words.forms
     nine = [f.ordered() for f in families(rest, vocabulary().tcp_matrix, 0) if len(f.columns) == 9]
     if len(nine) == 1 and _orthogonal(_sampled(nine[0], layouts).reshape(-1, 3, 3)):
         return nine[0], ("matrix",)

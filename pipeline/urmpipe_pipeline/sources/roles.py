@@ -80,7 +80,8 @@ def assign(
     else:
         pose = chosen_pose(columns, options) or find_pose(numeric, layouts)
         free = [column for column in numeric if column not in (*pose.position, *pose.rotation)]
-        found = _Joints(()) if path else _find_joints(free, file, robot)
+        half = bool(pose.position and not pose.rotation)
+        found = _Joints(()) if path else _find_joints(free, file, robot, half_pose=half)
     pose = with_form(pose, options.rotation)
     if not found.columns:
         return _path(columns, numeric, pose, layouts, robot)
@@ -119,7 +120,8 @@ def _family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ..
     return (), ()
 
 
-def _find_joints(free: Sequence[Column], file: str, robot: Chain | None) -> _Joints:
+def _find_joints(free: Sequence[Column], file: str, robot: Chain | None, *, half_pose: bool) -> _Joints:
+    """Return the joints among some columns; beside half a pose, three angles may be its other half."""
     count = len(robot.coordinates) if robot else None
     orders = [*((robot.coordinates,) if robot else ()), *vocabulary().orders]
     for names in orders:
@@ -132,10 +134,10 @@ def _find_joints(free: Sequence[Column], file: str, robot: Chain | None) -> _Joi
     by_number = _numbered(free, file, count)
     if by_number:
         return by_number
-    return _without_number(free, count)
+    return _without_number(free, count, half_pose=half_pose)
 
 
-def _without_number(free: Sequence[Column], count: int | None) -> _Joints:
+def _without_number(free: Sequence[Column], count: int | None, *, half_pose: bool) -> _Joints:
     """Return joints without numbers: by the word position, by their units, or as all that is left."""
     words = vocabulary()
     about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
@@ -146,7 +148,8 @@ def _without_number(free: Sequence[Column], count: int | None) -> _Joints:
         evidence = "the word position or angle in their names; the order is the file's"
         return _Joints(marked, evidence, names=names)
     sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
-    if any(c.unit and c.unit.quantity == "angle" for c in sized) and count in (None, len(sized)):
+    turning = any(c.unit and c.unit.quantity == "angle" for c in sized)
+    if turning and count in (None, len(sized)) and not (half_pose and count is None and len(sized) == 3):
         return _Joints(sized, "their units; the order is the file's")
     if count is not None and len(still) == count:
         return _Joints(still, f"the only {count} columns left; the order is the file's")
@@ -206,17 +209,19 @@ def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints |
     best = [family for family in fitting if family.rank == min(f.rank for f in fitting)]
     if len(best) > 1 and not all(len(family.columns) == 1 for family in best):
         groups = "; ".join(listed(family.ordered()) for family in best)
-        raise LogError(Finding(f"found several groups of joint columns: {groups}; {OPTION}", file=file))
+        message = f"found several groups of joint columns: {groups}, allowed: one; {OPTION}"
+        raise LogError(Finding(message, file=file))
     if len(best) > 1:  # one plot a joint, each with a number of its own
         columns = tuple(column for family in best for column in family.ordered())
         return _Joints(columns, "their names; the order is the file's")
     family = best[0]
     lowest = min(family.columns)
-    gaps = [n for n in range(lowest, lowest + len(family.columns)) if n not in family.columns]
+    first = lowest if len(family.columns) == 1 else min(lowest, 1)
+    gaps = [n for n in range(first, first + len(family.columns)) if n not in family.columns]
     if gaps and not family.twins:  # a number that is there twice is told as such
         missing = ", ".join(map(str, gaps))
         said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
-        raise LogError(Finding(f"{said}; {OPTION}", file=file))
+        raise LogError(Finding(f"{said}, allowed: numbers without a gap; {OPTION}", file=file))
     return _Joints(
         family.ordered(), "their names, in the order of their numbers", tuple(sorted(family.columns))
     )

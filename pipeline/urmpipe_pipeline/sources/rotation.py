@@ -62,7 +62,7 @@ def settle_rotation(
         told: The unit that each column tells, if it does.
         arm: The robot and the joint values in SI, shape (n, joints); None without a robot.
     """
-    if not columns or np.isnan(values).all(axis=0).any():
+    if not columns or np.isnan(values).any(axis=1).all():
         return Settled()
     names = ", ".join(column.name for column in columns)
     sound = [form for form in forms if _is_sound(values, form)]

@@ -11,6 +11,9 @@ from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.tables import Tables
 from urmpipe_pipeline.sources.vocabulary import Unit, key, vocabulary
 
+NOTHING_BUT = "holds nothing but"
+"""Stands in the evidence for a clock that is a file of its own."""
+
 
 def time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
     """Return which of two tables holds nothing but the times of the other; None if neither does.
@@ -56,7 +59,7 @@ def clock_of_file(tables: Tables, columns: Sequence[Column], index: int, units: 
             raise LogError(Finding(message, str(other.segment.path), other.header, column=column.header))
     own = tuple(column for column in columns if column.table == index)
     form = "one row" if layout.across else "one column"
-    return clock_of(own, f"{title} holds nothing but {form} of times", layout, tables.known, units)
+    return clock_of(own, f"{title} {NOTHING_BUT} {form} of times", layout, tables.known, units)
 
 
 def _is_named(tables: Tables, columns: Sequence[Column], index: int) -> bool:

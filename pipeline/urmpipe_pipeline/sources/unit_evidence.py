@@ -44,6 +44,7 @@ class Bounds:
         return cls(speed, tuple(max(abs(joint.lower), abs(joint.upper)) for joint in joints))
 
 
+@np.errstate(over="ignore", invalid="ignore")  # huge numbers: their steps are infinite
 def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds | None = None) -> str | None:
     """Return why joint values cannot be in rad, or None if they can.
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 
 from urmpipe_models.chain import Chain, JointKind
 from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.orientation import RotationForm, angles
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
 from urmpipe_pipeline.sources.columns import Column
 from urmpipe_pipeline.sources.kinematic_units import KinematicUnits
@@ -42,7 +43,7 @@ class UnitFinder:
     file: str
     kinematic: KinematicUnits | None = None
     _assumed: list[LogWarning] = field(default_factory=list)
-    _doubted: dict[tuple[Unit, Unit, str], list[str]] = field(default_factory=dict)
+    _doubted: dict[tuple[Unit, Unit, str], list[Column]] = field(default_factory=dict)
     _noted: dict[tuple[str, str], list[str]] = field(default_factory=dict)
 
     @property
@@ -117,14 +118,20 @@ class UnitFinder:
         rest = self._length([columns[k] for k in unsaid], values[:, unsaid], set(told))
         return [rest if unit is None else unit for unit in found]
 
-    def rotations(self, columns: Sequence[Column]) -> list[Unit | None]:
+    def rotations(self, columns: Sequence[Column], forms: Sequence[RotationForm]) -> list[Unit | None]:
         """Return the units that the columns of a recorded orientation tell, None where they do not.
+
+        Args:
+            columns: The columns.
+            forms: The forms that it may have: only angles have a unit.
 
         Raises:
             LogError: If a unit is not known or is none of an angle.
         """
+        if not any(map(angles, forms)):
+            return [None] * len(columns)
         default = self.source.units.get("angle") if self.source else None
-        units = []
+        units: list[Unit | None] = []
         for column in columns:
             own = self._own(column) or default
             if own is not None and (own.quantity != "angle" or own.order):
@@ -156,20 +163,22 @@ class UnitFinder:
             self._note([column], unit.name, evidence)
             return unit
         by_how_much = self.kinematic.evidence(unit.quantity, unit)
-        self._doubted.setdefault((unit, better, evidence), []).append(column.name)
+        self._doubted.setdefault((unit, better, evidence), []).append(column)
         given = evidence == GIVEN
         self._note([column], unit.name if given else better.name, evidence if given else by_how_much)
         return unit if given else better
 
     def _contradictions(self) -> Iterator[LogWarning]:
         """Yield what the kinematics say against the units that were told."""
-        for (unit, better, evidence), names in self._doubted.items():
-            told = f"{', '.join(names)}: {unit.name} ({evidence}) contradicts the kinematics: taken as"
+        for (unit, better, evidence), columns in self._doubted.items():
+            first = columns[0].header if columns[0].header.isdigit() else columns[0].name
+            names = ", ".join(column.name for column in columns)
+            told = f"{names}: {unit.name} ({evidence}) contradicts the kinematics: taken as"
             by_how_much = self.kinematic.evidence(unit.quantity, unit) if self.kinematic else ""
             if evidence == GIVEN:
                 said = f"{told} {unit.name}, though as {better.name} it would fit: {by_how_much}"
             else:
-                said = f"{told} {better.name}: {by_how_much}; --unit {names[0]}={unit.name} says otherwise"
+                said = f"{told} {better.name}: {by_how_much}; --unit {first}={unit.name} says otherwise"
             yield LogWarning("unit-contradiction", said)
 
     def _first_told(self, column: Column, kind: JointKind | None) -> tuple[Unit | None, str]:

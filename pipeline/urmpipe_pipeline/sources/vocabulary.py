@@ -84,6 +84,7 @@ class Vocabulary:
 
     time: Patterns
     dates: Patterns
+    long_times: frozenset[str]
     months: Mapping[str, int]
     time_pairs: tuple[tuple[re.Pattern[str], re.Pattern[str]], ...]
     index: Patterns
@@ -129,6 +130,7 @@ def vocabulary() -> Vocabulary:
     return Vocabulary(
         time=_compiled(data["time"]["patterns"]),
         dates=_compiled(data["time"]["dates"]),
+        long_times=frozenset(data["time"]["long"]),
         months={word: k for k, words in enumerate(data["time"]["months"], start=1) for word in words},
         time_pairs=tuple(
             (re.compile(pair["seconds"]), re.compile(pair["nanoseconds"])) for pair in data["time"]["pairs"]

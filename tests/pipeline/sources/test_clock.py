@@ -93,7 +93,8 @@ def test_seconds_and_nanoseconds_apart(read: Read) -> None:
 def test_steps_that_may_be_two_units_are_asked_for(wrong: Wrong, read: Read) -> None:
     text = clocked("t", "0", "600", "1200")
     assert wrong(text) == [
-        "log.csv:2, column t: found steps of 600, which may be ms or us: say which with --unit t=ms"
+        "log.csv:2, column t: found steps of 600, which may be ms or us:"
+        " say which with --unit t=ms or --unit t=us"
     ]
     assert read(text, units={"t": "us"}).t_ns.tolist() == [0, 600_000, 1_200_000]
 
@@ -223,3 +224,74 @@ def test_one_repeat_stays_an_error(wrong: Wrong) -> None:
     assert wrong(clocked("t", *(f"{time:.3f}" for time in times))) == [
         "log.csv:22, column t: found 0.095 s again, allowed: times that increase from row to row"
     ]
+
+
+@pytest.mark.parametrize(("start", "step", "units"), [
+    (1_600_000_000, 5, ("s", "ms")), (1_600_000_000_000, 5000, ("ms", "us")),
+    (1_600_000_000_000_000, 5_000_000, ("us", "ns")),
+])  # fmt: skip
+def test_a_counter_since_boot_is_not_taken_for_unix_time(
+    read: Read, wrong: Wrong, start: int, step: int, units: tuple[str, str]
+) -> None:
+    text = clocked("time", *(str(start + k * step) for k in range(4)))
+    found = f"found times of our years in steps of {step:g}, which may be {units[0]} or {units[1]}"
+    asked = f"say which with --unit time={units[0]} or --unit time={units[1]}"
+    assert wrong(text) == [f"log.csv:2, column time: {found}: {asked}"]
+    assert read(text, units={"time": units[1]}).period == 0.005
+
+
+def test_minutes_days_and_dates_in_numbers_are_not_taken_for_seconds(read: Read, wrong: Wrong) -> None:
+    minutes = clocked("Time [min]", "0", "0.1", "0.2")
+    hint = "convert the times, or --time none with --period SECONDS"
+    said = f"found the unit 'min', allowed: s, ms, us, ns; {hint}"
+    assert wrong(minutes) == [f"log.csv:2, column Time [min]: {said}"]
+    assert read(minutes, time="none", period=6.0).period == 6.0
+    excel = clocked("Time", *(f"{44297.5 + k * 0.005 / 86400:.12f}" for k in range(4)))
+    said = "found steps of 5.79e-08, as of days or hours, allowed: times in s, ms, us, ns"
+    hint = "convert them, or say that it is so with --unit Time=s"
+    assert wrong(excel) == [f"log.csv:2, column Time: {said}; {hint}"]
+    assert read(excel, units={"Time": "s"}).units["Time"] == "s"
+    date = clocked("Time", "20210411222721.0", "20210411222721.5")
+    said = "found 2.02104e+13 s, allowed: times within 146 years of 0"
+    hint = "a date is read if it is written as 2021-04-11 22:27:21.5"
+    assert wrong(date) == [f"log.csv:2, column Time: {said}; {hint}"]
+
+
+def test_a_clock_of_more_than_5_khz_is_said_to_be_assumed(read: Read) -> None:
+    log = read(clocked("Time", "0", "0.0001", "0.0002"))
+    assert [w.message for w in log.warnings if "time" in w.message] == [
+        "the time 'Time' steps by 0.0001: taken as s"
+    ]
+
+
+@pytest.mark.parametrize(
+    "times", [("101158", "101159", "101200", "101201"), ("105958", "105959", "110000", "110001")]
+)
+def test_times_of_day_in_numbers_are_refused_where_they_leap(
+    read: Read, wrong: Wrong, times: tuple[str, ...]
+) -> None:
+    text = clocked("Time", *times)
+    said = f"found {times[2]} after {times[1]}, as a time of day hhmmss goes on, allowed: a clock of one unit"
+    hint = "write it as hh:mm:ss, or say that it is no time of day with --unit Time=s"
+    assert wrong(text) == [f"log.csv:4, column Time: {said}; {hint}"]
+    assert read(text, units={"Time": "s"}).t[1:].tolist()[0] == 1.0
+
+
+def test_a_gap_of_forty_seconds_is_no_time_of_day(read: Read) -> None:
+    assert read(clocked("Time", "57", "58", "59", "100", "101", "162")).t[-1] == 105.0
+
+
+@pytest.mark.parametrize("names", [("time_sec", "time_nsec"), ("timestamp_secs", "timestamp_nsecs")])
+def test_halves_of_a_stamp_are_joined_though_the_first_is_named_like_a_time(
+    read: Read, names: tuple[str, str]
+) -> None:
+    for order in (names, names[::-1]):
+        cells = {names[0]: ("7", "7", "8"), names[1]: ("990000000", "995000000", "0")}
+        rows = [f"{cells[order[0]][k]},{cells[order[1]][k]},{k}" for k in range(3)]
+        log = read("\n".join([f"{order[0]},{order[1]},q1", *rows, ""]))
+        assert log.t_ns.tolist() == [0, 5_000_000, 10_000_000]
+
+
+def test_a_whole_time_beside_whole_nanoseconds_is_no_half_of_it(read: Read) -> None:
+    log = read("time_sec,time_nsec,q1\n1.5,1500000000,0\n1.505,1505000000,1\n")
+    assert log.t_ns.tolist() == [0, 5_000_000]

@@ -171,3 +171,32 @@ def test_a_sign_turns_the_recorded_rates_too(read: Read) -> None:
     np.testing.assert_allclose(log.q[:, 0], 0.5 - np.arange(5) / 10, atol=1e-15)
     assert log.qd is not None
     assert log.qd[:, 0].tolist() == [-1.0] * 5
+
+
+SPECIMENS = Path(__file__).parents[2] / "specimens"
+
+
+@pytest.mark.parametrize("name", [
+    "clock_iso_utc.csv", "clock_time_of_day.csv", "clock_minutes.csv", "clock_date_and_time.csv",
+    "clock_sec_nanosec.csv", "clock_ms_unsaid.csv", "matlab_timetable.csv", "coppeliasim_three_graphs.csv",
+    "ros2_echo_joint_states.csv", "kuka_fri.txt", "pandas_array_cells.csv", "numpy_savetxt_default.txt",
+])  # fmt: skip
+def test_the_map_of_any_log_reads_it_again(write: Write, name: str) -> None:
+    log = read_log([SPECIMENS / name])
+    again = read_log([SPECIMENS / name], read_map(write(map_of(log), "lab.toml")).read)
+    np.testing.assert_array_equal(again.q, log.q)
+    np.testing.assert_array_equal(again.t_ns, log.t_ns)
+    assert again.joints == log.joints
+
+
+def test_the_map_of_a_log_of_one_row_has_no_period(write: Write) -> None:
+    path = write("q1,q2\n0.5,1.5\n")
+    read_again = read_map(write(map_of(read_log([path])), "lab.toml")).read
+    assert (read_again.period, read_log([path], read_again).rows) == (None, 1)
+
+
+def test_the_map_of_a_log_with_a_file_of_times_reads_both_again(write: Write) -> None:
+    files = [write("q1,q2\n0.5,1\n0.4,2\n0.3,3\n", "q.csv"), write("1\n1.005\n1.01\n", "time.csv")]
+    log = read_log(files)
+    again = read_log(files, read_map(write(map_of(log), "lab.toml")).read)
+    assert again.t_ns.tolist() == log.t_ns.tolist() == [0, 5_000_000, 10_000_000]

@@ -196,3 +196,50 @@ def test_named_columns_of_the_pose(read: Read) -> None:
 def test_a_pose_needs_its_columns(options: dict[str, object], said: str, wrong: Wrong) -> None:
     table = text([*JOINTS_RAD, "a1", "a2", "a3", "b1", "b2", "b3"], Q, POSITION, ROTATION.as_rotvec())
     assert wrong(table, **options) == [said]
+
+
+def test_positions_and_vectors_by_number(read: Read) -> None:
+    vector = ROTATION.as_rotvec()
+    for names in (
+        [f"actual_TCP_pose_{k}" for k in range(1, 7)],
+        [*(f"tcp_position_{k}" for k in range(1, 4)), *(f"rotvec_{k}" for k in range(1, 4))],
+    ):
+        log = read(text([*JOINTS_RAD, *names], Q, POSITION, vector), UR5E)
+        assert log.tcp_position is not None
+        assert log.tcp_rotation is not None
+        np.testing.assert_allclose(log.tcp_position, POSITION, atol=PRINTED)
+        np.testing.assert_allclose(log.tcp_rotation, vector, atol=PRINTED)
+
+
+def test_a_quaternion_named_like_joints_is_known_by_its_length(read: Read) -> None:
+    wxyz = ROTATION.as_quat()[:, [3, 0, 1, 2]]
+    names = [*(f"J{k} [rad]" for k in range(1, 7)), *XYZ, "Q1", "Q2", "Q3", "Q4"]
+    log = read(text(names, Q, POSITION * 1e3, wxyz), UR5E)
+    assert log.joints == ("J1", "J2", "J3", "J4", "J5", "J6")
+    assert log.rotation_form == "quat_wxyz"
+    scara = read(text(["q1", "q2", "q3", "q4", *XYZ], Q[:, :4], POSITION * 1e3))
+    assert (scara.joints, scara.rotation_form) == (("q1", "q2", "q3", "q4"), None)
+
+
+def test_quaternions_have_no_unit_that_is_refused(read: Read) -> None:
+    names = [*JOINTS_RAD, *XYZ, "qx [-]", "qy [-]", "qz [-]", "qw [-]"]
+    assert read(text(names, Q, POSITION * 1e3, ROTATION.as_quat())).rotation_form == "quat_xyzw"
+
+
+def test_a_trajectory_without_header_is_no_log_of_seven_joints(read: Read) -> None:
+    rows = np.column_stack((np.arange(ROWS) * 0.005, POSITION, ROTATION.as_quat()))
+    tum = "".join(" ".join(map(repr, row)) + "\n" for row in rows.tolist())
+    log = read(tum)
+    assert (log.joints, log.source) == ((), "path")
+    assert log.tcp_position is not None
+    np.testing.assert_array_equal(log.tcp_position, POSITION)
+    assert read(tum, rotation="quat_xyzw").rotation_form == "quat_xyzw"
+    seven = np.column_stack((np.arange(ROWS) * 0.005, Q, Q[:, 0]))
+    assert len(read("".join(" ".join(map(repr, row)) + "\n" for row in seven.tolist())).joints) == 7
+
+
+def test_an_orientation_without_a_whole_sample_is_not_used(read: Read) -> None:
+    gappy = ROTATION.as_quat()
+    gappy[::2, 0], gappy[1::2, 1] = np.nan, np.nan
+    log = read(text([*JOINTS_RAD, *XYZ, "qx", "qy", "qz", "qw"], Q, POSITION * 1e3, gappy))
+    assert (log.rotation_form, log.tcp_rotation) == (None, None)

@@ -177,14 +177,18 @@ def test_too_few_and_too_many_for_the_robot(wrong: Wrong, arm: Arm) -> None:
 
 
 def test_a_missing_number_is_named(wrong: Wrong) -> None:
+    allowed = "allowed: numbers without a gap"
+    assert wrong(table(["t", "a", "J2", "J3"])) == [
+        f"log.csv: found joint columns J2, J3 and none with number 1, {allowed}; {OPTION}"
+    ]
     assert wrong(table(["t", "J1", "J2", "J4"])) == [
-        f"log.csv: found joint columns J1, J2, J4 and none with number 3; {OPTION}"
+        f"log.csv: found joint columns J1, J2, J4 and none with number 3, {allowed}; {OPTION}"
     ]
 
 
 def test_two_groups_are_ambiguous_unless_one_fits_the_robot(wrong: Wrong, read: Read, arm: Arm) -> None:
     names = ["left_q1", "left_q2", "right_q1", "right_q2"]
-    said = "found several groups of joint columns: left_q1, left_q2; right_q1, right_q2"
+    said = "found several groups of joint columns: left_q1, left_q2; right_q1, right_q2, allowed: one"
     assert wrong(table(["t", *names])) == [f"log.csv: {said}; {OPTION}"]
     assert read(table(["t", *names, "right_q3"]), arm(3)).joints == ("right_q1", "right_q2", "right_q3")
 
@@ -279,3 +283,25 @@ def test_ur_logs_may_have_no_time(read: Read) -> None:
     log = read(table([*(f"actual_q_{k}" for k in range(6)), "actual_execution_time", "runtime_state"]))
     assert log.source == "ur-rtde"
     assert log.t_ns.tolist() == [0, 5_000_000]
+
+
+@pytest.mark.parametrize(
+    ("word", "attribute"), [("vel", "qd"), ("dot", "qd"), ("acc", "qdd"), ("ddot", "qdd")]
+)
+def test_rates_named_behind_the_number(read: Read, word: str, attribute: str) -> None:
+    log = read(table(["t", "q1", "q2", f"q1_{word}", f"q2_{word}"]))
+    assert getattr(log, attribute).tolist() == [[3.0, 4.0], [3.5, 4.5]]
+
+
+def test_forces_and_torques_are_neither_joints_nor_a_position(read: Read, wrong: Wrong, arm: Arm) -> None:
+    wrench = ["Fx", "Fy", "Fz", "Tx", "Ty", "Tz"]
+    assert read(table(["t", "q1", "q2", *wrench])).tcp_position is None
+    said = "found no joint columns in Fx, Fy, Fz, Mx, My, Mz, allowed: 6 for robot arm"
+    names = ["t", "Fx", "Fy", "Fz", "Mx", "My", "Mz"]
+    assert wrong(table(names), arm(6)) == [f"log.csv: {said}; {OPTION}"]
+
+
+def test_three_angles_beside_a_position_are_no_joints(read: Read) -> None:
+    log = read(table(["t", "X [mm]", "Y [mm]", "Z [mm]", "W [deg]", "P [deg]", "R [deg]"]))
+    assert log.joints == ()
+    assert log.tcp_position is not None

@@ -207,7 +207,10 @@ WRONG = [
     Wrong("header_with_more_names", [r"^log:1: found 8 names over rows of 7 cells, allowed: "]),
     Wrong("header_with_a_name_twice", [r"^log:1, column q3: found as columns 4, 5, allowed: once"]),
     Wrong("header_with_all_names_twice", [r"^log:1, column q1: found as columns 2, 8, allowed: once"]),
-    Wrong("header_without_a_number", [r"^log: found joint columns .* none with number 3; .*--joints"]),
+    Wrong(
+        "header_without_a_number",
+        [r"^log: found joint columns .* none with number 3, allowed: .*--joints"],
+    ),
     Wrong("header_of_unknown_unit", [r"^log, column q1 \[gon\]: found the unit 'gon', allowed: rad, deg"]),
     Wrong("rows_too_short", [r"^log:8: found 6 cells, allowed: 7", r"^log:20: found 6 cells"]),
     Wrong("row_cut_off", [r"^log:31: found 2 cells, allowed: 7"]),

@@ -182,14 +182,37 @@ def test_whole_numbers_are_not_taken_for_decimals(read: Read) -> None:
 
 
 def test_without_header_the_columns_are_joints(read: Read, arm: Arm) -> None:
-    text = "0.1,0.2,0.3,0.4\n0.2,0.1,0.5,0.7\n"
+    text = "0.1,0.2,0.3,0.4\n0.05,0.1,0.5,0.7\n"
     assert read(text).joints == ("q1", "q2", "q3", "q4")
     log = read(text, arm(3))
     assert log.joints == ("phi1", "phi2", "phi3")
-    assert log.q.tolist() == [[0.1, 0.2, 0.3], [0.2, 0.1, 0.5]]
+    assert log.q.tolist() == [[0.1, 0.2, 0.3], [0.05, 0.1, 0.5]]
     assert found(log, "columns not used") == "4"
     assert log.first_line == 1
     assert [warning.kind for warning in log.warnings] == ["assumed-period", "assumed-unit"]
+
+
+@pytest.mark.parametrize(
+    ("text", "joints"),
+    [
+        ("0,0.5\n1,0.4\n2,0.6\n", None),  # a counter
+        ("0.0,0.5,1\n0.01,0.6,1\n0.02,0.7,1\n", None),  # two columns run evenly
+        ("7.0,0.5,1\n7.009,0.6,0\n7.031,0.5,1\n", 2),  # an uneven clock beside all joints
+        ("7.0,0.5,1\n7.01,0.4,0\n", 2),  # two rows
+    ],
+)
+def test_without_header_a_first_column_that_may_be_a_time_is_asked_for(
+    read: Read, wrong: Wrong, arm: Arm, text: str, joints: int | None
+) -> None:
+    robot = arm(joints) if joints else None
+    said = "found a first column that increases from row to row, which may be the time, a counter or a joint"
+    hint = "say --time 1 or --time none, or name the joint columns with --joints 2,3,..."
+    assert wrong(text, robot) == [f"log.csv:1: {said}: {hint}"]
+    first = [float(line.partition(",")[0]) for line in text.splitlines()]
+    others = text.partition("\n")[0].count(",")
+    assert read(text, robot, time="1").q.shape[1] == others
+    assert read(text, robot, joints=[str(k + 2) for k in range(others)]).q[0, 0] == 0.5
+    assert read(text, arm(1), time="none").q[:, 0].tolist() == first
 
 
 def test_without_header_a_first_column_in_even_steps_is_the_time(read: Read, arm: Arm) -> None:
@@ -288,3 +311,12 @@ def test_an_infinite_time_among_the_first_rows_is_named(wrong: Wrong) -> None:
     said = wrong("t,q1\n0,1\n1.#INF,2\n0.2,3\n")
     assert len(said) == 1
     assert said[0].startswith("log.csv:3, column t: found '1.#INF', allowed: ")
+
+
+def test_names_that_a_file_does_not_have_are_no_headers(read: Read) -> None:
+    echo = "7,0,,a,b,0.5,1.5,0,0,0,0\n7,5000000,,a,b,0.6,1.6,0,0,0,0\n"
+    labels = "Time: 0.1  q values: [0.5, 1.5]\nTime: 0.2  q values: [0.6, 1.6]\n"
+    for text in (echo, labels):
+        log = read(text)
+        assert log.q.tolist() == [[0.5, 1.5], [0.6, 1.6]]
+        assert {column.header for column in log.columns} == {""}

@@ -99,3 +99,8 @@ def test_two_joints_of_one_name_are_refused_wherever_the_times_stand(write: Writ
     for files in ([clock, joints], [joints, clock]):
         with pytest.raises(LogError, match=r"found as columns \d, \d, allowed: once"):
             read(*files)
+
+
+def test_the_names_of_a_map_hold_beside_a_file_of_times(write: Write) -> None:
+    files = [write(JOINTS, "q.csv"), write("1\n1.005\n1.01\n", "time.csv")]
+    assert read(*files, names=("shoulder", "elbow")).joints == ("shoulder", "elbow")

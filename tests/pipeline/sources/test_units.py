@@ -220,3 +220,12 @@ def test_recorded_rotation_vectors_follow_their_unit(read: Read, wrong: Wrong) -
     assert [warning.kind for warning in log.warnings].count("missing") == 1
     said = wrong("timestamp,actual_q_0," + header.replace("{}", " [mm]") + "\n" + rows)
     assert said == ["log.csv, column actual_TCP_pose_3 [mm]: found the unit mm, allowed: rad, deg"]
+
+
+@pytest.mark.filterwarnings("error")
+def test_huge_numbers_are_read_without_a_warning_of_numpy(read: Read, wrong: Wrong) -> None:
+    rows = "0,1e308\n1,-1e308\n2,0\n"
+    assert read(f"t,q1 [rad]\n{rows}").q[0, 0] == 1e308
+    assert wrong(f"t,q1\n{rows}") == [
+        "log.csv: found values up to 1e+308 in q1 and no unit, allowed: rad or deg; say which with --unit"
+    ]
