@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
+from urmpipe_models.orientation import RotationForm
 from urmpipe_pipeline.joint_log import (
     ROLES,
     FloatArray,
@@ -33,6 +35,32 @@ from urmpipe_pipeline.sources.units import UnitFinder
 from urmpipe_pipeline.sources.vocabulary import Unit
 
 
+@dataclass(frozen=True, slots=True, eq=False)
+class _Group:
+    """The columns of one role: their values in SI, shape (n, columns), and the units that they had."""
+
+    columns: Sequence[Column]
+    values: FloatArray
+    units: Sequence[Unit]
+
+    @property
+    def recorded(self) -> FloatArray | None:
+        """The values; None if there are none, or one of the columns is empty."""
+        if not self.units or np.isnan(self.values).all(axis=0).any():
+            return None
+        return self.values
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Measured:
+    """Everything that was recorded, in the order of the roles, and what was found out about units."""
+
+    groups: tuple[_Group, _Group, _Group, _Group, _Group]
+    form: RotationForm | None
+    inferences: Sequence[Inference]
+    warnings: Sequence[LogWarning]
+
+
 def assemble(
     plan: Plan,
     content: Content,
@@ -55,13 +83,64 @@ def assemble(
         LogError: If a column has no value, or a unit cannot be told or contradicts the data.
         OptionError: If an option does not fit the log.
     """
-    roles, layout = content.roles, plan.tables.layouts[plan.main]
+    roles, layout, clock = content.roles, plan.tables.layouts[plan.main], plan.clock
     t_ns, start, timed, noticed = _times(content, options)
-    q, qd, qdd = (content.values(group) for group in (roles.joints, roles.rates, roles.accelerations))
-    tcp, rotation = content.values(roles.position), content.values(roles.rotation)
-    file = str(layout.segment.path)
-    refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], file)
     signs, offsets = _corrections(options, len(roles.joints))
+    measured = _measured(plan, content, robot, t_ns, signs, offsets)
+    joints, rates, seconds, position, rotation = measured.groups
+    digits = _digits(plan, roles.joints)
+    found = (plan.tables, layout, clock)
+    return JointLog(
+        name=name,
+        source=PATH if not roles.joints and plan.tables.source == TABLE else plan.tables.source,
+        files=tuple(files),
+        t_ns=t_ns,
+        clock_start_ns=start,
+        joints=tuple(column.name for column in roles.joints),
+        q=joints.values,
+        first_line=layout.first_line,
+        qd=rates.recorded,
+        qdd=seconds.recorded,
+        tcp_position=position.recorded,
+        tcp_rotation=rotation.recorded,
+        rotation_form=measured.form,
+        columns=(*_time_columns(plan), *_used_columns(plan, measured.groups, signs, offsets)),
+        digits=digits,
+        inferences=(
+            *(inference for one in found for inference in one.inferences),
+            *timed,
+            *roles.inferences,
+            *content.inferences,
+            *measured.inferences,
+            *_about_digits(digits),
+        ),
+        warnings=(
+            *content.warnings,
+            *clock.warnings,
+            *noticed,
+            *measured.warnings,
+            *_missing(measured.groups),
+            *gaps(t_ns),
+        ),
+    )
+
+
+def _measured(
+    plan: Plan,
+    content: Content,
+    robot: Chain | None,
+    t_ns: IntArray,
+    signs: Sequence[int],
+    offsets: Sequence[float],
+) -> _Measured:
+    """Return what was recorded in SI: the units of the joints first, since others rest on them.
+
+    Raises:
+        LogError: If a column has no value, or a unit cannot be told or contradicts the data.
+    """
+    roles, file = content.roles, str(plan.tables.layouts[plan.main].segment.path)
+    q, qd, qdd, tcp, rotation = (content.values(group) for group in roles.groups)
+    refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], file)
     q, qd, qdd = _corrected(q, signs, offsets), _corrected(qd, signs), _corrected(qdd, signs)
     finder = UnitFinder(plan.units, plan.tables.known, file, by_kinematics(robot, q, tcp))
     units = finder.joints(roles.joints, q, t_ns if content.timed else None, robot) if roles.joints else []
@@ -71,53 +150,17 @@ def assemble(
     q = _in_si(q, units)
     told = finder.rotations(roles.rotation, roles.forms)
     turned = settle_rotation(roles.rotation, roles.forms, rotation, told, (robot, q) if robot else None)
-    used = (
-        (roles.joints, q, units),
-        (roles.rates, qd, rates),
-        (roles.accelerations, qdd, seconds),
-        (roles.position, tcp, lengths),
-        (roles.rotation if turned.form else (), rotation, turned.units),
-    )
-    digits = _digits(plan, roles.joints)
-    return JointLog(
-        name=name,
-        source=PATH if not roles.joints and plan.tables.source == TABLE else plan.tables.source,
-        files=tuple(files),
-        t_ns=t_ns,
-        clock_start_ns=start,
-        joints=tuple(column.name for column in roles.joints),
-        q=q,
-        first_line=layout.first_line,
-        qd=_recorded(qd, rates),
-        qdd=_recorded(qdd, seconds),
-        tcp_position=_recorded(tcp, lengths),
-        tcp_rotation=_recorded(rotation, turned.units),
-        rotation_form=turned.form,
-        columns=(
-            *_time_columns(plan),
-            *_used_columns(plan, [(group, found) for group, _, found in used], signs, offsets),
+    return _Measured(
+        groups=(
+            _Group(roles.joints, q, units),
+            _Group(roles.rates, _in_si(qd, rates), rates),
+            _Group(roles.accelerations, _in_si(qdd, seconds), seconds),
+            _Group(roles.position, _in_si(tcp, lengths), lengths),
+            _Group(roles.rotation if turned.form else (), _in_si(rotation, turned.units), turned.units),
         ),
-        digits=digits,
-        inferences=(
-            *plan.tables.inferences,
-            *layout.inferences,
-            *plan.clock.inferences,
-            *timed,
-            *roles.inferences,
-            *content.inferences,
-            *finder.inferences,
-            *turned.inferences,
-            *_about_digits(digits),
-        ),
-        warnings=(
-            *content.warnings,
-            *plan.clock.warnings,
-            *noticed,
-            *finder.warnings,
-            *turned.warnings,
-            *_missing(used),
-            *gaps(t_ns),
-        ),
+        form=turned.form,
+        inferences=(*finder.inferences, *turned.inferences),
+        warnings=(*finder.warnings, *turned.warnings),
     )
 
 
@@ -173,13 +216,13 @@ def _time_columns(plan: Plan) -> Iterator[LogColumn]:
 
 def _used_columns(
     plan: Plan,
-    groups: Sequence[tuple[Sequence[Column], Sequence[Unit]]],
+    groups: Sequence[_Group],
     signs: Sequence[int],
     offsets: Sequence[float],
 ) -> Iterator[LogColumn]:
     """Yield the columns of each group with their units; signs and offsets are those of the joints."""
-    for role, (group, units) in zip(ROLES[1:], groups, strict=True):
-        for i, (column, unit) in enumerate(zip(group, units, strict=True)):
+    for role, group in zip(ROLES[1:], groups, strict=True):
+        for i, (column, unit) in enumerate(zip(group.columns, group.units, strict=True)):
             sign = signs[i] if role in ("joint", "rate", "acceleration") else 1
             offset = offsets[i] if role == "joint" else 0.0
             header = _header(plan, column)
@@ -187,25 +230,18 @@ def _used_columns(
 
 
 def _in_si(values: FloatArray, units: Sequence[Unit]) -> FloatArray:
-    """Bring the columns to SI, in place."""
+    """Bring the columns to SI, in place; as they are without units."""
     factors = np.array([unit.factor for unit in units])
-    if (factors != 1.0).any():
+    if len(units) and (factors != 1.0).any():
         values *= factors
     return values
 
 
-def _recorded(values: FloatArray, units: Sequence[Unit]) -> FloatArray | None:
-    """Return what the log recorded beside the joints in SI; None if a column is not there or empty."""
-    if not units or np.isnan(values).all(axis=0).any():
-        return None
-    return _in_si(values, units)
-
-
-def _missing(used: Sequence[tuple[Sequence[Column], FloatArray, Sequence[Unit]]]) -> Iterator[LogWarning]:
+def _missing(groups: Sequence[_Group]) -> Iterator[LogWarning]:
     """Yield a warning for each column in which samples are missing."""
-    for group, values, _ in used:
-        if group:
-            yield from missing_samples(values, [column.name for column in group])
+    for group in groups:
+        if group.columns:
+            yield from missing_samples(group.values, [column.name for column in group.columns])
 
 
 def _digits(plan: Plan, joints: Sequence[Column]) -> int | None:

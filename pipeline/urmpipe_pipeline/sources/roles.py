@@ -42,9 +42,14 @@ class Roles:
     inferences: tuple[Inference, ...] = ()
 
     @property
+    def groups(self) -> tuple[tuple[Column, ...], ...]:
+        """The columns of each role: joints, rates, accelerations, position, rotation."""
+        return self.joints, self.rates, self.accelerations, self.position, self.rotation
+
+    @property
     def columns(self) -> tuple[Column, ...]:
         """All of them."""
-        return (*self.joints, *self.rates, *self.accelerations, *self.position, *self.rotation)
+        return tuple(column for group in self.groups for column in group)
 
 
 def assign(
