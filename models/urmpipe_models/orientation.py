@@ -28,6 +28,17 @@ def width(form: RotationForm) -> int:
     return 9 if form == "matrix" else 4 if form.startswith("quat") else 3
 
 
+NAMES: dict[RotationForm, tuple[str, ...]] = {
+    "vector": ("rx", "ry", "rz"),
+    "rpy": ("roll", "pitch", "yaw"),
+    **{form: tuple(f"{axis}{k + 1}" for k, axis in enumerate(axes)) for form, axes in EULER.items()},
+    "quat_xyzw": ("qx", "qy", "qz", "qw"),
+    "quat_wxyz": ("qw", "qx", "qy", "qz"),
+    "matrix": tuple(f"r{i}{j}" for i in "123" for j in "123"),
+}
+"""What the columns of a form are called: z1, y2, x3 are the first, second and third angle and their axes."""
+
+
 def angles(form: RotationForm) -> bool:
     """Return whether the columns of a form are in [rad]; the others are in [-]."""
     return width(form) == 3

@@ -12,6 +12,7 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import PointLog
+from urmpipe_models.orientation import NAMES
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning, SourceFile, seconds
 
 if TYPE_CHECKING:
@@ -106,6 +107,9 @@ class Run:
         audit: What the repolarizer did and what it could not decide, by row.
         warnings: What a person should know.
         provenance: How to repeat it.
+        rotation_recorded: The orientation that the log itself recorded, on the grid, in [rad] or [-], shape
+            (g, k): in its own form (of a matrix as a quaternion x, y, z, w), without jumps between the names
+            of one rotation.
         recording: Where it was written.
     """
 
@@ -122,6 +126,7 @@ class Run:
     audit: tuple[AuditEntry, ...]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
+    rotation_recorded: FloatArray | None = None
     recording: Path | None = None
 
     @property
@@ -138,6 +143,12 @@ class Run:
     def duration(self) -> float:
         """From the first to the last row, in [s]."""
         return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9
+
+    @property
+    def rotation_names(self) -> tuple[str, ...]:
+        """What the columns of `rotation_recorded` are called; none without one."""
+        form = self.log.rotation_form
+        return () if form is None else NAMES["quat_xyzw" if form == "matrix" else form]
 
     @property
     def joint_units(self) -> list[str]:

@@ -117,6 +117,10 @@ def grid_table(run: Run) -> Table:
         columns += _group(["rz", "ry", "rx"], ["rad"] * 3, run.tcp.euler_zyx)
     if run.tcp_recorded is not None:
         columns += _group([f"recorded_tcp_{axis}" for axis in AXES[:3]], ["m"] * 3, run.tcp_recorded)
+    if run.rotation_recorded is not None:
+        unit = "rad" if len(run.rotation_names) == 3 else "1"
+        names = [f"recorded_{name}" for name in run.rotation_names]
+        columns += _group(names, [unit] * len(names), run.rotation_recorded)
     return Table(tuple(columns), run.log.clock_start_ns + run.t_ns)
 
 

@@ -5,7 +5,7 @@ A run stands at the root; of a comparison the first run does, and each further o
     joints/raw, raw_velocity, raw_acceleration                  the file's own rows: timelines t and row
     tcp/raw_position, raw_rotation
     joints/repolarized, velocity, acceleration                  the grid: timelines t and sample
-    tcp/recorded, position, velocity, acceleration, euler_zyx, singular
+    tcp/recorded, recorded_rotation, position, velocity, acceleration, euler_zyx, singular
     delta/<key>, matched/<key>/reference, actual, outside       the compared samples: t and sample
     reference/position                                          the reference on its own times: t
 
@@ -22,6 +22,7 @@ from typing import Literal
 
 import numpy as np
 
+from urmpipe_models.orientation import NAMES
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.results import AXES, Comparison, Deviation, Run, Trajectory
@@ -46,6 +47,7 @@ GRID_ARRAYS: dict[str, tuple[str, Series]] = {
     "joints/velocity": ("qd", "joints"),
     "joints/acceleration": ("qdd", "joints"),
     "tcp/recorded": ("tcp_recorded", "xyz"),
+    "tcp/recorded_rotation": ("rotation_recorded", "rotation"),
 }
 """Entity: attribute of `Run`."""
 
@@ -163,24 +165,24 @@ def blocks(result: JointLog | Run | Comparison) -> list[Block]:
 
 
 def _log_blocks(log: JointLog, prefix: str) -> Iterator[Block]:
-    joints = tuple(printable(name) for name in log.joints)
+    names = _names(log, NAMES[log.rotation_form] if log.rotation_form else ())
     rows = ("row", np.arange(1, log.rows + 1))
     for entity, (attribute, series) in LOG_ARRAYS.items():
         if (values := getattr(log, attribute)) is not None:
-            yield _block(prefix + entity, log.t_ns, values, series, joints, rows)
+            yield Block(prefix + entity, log.t_ns, values, series, names[series], rows)
 
 
 def _run_blocks(run: Run, place: Place) -> Iterator[Block]:
     yield from _log_blocks(run.log, place.prefix)
-    joints = tuple(printable(name) for name in run.log.joints)
+    names = _names(run.log, run.rotation_names)
     samples = ("sample", np.arange(len(run.t_ns)))
     for entity, (attribute, series) in GRID_ARRAYS.items():
         if (values := getattr(run, attribute)) is not None:
-            yield _block(place.prefix + entity, run.t_ns, values, series, joints, samples)
+            yield Block(place.prefix + entity, run.t_ns, values, series, names[series], samples)
     if run.tcp is not None:
         for entity, (attribute, series) in TCP_ARRAYS.items():
             values = getattr(run.tcp, attribute)
-            yield _block(place.prefix + entity, run.t_ns, values, series, joints, samples)
+            yield Block(place.prefix + entity, run.t_ns, values, series, names[series], samples)
         yield from _flags(place.prefix + SINGULAR, run.tcp.singular, run.t_ns, samples[1])
 
 
@@ -196,21 +198,10 @@ def _reference_block(reference: Trajectory) -> Block:
     return Block("/" + REFERENCE, reference.t_ns, reference.position, "xyz", AXES[:3])
 
 
-def _block(
-    entity: str,
-    t_ns: IntArray,
-    values: FloatArray,
-    series: Series,
-    joints: tuple[str, ...],
-    numbers: tuple[str, IntArray],
-) -> Block:
-    names = {
-        "joints": joints,
-        "xyz": ("x", "y", "z"),
-        "rotation": tuple(f"r{k + 1}" for k in range(values.shape[1])),
-        "euler": ("rz", "ry", "rx"),
-    }
-    return Block(entity, t_ns, values, series, names[series], numbers)
+def _names(log: JointLog, rotation: tuple[str, ...]) -> dict[Series, tuple[str, ...]]:
+    """Return what the columns of each series are called."""
+    joints = tuple(printable(name) for name in log.joints)
+    return {"joints": joints, "xyz": AXES[:3], "rotation": rotation, "euler": ("rz", "ry", "rx")}
 
 
 def _flags(
