@@ -103,7 +103,6 @@ def ingest_log(
         qdd=qdd,
         tcp=None,
         tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
-        rotation_recorded=_rotation(log, grid),
         audit=found.entries,
         warnings=tuple(warnings),
         provenance=provenance("ingest", given, log.files),
@@ -127,16 +126,6 @@ def _given(options: ReadOptions) -> dict[str, Any] | None:
     """Return the reading options that differ from the defaults."""
     default = asdict(ReadOptions())
     return {name: value for name, value in asdict(options).items() if value != default[name]} or None
-
-
-def _rotation(log: JointLog, grid: Grid) -> FloatArray | None:
-    """Return the recorded orientation on the grid; linear between samples, since it goes on without jumps."""
-    pure = log.rotation_form in ("quat_xyzw", "quat_wxyz", "matrix")
-    values = log.tcp_quat_xyzw if log.rotation_form == "matrix" else log.tcp_rotation_continuous
-    if values is None:
-        return None
-    resampled = grid.resample(values)
-    return resampled / np.linalg.norm(resampled, axis=1, keepdims=True) if pure else resampled
 
 
 def _rates(

@@ -12,7 +12,8 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import PointLog
-from urmpipe_models.orientation import NAMES
+from urmpipe_models.orientation import NAMES, angles
+from urmpipe_pipeline.grid import interpolate
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning, SourceFile, seconds
 
 if TYPE_CHECKING:
@@ -107,9 +108,6 @@ class Run:
         audit: What the repolarizer did and what it could not decide, by row.
         warnings: What a person should know.
         provenance: How to repeat it.
-        rotation_recorded: The orientation that the log itself recorded, on the grid, in [rad] or [-], shape
-            (g, k): in its own form (of a matrix as a quaternion x, y, z, w), without jumps between the names
-            of one rotation.
         recording: Where it was written.
     """
 
@@ -126,7 +124,6 @@ class Run:
     audit: tuple[AuditEntry, ...]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
-    rotation_recorded: FloatArray | None = None
     recording: Path | None = None
 
     @property
@@ -143,6 +140,21 @@ class Run:
     def duration(self) -> float:
         """From the first to the last row, in [s]."""
         return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9
+
+    @property
+    def rotation_recorded(self) -> FloatArray | None:
+        """The orientation that the log itself recorded, on the grid, shape (g, k); None without one.
+
+        In its own form (of a matrix as a quaternion x, y, z, w) in [rad] or [-], without jumps between the
+        names of one rotation, and so linear between the rows.
+        """
+        form = self.log.rotation_form
+        values = self.log.tcp_quat_xyzw if form == "matrix" else self.log.tcp_rotation_continuous
+        if form is None or values is None:
+            return None
+        if not np.array_equal(self.t_ns, self.log.t_ns):
+            values = interpolate(self.t_ns, self.log.t_ns, values)
+        return values if angles(form) else values / np.linalg.norm(values, axis=1, keepdims=True)
 
     @property
     def rotation_names(self) -> tuple[str, ...]:

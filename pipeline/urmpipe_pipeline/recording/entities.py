@@ -5,7 +5,7 @@ A run stands at the root; of a comparison the first run does, and each further o
     joints/raw, raw_velocity, raw_acceleration                  the file's own rows: timelines t and row
     tcp/raw_position, raw_rotation
     joints/repolarized, velocity, acceleration                  the grid: timelines t and sample
-    tcp/recorded, recorded_rotation, position, velocity, acceleration, euler_zyx, singular
+    tcp/recorded, position, velocity, acceleration, euler_zyx, singular
     delta/<key>, matched/<key>/reference, actual, outside       the compared samples: t and sample
     reference/position                                          the reference on its own times: t
 
@@ -47,7 +47,6 @@ GRID_ARRAYS: dict[str, tuple[str, Series]] = {
     "joints/velocity": ("qd", "joints"),
     "joints/acceleration": ("qdd", "joints"),
     "tcp/recorded": ("tcp_recorded", "xyz"),
-    "tcp/recorded_rotation": ("rotation_recorded", "rotation"),
 }
 """Entity: attribute of `Run`."""
 
@@ -165,7 +164,7 @@ def blocks(result: JointLog | Run | Comparison) -> list[Block]:
 
 
 def _log_blocks(log: JointLog, prefix: str) -> Iterator[Block]:
-    names = _names(log, NAMES[log.rotation_form] if log.rotation_form else ())
+    names = _names(log)
     rows = ("row", np.arange(1, log.rows + 1))
     for entity, (attribute, series) in LOG_ARRAYS.items():
         if (values := getattr(log, attribute)) is not None:
@@ -174,7 +173,7 @@ def _log_blocks(log: JointLog, prefix: str) -> Iterator[Block]:
 
 def _run_blocks(run: Run, place: Place) -> Iterator[Block]:
     yield from _log_blocks(run.log, place.prefix)
-    names = _names(run.log, run.rotation_names)
+    names = _names(run.log)
     samples = ("sample", np.arange(len(run.t_ns)))
     for entity, (attribute, series) in GRID_ARRAYS.items():
         if (values := getattr(run, attribute)) is not None:
@@ -198,8 +197,9 @@ def _reference_block(reference: Trajectory) -> Block:
     return Block("/" + REFERENCE, reference.t_ns, reference.position, "xyz", AXES[:3])
 
 
-def _names(log: JointLog, rotation: tuple[str, ...]) -> dict[Series, tuple[str, ...]]:
+def _names(log: JointLog) -> dict[Series, tuple[str, ...]]:
     """Return what the columns of each series are called."""
+    rotation = NAMES[log.rotation_form] if log.rotation_form else ()
     joints = tuple(printable(name) for name in log.joints)
     return {"joints": joints, "xyz": AXES[:3], "rotation": rotation, "euler": ("rz", "ry", "rx")}
 

@@ -111,10 +111,6 @@ def _motion_views(run: Run, place: Place) -> list[View]:
         ]
     elif run.tcp_recorded is not None:
         views.append(_series("Recorded TCP [m]", f"{place.prefix}tcp/recorded"))
-    if run.rotation_recorded is not None:
-        unit = "rad" if len(run.rotation_names) == 3 else "-"
-        names = ", ".join(run.rotation_names)
-        views.append(_series(f"Recorded {names} [{unit}]", f"{place.prefix}tcp/recorded_rotation"))
     return views
 
 
