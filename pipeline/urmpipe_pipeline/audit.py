@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from urmpipe_models.chain import Chain
 from urmpipe_models.in_between import beside_wraps, off_line, repair
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
+from urmpipe_pipeline.audit_entry import AuditEntry, AuditKind
 from urmpipe_pipeline.interval import Interval, double_turns, given_periods, said_intervals
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, JointLog, LogWarning, seconds
-from urmpipe_pipeline.results import AuditEntry, AuditKind
 
 LISTED = 8
 """Warnings of a kind that are told one by one; the others are counted, and listed by the audit."""

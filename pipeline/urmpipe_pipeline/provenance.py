@@ -4,15 +4,34 @@ from __future__ import annotations
 
 import platform
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import version
 from typing import Any
 
 from urmpipe_pipeline.joint_log import SourceFile
-from urmpipe_pipeline.results import Provenance
 
 LIBRARIES = ("urmpipe", "numpy", "pyarrow", "rerun-sdk")
 """The distributions whose code made the numbers or the recording."""
+
+
+@dataclass(frozen=True, slots=True)
+class Provenance:
+    """What is needed to repeat a run.
+
+    Attributes:
+        command: Which function made it: ingest or compare.
+        options: The options that were given, by name.
+        inputs: The files it came from.
+        versions: Versions of urmpipe, Python and the libraries that computed.
+        created: When, in UTC, ISO 8601.
+    """
+
+    command: str
+    options: Mapping[str, Any]
+    inputs: tuple[SourceFile, ...]
+    versions: Mapping[str, str]
+    created: str
 
 
 def provenance(command: str, options: Mapping[str, Any], inputs: Sequence[SourceFile]) -> Provenance:

@@ -42,7 +42,7 @@ def read_plainly(path: Path) -> JointLog:
     return log
 
 
-def hold(log: JointLog, names: tuple[str, ...] = ("q1", "q2"), last: int = 20) -> None:
+def assert_the_motion(log: JointLog, names: tuple[str, ...] = ("q1", "q2"), last: int = 20) -> None:
     assert log.joints == names
     assert [log.units[name] for name in names] == ["rad", "rad"]
     np.testing.assert_array_equal(log.t_ns, np.rint(TIMES[:last] * 1e9))
@@ -85,7 +85,7 @@ def test_the_lua_script_of_coppeliasim(tmp_path: Path) -> None:
     (tmp_path / "recorder.lua").write_text(code, encoding="utf-8")
     (tmp_path / "simulator.lua").write_text(SIMULATOR, encoding="utf-8")
     run_in(tmp_path, "lua5.4", "simulator.lua")
-    hold(read_plainly(tmp_path / "log.csv"))
+    assert_the_motion(read_plainly(tmp_path / "log.csv"))
 
 
 class Simulator:
@@ -133,7 +133,7 @@ def test_the_python_script_of_coppeliasim(tmp_path: Path, monkeypatch: pytest.Mo
     monkeypatch.chdir(tmp_path)
     (code,) = snippets("CoppeliaSim, Python", "python")
     exec(compile(code, "recording-logs.md", "exec"), {})
-    hold(read_plainly(tmp_path / "log.csv"))
+    assert_the_motion(read_plainly(tmp_path / "log.csv"))
     assert simulator.calls == ["stepping True", "start", "stop"]
 
 
@@ -142,7 +142,7 @@ def test_the_function_of_matlab(tmp_path: Path) -> None:
     (tmp_path / "write_log.m").write_text(function, encoding="utf-8")
     call = "t = 0.05 * (0:19); write_log('log.csv', t, [t .* t; t / 7]');"
     run_in(tmp_path, "octave-cli", "--no-init-file", "--eval", call)
-    hold(read_plainly(tmp_path / "log.csv"))
+    assert_the_motion(read_plainly(tmp_path / "log.csv"))
 
 
 SIMLOG = """
@@ -162,7 +162,7 @@ def test_the_script_for_a_simscape_log(tmp_path: Path) -> None:
     (tmp_path / "write_log.m").write_text(function, encoding="utf-8")
     (tmp_path / "record.m").write_text(f"1;\n{SIMLOG}\n{script}", encoding="utf-8")
     run_in(tmp_path, "octave-cli", "--no-init-file", "record.m")
-    hold(read_plainly(tmp_path / "log.csv"))
+    assert_the_motion(read_plainly(tmp_path / "log.csv"))
 
 
 def messages() -> list[SimpleNamespace]:
@@ -211,7 +211,7 @@ def test_the_node_of_ros_2(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> N
     (code,) = snippets("ROS 2", "python")
     exec(compile(code, "recording-logs.md", "exec"), {})
     log = read_plainly(tmp_path / "log.csv")
-    hold(log, ("shoulder_joint_position", "elbow_joint_position"))
+    assert_the_motion(log, ("shoulder_joint_position", "elbow_joint_position"))
     assert log.clock_start_ns == STAMP * 10**9
 
 

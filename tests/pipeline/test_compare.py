@@ -16,7 +16,8 @@ from urmpipe_pipeline.audit import audit_log
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import derivatives
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogColumn, LogWarning, SourceFile
-from urmpipe_pipeline.results import Provenance, Run
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.results import Run
 
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
 TSP = 0.005

@@ -13,17 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.chain import Chain
+from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, Block, Place, places_of
-from urmpipe_pipeline.results import (
-    AuditEntry,
-    Comparison,
-    Deviation,
-    Provenance,
-    Run,
-    Statistics,
-    Trajectory,
-)
+from urmpipe_pipeline.results import Comparison, Deviation, Run, Statistics, Trajectory
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

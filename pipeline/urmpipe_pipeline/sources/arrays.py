@@ -138,12 +138,7 @@ def _spread(outer: Layout, form: Form, values: Sequence[list[Value]]) -> Layout:
     if outer.header is None:
         names = tuple(str(k + 1) for k in range(len(names)))
     units = [*outer.units, *("" for _ in range(len(outer.names) - len(outer.units)))] if outer.units else []
-    sample = []
-    for row in values:
-        try:
-            sample.append(tuple(form.spread(row)))
-        except RowError:
-            continue
+    sample = form.sampled(values)
     named = zip(outer.names, form.lengths, strict=True)
     arrays = ", ".join(f"{name or j + 1} ({n})" for j, (name, n) in enumerate(named) if n)
     said = Inference("arrays", arrays, "their cells hold as many numbers in brackets")
@@ -151,7 +146,7 @@ def _spread(outer: Layout, form: Form, values: Sequence[list[Value]]) -> Layout:
         outer,
         names=names,
         units=tuple(u for u, n in zip(units, form.lengths, strict=False) for _ in range(n or 1)),
-        sample=tuple(sample),
+        sample=sample,
         inferences=(*outer.inferences, said),
         form=form,
     )

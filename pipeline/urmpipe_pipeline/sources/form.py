@@ -131,6 +131,16 @@ class Form:
             text = text.replace(word, "")
         return _arrays(self.opening).sub(lambda match: function(match[0]), text)
 
+    def sampled(self, rows: Iterable[Sequence[Value]]) -> tuple[tuple[str, ...], ...]:
+        """Return the plain cells of some rows, without the rows whose arrays are not as the others."""
+        sample = []
+        for values in rows:
+            try:
+                sample.append(tuple(self.spread(values)))
+            except RowError:
+                continue
+        return tuple(sample)
+
     def spread(self, values: Sequence[Value]) -> list[str]:
         """Return the plain cells of a row's values.
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells import is_number
-from urmpipe_pipeline.sources.form import Form, RowError, spread_names, words_around
+from urmpipe_pipeline.sources.form import Form, spread_names, words_around
 from urmpipe_pipeline.sources.sniff import SAMPLED_LINES, Layout
 from urmpipe_pipeline.sources.text import HeadLine, Segment, head_lines
 
@@ -88,12 +88,7 @@ def _layout(segment: Segment, rows: Sequence[HeadLine], labels: tuple[str, ...],
     plain = [value for row in values for value in row if isinstance(value, str)]
     decimal = "," if any(is_number(v, ",") and not is_number(v, ".") for v in plain) else "."
     form = replace(form, lengths=lengths, decimal=decimal, opening=opening if any(lengths) else "")
-    sample = []
-    for row in values:
-        try:
-            sample.append(tuple(form.spread(row)))
-        except RowError:
-            continue
+    sample = form.sampled(values)
     if not sample or not any(is_number(cell, decimal) for cell in sample[0]):
         return None
     shown = " ".join(label.strip(",;{ ") for label in labels)
@@ -106,7 +101,7 @@ def _layout(segment: Segment, rows: Sequence[HeadLine], labels: tuple[str, ...],
         header=rows[0].number,
         first_line=rows[0].number,
         offset=rows[0].offset,
-        sample=tuple(sample),
+        sample=sample,
         inferences=(Inference("labels", shown, "they stand before the values of every row"),),
         form=form,
     )

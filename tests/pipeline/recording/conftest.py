@@ -12,10 +12,11 @@ import pytest
 from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import point_over_log
 from urmpipe_models.urm import urm_chain
+from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.results import AuditEntry, Comparison, Run
+from urmpipe_pipeline.results import Comparison, Run
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)
 TILT = math.radians(52.0)

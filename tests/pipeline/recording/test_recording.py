@@ -17,8 +17,9 @@ from hypothesis import strategies as st
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, record, write_recording
-from urmpipe_pipeline.results import Comparison, Provenance, Run
+from urmpipe_pipeline.results import Comparison, Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
