@@ -148,7 +148,7 @@ def peer_of_urdf(path: Path, links: Sequence[str]) -> Peer:
     return Peer(model, [model.getFrameId(link) for link in links])
 
 
-def hold_against(chain: Chain, peer: Peer, q: FloatArray, padding: int = 0) -> None:
+def assert_agrees_with_peer(chain: Chain, peer: Peer, q: FloatArray, padding: int = 0) -> None:
     """Compare the tool centre point, the peer's last frame, on every row of q."""
     position, rotation = poses_over_log(chain, q)
     for k, row in enumerate(q):
@@ -169,7 +169,7 @@ def test_urm6_is_pinocchios_built_by_hand() -> None:
     )
     frame = model.addFrame(pin.Frame("p7", parent, effector, pin.FrameType.OP_FRAME))
     chain = load_robot("urm6")
-    hold_against(chain, Peer(model, [frame]), random_poses(chain))
+    assert_agrees_with_peer(chain, Peer(model, [frame]), random_poses(chain))
 
 
 def test_every_point_of_urm6_is_pinocchios_of_the_exported_urdf(tmp_path: Path) -> None:
@@ -180,7 +180,7 @@ def test_every_point_of_urm6_is_pinocchios_of_the_exported_urdf(tmp_path: Path) 
     skeleton = points_over_log(chain, q)
     for k, row in enumerate(q):
         np.testing.assert_allclose(skeleton[k, 1:], peer.poses(row)[0], rtol=0.0, atol=AGREES)
-    hold_against(chain, peer, q)
+    assert_agrees_with_peer(chain, peer, q)
 
 
 def test_ur5e_is_pinocchios_of_its_dh_parameters() -> None:
@@ -196,7 +196,7 @@ def test_ur5e_is_pinocchios_of_its_dh_parameters() -> None:
         link = pin.SE3(pin.rpy.rpyToMatrix(alpha, 0.0, 0.0), np.array([a, 0.0, d]))
     frame = model.addFrame(pin.Frame("flange", parent, link, pin.FrameType.OP_FRAME))
     chain = load_robot("ur5e")
-    hold_against(chain, Peer(model, [frame]), random_poses(chain))
+    assert_agrees_with_peer(chain, Peer(model, [frame]), random_poses(chain))
 
 
 @pytest.mark.parametrize(
@@ -210,7 +210,7 @@ def test_ur5e_is_pinocchios_of_its_dh_parameters() -> None:
 def test_urdfs_of_others_are_pinocchios(shared: Path, file: str, tip: str, others: int) -> None:
     path = shared / "robots" / file
     chain = read_urdf(path, tip_link=tip)
-    hold_against(chain, peer_of_urdf(path, [tip]), random_poses(chain), padding=others)
+    assert_agrees_with_peer(chain, peer_of_urdf(path, [tip]), random_poses(chain), padding=others)
 
 
 @settings(deadline=None, max_examples=40)

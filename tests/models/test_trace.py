@@ -39,7 +39,7 @@ def everything(motion: Any) -> list[Any]:
     )
 
 
-def hold(got: FloatArray, expected: list[Any], size: float = 1.0) -> None:
+def assert_traced(got: FloatArray, expected: list[Any], size: float = 1.0) -> None:
     np.testing.assert_allclose(got, np.array(expected, dtype=float), rtol=0.0, atol=size * TRACED)
 
 
@@ -60,10 +60,12 @@ def test_forward_jacobian_and_motions_trace_with_symbolic_joints(symbols: list[A
     motion_of = traced("motion", [q, qd, qdd], everything(motions(chain, x, xd, xdd)[-1]))
     for values in np.random.default_rng(11).uniform(-1.0, 1.0, (20, 3, 6)).tolist():
         tip = forward(chain, values[0])[-1]
-        hold(pose_of(values[0]), flat(tip.translation))
-        hold(euler_of(values[0]), flat(euler_zyx(tip.rotation)), size=20.0)  # 1 / cos(ry)
-        hold(jacobian_of(values[0]), flat(jacobian(chain, values[0])))
-        hold(motion_of(*values), everything(motions(chain, *values)[-1]), size=20.0)  # speeds of up to 6
+        assert_traced(pose_of(values[0]), flat(tip.translation))
+        assert_traced(euler_of(values[0]), flat(euler_zyx(tip.rotation)), size=20.0)  # 1 / cos(ry)
+        assert_traced(jacobian_of(values[0]), flat(jacobian(chain, values[0])))
+        assert_traced(
+            motion_of(*values), everything(motions(chain, *values)[-1]), size=20.0
+        )  # speeds of up to 6
 
 
 def test_lengths_and_tilts_trace_as_parameters(symbols: list[Any]) -> None:
@@ -78,9 +80,9 @@ def test_lengths_and_tilts_trace_as_parameters(symbols: list[Any]) -> None:
         values = rng.uniform(-1.0, 1.0, 6).tolist()
         lengths, tilts = rng.uniform(0.1, 0.3, 7).tolist(), rng.uniform(0.0, 1.5, 6).tolist()
         numeric, given = urm_chain("urm6", lengths, tilts), (values, lengths, tilts)
-        hold(pose_of(*given), flat(forward(numeric, values)[-1].translation))
-        hold(jacobian_of(*given), flat(jacobian(numeric, values)))
-        hold(motion_of(*given), everything(motions(numeric, values, zero, values)[-1]), size=20.0)
+        assert_traced(pose_of(*given), flat(forward(numeric, values)[-1].translation))
+        assert_traced(jacobian_of(*given), flat(jacobian(numeric, values)))
+        assert_traced(motion_of(*given), everything(motions(numeric, values, zero, values)[-1]), size=20.0)
 
 
 def test_one_trace_serves_a_float_and_a_column() -> None:
