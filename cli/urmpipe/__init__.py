@@ -24,10 +24,10 @@ if TYPE_CHECKING:
     from urmpipe_models.catalogue import robot_names as robot_names
     from urmpipe_models.chain import Chain as Chain
     from urmpipe_models.errors import UrmpipeError as UrmpipeError
+    from urmpipe_pipeline.comparison import Comparison as Comparison
     from urmpipe_pipeline.export import Exported as Exported
     from urmpipe_pipeline.recording import read_recording as read_recording
     from urmpipe_pipeline.recording import write_recording as write_recording
-    from urmpipe_pipeline.results import Comparison as Comparison
     from urmpipe_pipeline.results import Run as Run
     from urmpipe_pipeline.sources import ReadOptions as ReadOptions
     from urmpipe_pipeline.sources import read_map as read_map
@@ -36,7 +36,7 @@ __version__ = "0.1.0"
 
 _HOME = {
     "Chain": "urmpipe_models.chain",
-    "Comparison": "urmpipe_pipeline.results",
+    "Comparison": "urmpipe_pipeline.comparison",
     "ReadOptions": "urmpipe_pipeline.sources",
     "Exported": "urmpipe_pipeline.export",
     "Report": "urmpipe.api",

@@ -15,6 +15,7 @@ from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
 from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline.audit_file import write_audit
 from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison import AlignMode, Comparison
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
@@ -22,9 +23,10 @@ from urmpipe_pipeline.operands import load_run, log_files
 from urmpipe_pipeline.outputs import OutputKind, guarded_output
 from urmpipe_pipeline.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.recording import is_recording, read_recording, record
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.sources import ReadOptions, map_of, read_map
-from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE
+from urmpipe_pipeline.sync import SyncOption
+from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -141,9 +143,10 @@ def compare(
     read: ReadOptions | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
-    tolerance: float = DEFAULT_TOLERANCE,
+    tolerance: float | Mapping[str, float] = DEFAULT_TOLERANCE,
     tcp: Tcp = "fk",
-    sync_offset: float = 0.0,
+    sync: SyncOption = "start",
+    align: AlignMode = "none",
     strict: bool = False,
     output: PathLike | None = None,
     progress: Callable[[float], None] | None = None,
@@ -160,9 +163,13 @@ def compare(
         read: How to read a file where it cannot tell by itself.
         tsp: Period of the grid in [s]; default: each log's own.
         derivative: central or savgol; default: savgol for quantised logs, else central.
-        tolerance: Largest deviation allowed on an axis, in [m].
+        tolerance: Largest deviation allowed on an axis in [m], or in [m] and [rad] by kind: axis, norm, path,
+            angle, joint, or x, y, z.
         tcp: fk or recorded: where a log was.
-        sync_offset: t_reference = t_log + sync_offset in [s]; 0 starts both together.
+        sync: How the clocks are put together: start (both start together), auto (by the motion), or the
+            offset in [s]: t_reference = t_log + offset.
+        align: How a log is moved in space before it is compared: none, start (the first poses agree), rigid
+            (the best rigid motion), tool (the best constant offset of the tool centre point).
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write.
         progress: Told the share of the recording that is written, 0..1.
@@ -175,7 +182,8 @@ def compare(
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
-    options = CompareOptions(tolerance, tcp, sync_offset)
+    allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
+    options = CompareOptions(allowed, tcp, sync, align)
     arm = place_robot(robot, base, tool)
 
     def run_of(operand: PathLike | Run) -> Run:

@@ -17,8 +17,9 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+    from urmpipe_pipeline.comparison import Comparison
     from urmpipe_pipeline.joint_log import LogWarning
-    from urmpipe_pipeline.results import Comparison, Run
+    from urmpipe_pipeline.results import Run
 
 LISTED = 30
 """Rows of a list that are printed; the others are counted (the recording and --json have them all)."""

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
-import numpy as np
-
-from urmpipe_models.delta import Delta, delta, outside
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics import positions_over_log
+from urmpipe_pipeline.alignment import align, check_align
 from urmpipe_pipeline.audit import audit_log
-from urmpipe_pipeline.grid import interpolate
-from urmpipe_pipeline.joint_log import FloatArray, LogWarning, seconds
+from urmpipe_pipeline.comparison import AlignMode, Comparison, Deviation, Sync, Trajectory
+from urmpipe_pipeline.joint_log import FloatArray, LogWarning
+from urmpipe_pipeline.matching import Matched, as_recorded, by_kinematics, lacking, match
+from urmpipe_pipeline.measure import measure
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.recorded_tcp import lacking_tool
-from urmpipe_pipeline.results import Comparison, Deviation, Run, Trajectory
-from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE, describe, overall
+from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.sync import SyncOption, check_sync, synchronise
+from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE, check_tolerance
 
 Tcp = Literal["fk", "recorded"]
-
-LONGEST_OFFSET = 1e9
-"""Offset in [s] that integers of 64 bits in [ns] hold beside any time of a log: 30 years."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,25 +28,25 @@ class CompareOptions:
     """How logs are held against a reference.
 
     Attributes:
-        tolerance: Largest deviation allowed on an axis, in [m].
+        tolerance: Largest deviation allowed in [m] or [rad], by kind: axis, norm, path, angle, joint, or one
+            coordinate. What is not named has no tolerance.
         tcp: Where a log was: by forward kinematics of its joints, or as it recorded itself.
-        sync_offset: t_reference = t_log + sync_offset in [s], both from their first samples; 0 starts
-            both together.
+        sync: How the clocks are put together: start (both start together), auto (by the motion), or
+            the offset in [s]: t_reference = t_log + offset, both from their first samples.
+        align: How a log is moved in space before it is compared: none, start, rigid or tool.
     """
 
-    tolerance: float = DEFAULT_TOLERANCE
+    tolerance: Mapping[str, float] = field(default_factory=lambda: {"axis": DEFAULT_TOLERANCE})
     tcp: Tcp = "fk"
-    sync_offset: float = 0.0
+    sync: SyncOption = "start"
+    align: AlignMode = "none"
 
     def __post_init__(self) -> None:
-        if not (np.isfinite(self.tolerance) and self.tolerance > 0):
-            raise OptionError(f"--tolerance: found {self.tolerance}, allowed: a positive length in m")
+        check_tolerance(self.tolerance)
         if self.tcp not in get_args(Tcp):
             raise OptionError(f"--tcp: found {self.tcp}, allowed: {', '.join(get_args(Tcp))}")
-        if not abs(self.sync_offset) < LONGEST_OFFSET:
-            raise OptionError(
-                f"--sync: found {self.sync_offset}, allowed: start, or a time in s below {LONGEST_OFFSET:g}"
-            )
+        check_sync(self.sync)
+        check_align(self.align)
 
 
 def trajectory(run: Run, tcp: Tcp = "fk") -> Trajectory:
@@ -59,13 +57,7 @@ def trajectory(run: Run, tcp: Tcp = "fk") -> Trajectory:
     Raises:
         LogError: If the run has neither kinematics nor a recorded position to go by.
     """
-    if run.log.joints and tcp == "fk":
-        if run.tcp is None:
-            raise LogError(_lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
-        return Trajectory(run.name, run.t_ns, run.tcp.position, run.log.files)
-    if run.tcp_recorded is None:
-        raise LogError(_lacking(run, "no recorded tool centre point; allowed: --tcp fk with a --robot"))
-    return Trajectory(run.name, run.t_ns, run.tcp_recorded, run.log.files)
+    return by_kinematics(run) if run.log.joints and tcp == "fk" else as_recorded(run)
 
 
 def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | None = None) -> Comparison:
@@ -77,10 +69,11 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     Args:
         reference: A path, or a run of its own.
         runs: The logs to judge, at least one.
-        options: Tolerance, which tool centre point, and the time offset.
+        options: Tolerance, which tool centre point, how time and space are put together.
 
     Raises:
-        LogError: If a run has no position to go by, or shares no time with the reference.
+        LogError: If a run has no position to go by, shares no time with the reference, or lacks what a
+            tolerance is for.
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
@@ -122,16 +115,16 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     chosen = options or CompareOptions()
     log = run.log
     if not log.joints:
-        raise LogError(_lacking(run, "a path alone, which has no joints; allowed: a log to hold against it"))
+        raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to hold against it"))
     if run.robot is None:
-        raise LogError(_lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
+        raise LogError(lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
     if log.tcp_position is None:
         raise LogError(
-            _lacking(run, "one log, which recorded no tool centre point; allowed: a reference before the log")
+            lacking(run, "one log, which recorded no tool centre point; allowed: a reference before the log")
         )
     recorded = Trajectory(f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files)
     computed = Trajectory(run.name, log.t_ns, positions_over_log(run.robot, _on_rows(run)), log.files)
-    deviation = _deviation(run.name, run, recorded, computed, replace(chosen, sync_offset=0.0))
+    deviation = _deviation(run.name, run, recorded, computed, replace(chosen, sync="start"))
     found = _comparison(recorded, [deviation], chosen)
     doubts = lacking_tool(run.robot, log) if deviation.verdict == "fail" else []
     return replace(found, warnings=(*found.warnings, *doubts))
@@ -165,7 +158,12 @@ def _comparison(
         ),
     ]
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
-    given = {"tolerance": options.tolerance, "tcp": options.tcp, "sync_offset": options.sync_offset}
+    given = {
+        "tolerance": dict(options.tolerance),
+        "tcp": options.tcp,
+        "sync": options.sync,
+        "align": options.align,
+    }
     name = (
         f"{deviations[0].name}-against-{reference.name}"
         if len(deviations) == 1
@@ -175,7 +173,7 @@ def _comparison(
         name=name,
         reference=reference,
         runs=tuple(deviations),
-        tolerance={"axis": options.tolerance},
+        tolerance=dict(options.tolerance),
         warnings=tuple(warnings),
         provenance=provenance("compare", given, inputs),
     )
@@ -185,38 +183,20 @@ def _deviation(
     name: str, run: Run, reference: Trajectory, actual: Trajectory, options: CompareOptions
 ) -> Deviation:
     """Return the deviation of one trajectory, at its own samples."""
-    offset = round(options.sync_offset * 1e9)
-    wanted = interpolate(actual.t_ns + offset, reference.t_ns, reference.position)
-    sample = np.flatnonzero(np.isfinite(wanted).all(axis=1) & np.isfinite(actual.position).all(axis=1))
-    if not len(sample):
+    sync = synchronise(reference, actual, options.sync)
+    matched = _matched(run, reference, actual, sync)
+    alignment, aligned = align(matched, options.align, name)
+    return measure(name, run, reference, aligned, sync, alignment, options.tolerance)
+
+
+def _matched(run: Run, reference: Trajectory, actual: Trajectory, sync: Sync) -> Matched:
+    """Return both sides at the same times, at least one of them."""
+    matched = match(reference, actual, sync.offset)
+    if not len(matched.sample):
         raise LogError(
-            _lacking(run, f"no sample in common with {reference.name} (time offset {options.sync_offset} s)")
+            lacking(run, f"no sample in common with {reference.name} (time offset {sync.offset} s)")
         )
-    t_ns, there, here = actual.t_ns[sample], wanted[sample], actual.position[sample]
-    deviation = delta(_columns(there), _columns(here))
-    values = np.column_stack(deviation)
-    statistics = describe(values, seconds(t_ns), sample, {"axis": options.tolerance})
-    x, y, z, norm = (float(value) for value in values[0])
-    return Deviation(
-        name=name,
-        run=run,
-        sample=sample,
-        t_ns=t_ns,
-        reference=there,
-        actual=here,
-        delta=values,
-        outside=np.asarray(outside(Delta(*deviation), options.tolerance)),
-        sync_offset=options.sync_offset,
-        left_out=len(actual.t_ns) - len(sample),
-        statistics=statistics,
-        start=(x, y, z, norm),
-        verdict=overall(statistics),
-    )
-
-
-def _columns(position: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-    x, y, z = position.T
-    return x, y, z
+    return matched
 
 
 def _unique(names: Sequence[str]) -> list[str]:
@@ -228,7 +208,3 @@ def _unique(names: Sequence[str]) -> list[str]:
             candidate, number = f"{name}-{number}", number + 1
         result.append(candidate)
     return result
-
-
-def _lacking(run: Run, message: str) -> Finding:
-    return Finding(message, file=run.log.files[0].name if run.log.files else run.name)

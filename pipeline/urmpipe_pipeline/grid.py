@@ -135,13 +135,18 @@ def inside_spans(
     return np.asarray(np.cumsum(depth, axis=0)[:-1] > 0)
 
 
+def apart(known_ns: IntArray) -> NDArray[np.bool_]:
+    """Tell which times are more than 3 median periods from the next, shape (n - 1,)."""
+    step = np.diff(known_ns)
+    return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
+
+
 def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> NDArray[np.bool_]:
     """Tell which times lie strictly between two known ones that are more than 3 median periods apart."""
     if len(known_ns) < 2:
         return np.zeros(len(at_ns), dtype=np.bool_)
     after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)
-    step = np.diff(known_ns)
-    wide = (step > GAP * np.median(step))[after - 1]
+    wide = apart(known_ns)[after - 1]
     return np.asarray(wide & (at_ns > known_ns[after - 1]) & (at_ns < known_ns[after]))
 
 

@@ -7,10 +7,11 @@ from pathlib import Path
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import EULER_SINGULAR, ingest_log, kinematics
 from urmpipe_pipeline.recording import is_recording, read_recording
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.sources import ReadOptions
 
 

@@ -1,4 +1,4 @@
-"""What the commands return: plain dataclasses with arrays, tables (`to_frame`) and JSON (`to_dict`)."""
+"""What `ingest` returns: plain arrays, a table (`to_frame`) and JSON (`to_dict`)."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -15,14 +15,12 @@ from urmpipe_models.kinematics import PointLog
 from urmpipe_models.orientation import NAMES, angles
 from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.grid import interpolate
-from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning, SourceFile, seconds
+from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning, seconds
 from urmpipe_pipeline.provenance import Provenance
 
 if TYPE_CHECKING:
     import pandas as pd
 
-Verdict = Literal["pass", "fail"]
-AXES = ("x", "y", "z", "norm")
 SCHEMA = 1
 
 
@@ -147,182 +145,6 @@ class Run:
             "inferences": [asdict(inference) for inference in self.log.inferences],
             "repolarizations": [entry.to_dict() for entry in self.repolarizations],
             "audit": [entry.to_dict() for entry in self.audit],
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
-            "recording": str(self.recording) if self.recording else None,
-        }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Trajectory:
-    """Where a point was, when: the reference of a comparison.
-
-    Attributes:
-        name: Its name.
-        t_ns: Times from its first sample in integer [ns], shape (m,).
-        position: In [m], shape (m, 3).
-        files: The files it came from.
-    """
-
-    name: str
-    t_ns: IntArray
-    position: FloatArray
-    files: tuple[SourceFile, ...] = ()
-
-    @property
-    def t(self) -> FloatArray:
-        """Times in [s], shape (m,)."""
-        return seconds(self.t_ns)
-
-
-@dataclass(frozen=True, slots=True)
-class Statistics:
-    """How one quantity deviates; max, rms and p95 are of absolute values, mean and std signed, all in [m].
-
-    Attributes:
-        max: Largest absolute value.
-        rms: Root mean square.
-        mean: Mean.
-        std: Standard deviation about the mean, of the samples themselves (n, not n - 1).
-        p95: 95th percentile of the absolute values.
-        t_max: When the largest stands, in [s] of the log.
-        sample_max: Grid sample of the largest, from 0.
-        tolerance: Largest absolute value allowed, or None.
-        verdict: pass or fail, None without a tolerance.
-    """
-
-    max: float
-    rms: float
-    mean: float
-    std: float
-    p95: float
-    t_max: float
-    sample_max: int
-    tolerance: float | None
-    verdict: Verdict | None
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        return {key: value for key, value in asdict(self).items() if key != "tolerance"}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Deviation:
-    """The deviation of one log from the reference.
-
-    Attributes:
-        name: The log's name, unique in the comparison.
-        run: The ingested log.
-        sample: Grid samples that were compared, shape (m,).
-        t_ns: Their times on the log's clock in integer [ns], shape (m,).
-        reference: Where the reference was, in [m], shape (m, 3).
-        actual: Where the log was, in [m], shape (m, 3).
-        delta: x, y, z and norm of reference - actual, in [m], shape (m, 4).
-        outside: Where an axis is out of tolerance, shape (m,).
-        sync_offset: t_reference = t_log + sync_offset, in [s].
-        left_out: Samples of the log without a reference or without a value.
-        statistics: One for each of x, y, z, norm.
-        start: delta at the first compared sample in [m]: x, y, z, norm (the paper's mutual calibration).
-        verdict: pass or fail.
-    """
-
-    name: str
-    run: Run
-    sample: IntArray
-    t_ns: IntArray
-    reference: FloatArray
-    actual: FloatArray
-    delta: FloatArray
-    outside: np.ndarray[tuple[int], np.dtype[np.bool_]]
-    sync_offset: float
-    left_out: int
-    statistics: dict[str, Statistics]
-    start: tuple[float, float, float, float]
-    verdict: Verdict
-
-    @property
-    def t(self) -> FloatArray:
-        """Times of the compared samples in [s], shape (m,)."""
-        return seconds(self.t_ns)
-
-    @property
-    def worst(self) -> int:
-        """Index into the compared samples of the largest norm."""
-        return int(np.argmax(self.delta[:, 3]))
-
-    @property
-    def share_out(self) -> float:
-        """Share of the compared samples out of tolerance, 0..1."""
-        return float(np.count_nonzero(self.outside)) / len(self.sample)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of one run."""
-        worst = self.worst
-        return {
-            "name": self.name,
-            "samples": len(self.sample),
-            "left_out": self.left_out,
-            "duration": float(self.t_ns[-1] - self.t_ns[0]) / 1e9,
-            "sync_offset": self.sync_offset,
-            "delta": {axis: self.statistics[axis].to_dict() for axis in AXES},
-            "start": dict(zip(AXES, self.start, strict=True)),
-            "worst": {
-                "t": float(self.t[worst]),
-                "sample": int(self.sample[worst]),
-                "norm": float(self.delta[worst, 3]),
-            },
-            "out_of_tolerance": int(np.count_nonzero(self.outside)),
-            "share_out": self.share_out,
-            "verdict": self.verdict,
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.run.warnings],
-        }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
-    """Some logs held against one reference.
-
-    Attributes:
-        name: Its name.
-        reference: Where the arm was asked to be.
-        runs: One deviation a log.
-        tolerance: Largest absolute deviation allowed in [m], by quantity; "axis" holds for x, y and z.
-        warnings: What a person should know about the comparison itself.
-        provenance: How to repeat it.
-        recording: Where it was written.
-    """
-
-    name: str
-    reference: Trajectory
-    runs: tuple[Deviation, ...]
-    tolerance: Mapping[str, float]
-    warnings: tuple[LogWarning, ...]
-    provenance: Provenance
-    recording: Path | None = None
-
-    @property
-    def verdict(self) -> Verdict:
-        """Pass if every log passes."""
-        return "pass" if all(run.verdict == "pass" for run in self.runs) else "fail"
-
-    def to_frame(self) -> pd.DataFrame:
-        """Return one row a log and quantity: the statistics and the verdict."""
-        import pandas as pd
-
-        rows = [
-            {"run": run.name, "quantity": axis, **asdict(run.statistics[axis])}
-            for run in self.runs
-            for axis in AXES
-        ]
-        return pd.DataFrame(rows)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the object that `urmpipe compare --json` prints."""
-        return {
-            "schema": SCHEMA,
-            "verdict": self.verdict,
-            "tolerance": dict(self.tolerance),
-            "reference": self.reference.name,
-            "runs": [run.to_dict() for run in self.runs],
             "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }

@@ -2,53 +2,91 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from urmpipe_pipeline.comparison import Kind, Statistics, Verdict
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
-from urmpipe_pipeline.results import AXES, Statistics, Verdict
+from urmpipe_pipeline.tolerance import allowed_for
 
-DEFAULT_TOLERANCE = 0.0035
-"""Largest deviation allowed on an axis in [m]. Source: [UrmArm2021]_ section 2.4."""
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Measured:
+    """One quantity of a deviation.
+
+    Attributes:
+        quantity: x, y, z, norm, path, angle, or a joint's name.
+        kind: What it is measured of.
+        unit: m or rad.
+        values: In that unit, shape (m,); NaN where a side has no value.
+    """
+
+    quantity: str
+    kind: Kind
+    unit: str
+    values: FloatArray
+
+    def outside(self, tolerance: Mapping[str, float]) -> NDArray[np.bool_]:
+        """Return where it is out of tolerance, shape (m,): nowhere without one."""
+        allowed = allowed_for(self.quantity, self.kind, tolerance)
+        return np.asarray(np.abs(self.values) > (np.inf if allowed is None else allowed))
 
 
 def describe(
-    delta: FloatArray, t: FloatArray, sample: IntArray, tolerance: Mapping[str, float]
-) -> dict[str, Statistics]:
-    """Return the statistics of x, y, z and norm.
+    measured: Measured, t: FloatArray, sample: IntArray, tolerance: Mapping[str, float]
+) -> Statistics:
+    """Return the statistics of one quantity over the samples that have a value.
 
     Args:
-        delta: Deviations in [m], shape (m, 4), m > 0, without NaN.
-        t: Their times in [s], shape (m,).
-        sample: Their grid samples, shape (m,).
-        tolerance: In [m]; "axis" holds for x, y and z, a quantity's own name for it alone.
+        measured: The quantity, with at least one value.
+        t: Times in [s], shape (m,).
+        sample: Grid samples, shape (m,).
+        tolerance: In [m] or [rad], by kind or by coordinate.
     """
-    return {
-        axis: _of_one(
-            delta[:, i], t, sample, tolerance.get(axis, tolerance.get("axis") if axis != "norm" else None)
-        )
-        for i, axis in enumerate(AXES)
-    }
-
-
-def overall(statistics: Mapping[str, Statistics]) -> Verdict:
-    """Return fail if any quantity fails."""
-    return "fail" if any(one.verdict == "fail" for one in statistics.values()) else "pass"
-
-
-def _of_one(values: FloatArray, t: FloatArray, sample: IntArray, tolerance: float | None) -> Statistics:
+    known = np.flatnonzero(np.isfinite(measured.values))
+    values = measured.values[known]
     size = np.abs(values)
     worst = int(np.argmax(size))
     largest = float(size[worst])
+    allowed = allowed_for(measured.quantity, measured.kind, tolerance)
+    out = None if allowed is None else int(np.count_nonzero(size > allowed))
     return Statistics(
+        quantity=measured.quantity,
+        kind=measured.kind,
+        unit=measured.unit,
         max=largest,
         rms=float(np.sqrt(np.mean(values * values))),
         mean=float(np.mean(values)),
         std=float(np.std(values)),
         p95=float(np.percentile(size, 95)),
-        t_max=float(t[worst]),
-        sample_max=int(sample[worst]),
-        tolerance=tolerance,
-        verdict=None if tolerance is None else "pass" if largest <= tolerance else "fail",
+        t_max=float(t[known[worst]]),
+        sample_max=int(sample[known[worst]]),
+        tolerance=allowed,
+        out_of_tolerance=out,
+        share_out=None if out is None else out / len(values),
+        verdict=None if out is None else "fail" if out else "pass",
     )
+
+
+def overall(statistics: Iterable[Statistics]) -> Verdict:
+    """Return fail if any quantity fails."""
+    return "fail" if any(one.verdict == "fail" for one in statistics) else "pass"
+
+
+def correlation(first: FloatArray, second: FloatArray) -> float | None:
+    """Return Pearson's r of two quantities where both have a value; None where one does not change.
+
+    Args:
+        first: Shape (m,), any unit; NaN where there is no value.
+        second: The same.
+    """
+    both = np.isfinite(first) & np.isfinite(second)
+    a, b = first[both], second[both]
+    if len(a) < 2:
+        return None
+    a, b = a - a.mean(), b - b.mean()
+    spread = float(np.sqrt((a @ a) * (b @ b)))
+    return float(a @ b) / spread if spread > 0.0 else None

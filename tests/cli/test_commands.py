@@ -235,7 +235,7 @@ def test_a_tolerance_may_have_its_unit_and_decides(urmpipe: RunCommand) -> None:
     )
     wrong = urmpipe("compare", PATH, MATLAB, "--robot", "urm6", "--tolerance", "3 inch")
     assert wrong.code == 2
-    assert "found '3 inch', allowed: a positive length in m, such as 0.0035 or 3.5mm" in wrong.err
+    assert "error: --tolerance: found '3 inch', allowed: a length in m, or axis=, x=, y=, z=" in wrong.err
 
 
 def test_a_path_alone_is_nothing_to_judge(urmpipe: RunCommand) -> None:

@@ -112,6 +112,6 @@ def test_shell_completion_offers_commands_and_robots() -> None:
 def test_the_default_tolerance_of_the_command_is_that_of_the_function() -> None:
     """The command spells it again, so that its --help needs not import NumPy."""
     from urmpipe.commands.compare import TOLERANCE
-    from urmpipe_pipeline.statistics import DEFAULT_TOLERANCE
+    from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE
 
     assert TOLERANCE == DEFAULT_TOLERANCE

@@ -13,8 +13,8 @@ from urmpipe_datasets import LOGS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"`(\w+)`", PAGE))
-FREE = {"units", "tolerance", "delta", "start"}
-"""Objects whose keys are names of columns or axes."""
+FREE = {"units", "tolerance", "delta", "start", "joints", "joint_turns"}
+"""Objects whose keys are names of columns, axes, joints or kinds."""
 
 
 def keys(value: Any) -> set[str]:

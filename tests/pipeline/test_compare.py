@@ -64,7 +64,7 @@ def test_a_path_made_by_the_arm_itself_has_no_deviation(q: FloatArray) -> None:
     assert result.verdict == "pass"
     assert result.runs[0].delta.max() == 0.0
     assert result.runs[0].left_out == 0
-    assert result.runs[0].sync_offset == 0.0
+    assert result.runs[0].sync.offset == 0.0
     assert result.name == "log-against-path"
 
 
@@ -94,11 +94,11 @@ def test_the_tolerance_decides_axis_by_axis(q: FloatArray) -> None:
     result = compare_runs(path_run(wanted), [arm_run(q)])
     deviation = result.runs[0]
     verdicts = {axis: one.verdict for axis, one in deviation.statistics.items()}
-    assert verdicts == {"x": "pass", "y": "pass", "z": "fail", "norm": None}
+    assert verdicts == {"x": "pass", "y": "pass", "z": "fail", "norm": None, "path": None}
     assert (result.verdict, deviation.verdict) == ("fail", "fail")
     assert np.flatnonzero(deviation.outside).tolist() == list(range(100, 110))
     assert deviation.share_out == 10 / 500
-    assert compare_runs(path_run(wanted), [arm_run(q)], CompareOptions(tolerance=0.0037)).verdict == "pass"
+    assert compare_runs(path_run(wanted), [arm_run(q)], CompareOptions({"axis": 0.0037})).verdict == "pass"
 
 
 def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q: FloatArray) -> None:
@@ -114,9 +114,9 @@ def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q: Floa
 
 def test_an_offset_shifts_the_log_against_the_reference(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
-    late = compare_runs(wanted, [arm_run(q[100:])], CompareOptions(sync_offset=0.5)).runs[0]
+    late = compare_runs(wanted, [arm_run(q[100:])], CompareOptions(sync=0.5)).runs[0]
     assert late.delta.max() == 0.0
-    assert late.sync_offset == 0.5
+    assert late.sync.offset == 0.5
     assert len(late.sample) == 400
 
 
@@ -155,17 +155,20 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
         "log.csv: one log, which recorded no tool centre point; allowed: a reference before the log"
     )
     with pytest.raises(LogError) as error:
-        compare_runs(wanted, [arm_run(q)], CompareOptions(sync_offset=99.0))
+        compare_runs(wanted, [arm_run(q)], CompareOptions(sync=99.0))
     assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
     with pytest.raises(OptionError) as option_error:
-        CompareOptions(tolerance=-1.0)
-    assert str(option_error.value) == "--tolerance: found -1.0, allowed: a positive length in m"
+        CompareOptions({"axis": -1.0})
+    assert str(option_error.value) == (
+        "--tolerance: found axis=-1.0, allowed: a length in m, or axis=, x=, y=, z=, norm=,"
+        " path= (m, mm, um), angle=, joint= (rad, mrad, deg); positive"
+    )
 
 
 def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
     result = compare_runs(path_run(positions_over_log(URM6, q) + 0.004), [arm_run(q)])
     frame = result.to_frame()
-    assert frame["quantity"].tolist() == ["x", "y", "z", "norm"]
+    assert frame["quantity"].tolist() == ["x", "y", "z", "norm", "path"]
     assert frame["verdict"].tolist()[:3] == ["fail"] * 3
     as_dict = result.to_dict()
     assert list(as_dict)[:3] == ["schema", "verdict", "tolerance"]
@@ -173,7 +176,10 @@ def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
     one = as_dict["runs"][0]
     assert set(one) >= {"name", "samples", "left_out", "duration", "sync_offset", "delta", "worst",
                         "out_of_tolerance", "share_out", "verdict", "warnings"}  # fmt: skip
-    assert set(one["delta"]["x"]) == {"max", "rms", "mean", "std", "p95", "t_max", "sample_max", "verdict"}
+    assert set(one["delta"]["x"]) == {
+        "unit", "max", "rms", "mean", "std", "p95", "t_max", "sample_max", "tolerance", "out_of_tolerance",
+        "share_out", "verdict",
+    }  # fmt: skip
     assert one["share_out"] == 1.0
 
 
@@ -192,8 +198,8 @@ def test_what_is_wrong_with_the_reference_is_told(q: FloatArray) -> None:
 
 def test_an_offset_that_no_clock_holds_is_refused() -> None:
     for offset in (1e300, -1e9, float("inf")):
-        with pytest.raises(OptionError, match=r"allowed: start, or a time in s below 1e\+09"):
-            CompareOptions(sync_offset=offset)
+        with pytest.raises(OptionError, match=r"allowed: start, auto, or a time in s below 1e\+09"):
+            CompareOptions(sync=offset)
 
 
 def test_a_log_alone_is_compared_as_it_was_repaired() -> None:

@@ -135,7 +135,7 @@ def test_a_real_controller_log_agrees_with_the_catalogue() -> None:
     from urmpipe_pipeline.compare import CompareOptions, compare_recorded
 
     run = ingest_log([SHARED / "logs" / "ur5e-rtde-static" / "robot_data.csv"], robot=load_robot("ur5e"))
-    result = compare_recorded(run, CompareOptions(tolerance=0.002))
+    result = compare_recorded(run, CompareOptions({"axis": 0.002}))
     assert result.verdict == "pass"
     assert 0.001 < result.runs[0].statistics["norm"].max < 0.002  # nominal geometry: within 1.6 mm
 

@@ -7,18 +7,27 @@ from typing import Any
 
 import click
 
-from urmpipe.options import LENGTH, about_recordings, log_options, output_options, take_log_options
+from urmpipe.options import about_recordings, log_options, output_options, take_log_options
 from urmpipe.process import tune_pyarrow
 
 TOLERANCE = 0.0035
 
 
-def _sync(ctx: click.Context, param: click.Parameter, value: str) -> float:
-    """Return the time offset in [s] that start or SECONDS stands for."""
+def _sync(ctx: click.Context, param: click.Parameter, value: str) -> str | float:
+    """Return how the clocks are put together: start, auto, or an offset in [s]."""
+    if value in ("start", "auto"):
+        return value
     try:
-        return 0.0 if value == "start" else float(value)
+        return float(value)
     except ValueError:
-        raise click.BadParameter(f"found {value!r}, allowed: start, or a time in s") from None
+        raise click.BadParameter(f"found {value!r}, allowed: start, auto, or a time in s") from None
+
+
+def _tolerance(ctx: click.Context, param: click.Parameter, value: str | float) -> dict[str, float]:
+    """Return what is allowed, by kind."""
+    from urmpipe_pipeline.tolerance import parse_tolerance
+
+    return parse_tolerance(str(value))
 
 
 @click.command(short_help="Hold logs against a reference and give a verdict.")
@@ -32,10 +41,11 @@ def _sync(ctx: click.Context, param: click.Parameter, value: str) -> float:
 )
 @click.option(
     "--tolerance",
-    type=LENGTH,
-    default=TOLERANCE,
+    default=str(TOLERANCE),
     show_default=True,
-    help="Largest deviation allowed on an axis, in m.",
+    callback=_tolerance,
+    metavar="M|KIND=VALUE,...",
+    help="Largest deviation allowed: on an axis in m, or of kinds: axis, norm, path, angle, joint, x, y, z.",
 )
 @click.option(
     "--tcp",
@@ -46,12 +56,18 @@ def _sync(ctx: click.Context, param: click.Parameter, value: str) -> float:
 )
 @click.option(
     "--sync",
-    "sync_offset",
     default="start",
     show_default=True,
     callback=_sync,
-    metavar="start|SECONDS",
-    help="t_reference = t_log + SECONDS, from the first samples of both.",
+    metavar="start|auto|SECONDS",
+    help="Start both together, find the offset by the motion, or t_reference = t_log + SECONDS.",
+)
+@click.option(
+    "--align",
+    type=click.Choice(["none", "start", "rigid", "tool"]),
+    default="none",
+    show_default=True,
+    help="Move the log first: to the same start pose, by the best rigid motion, by the best tool offset.",
 )
 @log_options
 @output_options
@@ -88,7 +104,7 @@ def compare(
     if said and not quiet:
         click.echo(f"note: {said}", err=True)
     robot, read = take_log_options(options)
-    names = ("tsp", "derivative", "strict", "tolerance", "tcp", "sync_offset")
+    names = ("tsp", "derivative", "strict", "tolerance", "tcp", "sync", "align")
     shared = {name: options.pop(name) for name in names}
     target = output or Path(default_name(reference, logs))
     with progress_bar(f"Writing {target}", quiet=quiet) as progress:

@@ -6,7 +6,8 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from urmpipe_pipeline.results import Comparison, Run, json_ready
+from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.results import Run, json_ready
 
 MARK = "urmpipe export"
 """Stands in every file that can hold it; only such a file is replaced."""

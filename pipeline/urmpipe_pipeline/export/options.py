@@ -8,7 +8,8 @@ from typing import Literal, get_args
 
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.compare import Tcp
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.results import Run
 
 Format = Literal["csv", "parquet", "mat", "tum"]
 FORMATS: tuple[Format, ...] = get_args(Format)

@@ -10,9 +10,10 @@ from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.kinematics import poses_over_log
 from urmpipe_pipeline.compare import Tcp
+from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.export.options import ExportOptions, Rows
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning
-from urmpipe_pipeline.results import Comparison, Deviation, Run
+from urmpipe_pipeline.results import Run
 
 
 @dataclass(frozen=True, slots=True, eq=False)

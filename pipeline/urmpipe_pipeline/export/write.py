@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.export.csv_file import write_csv
 from urmpipe_pipeline.export.mat_file import comparison_fields, file_fields, run_fields, write_mat
 from urmpipe_pipeline.export.metadata import describe
@@ -21,7 +22,7 @@ from urmpipe_pipeline.export.tables import Table, delta_table, file_table, grid_
 from urmpipe_pipeline.export.tum_file import write_tum
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 POSE_COLUMNS = (
     ("t", "s"), ("x", "m"), ("y", "m"), ("z", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""),

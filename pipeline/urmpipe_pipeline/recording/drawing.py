@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urmpipe_pipeline.audit_entry import AuditEntry
+from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, entity_path, places_of, printable
 from urmpipe_pipeline.recording.scene import Arm, Scene, Way
 from urmpipe_pipeline.recording.summary import summary
-from urmpipe_pipeline.results import Comparison, Deviation, Run
+from urmpipe_pipeline.results import Run
 
 if TYPE_CHECKING:
     from rerun import RecordingStream, TimeColumn

@@ -6,8 +6,9 @@ A run stands at the root; of a comparison the first run does, and each further o
     tcp/raw_position, raw_rotation
     joints/repolarized, velocity, acceleration                  the grid: timelines t and sample
     tcp/recorded, position, velocity, acceleration, euler_zyx, singular
-    delta/<key>, matched/<key>/reference, actual, outside       the compared samples: t and sample
-    reference/position                                          the reference on its own times: t
+    delta/<key>                                                 the compared samples: t and sample
+    matched/<key>/reference, actual, path, speed, angle, joints, outside
+    reference/position, quat_xyzw, joints                       the reference on its own times: t
 
 Everything is in SI: [rad] or [m] and their derivatives, times in integer [ns]. joints/raw and
 joints/repolarized always stand, with no value a row for a log without joints: they carry the times.
@@ -23,14 +24,15 @@ from typing import Literal
 import numpy as np
 
 from urmpipe_models.orientation import NAMES
+from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
-from urmpipe_pipeline.results import AXES, Comparison, Deviation, Run, Trajectory
+from urmpipe_pipeline.results import Run
 
-LAYOUT_VERSION = 3
+LAYOUT_VERSION = 4
 """Raised when an older reader would misunderstand a newer recording."""
 
-Series = Literal["joints", "xyz", "rotation", "euler", "delta", "flag"]
+Series = Literal["joints", "xyz", "rotation", "euler", "delta", "number", "flag"]
 """What the columns of an entity are."""
 
 LOG_ARRAYS: dict[str, tuple[str, Series]] = {
@@ -58,8 +60,24 @@ TCP_ARRAYS: dict[str, tuple[str, Series]] = {
 }
 """Entity: attribute of `PointLog`."""
 
+MATCHED_ARRAYS: dict[str, tuple[str, Series]] = {
+    "reference": ("reference", "xyz"),
+    "actual": ("actual", "xyz"),
+    "path": ("path", "number"),
+    "speed": ("speed", "number"),
+    "angle": ("angle", "number"),
+    "joints": ("joint_delta", "joints"),
+}
+"""Entity below matched/<key>: attribute of `Deviation`, and what its columns are."""
+
+REFERENCE_ARRAYS: dict[str, tuple[str, Series]] = {
+    "reference/position": ("position", "xyz"),
+    "reference/quat_xyzw": ("quat_xyzw", "rotation"),
+    "reference/joints": ("q", "joints"),
+}
+"""Entity: attribute of `Trajectory`."""
+
 SINGULAR = "tcp/singular"
-REFERENCE = "reference/position"
 SUMMARY = "/summary"
 
 RESERVED = ("reference", "recorded", "tolerance")
@@ -156,7 +174,7 @@ def blocks(result: JointLog | Run | Comparison) -> list[Block]:
     standing = places_of(result)
     if isinstance(result, Run):
         return list(_run_blocks(result, standing[0]))
-    found = [_reference_block(result.reference)]
+    found = list(_reference_blocks(result.reference))
     for place, deviation in zip(standing, result.runs, strict=True):
         found += _run_blocks(deviation.run, place)
         found += _deviation_blocks(deviation, place)
@@ -188,13 +206,21 @@ def _run_blocks(run: Run, place: Place) -> Iterator[Block]:
 def _deviation_blocks(one: Deviation, place: Place) -> Iterator[Block]:
     samples = ("sample", one.sample)
     yield Block(place.named("delta"), one.t_ns, one.delta, "delta", AXES, samples, one.worst)
-    for leaf, values in (("reference", one.reference), ("actual", one.actual)):
-        yield Block(place.named("matched", leaf), one.t_ns, values, "xyz", AXES[:3], samples, one.worst)
+    names = _names(one.run.log)
+    for leaf, (attribute, series) in MATCHED_ARRAYS.items():
+        if (values := getattr(one, attribute)) is not None:
+            known = names.get(series, (leaf,))
+            columns = values.reshape(len(values), -1)
+            yield Block(place.named("matched", leaf), one.t_ns, columns, series, known, samples, one.worst)
     yield from _flags(place.named("matched", "outside"), one.outside, one.t_ns, one.sample)
 
 
-def _reference_block(reference: Trajectory) -> Block:
-    return Block("/" + REFERENCE, reference.t_ns, reference.position, "xyz", AXES[:3])
+def _reference_blocks(reference: Trajectory) -> Iterator[Block]:
+    joints = tuple(printable(name) for name in reference.joints)
+    names: dict[Series, tuple[str, ...]] = {"xyz": AXES[:3], "rotation": NAMES["quat_xyzw"], "joints": joints}
+    for entity, (attribute, series) in REFERENCE_ARRAYS.items():
+        if (values := getattr(reference, attribute)) is not None:
+            yield Block("/" + entity, reference.t_ns, values, series, names[series])
 
 
 def _names(log: JointLog) -> dict[Series, tuple[str, ...]]:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
 from urmpipe_pipeline.recording.scene import Scene
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint, Container, Spatial3DView, TextLogView, TimeSeriesView, View

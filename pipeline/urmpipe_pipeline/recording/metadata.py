@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.chain import Chain
 from urmpipe_pipeline.audit_entry import AuditEntry
+from urmpipe_pipeline.comparison import Alignment, Comparison, Deviation, Statistics, Sync, Trajectory
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, Block, Place, places_of
-from urmpipe_pipeline.results import Comparison, Deviation, Run, Statistics, Trajectory
+from urmpipe_pipeline.results import Run
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -68,10 +69,15 @@ def deviation_fields(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a `Deviation` that are no arrays, its run apart."""
     return {
         "name": data["name"],
-        "sync_offset": data["sync_offset"],
+        "joint_turns": tuple(data["joint_turns"]),
+        "sync": Sync(**data["sync"]),
+        "alignment": _alignment(data["alignment"]),
         "left_out": data["left_out"],
+        "reference_left_out": data["reference_left_out"],
         "statistics": {name: Statistics(**one) for name, one in data["statistics"].items()},
+        "joint_statistics": {name: Statistics(**one) for name, one in data["joint_statistics"].items()},
         "start": tuple(data["start"]),
+        "speed_correlation": data["speed_correlation"],
         "verdict": data["verdict"],
     }
 
@@ -88,7 +94,18 @@ def comparison_fields(data: Mapping[str, Any]) -> dict[str, Any]:
 
 def reference_fields(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of the reference `Trajectory` that are no arrays."""
-    return {"name": data["name"], "files": _files(data["files"])}
+    return {
+        "name": data["name"],
+        "files": _files(data["files"]),
+        "joints": tuple(data["joints"]),
+        "joint_units": tuple(data["joint_units"]),
+    }
+
+
+def _alignment(data: Mapping[str, Any]) -> Alignment:
+    """Return the alignment that a JSON object tells of."""
+    rotation = tuple(tuple(row) for row in data["rotation"])
+    return Alignment(data["mode"], rotation, tuple(data["translation"]), tuple(data["tool"]))
 
 
 def _run(run: Run, place: Place) -> dict[str, Any]:
@@ -132,16 +149,26 @@ def _comparison(result: Comparison, standing: list[Place]) -> dict[str, Any]:
 
 
 def _reference(reference: Trajectory) -> dict[str, Any]:
-    return {"name": reference.name, "files": [_flat(one) for one in reference.files]}
+    return {
+        "name": reference.name,
+        "files": [_flat(one) for one in reference.files],
+        "joints": list(reference.joints),
+        "joint_units": list(reference.joint_units),
+    }
 
 
 def _deviation(one: Deviation, place: Place) -> dict[str, Any]:
     return {
         "name": one.name,
-        "sync_offset": one.sync_offset,
+        "joint_turns": list(one.joint_turns),
+        "sync": _flat(one.sync),
+        "alignment": _flat(one.alignment),
         "left_out": one.left_out,
+        "reference_left_out": one.reference_left_out,
         "statistics": {name: _flat(values) for name, values in one.statistics.items()},
+        "joint_statistics": {name: _flat(values) for name, values in one.joint_statistics.items()},
         "start": list(one.start),
+        "speed_correlation": one.speed_correlation,
         "verdict": one.verdict,
         "run": _run(one.run, place),
     }

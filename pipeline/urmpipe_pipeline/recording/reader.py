@@ -12,19 +12,21 @@ from numpy.typing import NDArray
 
 from urmpipe_models.errors import RecordingError
 from urmpipe_models.kinematics import PointLog
+from urmpipe_pipeline.comparison import Comparison, Deviation, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.recording import metadata
 from urmpipe_pipeline.recording.entities import (
     GRID_ARRAYS,
     LAYOUT_VERSION,
     LOG_ARRAYS,
-    REFERENCE,
+    MATCHED_ARRAYS,
+    REFERENCE_ARRAYS,
     SINGULAR,
     TCP_ARRAYS,
     Place,
 )
 from urmpipe_pipeline.recording.store import Chunk, Store
-from urmpipe_pipeline.results import Comparison, Deviation, Run, Trajectory
+from urmpipe_pipeline.results import Run
 
 Data: TypeAlias = Mapping[str, Any]
 
@@ -100,12 +102,13 @@ def _run(arrays: _Arrays, data: Data, path: Path | None) -> Run:
 
 
 def _comparison(arrays: _Arrays, data: Data, path: Path) -> Comparison:
-    wanted = arrays.chunk(f"/{REFERENCE}")
+    reference: dict[str, Any] = {
+        **metadata.reference_fields(data["reference"]),
+        **arrays.table("/", REFERENCE_ARRAYS),
+    }
     return Comparison(
         **metadata.comparison_fields(data),
-        reference=Trajectory(
-            **metadata.reference_fields(data["reference"]), t_ns=wanted.t_ns, position=wanted.values
-        ),
+        reference=Trajectory(**reference, t_ns=arrays.chunk("/reference/position").t_ns),
         runs=tuple(_deviation(arrays, one) for one in data["runs"]),
         recording=path,
     )
@@ -115,14 +118,17 @@ def _deviation(arrays: _Arrays, data: Data) -> Deviation:
     place = Place(**data["run"]["place"])
     delta = arrays.chunk(place.named("delta"))
     sample = np.empty(0, np.int64) if delta.numbers is None else delta.numbers
+    matched: dict[str, Any] = arrays.table(place.named("matched") + "/", MATCHED_ARRAYS)
+    for attribute, series in MATCHED_ARRAYS.values():
+        if series == "number" and matched[attribute] is not None:
+            matched[attribute] = matched[attribute][:, 0]
     return Deviation(
         **metadata.deviation_fields(data),
         run=_run(arrays, data["run"], None),
         sample=sample,
         t_ns=delta.t_ns,
-        reference=arrays.chunk(place.named("matched", "reference")).values,
-        actual=arrays.chunk(place.named("matched", "actual")).values,
         delta=delta.values,
+        **matched,
         outside=arrays.flags(place.named("matched", "outside"), sample),
     )
 

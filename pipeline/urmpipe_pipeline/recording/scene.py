@@ -15,10 +15,11 @@ from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import points_over_log
+from urmpipe_pipeline.comparison import Comparison, Deviation, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
 from urmpipe_pipeline.recording.entities import Place, entity_path, places_of
-from urmpipe_pipeline.results import Comparison, Deviation, Run, Trajectory
+from urmpipe_pipeline.results import Run
 
 POSE_PERIOD = 0.02
 """Time between two poses drawn in [s], at least."""

@@ -5,9 +5,10 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable
 
+from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
 from urmpipe_pipeline.palette import run_colour_word
 from urmpipe_pipeline.recording.entities import printable
-from urmpipe_pipeline.results import AXES, Comparison, Deviation, Run
+from urmpipe_pipeline.results import Run
 
 
 def summary(result: Run | Comparison) -> str:

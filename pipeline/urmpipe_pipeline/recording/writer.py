@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias, TypeVar
 import numpy as np
 
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import FloatArray, JointLog
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.recording.drawing import draw, time_columns
@@ -23,7 +24,7 @@ from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import PROPERTY
 from urmpipe_pipeline.recording.verify import verify
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 if TYPE_CHECKING:
     from rerun import ComponentColumn, RecordingStream, TimeColumn

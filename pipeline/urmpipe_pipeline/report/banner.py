@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
 from urmpipe_pipeline.report import text
-from urmpipe_pipeline.results import AXES, Comparison, Deviation, Run
+from urmpipe_pipeline.results import Run
 
 NAMED = 3
 """Logs named in the headline; more are only counted."""

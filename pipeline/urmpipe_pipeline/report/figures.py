@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_pipeline.audit_entry import AuditEntry
+from urmpipe_pipeline.comparison import AXES, Deviation
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.report import text
@@ -23,7 +24,7 @@ from urmpipe_pipeline.report.spec import (
     stacked,
     stroke,
 )
-from urmpipe_pipeline.results import AXES, Deviation, Run
+from urmpipe_pipeline.results import Run
 
 PANEL_PX = 112
 """Height of one plot among some on a common time axis."""

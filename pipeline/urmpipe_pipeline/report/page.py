@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import TypeAlias
 
 from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.report import figures, paths, tables, text
 from urmpipe_pipeline.report.banner import banner
 from urmpipe_pipeline.report.markup import asset, environment, script_hash
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
-from urmpipe_pipeline.results import Comparison, Deviation, Run
+from urmpipe_pipeline.results import Run
 
 Block: TypeAlias = Table | Figure
 
@@ -148,7 +149,7 @@ def _deviation_part(deviation: Deviation, ident: str) -> Part:
         ("Compared", text.counted(len(deviation.sample), "sample")),
         ("Out of tolerance", text.counted(int(deviation.outside.sum()), "sample")),
         ("Left out", text.counted(deviation.left_out, "sample")),
-        ("Sync offset", f"{text.seconds(deviation.sync_offset)} s"),
+        ("Sync offset", f"{text.seconds(deviation.sync.offset)} s"),
     ]
     blocks = (*(block for block in found if block), *_run_tables(deviation.run))
     return Part(deviation.name, blocks, (), ident, deviation.verdict, _given(facts))

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 
+from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR
 from urmpipe_pipeline.report import text
 from urmpipe_pipeline.report.decimate import decimate
 from urmpipe_pipeline.report.spec import FAULT, INK, Figure, Spec, base_layout, space_axis, typed
-from urmpipe_pipeline.results import Deviation, Run
+from urmpipe_pipeline.results import Run
 
 DEVIATION_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
 """Small to large deviation: darker all the way, blue to red, legible on white and to the colour-blind."""

@@ -7,10 +7,11 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 from urmpipe_pipeline.audit_entry import AuditKind
+from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Statistics
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.report import text
-from urmpipe_pipeline.results import AXES, Comparison, Deviation, Run, Statistics
+from urmpipe_pipeline.results import Run
 
 LONG = 12
 """A table with more rows is folded away."""

@@ -7,7 +7,8 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from urmpipe_pipeline.results import AXES, json_ready
+from urmpipe_pipeline.comparison import AXES
+from urmpipe_pipeline.results import json_ready
 
 NOTHING = "–"
 """Stands where there is no value."""

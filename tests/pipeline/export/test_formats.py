@@ -15,8 +15,9 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 from urmpipe_models.kinematics import poses_over_log
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.export import FORMATS, ExportOptions, Format, Rows, export_result
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 START_NS = 1_700_000_000_123_456_789
 GRID = [

@@ -14,9 +14,10 @@ from urmpipe_models.kinematics import point_over_log
 from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.compare import CompareOptions, compare_runs
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)
 TILT = math.radians(52.0)
@@ -92,7 +93,7 @@ def build_comparison(names: tuple[str, ...] = ("coppeliasim", "matlab"), rows: i
     """Return the comparison of runs, each a bit further from the reference, with the reference."""
     offsets = [0.002 * (i + 1) for i in range(len(names))]
     runs = [build_run(name, rows, offset) for name, offset in zip(names, offsets, strict=True)]
-    return compare_runs(build_run("asked for", rows), runs, CompareOptions(tolerance=0.0035))
+    return compare_runs(build_run("asked for", rows), runs, CompareOptions({"axis": 0.0035}))
 
 
 @pytest.fixture

@@ -16,10 +16,11 @@ from hypothesis import strategies as st
 
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, record, write_recording
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
@@ -153,7 +154,7 @@ def test_a_comparison_with_samples_left_out_comes_back_as_it_was(make_run: MakeR
     position = run.tcp.position.copy()
     position[[0, 5, 6, 700]] = np.nan
     run = replace(run, tcp=replace(run.tcp, position=position))
-    comparison = compare_runs(path_run(make_run(rows=1400)), [run], CompareOptions(sync_offset=-0.1))
+    comparison = compare_runs(path_run(make_run(rows=1400)), [run], CompareOptions(sync=-0.1))
     assert comparison.runs[0].left_out == 101  # 20 before and 80 after the path, one NaN
     assert_same(round_trip(comparison, tmp_path), comparison)
 

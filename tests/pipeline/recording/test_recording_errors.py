@@ -15,11 +15,12 @@ import pytest
 import rerun as rr
 
 from urmpipe_models.errors import OutputError, RecordingError
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.recording import is_ours, is_recording, read_recording, write_recording
 from urmpipe_pipeline.recording.entities import blocks
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.verify import verify
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
@@ -89,7 +90,7 @@ def test_a_recording_without_metadata(tmp_path: Path) -> None:
 def test_a_recording_of_a_newer_layout(tmp_path: Path) -> None:
     newer = rr.AnyValues(metadata=json.dumps({"layout_version": 99, "something": "new"}))
     path = foreign(tmp_path / "newer.rrd", "urmpipe", newer)
-    assert trouble(path) == "found layout version 99, allowed: up to 3; a newer urmpipe wrote it"
+    assert trouble(path) == "found layout version 99, allowed: up to 4; a newer urmpipe wrote it"
 
 
 @pytest.mark.parametrize(
@@ -101,8 +102,8 @@ def test_a_recording_of_a_newer_layout(tmp_path: Path) -> None:
         ),
         ("[]", "TypeError('list indices must be integers or slices, not str')"),
         ("{}", "KeyError('layout_version')"),
-        ('{"layout_version": 3, "kind": "run"}', "KeyError('arrays')"),
-        ('{"layout_version": 3, "kind": "run", "arrays": {}, "result": {"place": {"key": 1}}}', None),
+        ('{"layout_version": 4, "kind": "run"}', "KeyError('arrays')"),
+        ('{"layout_version": 4, "kind": "run", "arrays": {}, "result": {"place": {"key": 1}}}', None),
     ],
 )
 def test_a_recording_with_damaged_metadata(tmp_path: Path, metadata: str, reason: str | None) -> None:

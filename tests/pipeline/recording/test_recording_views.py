@@ -15,11 +15,12 @@ from rerun.chunk import RrdReader
 
 from urmpipe_models.kinematics import points_over_log
 from urmpipe_pipeline.audit_entry import AuditEntry, AuditKind
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.scene import DASHES, MOST, scene_of
 from urmpipe_pipeline.recording.summary import summary
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

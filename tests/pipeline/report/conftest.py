@@ -13,10 +13,11 @@ from urmpipe_models.repolarizer import repolarize
 from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.compare import compare_runs
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.derivatives import derivatives
 from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
 TSP = 0.005

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.report import render_report
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Page

@@ -9,10 +9,11 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.report import figures, paths
 from urmpipe_pipeline.report.spec import Figure, Panel, line, stacked, typed
-from urmpipe_pipeline.results import Comparison, Run
+from urmpipe_pipeline.results import Run
 
 
 def numbers(spec: dict[str, Any]) -> FloatArray:

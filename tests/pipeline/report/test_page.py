@@ -18,10 +18,11 @@ from urmpipe_models.errors import OptionError, OutputError
 from urmpipe_models.kinematics import point_over_log
 from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.compare import compare_runs
+from urmpipe_pipeline.comparison import AXES, Comparison
 from urmpipe_pipeline.report import render_report, tables, text, write_report
 from urmpipe_pipeline.report.banner import banner
 from urmpipe_pipeline.report.markup import script_json
-from urmpipe_pipeline.results import AXES, Comparison, Run
+from urmpipe_pipeline.results import Run
 
 VOID = {"meta", "br", "img", "link", "input", "hr", "path"}
 

@@ -1,0 +1,368 @@
+"""What `compare` returns: deviations with their statistics and verdicts, as arrays, tables and JSON."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning, SourceFile, seconds
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.results import SCHEMA, Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Verdict = Literal["pass", "fail"]
+
+Kind = Literal["axis", "norm", "path", "angle", "joint"]
+"""What a deviation is measured of: a coordinate, the distance at one time, the distance from the path,
+the orientation, a joint."""
+
+AXES = ("x", "y", "z", "norm")
+"""The columns of `Deviation.delta`."""
+
+SyncMode = Literal["start", "given", "auto"]
+AlignMode = Literal["none", "start", "rigid", "tool"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Where an arm or a point was, when: a side of a comparison.
+
+    Attributes:
+        name: Its name.
+        t_ns: Times from its first sample in integer [ns], shape (m,).
+        position: In [m], shape (m, 3).
+        files: The files it came from.
+        quat_xyzw: Orientation as unit quaternions x, y, z, w [-], shape (m, 4), each the nearer of q and -q
+            to the one before; None without one.
+        joints: Names of the joints; none of a path.
+        joint_units: rad or m, one a joint.
+        q: Repolarized joint values in [rad] or [m], shape (m, joints); None without joints.
+    """
+
+    name: str
+    t_ns: IntArray
+    position: FloatArray
+    files: tuple[SourceFile, ...] = ()
+    quat_xyzw: FloatArray | None = None
+    joints: tuple[str, ...] = ()
+    joint_units: tuple[str, ...] = ()
+    q: FloatArray | None = None
+
+    @property
+    def t(self) -> FloatArray:
+        """Times in [s], shape (m,)."""
+        return seconds(self.t_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class Sync:
+    """How two clocks were put together: t_reference = t_log + offset, both from their first samples.
+
+    Attributes:
+        mode: start (both start together), given, or auto (estimated from the motion).
+        offset: In [s].
+        by: What an estimate rests on: joints or position; empty without one.
+        precision: Standard error of an estimate in [s]; None without one.
+        similarity: How alike the two motions are at that offset, -1 to 1; None without an estimate.
+    """
+
+    mode: SyncMode = "start"
+    offset: float = 0.0
+    by: str = ""
+    precision: float | None = None
+    similarity: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return asdict(self) | {"by": self.by or None}
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """How the log was moved in space before it was compared: p' = rotation p + translation + R' tool.
+
+    R' is the log's orientation after the rotation.
+
+    Attributes:
+        mode: none, start (the first compared poses agree), rigid (the best rigid motion) or tool (the best
+            constant offset of the tool centre point).
+        rotation: Rotation matrix [-], row by row, 3 by 3.
+        translation: In [m].
+        tool: In the frame of the log's tool, in [m].
+    """
+
+    mode: AlignMode = "none"
+    rotation: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tool: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return asdict(self)
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """How one quantity deviates; max, rms and p95 are of absolute values, mean and std signed.
+
+    Attributes:
+        quantity: x, y, z, norm, path, angle, or a joint's name.
+        kind: What it is measured of; a tolerance of that name holds for it.
+        unit: m or rad, that of all lengths and angles here.
+        max: Largest absolute value.
+        rms: Root mean square.
+        mean: Mean.
+        std: Standard deviation about the mean, of the samples themselves (n, not n - 1).
+        p95: 95th percentile of the absolute values.
+        t_max: When the largest stands, in [s] of the log.
+        sample_max: Grid sample of the largest, from 0.
+        tolerance: Largest absolute value allowed, or None.
+        out_of_tolerance: Samples above it; None without a tolerance.
+        share_out: Their share of the compared samples, 0..1; None without a tolerance.
+        verdict: pass or fail, None without a tolerance.
+    """
+
+    quantity: str
+    kind: Kind
+    unit: str
+    max: float
+    rms: float
+    mean: float
+    std: float
+    p95: float
+    t_max: float
+    sample_max: int
+    tolerance: float | None
+    out_of_tolerance: int | None
+    share_out: float | None
+    verdict: Verdict | None
+
+    @property
+    def used(self) -> float | None:
+        """Share of the tolerance that the largest value uses up; None without one."""
+        return None if not self.tolerance else self.max / self.tolerance
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {key: value for key, value in asdict(self).items() if key not in ("quantity", "kind")}
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Samples in a row that are out of tolerance.
+
+    Attributes:
+        samples: How many.
+        sample: The first of them, by its grid sample.
+        t: When it begins, in [s] of the log.
+        duration: From its first to its last sample in [s].
+    """
+
+    samples: int
+    sample: int
+    t: float
+    duration: float
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Deviation:
+    """The deviation of one log from the reference.
+
+    Attributes:
+        name: The log's name, unique in the comparison.
+        run: The ingested log.
+        sample: Grid samples that were compared, shape (m,).
+        t_ns: Their times on the log's clock in integer [ns], shape (m,).
+        reference: Where the reference was, in [m], shape (m, 3).
+        actual: Where the log was, aligned, in [m], shape (m, 3).
+        delta: x, y, z and norm of reference - actual, in [m], shape (m, 4).
+        path: Distance of `actual` from the nearest point of the reference's path, in [m], shape (m,).
+        speed: Speed of the log's tool centre point in [m/s], shape (m,); NaN where it is not known.
+        angle: Angle between the orientations in [rad], shape (m,); None where a side has none.
+        joint_delta: reference - log of each joint, turns included, in [rad] or [m], shape (m, joints); None
+            where a side has none.
+        joint_turns: Whole turns that the two logs count apart for the pose they start in, one a joint; they
+            are taken out of `joint_delta`.
+        outside: Where any quantity with a tolerance is out of it, shape (m,).
+        sync: How the clocks were put together.
+        alignment: How the log was moved in space.
+        left_out: Samples of the log without a reference or without a value.
+        reference_left_out: Samples of the reference outside the log's time.
+        statistics: One for each of x, y, z, norm and path, and for angle where there is one.
+        joint_statistics: One a joint, by its name in the log; none where a side has no joints.
+        start: delta at the first compared sample in [m]: x, y, z, norm (the paper's mutual calibration).
+        speed_correlation: Pearson's r of the norm and the speed; None where one of them does not change.
+        verdict: pass or fail.
+    """
+
+    name: str
+    run: Run
+    sample: IntArray
+    t_ns: IntArray
+    reference: FloatArray
+    actual: FloatArray
+    delta: FloatArray
+    path: FloatArray
+    speed: FloatArray
+    angle: FloatArray | None
+    joint_delta: FloatArray | None
+    joint_turns: tuple[int, ...]
+    outside: NDArray[np.bool_]
+    sync: Sync
+    alignment: Alignment
+    left_out: int
+    reference_left_out: int
+    statistics: dict[str, Statistics]
+    joint_statistics: dict[str, Statistics]
+    start: tuple[float, float, float, float]
+    speed_correlation: float | None
+    verdict: Verdict
+
+    @property
+    def t(self) -> FloatArray:
+        """Times of the compared samples in [s], shape (m,)."""
+        return seconds(self.t_ns)
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last compared sample in [s]."""
+        return float(self.t_ns[-1] - self.t_ns[0]) / 1e9
+
+    @property
+    def worst(self) -> int:
+        """Index into the compared samples of the largest norm."""
+        return int(np.argmax(self.delta[:, 3]))
+
+    @property
+    def share_out(self) -> float:
+        """Share of the compared samples out of tolerance, 0..1."""
+        return float(np.count_nonzero(self.outside)) / len(self.sample)
+
+    @property
+    def longest_out(self) -> Stretch | None:
+        """The longest stretch out of tolerance, the first of equally long ones; None without any."""
+        edges = np.flatnonzero(np.diff(self.sample) > 1) + 1  # a stretch ends where samples are left out
+        changes = np.flatnonzero(np.diff(self.outside)) + 1
+        starts = np.unique(np.concatenate(([0], edges, changes)))
+        ends = np.append(starts[1:], len(self.sample))
+        lengths = np.where(self.outside[starts], ends - starts, 0)
+        longest = int(np.argmax(lengths))
+        if not lengths[longest]:
+            return None
+        first, last = int(starts[longest]), int(ends[longest]) - 1
+        return Stretch(
+            int(lengths[longest]),
+            int(self.sample[first]),
+            float(self.t[first]),
+            float(self.t_ns[last] - self.t_ns[first]) / 1e9,
+        )
+
+    @property
+    def all_statistics(self) -> tuple[Statistics, ...]:
+        """Of every quantity: x, y, z, norm, path, angle and the joints."""
+        return (*self.statistics.values(), *self.joint_statistics.values())
+
+    @property
+    def decisive(self) -> Statistics:
+        """The quantity that uses up most of its tolerance; the norm where nothing has one."""
+        held = [one for one in self.all_statistics if one.used is not None]
+        return max(held, key=lambda one: one.used or 0.0, default=self.statistics["norm"])
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of one run."""
+        worst, longest = self.worst, self.longest_out
+        angle = self.statistics.get("angle")
+        return {
+            "name": self.name,
+            "samples": len(self.sample),
+            "left_out": self.left_out,
+            "reference_left_out": self.reference_left_out,
+            "duration": self.duration,
+            "sync_offset": self.sync.offset,
+            "sync": self.sync.to_dict(),
+            "alignment": self.alignment.to_dict(),
+            "delta": {axis: self.statistics[axis].to_dict() for axis in AXES},
+            "path": self.statistics["path"].to_dict(),
+            "angle": None if angle is None else angle.to_dict(),
+            "joints": {name: one.to_dict() for name, one in self.joint_statistics.items()},
+            "joint_turns": dict(zip(self.joint_statistics, self.joint_turns, strict=True)),
+            "start": dict(zip(AXES, self.start, strict=True)),
+            "worst": {
+                "t": float(self.t[worst]),
+                "sample": int(self.sample[worst]),
+                "norm": float(self.delta[worst, 3]),
+            },
+            "out_of_tolerance": int(np.count_nonzero(self.outside)),
+            "share_out": self.share_out,
+            "longest_out": None if longest is None else asdict(longest),
+            "speed_correlation": self.speed_correlation,
+            "verdict": self.verdict,
+            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.run.warnings],
+        }
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Comparison:
+    """Some logs held against one reference.
+
+    Attributes:
+        name: Its name.
+        reference: Where the arm was asked to be.
+        runs: One deviation a log.
+        tolerance: Largest absolute deviation allowed in [m] or [rad], by kind, or by x, y, z.
+        warnings: What a person should know about the comparison itself.
+        provenance: How to repeat it.
+        recording: Where it was written.
+    """
+
+    name: str
+    reference: Trajectory
+    runs: tuple[Deviation, ...]
+    tolerance: Mapping[str, float]
+    warnings: tuple[LogWarning, ...]
+    provenance: Provenance
+    recording: Path | None = None
+
+    @property
+    def verdict(self) -> Verdict:
+        """Pass if every log passes."""
+        return "pass" if all(run.verdict == "pass" for run in self.runs) else "fail"
+
+    @property
+    def ranking(self) -> tuple[Deviation, ...]:
+        """The logs from best to worst: by the share of a tolerance that is used up, then by the rms norm."""
+        return tuple(
+            sorted(self.runs, key=lambda run: (run.decisive.used or 0.0, run.statistics["norm"].rms))
+        )
+
+    def rows(self) -> Iterator[dict[str, Any]]:
+        """Yield one row a log and quantity: the statistics and the verdict."""
+        for run in self.runs:
+            for one in run.all_statistics:
+                yield {"run": run.name, **asdict(one)}
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a log and quantity: the statistics and the verdict."""
+        import pandas as pd
+
+        return pd.DataFrame(list(self.rows()))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object that `urmpipe compare --json` prints."""
+        return {
+            "schema": SCHEMA,
+            "verdict": self.verdict,
+            "tolerance": dict(self.tolerance),
+            "reference": self.reference.name,
+            "runs": [run.to_dict() for run in self.runs],
+            "ranking": [run.name for run in self.ranking],
+            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+            "recording": str(self.recording) if self.recording else None,
+        }

@@ -1,0 +1,154 @@
+"""Measure: every deviation of a log from the reference at the same times, with its statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from urmpipe_models.delta import delta
+from urmpipe_models.errors import LogError
+from urmpipe_models.orientation import angle_between
+from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_pipeline.comparison import AXES, Alignment, Deviation, Kind, Sync, Trajectory
+from urmpipe_pipeline.grid import apart, interpolate
+from urmpipe_pipeline.joint_log import FloatArray, seconds
+from urmpipe_pipeline.matching import Matched, lacking
+from urmpipe_pipeline.nearest_path import distance_from_path
+from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.statistics import Measured, correlation, describe, overall
+
+KINDS: tuple[Kind, ...] = ("axis", "axis", "axis", "norm")
+"""What the columns of delta are measured of."""
+
+
+def measure(
+    name: str,
+    run: Run,
+    reference: Trajectory,
+    matched: Matched,
+    sync: Sync,
+    alignment: Alignment,
+    tolerance: Mapping[str, float],
+) -> Deviation:
+    """Return the deviation of a log: delta, distance from the path, angle, joints, and the verdict.
+
+    Args:
+        name: The log's name, unique in the comparison.
+        run: The log.
+        reference: What was asked for, whole.
+        matched: Both sides at the same times, the log aligned.
+        sync: How the clocks were put together.
+        alignment: How the log was moved in space.
+        tolerance: In [m] or [rad], by kind or by coordinate.
+
+    Raises:
+        LogError: If there is a tolerance for what a side does not have.
+
+    Source: [UrmArm2021]_ eq. 19-23.
+    """
+    t, sample = seconds(matched.t_ns), matched.sample
+    values = np.column_stack(delta(_columns(matched.wanted), _columns(matched.done)))
+    path = distance_from_path(matched.done, reference.position, ~apart(reference.t_ns))
+    angle = _angle(matched)
+    joint_delta, turns = _joint_delta(run, matched)
+    _refuse_unheld(run, tolerance, angle, joint_delta)
+    in_space = [
+        *(Measured(axis, KINDS[i], "m", values[:, i]) for i, axis in enumerate(AXES)),
+        Measured("path", "path", "m", path),
+        *([] if angle is None else [Measured("angle", "angle", "rad", angle)]),
+    ]
+    of_joints = _of_joints(run, joint_delta)
+    statistics, joint_statistics = (
+        {one.quantity: describe(one, t, sample, tolerance) for one in measured}
+        for measured in (in_space, of_joints)
+    )
+    speed = _speed(run, matched)
+    x, y, z, norm = (float(value) for value in values[0])
+    return Deviation(
+        name=name,
+        run=run,
+        sample=sample,
+        t_ns=matched.t_ns,
+        reference=matched.wanted,
+        actual=matched.done,
+        delta=values,
+        path=path,
+        speed=speed,
+        angle=angle,
+        joint_delta=joint_delta,
+        joint_turns=turns,
+        outside=np.any([one.outside(tolerance) for one in (*in_space, *of_joints)], axis=0),
+        sync=sync,
+        alignment=alignment,
+        left_out=matched.left_out,
+        reference_left_out=matched.reference_left_out,
+        statistics=statistics,
+        joint_statistics=joint_statistics,
+        start=(x, y, z, norm),
+        speed_correlation=correlation(values[:, 3], speed),
+        verdict=overall([*statistics.values(), *joint_statistics.values()]),
+    )
+
+
+def _angle(matched: Matched) -> FloatArray | None:
+    """Return the angle between the orientations in [rad], shape (m,); None if a side has none anywhere."""
+    if matched.wanted_quat is None or matched.done_quat is None:
+        return None
+    angle = angle_between(matched.wanted_quat, matched.done_quat)
+    return angle if np.isfinite(angle).any() else None
+
+
+def _joint_delta(run: Run, matched: Matched) -> tuple[FloatArray | None, tuple[int, ...]]:
+    """Return reference - log of each joint, and the whole turns that are taken out of it.
+
+    Two logs of one motion may count the turns of the pose they start in differently: what they count apart at
+    the first sample is no deviation, a turn more on the way is.
+    """
+    if matched.wanted_q is None or matched.done_q is None:
+        return None, ()
+    difference = matched.wanted_q - matched.done_q
+    if not np.isfinite(difference).any(axis=0).all():
+        return None, ()
+    first = np.argmax(np.isfinite(difference), axis=0)
+    turning = np.array([unit == "rad" for unit in run.joint_units])
+    turns = np.rint(difference[first, np.arange(len(first))] / FULL_TURN) * turning
+    return difference - FULL_TURN * turns, tuple(int(turn) for turn in turns)
+
+
+def _of_joints(run: Run, joint_delta: FloatArray | None) -> list[Measured]:
+    """Return each joint as a quantity."""
+    if joint_delta is None:
+        return []
+    columns = zip(run.log.joints, run.joint_units, joint_delta.T, strict=True)
+    return [Measured(name, "joint", unit, values) for name, unit, values in columns]
+
+
+def _refuse_unheld(
+    run: Run, tolerance: Mapping[str, float], angle: FloatArray | None, joint_delta: FloatArray | None
+) -> None:
+    """Raise a `LogError` if there is a tolerance for what a side does not have: nothing would be judged."""
+    lacks = {"angle": (angle, "orientation"), "joint": (joint_delta, "joints of the same number")}
+    faults = [
+        lacking(run, f"--tolerance {kind}: found no {what} on both sides, allowed: where both have it")
+        for kind, (values, what) in lacks.items()
+        if kind in tolerance and values is None
+    ]
+    if faults:
+        raise LogError(*faults)
+
+
+def _speed(run: Run, matched: Matched) -> FloatArray:
+    """Return the speed of the log's tool centre point in [m/s]: by kinematics, else by its positions."""
+    if run.tcp is not None:
+        speed = np.linalg.norm(run.tcp.velocity, axis=1, keepdims=True)
+        return interpolate(matched.t_ns, run.t_ns, speed)[:, 0]
+    if len(matched.t_ns) < 2:
+        return np.full(len(matched.t_ns), np.nan)
+    velocity = np.gradient(matched.done, seconds(matched.t_ns), axis=0)
+    return np.asarray(np.linalg.norm(velocity, axis=1))
+
+
+def _columns(position: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    x, y, z = position.T
+    return x, y, z
