@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_pipeline.comparison import Deviation
+from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR
 from urmpipe_pipeline.report import text
-from urmpipe_pipeline.report.decimate import decimate
 from urmpipe_pipeline.report.spec import FAULT, INK, Figure, Spec, base_layout, space_axis, typed
 from urmpipe_pipeline.results import Run
 

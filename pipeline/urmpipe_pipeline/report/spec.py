@@ -11,8 +11,8 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.joint_log import FloatArray
-from urmpipe_pipeline.report.decimate import decimate
 
 Spec: TypeAlias = dict[str, Any]
 """A figure, a trace or a part of a layout, in the words of plotly.js."""

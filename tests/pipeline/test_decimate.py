@@ -6,7 +6,7 @@ import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_pipeline.report.decimate import decimate
+from urmpipe_pipeline.decimate import decimate
 
 sizes = st.integers(1, 3000)
 seeds = st.integers(0, 2**32 - 1)
