@@ -124,7 +124,8 @@ def test_what_is_exported_gives_evo_the_same_errors(
 ) -> None:
     (reference, log), files = exported
     deviation = compare_runs(reference, [log], CompareOptions(align=align)).runs[0]
-    distance, angle = evo_errors(*(read_tum_trajectory_file(file) for file in files), align)
+    first, second = (read_tum_trajectory_file(file) for file in files)
+    distance, angle = evo_errors(first, second, align)
     np.testing.assert_allclose(deviation.delta[:, 3], distance, rtol=0, atol=METRES)
     assert deviation.angle is not None
     np.testing.assert_allclose(deviation.angle, angle, rtol=0, atol=RADIANS)

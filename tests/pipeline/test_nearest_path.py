@@ -19,7 +19,7 @@ ROUNDING = 1e-12
 
 def distance_by_hand(point: FloatArray, path: FloatArray, joined: NDArray[np.bool_]) -> float:
     """Piece by piece, with the foot of the perpendicular."""
-    known = np.isfinite(path).all(axis=1)
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(path).all(axis=1))
     found = [float(np.linalg.norm(point - vertex)) for vertex in path[known]]
     for k in np.flatnonzero(joined & known[1:] & known[:-1]):
         step = path[k + 1] - path[k]
