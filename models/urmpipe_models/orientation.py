@@ -76,6 +76,25 @@ def quaternions(rotation: FloatArray, form: RotationForm) -> FloatArray:
     return result
 
 
+def matrices(quat_xyzw: FloatArray) -> FloatArray:
+    """Return rotation matrices, shape (n, 3, 3) [-], of unit quaternions x, y, z, w, shape (n, 4) [-].
+
+    R = I + 2 w [v]x + 2 [v]x [v]x.
+    """
+    x, y, z, w = quat_xyzw.T
+    rows = [
+        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+    ]
+    return np.asarray(np.array(rows, dtype=np.float64).transpose(2, 0, 1))
+
+
+def conjugate(quat_xyzw: FloatArray) -> FloatArray:
+    """Return the opposite rotations of unit quaternions x, y, z, w, shape (n, 4) [-]."""
+    return np.asarray(quat_xyzw * np.array([-1.0, -1.0, -1.0, 1.0]))
+
+
 def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the angle of the rotation from one orientation to another, 0 to pi: 2 atan2(|v|, |w|).
 
@@ -86,10 +105,38 @@ def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
     Returns:
         In [rad], shape (n,).
     """
-    conjugate = first * np.array([-1.0, -1.0, -1.0, 1.0])
-    between = product(conjugate, second)
+    between = product(conjugate(first), second)
     angle: FloatArray = 2 * np.arctan2(np.linalg.norm(between[:, :3], axis=1), np.abs(between[:, 3]))
     return angle
+
+
+def slerp(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArray:
+    """Return orientations on the great arc from one to another, the shorter way.
+
+    (sin((1 - s) a) q1 + sin(s a) q2) / sin(a), with the angle a = 2 atan2(|q2 - q1|, |q2 + q1|) of the two as
+    vectors, of which q2 or -q2 is the nearer to q1. At an end of the way stands that end, though the other
+    is missing.
+
+    Args:
+        first: Unit quaternions x, y, z, w [-], shape (n, 4).
+        second: The same.
+        share: s, 0 to 1, shape (n,).
+
+    Returns:
+        Shape (n, 4) [-]; NaN between two of which one is missing.
+
+    Source: Shoemake 1985, Animating rotation with quaternion curves.
+    """
+    cosine = np.einsum("ij,ij->i", first, second)
+    near = second * np.where(cosine < 0.0, -1.0, 1.0)[:, np.newaxis]
+    angle = 2 * np.arctan2(np.linalg.norm(near - first, axis=1), np.linalg.norm(near + first, axis=1))
+    # sin(a s) / sin(a), which is s where a is 0
+    own, other = (
+        part * np.sinc(angle * part / np.pi) / np.sinc(angle / np.pi) for part in (1 - share, share)
+    )
+    between = own[:, np.newaxis] * first + other[:, np.newaxis] * near
+    at_first, at_second = (share == 0.0)[:, np.newaxis], (share == 1.0)[:, np.newaxis]
+    return np.where(at_first, first, np.where(at_second, second, between))
 
 
 def _about(axis: str, angle: FloatArray) -> FloatArray:
@@ -108,10 +155,16 @@ def product(first: FloatArray, second: FloatArray) -> FloatArray:
         first: Shape (n, 4) [-].
         second: The same.
     """
-    v, w = first[:, :3], first[:, 3:]
-    u, s = second[:, :3], second[:, 3:]
-    real = w * s - (v * u).sum(axis=1, keepdims=True)
-    return np.hstack((w * u + s * v + np.cross(v, u), real))
+    x, y, z, w = first.T
+    a, b, c, d = second.T
+    return np.column_stack(
+        (
+            w * a + d * x + y * c - z * b,
+            w * b + d * y + z * a - x * c,
+            w * c + d * z + x * b - y * a,
+            w * d - (x * a + y * b + z * c),
+        )
+    )
 
 
 def _of_matrix(r: FloatArray) -> FloatArray:

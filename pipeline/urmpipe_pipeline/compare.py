@@ -6,14 +6,16 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
+from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.kinematics import positions_over_log
+from urmpipe_models.kinematics import poses_over_log
+from urmpipe_models.orientation import quaternions
 from urmpipe_pipeline.alignment import align, check_align
 from urmpipe_pipeline.audit import audit_log
 from urmpipe_pipeline.comparison import AlignMode, Comparison, Deviation, Sync, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning
 from urmpipe_pipeline.matching import Matched, as_recorded, by_kinematics, lacking, match
-from urmpipe_pipeline.measure import measure
+from urmpipe_pipeline.measure import measure, unheld
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.recorded_tcp import lacking_tool
 from urmpipe_pipeline.results import Run
@@ -106,7 +108,8 @@ def _differing_robots(runs: Sequence[Run], tcp: Tcp) -> list[LogWarning]:
 def compare_recorded(run: Run, options: CompareOptions | None = None) -> Comparison:
     """Hold the forward kinematics of a log against the tool centre point that the same log recorded.
 
-    Both stand in the same rows of one file: nothing is resampled; samples are rows, from 0.
+    Both stand in the same rows of one file: nothing is resampled; samples are rows, from 0. Their joints are
+    the same and are not compared.
     Where samples left on a wrap were repaired, the repaired ones count.
 
     Raises:
@@ -122,8 +125,12 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         raise LogError(
             lacking(run, "one log, which recorded no tool centre point; allowed: a reference before the log")
         )
-    recorded = Trajectory(f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files)
-    computed = Trajectory(run.name, log.t_ns, positions_over_log(run.robot, _on_rows(run)), log.files)
+    recorded = Trajectory(
+        f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files, quat_xyzw=log.tcp_quat_xyzw
+    )
+    position, rotation = poses_over_log(run.robot, _on_rows(run))
+    quat = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
+    computed = Trajectory(run.name, log.t_ns, position, log.files, quat_xyzw=quat)
     deviation = _deviation(run.name, run, recorded, computed, replace(chosen, sync="start"))
     found = _comparison(recorded, [deviation], chosen)
     doubts = lacking_tool(run.robot, log) if deviation.verdict == "fail" else []
@@ -156,6 +163,7 @@ def _comparison(
             for one in deviations
             if one.left_out
         ),
+        *(_joints_not_compared(reference, one) for one in deviations if _lacks_joints(reference, one)),
     ]
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
     given = {
@@ -179,13 +187,25 @@ def _comparison(
     )
 
 
+def _lacks_joints(reference: Trajectory, one: Deviation) -> bool:
+    """Tell whether both sides have joints that were not compared."""
+    return bool(reference.joints and one.run.log.joints) and one.joint_delta is None
+
+
+def _joints_not_compared(reference: Trajectory, one: Deviation) -> LogWarning:
+    """Return the warning that says why."""
+    return LogWarning(
+        "joints-not-compared", f"{one.name}: no joint is compared: {unheld(reference, one.run)}"
+    )
+
+
 def _deviation(
     name: str, run: Run, reference: Trajectory, actual: Trajectory, options: CompareOptions
 ) -> Deviation:
     """Return the deviation of one trajectory, at its own samples."""
     sync = synchronise(reference, actual, options.sync)
     matched = _matched(run, reference, actual, sync)
-    alignment, aligned = align(matched, options.align, name)
+    alignment, aligned = align(matched, options.align, run)
     return measure(name, run, reference, aligned, sync, alignment, options.tolerance)
 
 

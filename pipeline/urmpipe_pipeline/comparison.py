@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from urmpipe_models.orientation import angle_between, quaternions
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning, SourceFile, seconds
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.results import SCHEMA, Run
@@ -102,6 +103,23 @@ class Alignment:
     rotation: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
     translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
     tool: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def angle(self) -> float:
+        """Angle of the rotation in [rad], 0 to pi."""
+        quat = quaternions(np.reshape(self.rotation, (1, 9)), "matrix")
+        return float(angle_between(quat, np.array([[0.0, 0.0, 0.0, 1.0]]))[0])
+
+    def moved(self, aligned: FloatArray) -> FloatArray:
+        """Return how far the log's positions were moved, in [m], shape (m,).
+
+        Args:
+            aligned: Where they are now, in [m], shape (m, 3).
+        """
+        if self.mode == "tool":
+            return np.full(len(aligned), np.linalg.norm(self.tool))
+        before = (aligned - np.array(self.translation)) @ np.array(self.rotation)  # R^T (p' - t)
+        return np.asarray(np.linalg.norm(aligned - before, axis=1))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""

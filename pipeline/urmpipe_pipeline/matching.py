@@ -5,12 +5,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.orientation import quaternions
+from urmpipe_models.orientation import quaternions, slerp
 from urmpipe_pipeline.comparison import Trajectory
-from urmpipe_pipeline.grid import interpolate
+from urmpipe_pipeline.grid import ROUNDING_NS, interpolate
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.results import Run
 
@@ -24,10 +25,10 @@ class Matched:
         t_ns: Their times on the log's clock in integer [ns], shape (m,).
         wanted: Where the reference was, in [m], shape (m, 3).
         done: Where the log was, in [m], shape (m, 3).
-        wanted_quat: Orientation of the reference x, y, z, w [-], shape (m, 4); None if a side has none.
+        wanted_quat: Orientation of the reference x, y, z, w [-], shape (m, 4); None without one.
         done_quat: The same of the log.
-        wanted_q: Joints of the reference, in the log's order, in [rad] or [m], shape (m, joints); None if a
-            side has none, or others.
+        wanted_q: Joints of the reference, in the log's order, in [rad] or [m], shape (m, joints); None where
+            `joints_apart` tells why not.
         done_q: The same of the log.
         left_out: Samples of the log that were not compared.
         reference_left_out: Samples of the reference outside the log's time.
@@ -43,6 +44,21 @@ class Matched:
     done_q: FloatArray | None
     left_out: int
     reference_left_out: int
+
+    def at(self, kept: NDArray[np.intp]) -> Matched:
+        """Return both sides at some of these samples alone, by index; the others are left out."""
+        return Matched(
+            sample=self.sample[kept],
+            t_ns=self.t_ns[kept],
+            wanted=self.wanted[kept],
+            done=self.done[kept],
+            wanted_quat=None if self.wanted_quat is None else self.wanted_quat[kept],
+            done_quat=None if self.done_quat is None else self.done_quat[kept],
+            wanted_q=None if self.wanted_q is None else self.wanted_q[kept],
+            done_q=None if self.done_q is None else self.done_q[kept],
+            left_out=self.left_out + len(self.sample) - len(kept),
+            reference_left_out=self.reference_left_out,
+        )
 
 
 def by_kinematics(run: Run) -> Trajectory:
@@ -104,24 +120,38 @@ def match(reference: Trajectory, log: Trajectory, offset: float) -> Matched:
     wanted = interpolate(at_ns, reference.t_ns, reference.position)
     sample = np.flatnonzero(np.isfinite(wanted).all(axis=1) & np.isfinite(log.position).all(axis=1))
     at_ns = at_ns[sample]
-    quats: tuple[FloatArray | None, FloatArray | None] = None, None
-    if reference.quat_xyzw is not None and log.quat_xyzw is not None:
-        quats = _between(at_ns, reference.t_ns, reference.quat_xyzw), log.quat_xyzw[sample]
-    order = _order(reference.joints, log.joints)
-    joints: tuple[FloatArray | None, FloatArray | None] = None, None
-    if order is not None and reference.q is not None and log.q is not None:
-        joints = interpolate(at_ns, reference.t_ns, reference.q[:, order]), log.q[sample]
-    outside = (reference.t_ns < log.t_ns[0] + shift) | (reference.t_ns > log.t_ns[-1] + shift)
+    wanted_q, done_q = _joints(reference, log, sample, at_ns)
+    before = reference.t_ns < log.t_ns[0] + shift - ROUNDING_NS
+    after = reference.t_ns > log.t_ns[-1] + shift + ROUNDING_NS
     return Matched(
-        sample,
-        log.t_ns[sample],
-        wanted[sample],
-        log.position[sample],
-        *quats,
-        *joints,
-        len(log.t_ns) - len(sample),
-        int(np.count_nonzero(outside)),
+        sample=sample,
+        t_ns=log.t_ns[sample],
+        wanted=wanted[sample],
+        done=log.position[sample],
+        wanted_quat=_between(at_ns, reference),
+        done_quat=None if log.quat_xyzw is None else log.quat_xyzw[sample],
+        wanted_q=wanted_q,
+        done_q=done_q,
+        left_out=len(log.t_ns) - len(sample),
+        reference_left_out=int(np.count_nonzero(before | after)),
     )
+
+
+def joints_apart(reference: Trajectory, joints: tuple[str, ...], units: tuple[str, ...]) -> str:
+    """Return why the joints of a log cannot be held against those of the reference; empty if they can.
+
+    Args:
+        reference: What was asked for.
+        joints: Names of the log's joints.
+        units: Theirs: rad or m.
+    """
+    if not reference.joints or not joints:
+        return "a side has no joints"
+    if len(reference.joints) != len(joints):
+        return f"the log has {len(joints)} joints, the reference has {len(reference.joints)}"
+    turning = [reference.joint_units[place] for place in _order(reference.joints, joints)]
+    apart = [name for name, *pair in zip(joints, units, turning, strict=True) if pair[0] != pair[1]]
+    return f"{', '.join(apart)} turn on one side and slide on the other" if apart else ""
 
 
 def lacking(run: Run, message: str) -> Finding:
@@ -129,13 +159,19 @@ def lacking(run: Run, message: str) -> Finding:
     return Finding(message, file=run.log.files[0].name if run.log.files else run.name)
 
 
-def _order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int] | None:
-    """Return where the reference has the log's joints: by name, else by place; None if it has others."""
-    if not log or len(reference) != len(log):
-        return None
-    if set(reference) == set(log):
-        return [reference.index(name) for name in log]
-    return list(range(len(log)))
+def _order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int]:
+    """Return where the reference has the log's joints: by name if it has the same, else by place."""
+    return [reference.index(name) for name in log] if set(reference) == set(log) else list(range(len(log)))
+
+
+def _joints(
+    reference: Trajectory, log: Trajectory, sample: IntArray, at_ns: IntArray
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return the joints of both sides at the compared samples; None where they cannot be compared."""
+    if reference.q is None or log.q is None or joints_apart(reference, log.joints, log.joint_units):
+        return None, None
+    order = _order(reference.joints, log.joints)
+    return interpolate(at_ns, reference.t_ns, reference.q[:, order]), log.q[sample]
 
 
 def _recorded_quat(run: Run) -> FloatArray | None:
@@ -146,27 +182,13 @@ def _recorded_quat(run: Run) -> FloatArray | None:
     return continuous_quaternions(quaternions(values, "quat_xyzw" if form == "matrix" else form))
 
 
-def _between(at_ns: IntArray, known_ns: IntArray, quat: FloatArray) -> FloatArray:
-    """Return orientations at times within the known ones, on the great arc between two of them."""
-    after = np.clip(np.searchsorted(known_ns, at_ns), 1, max(len(known_ns) - 1, 1))
+def _between(at_ns: IntArray, reference: Trajectory) -> FloatArray | None:
+    """Return the reference's orientations at times within its own, on the great arc between two of them."""
+    known_ns, quat = reference.t_ns, reference.quat_xyzw
+    if quat is None:
+        return None
     if len(known_ns) == 1:
         return np.repeat(quat, len(at_ns), axis=0)
+    after = np.clip(np.searchsorted(known_ns, at_ns), 1, len(known_ns) - 1)
     share = (at_ns - known_ns[after - 1]) / (known_ns[after] - known_ns[after - 1])
     return slerp(quat[after - 1], quat[after], np.clip(share, 0.0, 1.0))
-
-
-def slerp(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArray:
-    """Return orientations on the great arc from one to another, the shorter way.
-
-    Args:
-        first: Unit quaternions x, y, z, w [-], shape (n, 4).
-        second: The same.
-        share: Of the way, 0 to 1, shape (n,).
-    """
-    cosine = np.einsum("ij,ij->i", first, second)
-    near = second * np.where(cosine < 0.0, -1.0, 1.0)[:, np.newaxis]
-    half = np.arctan2(np.linalg.norm(near - first, axis=1), np.linalg.norm(near + first, axis=1))
-    angle = 2 * half
-    # sin(a x) / sin(a), with x where a is 0.
-    weights = [part * np.sinc(angle * part / np.pi) / np.sinc(angle / np.pi) for part in (1.0 - share, share)]
-    return np.asarray(weights[0][:, np.newaxis] * first + weights[1][:, np.newaxis] * near)

@@ -13,13 +13,16 @@ from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_pipeline.comparison import AXES, Alignment, Deviation, Kind, Sync, Trajectory
 from urmpipe_pipeline.grid import apart, interpolate
 from urmpipe_pipeline.joint_log import FloatArray, seconds
-from urmpipe_pipeline.matching import Matched, lacking
+from urmpipe_pipeline.matching import Matched, joints_apart, lacking
 from urmpipe_pipeline.nearest_path import distance_from_path
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.statistics import Measured, correlation, describe, overall
 
 KINDS: tuple[Kind, ...] = ("axis", "axis", "axis", "norm")
 """What the columns of delta are measured of."""
+
+START_SAMPLES = 11
+"""Samples by which the turns of the start are counted: as few as outvote a wild one."""
 
 
 def measure(
@@ -50,9 +53,10 @@ def measure(
     t, sample = seconds(matched.t_ns), matched.sample
     values = np.column_stack(delta(_columns(matched.wanted), _columns(matched.done)))
     path = distance_from_path(matched.done, reference.position, ~apart(reference.t_ns))
+    path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
     angle = _angle(matched)
     joint_delta, turns = _joint_delta(run, matched)
-    _refuse_unheld(run, tolerance, angle, joint_delta)
+    _refuse_unheld(run, reference, tolerance, angle, joint_delta)
     in_space = [
         *(Measured(axis, KINDS[i], "m", values[:, i]) for i, axis in enumerate(AXES)),
         Measured("path", "path", "m", path),
@@ -102,18 +106,27 @@ def _angle(matched: Matched) -> FloatArray | None:
 def _joint_delta(run: Run, matched: Matched) -> tuple[FloatArray | None, tuple[int, ...]]:
     """Return reference - log of each joint, and the whole turns that are taken out of it.
 
-    Two logs of one motion may count the turns of the pose they start in differently: what they count apart at
-    the first sample is no deviation, a turn more on the way is.
+    None if a joint has no value on a side: it could not be judged.
     """
     if matched.wanted_q is None or matched.done_q is None:
         return None, ()
     difference = matched.wanted_q - matched.done_q
     if not np.isfinite(difference).any(axis=0).all():
         return None, ()
-    first = np.argmax(np.isfinite(difference), axis=0)
-    turning = np.array([unit == "rad" for unit in run.joint_units])
-    turns = np.rint(difference[first, np.arange(len(first))] / FULL_TURN) * turning
-    return difference - FULL_TURN * turns, tuple(int(turn) for turn in turns)
+    turning = zip(difference.T, run.joint_units, strict=True)
+    turns = [_turns_at_start(values) if unit == "rad" else 0 for values, unit in turning]
+    return difference - FULL_TURN * np.array(turns), tuple(turns)
+
+
+def _turns_at_start(difference: FloatArray) -> int:
+    """Return the whole turns that two joints in [rad] count apart for the pose they start in.
+
+    Logs of one motion may name it by other turns, such as pi and -pi: that is no deviation, a turn more on
+    the way is. The median of the first few samples: a wild first one would put all the others a turn out,
+    and what happens later stands where it happens.
+    """
+    first = difference[np.isfinite(difference)][:START_SAMPLES]
+    return int(np.rint(np.sort(first)[(len(first) - 1) // 2] / FULL_TURN))
 
 
 def _of_joints(run: Run, joint_delta: FloatArray | None) -> list[Measured]:
@@ -124,16 +137,27 @@ def _of_joints(run: Run, joint_delta: FloatArray | None) -> list[Measured]:
     return [Measured(name, "joint", unit, values) for name, unit, values in columns]
 
 
+def unheld(reference: Trajectory, run: Run) -> str:
+    """Return why no joint of a log is compared."""
+    apart = joints_apart(reference, run.log.joints, tuple(run.joint_units))
+    return apart or "a joint has no value at any compared sample"
+
+
 def _refuse_unheld(
-    run: Run, tolerance: Mapping[str, float], angle: FloatArray | None, joint_delta: FloatArray | None
+    run: Run,
+    reference: Trajectory,
+    tolerance: Mapping[str, float],
+    angle: FloatArray | None,
+    joint_delta: FloatArray | None,
 ) -> None:
     """Raise a `LogError` if there is a tolerance for what a side does not have: nothing would be judged."""
-    lacks = {"angle": (angle, "orientation"), "joint": (joint_delta, "joints of the same number")}
-    faults = [
-        lacking(run, f"--tolerance {kind}: found no {what} on both sides, allowed: where both have it")
-        for kind, (values, what) in lacks.items()
-        if kind in tolerance and values is None
-    ]
+    faults = []
+    if "angle" in tolerance and angle is None:
+        found = "--tolerance angle: found a side without an orientation"
+        faults.append(lacking(run, f"{found}, allowed: joints with a --robot, or a recorded orientation"))
+    if "joint" in tolerance and joint_delta is None:
+        found = f"--tolerance joint: found that {unheld(reference, run)}"
+        faults.append(lacking(run, f"{found}, allowed: the same joints on both sides"))
     if faults:
         raise LogError(*faults)
 
@@ -143,10 +167,23 @@ def _speed(run: Run, matched: Matched) -> FloatArray:
     if run.tcp is not None:
         speed = np.linalg.norm(run.tcp.velocity, axis=1, keepdims=True)
         return interpolate(matched.t_ns, run.t_ns, speed)[:, 0]
-    if len(matched.t_ns) < 2:
-        return np.full(len(matched.t_ns), np.nan)
-    velocity = np.gradient(matched.done, seconds(matched.t_ns), axis=0)
-    return np.asarray(np.linalg.norm(velocity, axis=1))
+    return _speed_by_positions(matched)
+
+
+def _speed_by_positions(matched: Matched) -> FloatArray:
+    """Return the speed by the differences to both neighbours: to one beside a gap or a sample left out.
+
+    NaN without a neighbour. Between two the slopes are weighted so that a parabola's is exact.
+    """
+    step = np.diff(seconds(matched.t_ns))[:, np.newaxis]
+    joined = (np.diff(matched.sample) == 1) & ~apart(matched.t_ns)
+    slope = np.where(joined[:, np.newaxis], np.diff(matched.done, axis=0) / step, 0.0)
+    weight = np.where(joined[:, np.newaxis], 1.0 / step, 0.0)  # of the nearer neighbour the more
+    none = np.zeros((1, 1))
+    before, after = np.vstack((none, weight)), np.vstack((weight, none))
+    along = before * np.vstack((np.zeros((1, 3)), slope)) + after * np.vstack((slope, np.zeros((1, 3))))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.linalg.norm(along / (before + after), axis=1))
 
 
 def _columns(position: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:

@@ -12,6 +12,10 @@ from urmpipe_pipeline.comparison import Kind, Statistics, Verdict
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.tolerance import allowed_for
 
+UNCHANGING = 1e-9
+"""A quantity with a smaller standard deviation, in [m] or [m/s], does not change: logs print nothing finer
+than a nanometre, and what rounding leaves (1e-15 m) correlates with anything by chance."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Measured:
@@ -80,13 +84,14 @@ def correlation(first: FloatArray, second: FloatArray) -> float | None:
     """Return Pearson's r of two quantities where both have a value; None where one does not change.
 
     Args:
-        first: Shape (m,), any unit; NaN where there is no value.
+        first: Shape (m,), in [m] or [m/s]; NaN where there is no value.
         second: The same.
     """
     both = np.isfinite(first) & np.isfinite(second)
-    a, b = first[both], second[both]
-    if len(a) < 2:
+    if not both.any():
         return None
-    a, b = a - a.mean(), b - b.mean()
-    spread = float(np.sqrt((a @ a) * (b @ b)))
-    return float(a @ b) / spread if spread > 0.0 else None
+    a, b = (values[both] - values[both].mean() for values in (first, second))
+    spread = float(np.sqrt(np.mean(a * a))), float(np.sqrt(np.mean(b * b)))
+    if min(spread) < UNCHANGING:
+        return None
+    return float(np.clip(np.mean(a * b) / (spread[0] * spread[1]), -1.0, 1.0))

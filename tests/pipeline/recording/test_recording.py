@@ -7,7 +7,7 @@ import sys
 from collections.abc import Callable, Mapping
 from dataclasses import fields, is_dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison import AlignMode, Comparison
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, record, write_recording
@@ -161,6 +161,33 @@ def test_a_comparison_with_samples_left_out_comes_back_as_it_was(make_run: MakeR
 
 def test_a_log_against_itself_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
     comparison = compare_recorded(full(make_run()))
+    assert_same(round_trip(comparison, tmp_path), comparison)
+
+
+@pytest.mark.parametrize("align", get_args(AlignMode))
+def test_a_comparison_of_poses_and_joints_comes_back_as_it_was(
+    align: AlignMode, make_run: MakeRun, tmp_path: Path
+) -> None:
+    reference, log = make_run("asked for"), make_run("log", offset=0.002)
+    turned = replace(log, q=log.q + 2 * np.pi * np.array([0, 0, 1, 0, 0, -2]))
+    comparison = compare_runs(reference, [turned, full(log)], CompareOptions({"angle": 0.001}, align=align))
+    first = comparison.runs[0]
+    assert comparison.reference.quat_xyzw is not None
+    assert first.joint_turns == (0, 0, -1, 0, 0, 2)
+    assert set(first.statistics) == {"x", "y", "z", "norm", "path", "angle"}
+    assert list(first.joint_statistics) == list(log.log.joints)
+    assert first.alignment.mode == align
+    assert_same(round_trip(comparison, tmp_path), comparison)
+
+
+def test_a_comparison_of_recorded_poses_with_gaps_comes_back_as_it_was(
+    make_run: MakeRun, tmp_path: Path
+) -> None:
+    reference, log = full(make_run("asked for")), full(make_run("log"))
+    comparison = compare_runs(reference, [log], CompareOptions(tcp="recorded"))
+    angle = comparison.runs[0].angle
+    assert angle is not None
+    assert comparison.runs[0].left_out == 1
     assert_same(round_trip(comparison, tmp_path), comparison)
 
 

@@ -1,0 +1,112 @@
+"""Distance from a path, against a look at every piece of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
+
+from urmpipe_pipeline import nearest_path
+from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.nearest_path import distance_from_path
+
+ROUNDING = 1e-12
+"""Distances of points up to 10 m away round at 2e-15; feet of perpendiculars on tiny pieces at some more."""
+
+
+def distance_by_hand(point: FloatArray, path: FloatArray, joined: NDArray[np.bool_]) -> float:
+    """Piece by piece, with the foot of the perpendicular."""
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(path).all(axis=1))
+    found = [float(np.linalg.norm(point - vertex)) for vertex in path[known]]
+    for k in np.flatnonzero(joined & known[1:] & known[:-1]):
+        step = path[k + 1] - path[k]
+        length = float(np.linalg.norm(step))
+        if length > 0.0:
+            direction = step / length
+            along = float(np.clip((point - path[k]) @ direction, 0.0, length))
+            found.append(float(np.linalg.norm(point - path[k] - along * direction)))
+    return min(found)
+
+
+def assert_distances(points: FloatArray, path: FloatArray, joined: NDArray[np.bool_]) -> None:
+    expected = [distance_by_hand(point, path, joined) for point in points]
+    np.testing.assert_allclose(distance_from_path(points, path, joined), expected, rtol=0, atol=ROUNDING)
+
+
+# On a coarse grid points lie on the path, vertices repeat and distances tie; the fine ones have no pattern.
+coordinates = st.integers(-3, 3).map(float) | st.floats(-10, 10).map(lambda value: round(value, 6))
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.data())
+def test_the_distance_is_that_of_the_nearest_piece(data: st.DataObject) -> None:
+    count = data.draw(st.integers(1, 40))
+    path = data.draw(arrays(np.float64, (count, 3), elements=coordinates))
+    path[data.draw(st.lists(st.integers(1, count - 1), max_size=3)) if count > 1 else []] = np.nan
+    joined = data.draw(arrays(np.bool_, count - 1))
+    assert_distances(data.draw(arrays(np.float64, (6, 3), elements=coordinates)), path, joined)
+
+
+@pytest.mark.parametrize("far", [0.0, 0.01, 1.0])
+def test_a_long_path_with_loops_corners_and_dwells(far: float) -> None:
+    rng = np.random.default_rng(1)
+    t = np.linspace(0, 40, 3000)
+    path = np.column_stack([np.sin(0.9 * t), np.abs(np.cos(1.1 * t)), 0.2 * np.sin(5 * t)])
+    path[500:900] = path[500]  # stands
+    path[1500:1700] = path[1500] + rng.normal(0, 1e-6, (200, 3))  # stands and trembles
+    path[2000] = np.nan
+    joined = np.ones(2999, bool)
+    joined[2500] = False
+    points = path[np.isfinite(path).all(axis=1)][::150] + far
+    points += rng.normal(0, 1e-4, points.shape)
+    assert_distances(points, path, joined)
+
+
+def test_a_raster_of_long_lines_is_met_between_their_ends() -> None:
+    rows = np.arange(50)
+    ends = np.where(rows % 2 == 0, 0.0, 1.0)
+    path = np.column_stack([np.stack((ends, 1 - ends), 1).ravel(), np.repeat(rows * 0.001, 2), np.zeros(100)])
+    points = np.column_stack([np.full(40, 0.5), np.linspace(0, 0.049, 40), np.full(40, 0.0002)])
+    assert_distances(points, path, np.ones(99, bool))
+
+
+def test_a_path_of_one_point_and_a_gap() -> None:
+    point, path = np.array([[0.0, 0.0, 1.0]]), np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    assert distance_from_path(point, path[:1], np.empty(0, bool)).tolist() == [np.sqrt(2.0)]
+    assert distance_from_path(point, path, np.array([True])).tolist() == [1.0]
+    assert distance_from_path(point, path, np.array([False])).tolist() == [np.sqrt(2.0)]
+    assert distance_from_path(point, np.insert(path, 1, np.nan, axis=0), np.ones(2, bool)).tolist() == [
+        np.sqrt(2.0)
+    ]
+    assert distance_from_path(np.empty((0, 3)), path, np.array([True])).tolist() == []
+
+
+def test_the_middle_of_a_circle_is_as_far_from_every_piece() -> None:
+    angle = np.cumsum(np.random.default_rng(2).uniform(0.001, 0.004, 2000))
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(2000)])
+    assert_distances(np.random.default_rng(3).normal(0, 1e-7, (5, 3)), circle, np.ones(1999, bool))
+
+
+def test_what_would_take_too_long_is_off_by_less_than_half_a_piece(monkeypatch: pytest.MonkeyPatch) -> None:
+    rng = np.random.default_rng(4)
+    path = np.vstack([rng.normal(0, 1e-3, (3000, 3)), np.linspace((0, 0, 0), (0, 0, 10), 1000)])
+    points, joined = rng.normal(0, 1e-3, (100, 3)), np.ones(3999, bool)
+    exact = distance_from_path(points, path, joined)
+    monkeypatch.setattr(nearest_path, "MOST_PAIRS", 0)
+    near = distance_from_path(points, path, joined)
+    mean = float(np.linalg.norm(np.diff(path, axis=0), axis=1).sum()) / (4000 + nearest_path.FINER)
+    assert (near >= exact).all()
+    assert (near - exact < mean / 2).all()
+
+
+def test_nothing_that_is_given_is_changed() -> None:
+    path = np.array([[0.0, 0, 0], [0, 0, 0], [np.nan, 0, 0], [1, 0, 0]])
+    points, joined = np.ones((2, 3)), np.ones(3, bool)
+    before = path.copy()
+    distance_from_path(points, path, joined)
+    np.testing.assert_array_equal(path, before)
+    assert joined.all()
+    assert (points == 1.0).all()
