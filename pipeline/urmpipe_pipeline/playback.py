@@ -18,9 +18,9 @@ from urmpipe_pipeline.grid import interpolate
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.results import Run
 
-PARTS = 16
-"""Periods of playback between the two rows of a jump: a part is 1/16 of a turn of the joint, and the eighth
-of them ends at t_r."""
+PARTS = 32
+"""Periods of playback between the two rows of a jump: in each the joint turns by 11 degrees, so that the
+swing of the tool centre point is seen as a curve, and the sixteenth ends at t_r."""
 
 MOST = 1000
 """Jumps that are played back at most, the first ones: beyond them a drawing tells nothing more."""
@@ -30,8 +30,8 @@ MOST = 1000
 class Playback:
     """The raw joints played back, and where the tool centre point is then.
 
-    Its instants are those of some rows of the file, enough to draw it, and `PARTS` + 1 a jump, from the row
-    before it to the row after it.
+    Its instants are those of some rows of the file, enough to draw it, the ones beside a jump among them, and
+    `PARTS` + 1 a jump, from the row before it to the row after it.
 
     Attributes:
         t: Instants in [s] from the first row, increasing, shape (m,); not all are whole [ns].
@@ -74,7 +74,8 @@ def play_back(run: Run) -> Playback | None:
         return None
     first, last = _jumps(run)
     inside, q_inside, motion = _across(run, run.robot, first, last)
-    rows = _outside(_drawn_rows(run, run.tcp), first, last)
+    beside = np.clip(np.concatenate((first - 1, last + 1)), 0, run.log.rows - 1)
+    rows = _outside(np.union1d(_drawn_rows(run, run.tcp), beside), first, last)
     t_rows, q_rows = run.log.t_ns[rows], run.log.q[rows]
     should = positions_over_log(run.robot, _linear(inside, run.t_ns, run.q))
     parts = (

@@ -79,7 +79,7 @@ def test_of_a_resampled_run_the_rows_of_the_file_are_played_back(run: Run) -> No
 def test_half_way_down_each_jump_stands_the_mean_of_its_two_rows(run: Run, played: Playback) -> None:
     assert played.jumps == len(run.repolarizations) == 13
     for entry in run.repolarizations:
-        (at,) = np.flatnonzero(np.abs(played.t - entry.t) < 1e-9)  # parts are 0.3 ms apart
+        (at,) = np.flatnonzero(np.abs(played.t - entry.t) < 1e-9)  # parts are 0.16 ms apart
         mean = (run.log.q[entry.sample - 1] + run.log.q[entry.sample]) / 2.0
         np.testing.assert_allclose(played.q[at], mean, rtol=0, atol=1e-14)  # of values up to pi
         j = run.log.joints.index(entry.joint)
@@ -98,7 +98,9 @@ def test_the_tool_is_as_far_off_as_an_own_computation_finds(run: Run, played: Pl
             raw = run.log.q[row - 1] + (run.log.q[row] - run.log.q[row - 1]) * part / PARTS
             right = run.q[row - 1] + (run.q[row] - run.q[row - 1]) * part / PARTS
             off = float(np.linalg.norm(p7(raw) - p7(right)))
-            (at,) = np.flatnonzero(np.abs(played.t - (entry.t + entry.half_period * (part / 8 - 1))) < 1e-9)
+            (at,) = np.flatnonzero(
+                np.abs(played.t - (entry.t + entry.half_period * (2 * part / PARTS - 1))) < 1e-9
+            )
             # Sums of seven segments of 0.2 m: 1e-15 m each.
             assert played.off[at] == pytest.approx(off, abs=1e-12)
             furthest = max(furthest, off)
