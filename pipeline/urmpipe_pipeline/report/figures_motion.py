@@ -146,12 +146,12 @@ def _recorded_figure(run: Run) -> Figure | None:
 
 def _rotation(run: Run, names: Sequence[str], values: FloatArray) -> Panel:
     """Return a recorded orientation in its own form; a quaternion has no unit."""
-    unit = "-" if len(names) == 4 else "rad"
+    unit = "" if len(names) == 4 else "rad"
     lines = [
         line(run.t, column, name, joint_colour(i), unit, showlegend=True)
         for i, (name, column) in enumerate(zip(names, values.T, strict=True))
     ]
-    return Panel(f"orientation [{unit}]", lines)
+    return Panel(f"orientation [{unit or '-'}]", lines)
 
 
 def _reached(motion: PointLog) -> str:

@@ -6,6 +6,7 @@ import numpy as np
 
 from urmpipe_models.kinematics import PointLog
 from urmpipe_pipeline.audit_entry import AuditEntry
+from urmpipe_pipeline.decimate import POINTS
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.palette import JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.playback import MOST, PARTS, Playback
@@ -18,8 +19,8 @@ from urmpipe_pipeline.results import Run
 JOINTS_PX = 230
 """Height of a plot of all joints."""
 
-POINT_PX = 150
-"""Height of a plot of the tool centre point."""
+POINT_PX = 140
+"""Height of a plot of the tool centre point; all of them fit on a printed page."""
 
 BEFORE_POINTS = 4000
 """Points of a line with jumps: it leaves its course and comes back within a sample, so that it needs more."""
@@ -86,7 +87,7 @@ def point_figure(run: Run, played: Playback) -> Figure | None:
         f"Position, speed and acceleration of {point} of {run.name} over time, as the angles of the file move"
         f" it and after repolarization. {wrongness(run, played)}",
         stacked(panels, run.duration, through),
-        POINT_PX * len(panels) + AROUND_PX,
+        sum(round(POINT_PX * panel.share) for panel in panels) + AROUND_PX,
     )
 
 
@@ -121,13 +122,14 @@ def _sizes(run: Run, after: PointLog, played: Playback) -> list[Panel]:
         ("v", "m/s", played.velocity, after.velocity),
         ("a", "m/s²", played.acceleration, after.acceleration),
     ):
-        for word, t, vectors, colour in (
-            ("before", played.t, values, FAULT),
-            ("after", run.t, right, MUTED),
+        for word, t, vectors, colour, digits in (
+            ("before", played.t, values, FAULT, 1),
+            ("after", run.t, right, MUTED, 4),
         ):
             norm = np.linalg.norm(vectors, axis=1)
-            drawn = line(t, norm, f"‖{symbol}‖ {word}", colour, unit, points=BEFORE_POINTS)
-            found.append(Panel(f"‖{symbol}‖ {word} [{unit}]", [drawn], share=0.7, from_zero=True))
+            points = BEFORE_POINTS if word == "before" else POINTS
+            drawn = line(t, norm, f"‖{symbol}‖ {word}", colour, unit, digits=digits, points=points)
+            found.append(Panel(f"‖{symbol}‖ {word} [{unit}]", [drawn], share=0.75, from_zero=True))
     return found
 
 
@@ -151,8 +153,8 @@ def _marks_caption(count: int) -> str:
     """Say what the triangles are."""
     which = "each" if count <= MARKED else f"each of the first {MARKED}"
     return (
-        f"{text.counted(count, 'repolarization')}: a triangle stands at {which},"
-        " up where a turn was added, down where one was taken."
+        f"Above as in the file, below repolarized. {text.counted(count, 'repolarization')}: a triangle stands"
+        f" at {which}, up where a turn was added, down where one was taken."
     )
 
 

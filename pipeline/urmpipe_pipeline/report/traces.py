@@ -54,7 +54,7 @@ def line(
         values: Shape (n,), in `unit`.
         name: What the legend and the pointer call it.
         colour: As CSS writes it.
-        unit: Unit of the values.
+        unit: Unit of the values; empty without one.
         digits: Digits after the point under the pointer.
         points: How many of its samples may stay.
         **more: Further settings of the trace.
@@ -68,7 +68,7 @@ def line(
         "name": label(name),
         "x": typed(t[kept], "f8"),
         "y": typed(drawn, precision(drawn, digits)),
-        "hovertemplate": f"%{{y:{told(drawn, digits)}}} {unit}",
+        "hovertemplate": f"%{{y:{told(drawn, digits)}}} {unit}".rstrip(),
         "showlegend": False,
     } | settings
 
