@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -76,3 +79,13 @@ def test_what_is_no_array_in_a_row_is_decimated_alike() -> None:
     before = values.copy()
     np.testing.assert_array_equal(decimate(values[:, 1], 100), decimate(values[:, 1].copy(), 100))
     np.testing.assert_array_equal(values, before)
+
+
+def test_the_library_is_loaded_by_a_drawing_and_not_by_the_reader() -> None:
+    code = (
+        "import sys\nfrom urmpipe_datasets import LOGS\nfrom urmpipe_pipeline.ingest import ingest_log\n"
+        "import urmpipe_pipeline.recording\nimport urmpipe_pipeline.report\n"
+        "ingest_log([LOGS / 'coppeliasim.csv'])\nprint('tsdownsample' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "False\n"

@@ -9,8 +9,6 @@ from typing import Any
 import numpy as np
 import plotly.graph_objects as go
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from urmpipe_pipeline.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison import Comparison, Deviation
@@ -23,8 +21,7 @@ from urmpipe_pipeline.report.figures_motion import motion_figure
 from urmpipe_pipeline.report.figures_overview import overview_figure
 from urmpipe_pipeline.report.figures_repolarization import joints_figure, point_figure
 from urmpipe_pipeline.report.paths import path_figure, repolarized_path_figure
-from urmpipe_pipeline.report.spec import Figure, Panel, stacked, typed
-from urmpipe_pipeline.report.traces import line, precision, shaded, told
+from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.results import Run
 
 
@@ -98,13 +95,6 @@ def test_plotly_accepts_every_figure(comparison: Comparison, hostile: Comparison
     assert len(found) == 1 + 2 * (8 + 5) + 6 + 3 + 1
     for figure in found:
         go.Figure(figure.spec)  # raises on an unknown word or a wrong value
-
-
-def test_typed_arrays_come_back() -> None:
-    values = np.array([[0.0, -1.5], [np.nan, 1e6]])
-    np.testing.assert_array_equal(numbers(typed(values)), values)
-    exact = np.array([0.005 * 1e6, np.pi])
-    np.testing.assert_array_equal(numbers(typed(exact, "f8")), exact)
 
 
 def test_the_drawn_deviation_is_that_of_the_tables_with_its_tolerance(comparison: Comparison) -> None:
@@ -333,25 +323,6 @@ def test_all_logs_stand_in_one_figure_from_best_to_worst(comparison: Comparison)
     assert wide.spec["layout"]["yaxis"]["type"] == "log"
 
 
-def test_stretches_near_each_other_are_tinted_as_one_and_a_sample_is_seen() -> None:
-    t = np.arange(10_001) / 100.0  # 100 s
-    where = np.zeros(len(t), dtype=np.bool_)
-    where[[1000, 1040, 5000]] = True  # 0.4 s apart, and far away
-    first, second = shaded(t, where, 100.0)
-    assert (first["x0"], first["x1"]) == (10.0, 10.4)
-    assert (second["x0"], second["x1"]) == pytest.approx((49.95, 50.05))  # a thousandth of it wide
-    assert shaded(t, np.zeros(len(t), dtype=np.bool_), 100.0) == []
-
-
-@given(st.floats(-1e9, 1e9), st.integers(1, 6))
-def test_the_pointer_tells_the_extremes_as_the_tables_do(value: float, digits: int) -> None:
-    values = np.array([value, np.nan, value / 3])
-    drawn = numbers(typed(values, precision(values, digits)))
-    form = told(values, digits)
-    assert form == (".3e" if 0 < abs(value) < 1e-3 else f".{digits}f")
-    assert f"{drawn[0]:{form}}" == f"{value:{form}}"
-
-
 def test_every_repolarization_is_marked_where_it_is(comparison: Comparison) -> None:
     run = comparison.runs[0].run
     assert {item.joint for item in run.repolarizations} >= {"phi1", "phi4"}
@@ -390,14 +361,3 @@ def test_the_scene_has_equal_scales_and_shows_the_worst_point(comparison: Compar
     np.testing.assert_allclose(place, deviation.actual[deviation.worst], rtol=0, atol=2**-23)
     (actual,) = [trace for trace in spec["data"] if trace["name"] == "actual"]
     assert numbers(actual["customdata"])[:, 1].max() == deviation.statistics["norm"].max * 1e3
-
-
-def test_panels_do_not_overlap_and_fill_the_height() -> None:
-    t = np.arange(3.0)
-    panels = [Panel("a [m]", [line(t, t, "a", "#000000", "m")], share=share) for share in (2.0, 1.0, 1.0)]
-    layout = stacked(panels, 2.0)["layout"]
-    domains = [layout[f"yaxis{number}"]["domain"] for number in ("", "2", "3")]
-    assert domains[0][1] == 1.0
-    assert domains[2][0] == pytest.approx(0.0, abs=1e-3)  # rounded to four digits
-    assert domains[0][0] > domains[1][1] > domains[1][0] > domains[2][1]
-    assert layout["xaxis"]["range"] == [0.0, 2.0]
