@@ -11,7 +11,7 @@ from typing import TypeAlias
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.outputs import guarded_output
-from urmpipe_pipeline.report import figures, paths, tables, text
+from urmpipe_pipeline.report import gallery, tables, text
 from urmpipe_pipeline.report.banner import banner
 from urmpipe_pipeline.report.markup import asset, environment, script_hash
 from urmpipe_pipeline.report.spec import Figure
@@ -128,7 +128,10 @@ def _comparison_part(comparison: Comparison, ident: str) -> Part:
     ]
     return Part(
         f"Comparison {comparison.name}",
-        (tables.warnings_table(comparison),) if comparison.warnings else (),
+        (
+            *((tables.warnings_table(comparison),) if comparison.warnings else ()),
+            *gallery.comparison_figures(comparison),
+        ),
         (*logs, about),
         ident,
         comparison.verdict,
@@ -138,12 +141,6 @@ def _comparison_part(comparison: Comparison, ident: str) -> Part:
 
 def _deviation_part(deviation: Deviation, ident: str) -> Part:
     """Return the part of one compared log."""
-    found: list[Block | None] = [
-        tables.statistics_table(deviation),
-        figures.deviation_figure(deviation),
-        paths.path_figure(deviation),
-        figures.joints_figure(deviation.run),
-    ]
     facts = [
         *_run_facts(deviation.run),
         ("Compared", text.counted(len(deviation.sample), "sample")),
@@ -151,18 +148,17 @@ def _deviation_part(deviation: Deviation, ident: str) -> Part:
         ("Left out", text.counted(deviation.left_out, "sample")),
         ("Sync offset", f"{text.seconds(deviation.sync.offset)} s"),
     ]
-    blocks = (*(block for block in found if block), *_run_tables(deviation.run))
+    blocks = (
+        tables.statistics_table(deviation),
+        *gallery.deviation_figures(deviation),
+        *_run_tables(deviation.run),
+    )
     return Part(deviation.name, blocks, (), ident, deviation.verdict, _given(facts))
 
 
 def _run_part(run: Run, ident: str) -> Part:
     """Return the part of one log that was only ingested."""
-    found: list[Block | None] = [
-        figures.joints_figure(run),
-        paths.run_path_figure(run),
-        figures.motion_figure(run),
-    ]
-    blocks = (*(block for block in found if block), *_run_tables(run))
+    blocks = (*gallery.run_figures(run), *_run_tables(run))
     return Part(f"Log {run.name}", blocks, (), ident, "", _given(_run_facts(run)))
 
 

@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_pipeline.comparison import Deviation
-from urmpipe_pipeline.decimate import decimate
+from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR
+from urmpipe_pipeline.playback import Playback
 from urmpipe_pipeline.report import text
+from urmpipe_pipeline.report.figures_motion import point_name
+from urmpipe_pipeline.report.figures_repolarization import BEFORE_POINTS, wrongness
 from urmpipe_pipeline.report.spec import FAULT, INK, Figure, Spec, base_layout, space_axis, typed
 from urmpipe_pipeline.results import Run
 
@@ -34,10 +37,7 @@ def path_figure(deviation: Deviation) -> Figure:
     reference = _way("reference", deviation.reference, deviation.t, REFERENCE_COLOUR, 2)
     worst = deviation.worst
     where = text.point(deviation.actual[worst])
-    spots = [
-        _spot("start", deviation.actual[0], INK, "circle"),
-        _spot("worst", deviation.actual[worst], FAULT, "diamond"),
-    ]
+    spots = [*_ends(deviation.actual), _spot("worst", deviation.actual[worst], FAULT, "diamond")]
     return Figure(
         "Path in space",
         "Equal scale on all axes. The colour is the distance from the reference at the same time. "
@@ -65,7 +65,35 @@ def run_path_figure(run: Run) -> Figure | None:
         "Path in space",
         f"The tool centre point, equal scale on all axes. {HANDLING}",
         f"Path of {run.name} in three dimensions, within ({text.point(low)}) m and ({text.point(high)}) m.",
-        _scene([*traces, _spot("start", known[0], INK, "circle")]),
+        _scene([*traces, *_ends(known)]),
+        SCENE_PX,
+        space=True,
+    )
+
+
+def repolarized_path_figure(run: Run, played: Playback) -> Figure | None:
+    """Return the path in space as the raw joints lead the tool centre point, and after repolarization.
+
+    None without kinematics.
+    """
+    if run.tcp is None:
+        return None
+    after = run.tcp.position
+    spots = _ends(after)
+    if played.worst is not None:
+        spots.append(_spot("furthest off", played.position[played.worst], FAULT, "diamond"))
+    return Figure(
+        "Path in space before and after repolarization",
+        f"{wrongness(run, played)} A word in the legend hides or shows a path. {HANDLING}",
+        f"Path of {point_name(run)} of {run.name} in three dimensions, as the angles of the file lead it and"
+        f" after repolarization. {wrongness(run, played)}",
+        _scene(
+            [
+                _way("before", played.position, played.t, FAULT, 2, BEFORE_POINTS),
+                _way("after", after, run.t, AXIS_COLOURS["norm"], 5),
+                *spots,
+            ]
+        ),
         SCENE_PX,
         space=True,
     )
@@ -91,9 +119,11 @@ def _by_deviation(norm: FloatArray, kept: IntArray) -> Spec:
     }
 
 
-def _way(name: str, position: FloatArray, t: FloatArray, colour: str, width: int) -> Spec:
+def _way(
+    name: str, position: FloatArray, t: FloatArray, colour: str, width: int, points: int = POINTS
+) -> Spec:
     """Return a path of one colour."""
-    kept = decimate(position)
+    kept = decimate(position, points)
     return _trail(name, position[kept], t[kept], None, line={"color": colour, "width": width})
 
 
@@ -110,6 +140,15 @@ def _trail(name: str, position: FloatArray, t: FloatArray, norm: FloatArray | No
         "hovertemplate": told + f"<extra>{name}</extra>",
         **more,
     }
+
+
+def _ends(position: FloatArray) -> list[Spec]:
+    """Return where a path starts and ends."""
+    known = np.flatnonzero(np.isfinite(position).all(axis=1))
+    if not len(known):
+        return []
+    start, end = position[known[0]], position[known[-1]]
+    return [_spot("start", start, INK, "circle"), _spot("end", end, INK, "square")]
 
 
 def _spot(name: str, position: FloatArray, colour: str, symbol: str) -> Spec:

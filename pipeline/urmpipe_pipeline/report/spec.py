@@ -1,18 +1,14 @@
-"""Plotly figures as plain dicts: typed arrays, stacked time axes, one look for all."""
+"""Plotly figures as plain dicts: typed arrays, axes, stacked panels, one look for all."""
 
 from __future__ import annotations
 
 import base64
-import html
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
-
-from urmpipe_pipeline.decimate import decimate
-from urmpipe_pipeline.joint_log import FloatArray
 
 Spec: TypeAlias = dict[str, Any]
 """A figure, a trace or a part of a layout, in the words of plotly.js."""
@@ -30,9 +26,6 @@ BAND = "rgba(0, 114, 178, 0.06)"
 
 MARGIN = {"l": 64, "r": 12, "t": 24, "b": 48}
 
-DASHES = ("solid", "dash", "dot", "dashdot")
-"""Tells the ninth joint from the first: colours repeat, dashes do not."""
-
 
 @dataclass(frozen=True, slots=True)
 class Figure:
@@ -44,7 +37,8 @@ class Figure:
         alt: What it shows, for who does not see it.
         spec: data and layout for plotly.js.
         height: In [px].
-        space: True for a scene in 3D, false for quantities over the run's time.
+        space: True for a scene in 3D.
+        over: What its horizontal axis measures: figures of one part that share it move together.
     """
 
     title: str
@@ -53,6 +47,7 @@ class Figure:
     spec: Spec
     height: int
     space: bool = False
+    over: str = "t"
     kind: Literal["figure"] = "figure"
 
 
@@ -63,7 +58,7 @@ class Panel:
     Attributes:
         title: The quantity and its unit.
         traces: Its lines; the axes are filled in by `stacked`.
-        shapes: Lines and bands at values of the quantity, from `level` and `band`.
+        shapes: What stands behind its lines, from `level`, `band` and `shaded`.
         share: Height relative to the others.
         from_zero: True for a size, whose axis begins at 0.
     """
@@ -90,88 +85,6 @@ def typed(values: NDArray[Any], dtype: Literal["f4", "f8"] = "f4") -> Spec:
     return spec if values.ndim == 1 else spec | {"shape": ", ".join(map(str, values.shape))}
 
 
-def label(text: str) -> str:
-    """Return a text from a file so that plotly.js, which reads HTML, draws it letter by letter."""
-    return html.escape(text, quote=False)
-
-
-def line(t: FloatArray, values: FloatArray, name: str, colour: str, unit: str, **more: Any) -> Spec:
-    """Return a line over time, decimated.
-
-    Args:
-        t: Times in [s], shape (n,).
-        values: Shape (n,), in `unit`.
-        name: What the legend and the pointer call it.
-        colour: As CSS writes it.
-        unit: Unit of the values.
-        **more: Further settings of the trace.
-    """
-    kept = decimate(values)
-    settings = {"line": stroke(colour)} | more
-    return {
-        "type": "scatter",
-        "mode": "lines",
-        "name": label(name),
-        "x": typed(t[kept], "f8"),
-        "y": typed(values[kept]),
-        "hovertemplate": f"%{{y:.4f}} {unit}",
-        "showlegend": False,
-    } | settings
-
-
-def stroke(colour: str, dash: str = "solid") -> Spec:
-    """Return how a line is drawn: through every point, for `decimate` has chosen them already."""
-    return {"color": colour, "width": 1.4, "dash": dash, "simplify": False}
-
-
-def marks(t: FloatArray, values: FloatArray, colour: str, symbols: str | list[str], **more: Any) -> Spec:
-    """Return points over time, every one of them.
-
-    Args:
-        t: Times in [s], shape (n,).
-        values: In the unit of their panel, shape (n,).
-        colour: As CSS writes it.
-        symbols: One for all, or one each, in plotly.js's words.
-        **more: Further settings of the trace.
-    """
-    return {
-        "type": "scatter",
-        "mode": "markers",
-        "x": typed(np.asarray(t), "f8"),
-        "y": typed(np.asarray(values)),
-        "marker": {"color": colour, "size": 10, "symbol": symbols, "line": {"color": "#ffffff", "width": 1}},
-        "cliponaxis": False,
-        "hoverinfo": "skip",
-        "showlegend": False,
-    } | more
-
-
-def level(value: float, text: str = "") -> Spec:
-    """Return a dashed line at one value, as wide as the plot, with a word at its end."""
-    ends = {"xref": "x domain", "x0": 0, "x1": 1, "y0": value, "y1": value}
-    word = {"text": text, "textposition": "end", "yanchor": "top", "font": {"color": MUTED, "size": 10}}
-    return {"type": "line", "line": {"color": INK, "width": 1, "dash": "dash"}, "label": word} | ends
-
-
-def band(low: float, high: float) -> Spec:
-    """Return a tinted band between two values, behind the lines."""
-    ends = {"xref": "x domain", "x0": 0, "x1": 1, "y0": low, "y1": high}
-    return {"type": "rect", "fillcolor": BAND, "line": {"width": 0}, "layer": "below"} | ends
-
-
-def instant(t: float, text: str, duration: float) -> Spec:
-    """Return a line at one time through all panels, with a word at its head that stays inside."""
-    ends = {"xref": "x", "x0": t, "x1": t, "yref": "paper", "y0": 0, "y1": 1}
-    side = "left" if t < 0.1 * duration else "right" if t > 0.9 * duration else "center"
-    head = {"text": text, "textposition": "end", "textangle": 0, "xanchor": side}
-    font = {"color": FAULT, "size": 11}
-    return {
-        "type": "line",
-        "line": {"color": FAULT, "width": 1, "dash": "dot"},
-        "label": head | {"font": font},
-    } | ends
-
-
 def stacked(panels: Sequence[Panel], duration: float, shapes: Sequence[Spec] = ()) -> Spec:
     """Return panels one under the other on a common time axis.
 
@@ -190,7 +103,7 @@ def stacked(panels: Sequence[Panel], duration: float, shapes: Sequence[Spec] = (
             "rangemode": "tozero" if panel.from_zero else "normal",
         }
         data += [trace | {"xaxis": "x", "yaxis": f"y{suffix}"} for trace in panel.traces]
-        drawn += [shape | {"yref": f"y{suffix}"} for shape in panel.shapes]
+        drawn += [shape | {"yref": f"y{suffix}{shape.get('yref', '')}"} for shape in panel.shapes]
     bottom = "y" if len(panels) == 1 else f"y{len(panels)}"
     layout["xaxis"] = axis("t [s]") | {
         "anchor": bottom,

@@ -141,7 +141,7 @@ def test_tables_and_figures_are_told_to_a_screen_reader(page: Page) -> None:
     assert heads
     assert all(attrs.get("scope") in ("col", "row") for attrs, _ in heads)
     plots = [attrs for tag, attrs, _ in page.elements if (attrs.get("class") or "").startswith("plot")]
-    assert len(plots) == 7  # three a compared log, the joints of the bare one
+    assert len(plots) == 1 + 2 * 8 + 1  # of both logs together, of each, the joints of the bare one
     assert all(attrs["role"] == "img" and len(attrs["aria-label"] or "") > 40 for attrs in plots)
     assert len(page.all("figcaption")) == len(plots)
     assert page.all("noscript")
@@ -177,7 +177,7 @@ def test_hostile_texts_stay_texts(hostile: Comparison) -> None:
     assert not page.all("b")
     assert "<img" not in html
     scripts = [attrs for attrs, _ in page.all("script")]
-    assert len(scripts) == 6 + 2  # three figures of the compared log and of the ingested one; the code
+    assert len(scripts) == 6 + 3 + 2  # figures of the compared log and of the ingested one; the code
     for attrs, spec in page.all("script"):
         if attrs:
             assert json.loads(spec)["data"]
@@ -285,7 +285,7 @@ def test_a_log_of_one_sample_and_a_path_have_pages_too(comparison: Comparison) -
     result = compare_runs(path, [single])
     page = Page(render_report([result, single, path]))
     plots = [attrs for _, attrs, _ in page.elements if (attrs.get("class") or "").startswith("plot")]
-    assert len(plots) == 3 + 3 + 1
+    assert len(plots) == 4 + 3 + 2
     assert [said for _, said in page.all("h1")] == ["PASS shifted is within tolerance"]
 
 
