@@ -68,22 +68,33 @@ def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
 
     Source: [UrmArm2021]_ eq. 7 and 8.
     """
-    poses: list[Transform] = []
+    _, *moved = frames(chain, q)
+    poses = [
+        Transform(frame.rotation, frame.point(joint.origin.translation))
+        for frame, joint in zip(moved, chain.joints[1:], strict=False)
+    ]
+    return (*poses, moved[-1] @ chain.tip @ chain.tool)
+
+
+def frames(chain: Chain, q: Sequence[Element]) -> Iterator[Transform]:
+    """Yield the base and the moving frame of every joint, in the world: what the links hang on.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+    """
     frame = chain.base
-    for k, (joint, value) in enumerate(zip(chain.joints, joint_values(chain, q), strict=True)):
-        at_joint = frame @ joint.origin
-        if k > 0:
-            poses.append(Transform(frame.rotation, at_joint.translation))
-        frame = _moved(at_joint, joint, value)
-    return (*poses, frame @ chain.tip @ chain.tool)
+    yield frame
+    for joint, value in zip(chain.joints, joint_values(chain, q), strict=True):
+        frame = _moved(frame @ joint.origin, joint, value)
+        yield frame
 
 
 def tip_pose(chain: Chain, q: Sequence[Element]) -> Transform:
     """Return the pose of the tool centre point alone: the last of `forward`, at less cost."""
-    frame = chain.base
-    for joint, value in zip(chain.joints, joint_values(chain, q), strict=True):
-        frame = _moved(frame @ joint.origin, joint, value)
-    return frame @ chain.tip @ chain.tool
+    for frame in frames(chain, q):
+        last = frame
+    return last @ chain.tip @ chain.tool
 
 
 def motions(
@@ -264,6 +275,30 @@ def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
 
     _each_block(work, len(q))
     return skeleton.transpose(2, 0, 1)
+
+
+def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return positions [m], shape (n, joints + 1, 3), and rotations, shape (n, joints + 1, 3, 3), of frames.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, coordinates).
+
+    Returns:
+        The base's, then those of the moving frame of every joint, fixed ones and mimics included.
+    """
+    count = len(chain.joints) + 1
+    position, rotation = np.empty((count, 3, len(q))), np.empty((count, 3, 3, len(q)))
+
+    def work(block: slice) -> None:
+        """Fill the rows of a block."""
+        for k, frame in enumerate(frames(chain, _columns(q[block]))):
+            _fill(position[k, :, block], frame.translation)
+            for row in range(3):
+                _fill(rotation[k, row, :, block], frame.rotation[row])
+
+    _each_block(work, len(q))
+    return position.transpose(2, 0, 1), rotation.transpose(3, 0, 1, 2)
 
 
 def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArray:
