@@ -2,18 +2,24 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from urmpipe_pipeline.palette import rgb
-from urmpipe_pipeline.recording.scene import Arm, Scene, Way
+from urmpipe_pipeline.palette import DEVIATION_COLOUR, rgb
+from urmpipe_pipeline.recording.scene import Arm, Mark, Scene
+from urmpipe_pipeline.recording.shape_drawing import draw_body
 from urmpipe_pipeline.recording.times import time_columns
+from urmpipe_pipeline.recording.ways import Way
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
 
-LINK_RADIUS, JOINT_RADIUS, POINT_RADIUS = 0.012, 0.022, 0.018
+Skeleton: TypeAlias = NDArray[np.float32]
+"""Base, p1..pn of each pose in [m], shape (m, n + 1, 3)."""
+
+LINK_RADIUS, JOINT_RADIUS, POINT_RADIUS, MARK_RADIUS = 0.012, 0.022, 0.018, 0.024
 WANTED_RADIUS, DONE_RADIUS = 0.0065, 0.0035
 """Sizes in the 3D view, as shares of the radius of everything in it."""
 
@@ -25,37 +31,49 @@ LINK_COLOUR = "#c8d0d4"
 
 
 def draw_scene(stream: RecordingStream, scene: Scene) -> None:
-    """Send the arm and the paths; nothing if there is neither."""
+    """Send the arm, the paths and the worst place; nothing if there is neither arm nor path."""
     import rerun as rr
 
     if scene.empty:
         return
     stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     size = scene.ball()[1]
-    for way in scene.ways:
+    for way in (*scene.ways, *([scene.enlarged] if scene.enlarged else [])):
         _draw_way(stream, way, size)
+    if scene.worst is not None:
+        _draw_mark(stream, scene.worst, size)
     if scene.arm is not None:
         _draw_arm(stream, scene.arm, size)
 
 
 def _draw_arm(stream: RecordingStream, arm: Arm, size: float) -> None:
-    """Draw the skeleton: a line through the points, a ball at each in the colour of its joint."""
+    """Draw the links, as they look or as lines, and a ball at each joint in its colour."""
     import rerun as rr
 
+    for body in arm.bodies:
+        draw_body(stream, body, time_columns(arm.t_ns, "sample", arm.sample))
     skeleton = arm.skeleton.astype(np.float32)
-    count, points = skeleton.shape[:2]
-    links = rr.LineStrips3D.from_fields(colors=[rgb(LINK_COLOUR)], radii=[LINK_RADIUS * size])
-    stream.log("/robot/links", links, static=True)
-    for start in range(0, count, STRIPS):
-        rows = slice(start, start + STRIPS)
-        times = time_columns(arm.t_ns[rows], "sample", arm.sample[rows])
-        stream.send_columns("/robot/links", times, rr.LineStrips3D.columns(strips=skeleton[rows]))
+    if arm.bare:
+        _draw_links(stream, arm, skeleton, size)
     joints = rr.Points3D.from_fields(
         colors=[rgb(colour) for colour in arm.colours], radii=[JOINT_RADIUS * size]
     )
     stream.log("/robot/joints", joints, static=True)
+    count, points = skeleton.shape[:2]
     columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3)).partition(np.full(count, points))
     stream.send_columns("/robot/joints", time_columns(arm.t_ns, "sample", arm.sample), columns)
+
+
+def _draw_links(stream: RecordingStream, arm: Arm, skeleton: Skeleton, size: float) -> None:
+    """Draw a line through the points of the arm."""
+    import rerun as rr
+
+    links = rr.LineStrips3D.from_fields(colors=[rgb(LINK_COLOUR)], radii=[LINK_RADIUS * size])
+    stream.log("/robot/links", links, static=True)
+    for start in range(0, len(skeleton), STRIPS):
+        rows = slice(start, start + STRIPS)
+        times = time_columns(arm.t_ns[rows], "sample", arm.sample[rows])
+        stream.send_columns("/robot/links", times, rr.LineStrips3D.columns(strips=skeleton[rows]))
 
 
 def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:
@@ -68,8 +86,23 @@ def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:
         [strip.astype(np.float32) for strip in way.strips], colors=[colour], radii=[radius]
     )
     stream.log(way.path, lines, static=True)
-    style = rr.Points3D.from_fields(colors=[colour], radii=[POINT_RADIUS * size])
+    labels = [way.label] if way.label else None
+    style = rr.Points3D.from_fields(colors=[colour], radii=[POINT_RADIUS * size], labels=labels)
     stream.log(way.point, style, static=True)
     track = way.track
     columns = rr.Points3D.columns(positions=track.position.astype(np.float32))
     stream.send_columns(way.point, time_columns(track.t_ns, "sample", track.sample), columns)
+
+
+def _draw_mark(stream: RecordingStream, mark: Mark, size: float) -> None:
+    """Draw a place that is there at all times, with its label."""
+    import rerun as rr
+
+    point = rr.Points3D(
+        [mark.position],
+        colors=[rgb(DEVIATION_COLOUR)],
+        radii=[MARK_RADIUS * size],
+        labels=[mark.text],
+        show_labels=True,
+    )
+    stream.log("/point/worst", point, static=True)

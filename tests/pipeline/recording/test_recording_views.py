@@ -18,8 +18,9 @@ from urmpipe_pipeline.audit_entry import AuditEntry, AuditKind
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
-from urmpipe_pipeline.recording.scene import DASHES, MOST, scene_of
+from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.summary import summary
+from urmpipe_pipeline.recording.ways import DASHES, MOST
 from urmpipe_pipeline.results import Run
 
 MakeRun = Callable[..., Run]
