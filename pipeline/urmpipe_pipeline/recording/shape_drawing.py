@@ -30,10 +30,13 @@ def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> N
     import rerun as rr
 
     place = ("robot", "base") if body.joint is None else ("robot", "joint", body.joint)
-    columns = rr.Transform3D.columns(
-        translation=body.position.astype(np.float32), quaternion=body.quat_xyzw.astype(np.float32)
-    )
-    stream.send_columns(entity_path(*place), times, columns)
+    position, rotation = body.position.astype(np.float32), body.quat_xyzw.astype(np.float32)
+    if body.joint is None:  # the base does not move
+        still = rr.Transform3D(translation=position[0], quaternion=rotation[0])
+        stream.log(entity_path(*place), still, static=True)
+    else:
+        columns = rr.Transform3D.columns(translation=position, quaternion=rotation)
+        stream.send_columns(entity_path(*place), times, columns)
     for number, visual in enumerate(body.visuals, start=1):
         if (shape := _shape(visual)) is not None:
             entity = entity_path(*place, f"visual {number}")

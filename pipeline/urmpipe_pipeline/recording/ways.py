@@ -19,7 +19,10 @@ POSE_PERIOD = 0.02
 """Time between two poses drawn in [s], at least."""
 
 DASHES = 120
-"""Dashes of a line that was asked for."""
+"""Dashes of a line that was asked for, at most."""
+
+LEAST_DASH = 0.04
+"""Least length of a dash, as a share of half the lines' extent: shorter ones run together where drawn."""
 
 MOST = 20_000
 """Poses of the arm, and vertices of a path, at most."""
@@ -121,9 +124,12 @@ def _within(row: int | None, start: int, end: int) -> list[int]:
 
 
 def dashed(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return every second piece of the lines, all pieces of a line equally long."""
+    """Return every second piece of the lines, all pieces equally long."""
+    if not strips:
+        return ()
     lengths = [np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(strip, axis=0), axis=1))] for strip in strips]
-    dash = sum(float(length[-1]) for length in lengths) / (2 * DASHES)
+    extent = np.linalg.norm(np.ptp(np.concatenate(strips), axis=0)) / 2
+    dash = max(sum(float(length[-1]) for length in lengths) / (2 * DASHES), LEAST_DASH * float(extent))
     return tuple(
         _piece(strip, length, start, start + dash)
         for strip, length in zip(strips, lengths, strict=True)
