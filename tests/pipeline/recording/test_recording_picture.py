@@ -36,9 +36,6 @@ SCENE_VIEW = "Arm and paths [m]"
 FIELD_OF_VIEW = math.radians(55.0)
 """Of the viewer's eye, from the bottom to the top of a view (re_view_spatial, Eye::DEFAULT_FOV_Y)."""
 
-TIMES = 8.5, 13.0
-"""When the arm is looked at in [s]: its links do not hide each other then."""
-
 pytestmark = [
     pytest.mark.slow,
     pytest.mark.skipif(
@@ -191,14 +188,27 @@ def missed(scene: Scene, points: FloatArray, colours: Sequence[str], picture: Pi
 
 
 def assert_stands(
-    viewer: Any, run: Run, folder: Path, colours: Sequence[str], points: Callable[[FloatArray], FloatArray]
+    viewer: Any,
+    run: Run,
+    folder: Path,
+    colours: Sequence[str],
+    points: Callable[[FloatArray], FloatArray],
+    times: tuple[float, float],
 ) -> None:
-    """Hold two pictures of a run against the points that its joint values, shape (1, joints), have then."""
+    """Hold the pictures at two times in [s] against the points that joint values, shape (1, joints), give.
+
+    The times are such that nothing hides a point.
+    """
     scene, path = scene_of(run), folder / "run.rrd"
     viewer.open(str(write_recording(run, path)))
-    at_both = [points(run.q[round(at / run.tsp)][np.newaxis]) for at in TIMES]
-    for at, standing in zip(TIMES, at_both, strict=True):
-        picture = scene_at(viewer, at, path, lambda seen, p=standing: not missed(scene, p, colours, seen))  # type: ignore[misc]
+    at_both = [points(run.q[round(at / run.tsp)][np.newaxis]) for at in times]
+    for at, standing in zip(times, at_both, strict=True):
+
+        def drawn(picture: Picture, wanted: FloatArray = standing) -> bool:
+            """Tell whether all points are where they should be."""
+            return not missed(scene, wanted, colours, picture)
+
+        picture = scene_at(viewer, at, path, drawn)
         assert missed(scene, standing, colours, picture) == [], f"at {at} s"
     # The last two move by more than twice the reach in which they are looked for.
     first, second = (projected(scene, standing, picture) for standing in at_both)
@@ -212,10 +222,13 @@ def test_the_arm_stands_where_its_kinematics_project_it(
     run = make_run(rows=4000)
     robot = run.robot
     assert robot is not None
-    # The base and p1..p5, where the six joints are.
-    assert_stands(
-        viewer, run, tmp_path, JOINT_COLOURS[:6], lambda q: points_over_log(robot, q)[0, : len(robot.moving)]
-    )
+
+    def joints(q: FloatArray) -> FloatArray:
+        """Return the base and p1..p5, where the six joints are."""
+        result: FloatArray = points_over_log(robot, q)[0, :6]
+        return result
+
+    assert_stands(viewer, run, tmp_path, JOINT_COLOURS[:6], joints, (3.0, 17.0))
 
 
 def test_a_robot_of_shapes_stands_where_its_kinematics_project_it(
@@ -233,4 +246,4 @@ def test_a_robot_of_shapes_stands_where_its_kinematics_project_it(
         result: FloatArray = position[0, numbers] + rotation[0, numbers] @ middle
         return result
 
-    assert_stands(viewer, run, tmp_path, ["#ff3333", "#33ff33", "#3366ff", "#ffff33"], middles)
+    assert_stands(viewer, run, tmp_path, ["#ff3333", "#33ff33", "#3366ff", "#ffff33"], middles, (8.5, 13.0))
