@@ -52,5 +52,5 @@ def _self_contained(path: Path) -> bool:
         document = json.loads(path.read_bytes())
         parts = [*document.get("buffers", []), *document.get("images", [])]
         return all(part.get("uri", "data:").startswith("data:") for part in parts)
-    except (OSError, ValueError, AttributeError):
+    except (OSError, ValueError, TypeError, AttributeError):  # cannot be read, or is no glTF
         return False

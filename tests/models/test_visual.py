@@ -214,14 +214,11 @@ def test_an_arm_without_visuals_comes_back_without(tmp_path: Path) -> None:
 
 def test_pinocchio_sees_the_visuals_where_they_are(tmp_path: Path) -> None:
     pin = pytest.importorskip("pinocchio")
-    chain = replace(
-        load_robot("ur5e").placed(from_offset([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])),
-        visuals=(
-            Visual(None, Box((0.1, 0.2, 0.3)), translation(0.0, 0.0, 0.1), (1.0, 0.5, 0.0, 1.0)),
-            Visual("elbow_joint", Cylinder(0.05, 0.4), from_offset([0.1, 0.0, 0.2, 0.3, 0.2, 0.1])),
-            Visual("wrist_3_joint", Sphere(0.05)),
-        ),
-    )
+    robot = load_robot("ur5e").placed(from_offset([0.1, 0.2, 0.3, 0.4, 0.5, 0.6]))
+    origin = from_offset([0.1, 0.0, 0.2, 0.3, 0.2, 0.1])
+    box = Visual(None, Box((0.1, 0.2, 0.3)), origin, (1.0, 0.5, 0.0, 1.0))
+    cylinders = (Visual(joint.name, Cylinder(0.05, 0.4), origin) for joint in robot.joints)
+    chain = replace(robot, visuals=(box, *cylinders))
     text = urdf_text(chain)
     model = pin.buildModelFromXML(text)
     geometry = pin.buildGeomFromUrdfString(model, text, pin.GeometryType.VISUAL)
@@ -238,7 +235,6 @@ def test_pinocchio_sees_the_visuals_where_they_are(tmp_path: Path) -> None:
     names = [None, *(joint.name for joint in chain.joints)]
     for visual, peer in zip(chain.visuals, placed.oMg, strict=True):
         k = names.index(visual.joint)
-        origin = visual.origin
         np.testing.assert_allclose(
             position[0, k] + rotation[0, k] @ np.array(origin.translation), peer.translation, atol=SAME
         )

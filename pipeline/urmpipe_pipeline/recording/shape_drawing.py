@@ -13,7 +13,7 @@ from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.meshes import MEDIA_TYPES
 from urmpipe_pipeline.palette import rgb
 from urmpipe_pipeline.recording.bodies import Body
-from urmpipe_pipeline.recording.entities import entity_path
+from urmpipe_pipeline.recording.entities import entity_path, printable
 
 if TYPE_CHECKING:
     from rerun import AsComponents, RecordingStream, TimeColumn
@@ -29,7 +29,9 @@ def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> N
     """
     import rerun as rr
 
-    place = ("robot", "base") if body.joint is None else ("robot", "joint", body.joint)
+    place = (
+        ("robot", "base") if body.joint is None else ("robot", "joint", printable(body.joint) or "unnamed")
+    )
     position, rotation = body.position.astype(np.float32), body.quat_xyzw.astype(np.float32)
     if body.joint is None:  # the base does not move
         still = rr.Transform3D(translation=position[0], quaternion=rotation[0])

@@ -168,6 +168,7 @@ def test_one_warning_tells_of_all_meshes_that_are_missing(tmp_path: Path) -> Non
         ({"buffers": [{"uri": "arm.bin"}]}, False),
         ({"images": [{"uri": "arm.png"}]}, False),
         ([], False),
+        ({"buffers": None}, False),
     ],
 )
 def test_a_gltf_that_needs_other_files_is_not_drawn(document: object, whole: bool, tmp_path: Path) -> None:
