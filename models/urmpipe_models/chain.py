@@ -10,6 +10,7 @@ from typing import Literal
 
 from urmpipe_models.errors import RobotError
 from urmpipe_models.transform import Transform
+from urmpipe_models.visual import Visual
 
 JointKind = Literal["revolute", "prismatic", "fixed"]
 
@@ -68,6 +69,7 @@ class Chain:
         start: Calibration pose q(0), in [rad] or [m], one value a coordinate.
         description: One line for people.
         source: Where the numbers come from.
+        visuals: What the arm looks like; none where the description does not tell.
     """
 
     name: str
@@ -78,6 +80,7 @@ class Chain:
     start: tuple[float, ...] = ()
     description: str = ""
     source: str = ""
+    visuals: tuple[Visual, ...] = ()
 
     def __post_init__(self) -> None:
         if not self.start:
@@ -106,6 +109,9 @@ class Chain:
                     f"joint {joint.name} mimics {joint.mimic.joint}, no moving joint of the chain;"
                     f" allowed: {', '.join(self.coordinates)}"
                 )
+        carriers = {visual.joint for visual in self.visuals if visual.joint is not None}
+        for carrier in sorted(carriers - set(names)):
+            yield f"a visual hangs on {carrier}, no joint of the chain; allowed: {', '.join(names)}"
         if len(self.start) != len(self.coordinates):
             yield f"start has {len(self.start)} values; allowed: {len(self.coordinates)}, one a coordinate"
 

@@ -1,4 +1,4 @@
-"""Forward kinematics, velocities, accelerations and Jacobian of a chain, elementwise.
+"""Forward kinematics and Jacobian of a chain, elementwise, and its motion over a log.
 
 Each function takes one element per coordinate (see `elementwise`): arrays over the samples of a log,
 floats, or CasADi symbols. `over_log` runs one of them over the rows of an (n, joints) array.
@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import islice
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.chain import Chain, Joint
-from urmpipe_models.elementwise import ZERO, Element, Vector, add, cross, plus, scale, subtract, times
+from urmpipe_models.chain import Chain
+from urmpipe_models.elementwise import ZERO, Element, Vector, cross, plus, subtract, times
+from urmpipe_models.frames import frames, joint_values, moved
+from urmpipe_models.motion import each_motion
 from urmpipe_models.transform import Transform, euler_zyx
 
 FloatArray: TypeAlias = NDArray[np.float64]
@@ -26,31 +28,6 @@ BLOCK = 16384
 
 THREADS = min(4, os.cpu_count() or 1)
 """Blocks worked on side by side: beyond some, Python's own work, which runs alone, sets the pace."""
-
-
-@dataclass(frozen=True, slots=True)
-class Motion:
-    """Pose and its first two derivatives of one point, in the world.
-
-    Attributes:
-        pose: Position in [m] and rotation.
-        velocity: In [m/s].
-        acceleration: In [m/s2].
-        omega: Angular velocity in [rad/s].
-        alpha: Angular acceleration in [rad/s2].
-    """
-
-    pose: Transform
-    velocity: Vector
-    acceleration: Vector
-    omega: Vector
-    alpha: Vector
-
-
-def joint_values(chain: Chain, q: Sequence[Element]) -> list[Element]:
-    """Return the value of every joint of the chain, mimics included, fixed ones as 0 (rad or m)."""
-    of = dict(zip(chain.coordinates, q, strict=True))
-    return [_value(joint, of) for joint in chain.joints]
 
 
 def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
@@ -68,57 +45,19 @@ def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
 
     Source: [UrmArm2021]_ eq. 7 and 8.
     """
-    poses: list[Transform] = []
-    frame = chain.base
-    for k, (joint, value) in enumerate(zip(chain.joints, joint_values(chain, q), strict=True)):
-        at_joint = frame @ joint.origin
-        if k > 0:
-            poses.append(Transform(frame.rotation, at_joint.translation))
-        frame = _moved(at_joint, joint, value)
-    return (*poses, frame @ chain.tip @ chain.tool)
+    _, *links = frames(chain, q)
+    poses = [
+        Transform(frame.rotation, frame.point(joint.origin.translation))
+        for frame, joint in zip(links, chain.joints[1:], strict=False)
+    ]
+    return (*poses, links[-1] @ chain.tip @ chain.tool)
 
 
 def tip_pose(chain: Chain, q: Sequence[Element]) -> Transform:
     """Return the pose of the tool centre point alone: the last of `forward`, at less cost."""
-    frame = chain.base
-    for joint, value in zip(chain.joints, joint_values(chain, q), strict=True):
-        frame = _moved(frame @ joint.origin, joint, value)
-    return frame @ chain.tip @ chain.tool
-
-
-def motions(
-    chain: Chain, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
-) -> tuple[Motion, ...]:
-    """Return pose, velocity and acceleration of the points p1..pn, from q, q' and q''.
-
-    Outward recursion over the joints, with d the way from one frame's origin to the next:
-    v' = v + omega x d, a' = a + alpha x d + omega x (omega x d); a revolute joint adds z q' to omega and
-    z q'' + omega x z q' to alpha, a prismatic one z q' to v and z q'' + 2 omega x z q' to a.
-
-    Args:
-        chain: The arm.
-        q: One element per coordinate, in [rad] or [m].
-        qd: Their rates, in [rad/s] or [m/s].
-        qdd: Their second derivatives, in [rad/s2] or [m/s2].
-
-    Source: [UrmArm2021]_ section 3, Figure 10 b and c (v7 of q', a7 of q'' and q'^2).
-    """
-    return tuple(_motions(chain, q, qd, qdd))
-
-
-def _motions(
-    chain: Chain, q: Sequence[Element], qd: Sequence[Element], qdd: Sequence[Element]
-) -> Iterator[Motion]:
-    """Yield the motions of p1..pn; who wants one of them need not keep the arrays of all."""
-    values, rates, second = joint_values(chain, q), _joint_rates(chain, qd), _joint_rates(chain, qdd)
-    body = Motion(chain.base, ZERO, ZERO, ZERO, ZERO)
-    for k, joint in enumerate(chain.joints):
-        at_joint = _carried(body, joint.origin)
-        if k > 0:
-            end = Transform(body.pose.rotation, at_joint.pose.translation)
-            yield replace(at_joint, pose=end)
-        body = _driven(at_joint, joint, values[k], rates[k], second[k])
-    yield _carried(body, chain.tip @ chain.tool)
+    for frame in frames(chain, q):
+        last = frame
+    return last @ chain.tip @ chain.tool
 
 
 def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple[Element, ...], ...]:
@@ -146,7 +85,7 @@ def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple
             target = at_joint.translation
             break
         axes.append((at_joint.rotate(joint.axis), at_joint.translation))
-        frame = _moved(at_joint, joint, value)
+        frame = moved(at_joint, joint, value)
     else:
         target = (frame @ chain.tip @ chain.tool).translation
 
@@ -240,7 +179,7 @@ def point_over_log(
 
     def work(block: slice) -> None:
         """Fill the rows of a block."""
-        every = _motions(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))
+        every = each_motion(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))
         motion = next(islice(every, place, None))
         rz, ry, rx, singular[block] = euler_zyx(motion.pose.rotation)
         _fill(position[:, block], motion.pose.translation)
@@ -266,6 +205,30 @@ def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
     return skeleton.transpose(2, 0, 1)
 
 
+def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return positions [m], shape (n, joints + 1, 3), and rotations, shape (n, joints + 1, 3, 3), of frames.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, coordinates).
+
+    Returns:
+        The base's, then those of the moving frame of every joint, fixed ones and mimics included.
+    """
+    count = len(chain.joints) + 1
+    position, rotation = np.empty((count, 3, len(q))), np.empty((count, 3, 3, len(q)))
+
+    def work(block: slice) -> None:
+        """Fill the rows of a block."""
+        for k, frame in enumerate(frames(chain, _columns(q[block]))):
+            _fill(position[k, :, block], frame.translation)
+            for row in range(3):
+                _fill(rotation[k, row, :, block], frame.rotation[row])
+
+    _each_block(work, len(q))
+    return position.transpose(2, 0, 1), rotation.transpose(3, 0, 1, 2)
+
+
 def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArray:
     """Return the geometric Jacobian of a point for every row of q: shape (n, 6, joints)."""
     result = np.empty((len(chain.coordinates), 6, len(q)))
@@ -277,71 +240,6 @@ def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArra
 
     _each_block(work, len(q))
     return result.transpose(2, 1, 0)
-
-
-def _value(joint: Joint, of: dict[str, Element]) -> Element:
-    if joint.kind == "fixed":
-        return 0.0
-    if joint.mimic is None:
-        return of[joint.name]
-    return plus(times(joint.mimic.multiplier, of[joint.mimic.joint]), joint.mimic.offset)
-
-
-def _joint_rates(chain: Chain, rates: Sequence[Element]) -> list[Element]:
-    """Return the derivative of every joint's value: as `joint_values`, but a mimic's offset drops out."""
-    of = dict(zip(chain.coordinates, rates, strict=True))
-    return [
-        times(joint.mimic.multiplier, of[joint.mimic.joint]) if joint.mimic else of.get(joint.name, 0.0)
-        for joint in chain.joints
-    ]
-
-
-def _moved(at_joint: Transform, joint: Joint, value: Element) -> Transform:
-    """Return the joint's moving frame."""
-    if joint.kind == "revolute":
-        return at_joint.turned(joint.axis, value)
-    if joint.kind == "prismatic":
-        return Transform(at_joint.rotation, at_joint.point(scale(value, joint.axis)))
-    return at_joint
-
-
-def _carried(state: Motion, origin: Transform) -> Motion:
-    """Return the motion of a frame fixed to a moving body."""
-    d = state.pose.rotate(origin.translation)
-    spin = cross(state.omega, d)
-    turned = Transform(state.pose.rotation) @ Transform(origin.rotation)
-    return Motion(
-        Transform(turned.rotation, add(state.pose.translation, d)),
-        add(state.velocity, spin),
-        add(state.acceleration, add(cross(state.alpha, d), cross(state.omega, spin))),
-        state.omega,
-        state.alpha,
-    )
-
-
-def _driven(state: Motion, joint: Joint, value: Element, rate: Element, second: Element) -> Motion:
-    """Return the motion of the joint's moving frame from that of its fixed one."""
-    pose = _moved(state.pose, joint, value)
-    if joint.kind == "fixed":
-        return state
-    axis = state.pose.rotate(joint.axis)
-    own, own_second = scale(rate, axis), scale(second, axis)
-    coupling = cross(state.omega, own)
-    if joint.kind == "revolute":
-        omega = add(state.omega, own)
-        alpha = add(state.alpha, add(own_second, coupling))
-        return Motion(pose, state.velocity, state.acceleration, omega, alpha)
-    slide = scale(value, axis)
-    spin = cross(state.omega, slide)
-    acceleration = add(cross(state.alpha, slide), cross(state.omega, spin))
-    acceleration = add(acceleration, add(scale(2.0, coupling), own_second))
-    return Motion(
-        pose,
-        add(state.velocity, add(spin, own)),
-        add(state.acceleration, acceleration),
-        state.omega,
-        state.alpha,
-    )
 
 
 def row_blocks(count: int) -> Iterator[slice]:

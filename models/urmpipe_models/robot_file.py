@@ -4,54 +4,30 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
-from decimal import Decimal
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias, cast
 
 from urmpipe_models.chain import Chain, Joint, JointKind, Mimic
 from urmpipe_models.dh import DHRow, dh_chain, modified_dh_chain
-from urmpipe_models.elementwise import cross, dot
 from urmpipe_models.errors import Finding, RobotError
 from urmpipe_models.export import EXPORT_MARK
+from urmpipe_models.robot_frames import Units, frame_to_dict, read_frame
+from urmpipe_models.robot_visuals import read_visual, visual_to_dict
 from urmpipe_models.tables import Table
 from urmpipe_models.toml_text import parse_toml, toml_lines
-from urmpipe_models.transform import Transform, from_rpy
 from urmpipe_models.urdf_reader import read_urdf
 from urmpipe_models.urm import urm_chain
 
 Build: TypeAlias = Callable[[str], Chain]
 """Makes the chain of a given name, once all keys are read and found right."""
 
-ORTHONORMAL = 1e-9
-"""R R^T may differ from the identity by this: rounding, not a matrix that is no rotation."""
-
 
 class _Limits(NamedTuple):
     lower: float
     upper: float
     velocity: float
-
-
-@dataclass(frozen=True, slots=True)
-class _Units:
-    """The units of a robot file, made SI where the file is read and nowhere else."""
-
-    millimetres: bool = False
-    degrees: bool = False
-
-    def length(self, value: float) -> float:
-        """Return a length of the file in [m]; by decimals: 243.215 mm is the very double that 0.243215 is."""
-        return float(Decimal(repr(value)).scaleb(-3)) if self.millimetres else value
-
-    def angle(self, value: float) -> float:
-        """Return an angle of the file in [rad]."""
-        return math.radians(value) if self.degrees else value
-
-    def of_joint(self, kind: str, value: float) -> float:
-        """Return a joint's value in [m] if it slides, else in [rad]."""
-        return self.length(value) if kind == "prismatic" else self.angle(value)
 
 
 def read_robot_file(path: str | Path) -> Chain:
@@ -68,6 +44,10 @@ def read_robot_file(path: str | Path) -> Chain:
       `[tip]`. A mimic has `joint`, `offset` and `multiplier`, the last in rad and m always.
     - urdf: `file` (relative to this one), `base_link`, `tip_link`.
 
+    What the arm looks like (instead of what a URDF says): `[[visuals]]` with `joint` (none: the base),
+    `origin`, `colour` (r, g, b, opacity) and one of `box` (x, y, z), `cylinder` and `capsule` (radius,
+    length), `sphere` (radius), `mesh` (a file, relative to this one) with `scale`.
+
     Args:
         path: The file.
 
@@ -75,9 +55,10 @@ def read_robot_file(path: str | Path) -> Chain:
         RobotError: With everything that is wrong: the key, what was found and what is allowed.
     """
     path = Path(path)
-    return _read(
+    chain = _read(
         parse_toml(path, RobotError), tuple(_READERS), file=str(path), stem=path.stem, folder=path.parent
     )
+    return replace(chain, visuals=tuple(visual.located(path.parent) for visual in chain.visuals))
 
 
 def chain_to_dict(chain: Chain) -> dict[str, Any]:
@@ -88,10 +69,11 @@ def chain_to_dict(chain: Chain) -> dict[str, Any]:
         "description": chain.description,
         "source": chain.source,
         "start": [float(value) for value in chain.start],
-        "base": _frame_to_dict(chain.base),
-        "tip": _frame_to_dict(chain.tip),
-        "tool": _frame_to_dict(chain.tool),
+        "base": frame_to_dict(chain.base),
+        "tip": frame_to_dict(chain.tip),
+        "tool": frame_to_dict(chain.tool),
         "joints": [_joint_to_dict(joint) for joint in chain.joints],
+        **({"visuals": [visual_to_dict(visual) for visual in chain.visuals]} if chain.visuals else {}),
     }
 
 
@@ -111,12 +93,14 @@ def chain_from_dict(data: Mapping[str, Any], file: str | None = None) -> Chain:
 def robot_toml(chain: Chain) -> str:
     """Return a chain as a TOML robot file of kind `joints`; read back it is the same chain, bit by bit."""
     data = chain_to_dict(chain)
-    joints, frames = data.pop("joints"), {key: data.pop(key) for key in ("base", "tip", "tool")}
+    frames = {key: data.pop(key) for key in ("base", "tip", "tool")}
+    lists = {key: data.pop(key, []) for key in ("joints", "visuals")}
     lines = [f"# {EXPORT_MARK}: lengths in m, angles in rad", *toml_lines(data)]
     for key, frame in frames.items():
         lines += ["", f"[{key}]", *toml_lines(frame)]
-    for joint in joints:
-        lines += ["", "[[joints]]", *toml_lines(joint)]
+    for key, items in lists.items():
+        for item in items:
+            lines += ["", f"[[{key}]]", *toml_lines(item)]
     return "\n".join(lines) + "\n"
 
 
@@ -134,7 +118,7 @@ def _read(
     kind = table.choice("kind", kinds)
     if faults:  # without a kind every other key would be called unknown
         raise RobotError(*faults)
-    units = _Units(
+    units = Units(
         table.choice("length_unit", ("m", "mm"), "m") == "mm",
         table.choice("angle_unit", ("rad", "deg"), "rad") == "deg",
     )
@@ -142,8 +126,10 @@ def _read(
         table.text(key, default) for key, default in (("name", stem), ("description", ""), ("source", ""))
     )
     start = table.numbers("start", None, ())
-    base, tool = (_frame(table.table(key), units) if table.has(key) else None for key in ("base", "tool"))
+    base, tool = (read_frame(table.table(key), units) if table.has(key) else None for key in ("base", "tool"))
     build = _READERS[kind](table, units, folder)
+    given = table.tables("visuals") if table.has("visuals") else []
+    visuals = tuple(read_visual(row, units) for row in given)
     table.close()
     if faults:
         raise RobotError(*faults)
@@ -155,12 +141,13 @@ def _read(
             start=_start(chain, start, units) or chain.start,
             description=description or chain.description,
             source=source or chain.source,
+            visuals=visuals or chain.visuals,
         )
     except RobotError as error:
         raise RobotError(*(replace(fault, file=fault.file or file) for fault in error.findings)) from error
 
 
-def _read_urm(table: Table, units: _Units, folder: Path) -> Build:
+def _read_urm(table: Table, units: Units, folder: Path) -> Build:
     lengths = tuple(units.length(value) for value in table.numbers("lengths", None))
     tilts = tuple(units.angle(value) for value in table.numbers("tilts", None))
     directions = table.numbers("directions", None, ())
@@ -176,25 +163,25 @@ def _read_urm(table: Table, units: _Units, folder: Path) -> Build:
     return build
 
 
-def _read_dh(table: Table, units: _Units, folder: Path, *, modified: bool = False) -> Build:
+def _read_dh(table: Table, units: Units, folder: Path, *, modified: bool = False) -> Build:
     rows = [_dh_row(row, units) for row in table.tables("joints")]
     limits = _limits(table.table("limits"), [row.kind for row in rows], units)
     limited = [replace(row, **limit._asdict()) for row, limit in zip(rows, limits, strict=True)]
     return partial(modified_dh_chain if modified else dh_chain, rows=limited)
 
 
-def _read_joints(table: Table, units: _Units, folder: Path) -> Build:
+def _read_joints(table: Table, units: Units, folder: Path) -> Build:
     joints = tuple(_joint(row, units) for row in table.tables("joints"))
-    return partial(Chain, joints=joints, tip=_frame(table.table("tip"), units))
+    return partial(Chain, joints=joints, tip=read_frame(table.table("tip"), units))
 
 
-def _read_urdf(table: Table, units: _Units, folder: Path) -> Build:
+def _read_urdf(table: Table, units: Units, folder: Path) -> Build:
     file = table.text("file")
     base_link, tip_link = (table.text(key, "") or None for key in ("base_link", "tip_link"))
     return lambda name: read_urdf(folder / file, base_link=base_link, tip_link=tip_link)
 
 
-_READERS: dict[str, Callable[[Table, _Units, Path], Build]] = {
+_READERS: dict[str, Callable[[Table, Units, Path], Build]] = {
     "urm": _read_urm,
     "dh": _read_dh,
     "modified_dh": partial(_read_dh, modified=True),
@@ -203,7 +190,7 @@ _READERS: dict[str, Callable[[Table, _Units, Path], Build]] = {
 }
 
 
-def _dh_row(table: Table, units: _Units) -> DHRow:
+def _dh_row(table: Table, units: Units) -> DHRow:
     row = DHRow(
         theta=units.angle(table.number("theta", 0.0)),
         d=units.length(table.number("d", 0.0)),
@@ -216,12 +203,12 @@ def _dh_row(table: Table, units: _Units) -> DHRow:
     return row
 
 
-def _joint(table: Table, units: _Units) -> Joint:
+def _joint(table: Table, units: Units) -> Joint:
     kind = table.choice("kind", ("revolute", "prismatic", "fixed"), "revolute")
     joint = Joint(
         table.text("name"),
         cast("JointKind", kind),
-        _frame(table.table("origin"), units),
+        read_frame(table.table("origin"), units),
         cast("tuple[float, float, float]", table.numbers("axis", 3, (0.0, 0.0, 1.0))),
         lower=units.of_joint(kind, table.number("lower", -math.inf, infinite=True)),
         upper=units.of_joint(kind, table.number("upper", math.inf, infinite=True)),
@@ -232,7 +219,7 @@ def _joint(table: Table, units: _Units) -> Joint:
     return joint
 
 
-def _mimic(table: Table, kind: str, units: _Units) -> Mimic:
+def _mimic(table: Table, kind: str, units: Units) -> Mimic:
     mimic = Mimic(
         table.text("joint"),
         table.number("multiplier", 1.0),
@@ -242,7 +229,7 @@ def _mimic(table: Table, kind: str, units: _Units) -> Mimic:
     return mimic
 
 
-def _limits(table: Table, kinds: Sequence[JointKind], units: _Units) -> list[_Limits]:
+def _limits(table: Table, kinds: Sequence[JointKind], units: Units) -> list[_Limits]:
     """Return the limits of every joint, in SI."""
     given = [
         table.spread(key, len(kinds), default)
@@ -255,45 +242,17 @@ def _limits(table: Table, kinds: Sequence[JointKind], units: _Units) -> list[_Li
     ]
 
 
-def _frame(table: Table, units: _Units) -> Transform:
-    x, y, z = (units.length(value) for value in table.numbers("translation", 3, (0.0, 0.0, 0.0)))
-    rx, ry, rz = (units.angle(value) for value in table.numbers("rpy", 3, (0.0, 0.0, 0.0)))
-    rotation = from_rpy(rx, ry, rz).rotation
-    if table.has("rotation"):
-        rotation = cast("Any", table.rows("rotation"))
-        if table.has("rpy"):
-            table.fault("rotation", "found beside rpy; allowed: one of the two")
-        elif not _is_rotation(Transform(rotation)):
-            table.fault("rotation", "is no rotation matrix; allowed: orthonormal rows, right-handed")
-    table.close()
-    return Transform(rotation, (x, y, z))
-
-
-def _is_rotation(frame: Transform) -> bool:
-    x, y, z = frame.rotation
-    product = (frame @ Transform(frame.columns)).rotation
-    orthonormal = all(abs(product[i][j] - float(i == j)) <= ORTHONORMAL for i in range(3) for j in range(3))
-    return orthonormal and bool(dot(x, cross(y, z)) > 0.0)
-
-
-def _start(chain: Chain, values: tuple[float, ...], units: _Units) -> tuple[float, ...]:
+def _start(chain: Chain, values: tuple[float, ...], units: Units) -> tuple[float, ...]:
     if len(values) != len(chain.moving):  # Chain says what is wrong
         return values
     return tuple(units.of_joint(joint.kind, value) for joint, value in zip(chain.moving, values, strict=True))
-
-
-def _frame_to_dict(frame: Transform) -> dict[str, Any]:
-    return {
-        "translation": [float(value) for value in frame.translation],
-        "rotation": [[float(value) for value in row] for row in frame.rotation],
-    }
 
 
 def _joint_to_dict(joint: Joint) -> dict[str, Any]:
     return {
         "name": joint.name,
         "kind": joint.kind,
-        "origin": _frame_to_dict(joint.origin),
+        "origin": frame_to_dict(joint.origin),
         "axis": [float(value) for value in joint.axis],
         "lower": _finite_or_none(joint.lower),
         "upper": _finite_or_none(joint.upper),

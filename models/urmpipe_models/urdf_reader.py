@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from difflib import get_close_matches
 from pathlib import Path
@@ -20,13 +20,16 @@ from urmpipe_models.urdf_tree import (
     UrdfTree,
     read_tree,
 )
+from urmpipe_models.urdf_visuals import link_visuals
+from urmpipe_models.visual import Visual
 
 
 def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str | None = None) -> Chain:
     """Return the chain from a base link to a tip link of a URDF file.
 
     Every joint between the two is kept, the fixed ones as frames that may carry a sensor. Only the
-    three fixed joints that `write_urdf` adds for base, tip and tool become these again.
+    three fixed joints that `write_urdf` adds for base, tip and tool become these again. What the links
+    between the two look like is kept, too; mesh files are looked up but not opened.
 
     Args:
         path: The file.
@@ -40,15 +43,19 @@ def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str |
     tree = read_tree(Path(path))
     edges = _choose(tree, base_link, tip_link) if tree.sound else []
     joints = [_joint(tree, edge, edges) for edge in edges]
-    if tree.faults:
-        raise RobotError(*tree.faults)
     base, tool, tip = (
         _take(joints, BASE_JOINT, 0),
         _take(joints, TOOL_JOINT, -1),
         _take(joints, TIP_JOINT, -1),
     )
+    visuals = tuple(_visuals(tree, edges, joints, base))
+    if tree.faults:
+        raise RobotError(*tree.faults)
+    located = tuple(visual.located(Path(path).parent) for visual in visuals)
     try:
-        return Chain(tree.name, tuple(joints), tip=tip, base=base, tool=tool, source=Path(path).name)
+        return Chain(
+            tree.name, tuple(joints), tip=tip, base=base, tool=tool, source=Path(path).name, visuals=located
+        )
     except RobotError as error:
         raise RobotError(*(replace(fault, file=tree.file) for fault in error.findings)) from error
 
@@ -162,6 +169,29 @@ def _take(joints: list[Joint], name: str, index: int) -> Transform:
     if joints and joints[index].name == name and joints[index].kind == "fixed":
         return joints.pop(index).origin
     return Transform()
+
+
+def _visuals(
+    tree: UrdfTree, edges: Sequence[Edge], joints: Sequence[Joint], base: Transform
+) -> Iterator[Visual]:
+    """Yield what the links of the chain show, each on the joint of the chain that carries it.
+
+    Links that hang on a joint which became base, tip or tool are carried by the joint before it.
+    """
+    if not edges:
+        return
+    kept = {joint.name for joint in joints}
+    carrier, frame = None, base.inverse()
+    yield from _on(frame, link_visuals(tree, edges[0].parent, carrier))
+    for edge in edges:
+        name = edge.joint.name
+        carrier, frame = (name, Transform()) if name in kept else (carrier, frame @ edge.joint.origin)
+        yield from _on(frame, link_visuals(tree, edge.child, carrier))
+
+
+def _on(frame: Transform, visuals: Iterable[Visual]) -> Iterator[Visual]:
+    """Yield shapes that are given in a frame in the frame that carries it."""
+    return (replace(visual, origin=frame @ visual.origin) for visual in visuals)
 
 
 def _listed(names: Iterable[str]) -> str:

@@ -28,7 +28,10 @@ UNLIMITED = 1.7976931348623157e308
 BASE_JOINT, TIP_JOINT, TOOL_JOINT = "urmpipe_base", "urmpipe_tip", "urmpipe_tool"
 """Names of the fixed joints that stand for a chain's base, tip and tool."""
 
-COUNTS = {1: "a number", 3: "three numbers"}
+STAND_IN = "urmpipe"
+"""Name of the material of the shapes that `write_urdf` gives an arm that has none."""
+
+COUNTS = {1: "a number", 3: "three numbers", 4: "four numbers"}
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,16 +60,18 @@ class UrdfTree:
     Attributes:
         file: The file, as the user named it.
         name: The robot's name.
-        links: Line of each link.
+        links: The element of each link by its name.
         edges: The joints by name.
+        colours: The <color> of each material that has one, by the material's name.
         faults: All that is wrong.
         sound: Whether links and joints form a forest, so that paths can be followed.
     """
 
     file: str
     name: str
-    links: dict[str, int] = field(default_factory=dict)
+    links: dict[str, Node] = field(default_factory=dict)
     edges: dict[str, Edge] = field(default_factory=dict)
+    colours: dict[str, Node] = field(default_factory=dict)
     faults: list[Finding] = field(default_factory=list)
     sound: bool = True
 
@@ -94,6 +99,9 @@ def read_tree(path: Path) -> UrdfTree:
         _add_link(tree, node)
     for node in root.all("joint"):
         _add_joint(tree, node)
+    for node in root.walk():
+        if node.tag == "material" and (colour := node.first("color")):
+            tree.colours.setdefault(node.attributes.get("name", ""), colour)
     _check_links(tree)
     _check_mimics(tree)
     return tree
@@ -104,9 +112,9 @@ def _add_link(tree: UrdfTree, node: Node) -> None:
     if not name:
         tree.fault("link without a name", node.line)
     elif name in tree.links:
-        tree.fault(f"link {name}: name stands already in line {tree.links[name]}", node.line)
+        tree.fault(f"link {name}: name stands already in line {tree.links[name].line}", node.line)
     else:
-        tree.links[name] = node.line
+        tree.links[name] = node
 
 
 def _add_joint(tree: UrdfTree, node: Node) -> None:
@@ -125,7 +133,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
     joint = Joint(
         name,
         kind,
-        _origin(tree, node, name),
+        origin_of(tree, node, f"joint {name}"),
         (0.0, 0.0, 1.0) if kind == "fixed" else _axis(tree, node, name),
         lower=lower,
         upper=upper,
@@ -150,12 +158,19 @@ def _link_of(tree: UrdfTree, node: Node, joint: str, end: Literal["parent", "chi
     return link
 
 
-def _origin(tree: UrdfTree, node: Node, joint: str) -> Transform:
+def origin_of(tree: UrdfTree, node: Node, place: str) -> Transform:
+    """Return the frame that an element's <origin> tells, the identity without one.
+
+    Args:
+        tree: The file; what is wrong is noted there.
+        node: The element.
+        place: What it is, for the faults.
+    """
     origin = node.first("origin")
     if origin is None:
         return Transform()
-    x, y, z = _numbers(tree, origin, f"joint {joint}: origin", "xyz", (0.0, 0.0, 0.0))
-    rx, ry, rz = _numbers(tree, origin, f"joint {joint}: origin", "rpy", (0.0, 0.0, 0.0))
+    x, y, z = numbers_of(tree, origin, f"{place}: origin", "xyz", (0.0, 0.0, 0.0))
+    rx, ry, rz = numbers_of(tree, origin, f"{place}: origin", "rpy", (0.0, 0.0, 0.0))
     return Transform(from_rpy(rx, ry, rz).rotation, (x, y, z))
 
 
@@ -164,7 +179,7 @@ def _axis(tree: UrdfTree, node: Node, joint: str) -> tuple[float, float, float]:
     element = node.first("axis")
     if element is None:
         return (1.0, 0.0, 0.0)
-    x, y, z = _numbers(tree, element, f"joint {joint}: axis", "xyz", (1.0, 0.0, 0.0))
+    x, y, z = numbers_of(tree, element, f"joint {joint}: axis", "xyz", (1.0, 0.0, 0.0))
     length = math.hypot(x, y, z)
     if length == 0.0:
         tree.fault(f"joint {joint}: axis is zero; allowed: a direction", element.line)
@@ -180,13 +195,13 @@ def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, 
     if limit is None or type_ == "fixed":
         return -math.inf, math.inf, math.inf
     place = f"joint {joint}: limit"
-    (velocity,) = _numbers(tree, limit, place, "velocity", (math.inf,))
+    (velocity,) = numbers_of(tree, limit, place, "velocity", (math.inf,))
     if velocity < 0.0:
         tree.fault(f"{place} velocity: found {velocity:g}; allowed: 0 (not known) or more", limit.line)
         velocity = 0.0
     if type_ == "continuous" or not limit.attributes.keys() & {"lower", "upper"}:
         return -math.inf, math.inf, velocity or math.inf
-    (lower,), (upper,) = (_numbers(tree, limit, place, end, (0.0,)) for end in ("lower", "upper"))
+    (lower,), (upper,) = (numbers_of(tree, limit, place, end, (0.0,)) for end in ("lower", "upper"))
     if lower > upper:
         tree.fault(f"{place}: lower {lower:g} above upper {upper:g}", limit.line)
         upper = lower
@@ -198,15 +213,23 @@ def _mimic(tree: UrdfTree, node: Node, joint: str) -> Mimic | None:
     if element is None:
         return None
     place = f"joint {joint}: mimic"
-    (multiplier,) = _numbers(tree, element, place, "multiplier", (1.0,))
-    (offset,) = _numbers(tree, element, place, "offset", (0.0,))
+    (multiplier,) = numbers_of(tree, element, place, "multiplier", (1.0,))
+    (offset,) = numbers_of(tree, element, place, "offset", (0.0,))
     return Mimic(element.attributes.get("joint", ""), multiplier, offset)
 
 
-def _numbers(
+def numbers_of(
     tree: UrdfTree, node: Node, place: str, attribute: str, default: Sequence[float]
 ) -> tuple[float, ...]:
-    """Return the numbers of an attribute, as many as the default has; only limits may be infinite."""
+    """Return the numbers of an attribute, as many as the default has; only limits may be infinite.
+
+    Args:
+        tree: The file; what is wrong is noted there.
+        node: The element.
+        place: What it is, for the faults.
+        attribute: The attribute's name.
+        default: What stands for an attribute that is not there, or is wrong.
+    """
     text = node.attributes.get(attribute)
     if text is None:
         return tuple(default)

@@ -1,4 +1,4 @@
-"""URDF out: a chain as links and joints, with cylinders to look at."""
+"""URDF out: a chain as links and joints, with what it looks like, or cylinders to look at."""
 
 from __future__ import annotations
 
@@ -12,7 +12,8 @@ from urmpipe_models.elementwise import ZERO, Vector
 from urmpipe_models.errors import RobotError
 from urmpipe_models.export import EXPORT_MARK, replace_text
 from urmpipe_models.transform import rpy_of
-from urmpipe_models.urdf_tree import BASE_JOINT, TIP_JOINT, TOOL_JOINT, UNLIMITED
+from urmpipe_models.urdf_tree import BASE_JOINT, STAND_IN, TIP_JOINT, TOOL_JOINT, UNLIMITED
+from urmpipe_models.visual import Box, Mesh, Shape, Sphere, Visual
 
 SLENDERNESS = 40.0
 """The arm's stretched length by the cylinders' radius: a choice for the eye."""
@@ -35,7 +36,8 @@ def urdf_text(chain: Chain) -> str:
     too, then `tip` and `tool0`. The fixed joints `urmpipe_base`, `urmpipe_tip` and `urmpipe_tool` hold
     the chain's base, tip and tool. Point p_k is where joint k + 1 sits on link k, so the origin of link
     k + 1 if that joint does not slide; the last one is the origin of tool0. A revolute joint without
-    limits is `continuous`; elsewhere the largest double stands for infinity.
+    limits is `continuous`; elsewhere the largest double stands for infinity. An arm without visuals gets a
+    cylinder a link, which `read_urdf` leaves out again.
 
     Raises:
         RobotError: If a joint has one of these three names.
@@ -52,39 +54,73 @@ def urdf_text(chain: Chain) -> str:
         Joint(TOOL_JOINT, "fixed", chain.tool),
     ]
     links = ["world", "base_link", *(f"link{k}" for k in range(1, len(chain.joints) + 1)), "tip", "tool0"]
+    carried: dict[str, list[str]] = {link: [] for link in links}
+    of_joint = dict(zip([None, *(joint.name for joint in chain.joints)], links[1:-2], strict=True))
+    for visual in chain.visuals:
+        carried[of_joint[visual.joint]] += _visual_lines(visual)
     radius = sum(math.hypot(*joint.origin.translation) for joint in frames[1:]) / SLENDERNESS
     lines = [
         '<?xml version="1.0" encoding="utf-8"?>',
         f"<!-- {EXPORT_MARK}: lengths in m, angles in rad -->",
         f"<robot name={quoteattr(chain.name)}>",
-        '  <material name="urmpipe"><color rgba="0.35 0.55 0.75 1.0"/></material>',
+        f'  <material name="{STAND_IN}"><color rgba="0.35 0.55 0.75 1.0"/></material>',
         '  <link name="world"/>',
     ]
     for joint, following, parent, child in zip(
         frames, [*frames[1:], None], links[:-1], links[1:], strict=True
     ):
-        lines += _link_lines(child, following.origin.translation if following else ZERO, radius)
+        end = following.origin.translation if following else ZERO
+        lines += _link_lines(child, carried[child] if chain.visuals else _stand_in_lines(end, radius))
         lines += _joint_lines(joint, parent, child)
     return "\n".join([*lines, "</robot>"]) + "\n"
 
 
-def _link_lines(name: str, end: Vector, radius: float) -> list[str]:
-    """Return a link; where it has a length, with a cylinder from its frame to the next one at `end`."""
+def _link_lines(name: str, visuals: Sequence[str]) -> list[str]:
+    """Return a link with the lines of its visuals."""
+    return [f'  <link name="{name}">', *visuals, "  </link>"] if visuals else [f'  <link name="{name}"/>']
+
+
+def _stand_in_lines(end: Vector, radius: float) -> list[str]:
+    """Return a cylinder from a link's frame to the next one at `end`; nothing where that is no way off."""
     length = math.hypot(*end)
     if length == 0.0:
-        return [f'  <link name="{name}"/>']
+        return []
     x, y, z = end
     middle = (x / 2.0, y / 2.0, z / 2.0)
     along = (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))  # turns the cylinder's z towards the end
     return [
-        f'  <link name="{name}">',
         "    <visual>",
         f'      <origin xyz="{_numbers(middle)}" rpy="{_numbers(along)}"/>',
         f'      <geometry><cylinder radius="{float(radius)!r}" length="{length!r}"/></geometry>',
-        '      <material name="urmpipe"/>',
+        f'      <material name="{STAND_IN}"/>',
         "    </visual>",
-        "  </link>",
     ]
+
+
+def _visual_lines(visual: Visual) -> list[str]:
+    """Return a shape that the arm shows."""
+    xyz, rpy = _numbers(visual.origin.translation), _numbers(rpy_of(visual.origin.rotation))
+    lines = [
+        "    <visual>",
+        f'      <origin xyz="{xyz}" rpy="{rpy}"/>',
+        f"      <geometry>{_shape(visual.shape)}</geometry>",
+    ]
+    if visual.colour is not None:
+        rgba = _numbers(visual.colour)
+        lines.append(f'      <material name="{rgba}"><color rgba="{rgba}"/></material>')
+    return [*lines, "    </visual>"]
+
+
+def _shape(shape: Shape) -> str:
+    """Return a shape as an element."""
+    if isinstance(shape, Mesh):
+        return f'<mesh filename={quoteattr(shape.file)} scale="{_numbers(shape.scale)}"/>'
+    if isinstance(shape, Box):
+        return f'<box size="{_numbers(shape.size)}"/>'
+    if isinstance(shape, Sphere):
+        return f'<sphere radius="{float(shape.radius)!r}"/>'
+    tag = type(shape).__name__.lower()
+    return f'<{tag} radius="{float(shape.radius)!r}" length="{float(shape.length)!r}"/>'
 
 
 def _joint_lines(joint: Joint, parent: str, child: str) -> list[str]:

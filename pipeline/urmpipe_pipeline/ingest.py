@@ -16,6 +16,7 @@ from urmpipe_pipeline.audit import audit_log, turning
 from urmpipe_pipeline.derivatives import Method, derivatives, recorded_agree
 from urmpipe_pipeline.grid import Grid, make_grid
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning
+from urmpipe_pipeline.meshes import VISUAL_MISSING, missing_visuals
 from urmpipe_pipeline.plausibility import implausible
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.recorded_tcp import far_from_recorded
@@ -34,7 +35,9 @@ UNUSED_PERIOD = LogWarning(
 )
 
 EULER_SINGULAR = "euler-singular"
-"""The kind of the only warning that rests on the robot."""
+
+OF_ROBOT = (EULER_SINGULAR, VISUAL_MISSING)
+"""The kinds of the warnings that rest on the robot."""
 
 
 def ingest_log(
@@ -176,8 +179,9 @@ def kinematics(
             f"found {q.shape[1]} joints, allowed: {len(robot.coordinates)}, as robot {robot.name} has"
         )
     tcp = point_over_log(robot, q, qd, qdd, threads=threads)
+    notices = missing_visuals(robot)
     if not tcp.singular.any():
-        return tcp, []
+        return tcp, notices
     count, first = int(tcp.singular.sum()), int(np.argmax(tcp.singular))
     said = "ry is +-90 deg: rz and rx are not separately defined, rx = 0 by convention"
-    return tcp, [LogWarning(EULER_SINGULAR, f"at {count} samples from {first} on {said}")]
+    return tcp, [*notices, LogWarning(EULER_SINGULAR, f"at {count} samples from {first} on {said}")]

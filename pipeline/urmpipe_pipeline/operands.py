@@ -9,7 +9,7 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.derivatives import Method
-from urmpipe_pipeline.ingest import EULER_SINGULAR, ingest_log, kinematics
+from urmpipe_pipeline.ingest import OF_ROBOT, ingest_log, kinematics
 from urmpipe_pipeline.recording import is_recording, read_recording
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.sources import ReadOptions
@@ -48,7 +48,7 @@ def load_run(
         )
     if robot is not None and robot != result.robot:
         tcp, warnings = kinematics(robot, result.q, result.qd, result.qdd)
-        others = [warning for warning in result.warnings if warning.kind != EULER_SINGULAR]
+        others = [warning for warning in result.warnings if warning.kind not in OF_ROBOT]
         made = replace(result.provenance, options={**result.provenance.options, "robot": robot.name})
         return replace(result, robot=robot, tcp=tcp, warnings=(*others, *warnings), provenance=made)
     return result

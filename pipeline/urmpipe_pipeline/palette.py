@@ -36,6 +36,9 @@ RUN_COLOURS = {
 }
 """One a run of a comparison, by the word for it; none like the reference."""
 
+DEVIATION_COLOUR = "#fe046c"
+"""The deviation made visible in the 3D view: the enlarged path and the worst place; crimson."""
+
 
 def joint_colour(index: int) -> str:
     """Return the colour of a joint as #rrggbb, counted from 0 at the base."""

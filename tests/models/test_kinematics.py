@@ -18,19 +18,19 @@ from numpy.typing import NDArray
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint, Mimic
 from urmpipe_models.dh import DHRow, modified_dh_chain
+from urmpipe_models.frames import joint_values
 from urmpipe_models.kinematics import (
     BLOCK,
     forward,
     jacobian,
     jacobian_over_log,
-    joint_values,
-    motions,
     point_over_log,
     points_over_log,
     poses_over_log,
     positions_over_log,
     tip_pose,
 )
+from urmpipe_models.motion import motions
 from urmpipe_models.transform import Transform, euler_zyx, from_offset, from_rpy, translation
 from urmpipe_models.urdf_reader import read_urdf
 from urmpipe_models.urdf_writer import write_urdf

@@ -189,7 +189,7 @@ def test_everything_wrong_is_said_at_once(robot: Any) -> None:
         "arm.toml: key limits.velocity: found 'fast', allowed: a number, or 0 numbers, one a joint",
         "arm.toml: key limits.uper: unknown (did you mean upper?); allowed: lower, upper, velocity",
         "arm.toml: key nmae: unknown (did you mean name?); allowed: kind, length_unit, angle_unit, name,"
-        " description, source, start, base, tool, lengths, tilts, directions, limits",
+        " description, source, start, base, tool, lengths, tilts, directions, limits, visuals",
     ]
 
 

@@ -11,7 +11,8 @@ import pytest
 from numpy.typing import NDArray
 
 from urmpipe_models.catalogue import load_robot
-from urmpipe_models.kinematics import forward, jacobian, motions
+from urmpipe_models.kinematics import forward, jacobian
+from urmpipe_models.motion import motions
 from urmpipe_models.transform import euler_zyx
 from urmpipe_models.urm import urm_chain
 

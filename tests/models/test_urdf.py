@@ -17,7 +17,8 @@ from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint, Mimic
 from urmpipe_models.dh import DHRow, dh_chain
 from urmpipe_models.errors import OutputError, RobotError
-from urmpipe_models.kinematics import forward, joint_values
+from urmpipe_models.frames import joint_values
+from urmpipe_models.kinematics import forward
 from urmpipe_models.transform import from_offset, translation
 from urmpipe_models.urdf_reader import read_urdf
 from urmpipe_models.urdf_writer import urdf_text, write_urdf

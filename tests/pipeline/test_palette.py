@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
+    DEVIATION_COLOUR,
     JOINT_COLOURS,
     REFERENCE_COLOUR,
     RUN_COLOURS,
@@ -76,8 +77,19 @@ def test_colours_differ_for_every_sight(sight: str, colours: Sequence[str]) -> N
     assert nearest >= 30.0  # CIE76; the palette of Okabe and Ito with a grey for its black keeps 8.5
 
 
+@pytest.mark.parametrize("sight", SIGHTS)
+def test_the_deviation_differs_from_joints_runs_and_reference_for_every_sight(sight: str) -> None:
+    seen = lab(np.array(SIGHTS[sight]) @ linear(DEVIATION_COLOUR))
+    others = {*JOINT_COLOURS, *RUN_COLOURS.values(), REFERENCE_COLOUR}
+    nearest = min(float(np.linalg.norm(seen - lab(np.array(SIGHTS[sight]) @ linear(c)))) for c in others)
+    assert nearest >= 20.0  # CIE76; beside all of these no colour was found that keeps 20.5
+
+
 @pytest.mark.parametrize(
-    "colour", sorted({*JOINT_COLOURS, *AXIS_COLOURS.values(), *RUN_COLOURS.values(), REFERENCE_COLOUR})
+    "colour",
+    sorted(
+        {*JOINT_COLOURS, *AXIS_COLOURS.values(), *RUN_COLOURS.values(), REFERENCE_COLOUR, DEVIATION_COLOUR}
+    ),
 )
 def test_colours_stand_out_on_white_and_in_the_viewer(colour: str) -> None:
     assert contrast(colour, WHITE) >= 1.95

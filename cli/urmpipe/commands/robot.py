@@ -125,7 +125,7 @@ def show(
 @placing_options
 @output_options
 def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> int:
-    """Write a robot as URDF (cylinders for its links) or as a TOML robot file.
+    """Write a robot as URDF (its visuals, else cylinders for its links) or as a TOML robot file.
 
     Read back, the file is the same arm: of a TOML bit by bit, of a URDF to rounding. It replaces only
     another export.

@@ -1,4 +1,4 @@
-"""Send what the viewer draws: series with names and colours, tolerance lines, events, arm and paths."""
+"""Send what the viewer draws: series with names and colours, tolerance lines and events."""
 
 from __future__ import annotations
 
@@ -12,40 +12,17 @@ from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, entity_path, places_of, printable
-from urmpipe_pipeline.recording.scene import Arm, Scene, Way
+from urmpipe_pipeline.recording.scene import Scene
+from urmpipe_pipeline.recording.scene_drawing import draw_scene
 from urmpipe_pipeline.recording.summary import summary
+from urmpipe_pipeline.recording.times import time_columns
 from urmpipe_pipeline.results import Run
 
 if TYPE_CHECKING:
-    from rerun import RecordingStream, TimeColumn
-
-LINK_RADIUS, JOINT_RADIUS, POINT_RADIUS = 0.012, 0.022, 0.018
-WANTED_RADIUS, DONE_RADIUS = 0.0065, 0.0035
-"""Sizes in the 3D view, as shares of the radius of everything in it."""
-
-STRIPS = 256
-"""Poses of the skeleton sent at a time: decoding a chunk of strips takes time by the square of its rows."""
+    from rerun import RecordingStream
 
 LINE_WIDTH, LIMIT_WIDTH = 2.0, 1.5
 """Width of a series, and of a tolerance, in points of the screen."""
-
-LINK_COLOUR = "#c8d0d4"
-"""The links of the arm: neutral, so that the joints stand out in their own colours."""
-
-
-def time_columns(
-    t_ns: IntArray, name: str | None = None, numbers: IntArray | None = None
-) -> list[TimeColumn]:
-    """Return the time columns: t in integer [ns], and a sequence if one is named.
-
-    Rerun truncates seconds given as floats, which puts some times off by a nanosecond; integers are exact.
-    """
-    import rerun as rr
-
-    columns = [rr.TimeColumn("t", duration=t_ns.astype("timedelta64[ns]"))]
-    if name is not None and numbers is not None:
-        columns.append(rr.TimeColumn(name, sequence=numbers))
-    return columns
 
 
 def draw(stream: RecordingStream, result: Run | Comparison, every: Sequence[Block], scene: Scene) -> None:
@@ -62,7 +39,7 @@ def draw(stream: RecordingStream, result: Run | Comparison, every: Sequence[Bloc
         for place, one in zip(standing, result.runs, strict=True):
             _draw_events(stream, place, one.run, f"{printable(one.name)}: " if len(standing) > 1 else "")
             _draw_worst(stream, place, one)
-    _draw_scene(stream, scene)
+    draw_scene(stream, scene)
 
 
 def _draw_styles(stream: RecordingStream, every: Sequence[Block]) -> None:
@@ -153,53 +130,3 @@ def _draw_text(
     lines = [f"{at / 1e9:.4f} s  {text}" for at, text in zip(t_ns.tolist(), texts, strict=True)]
     columns = rr.TextLog.columns(text=lines, level=list(levels))
     stream.send_columns(entity, time_columns(t_ns), columns)
-
-
-def _draw_scene(stream: RecordingStream, scene: Scene) -> None:
-    import rerun as rr
-
-    if scene.empty:
-        return
-    stream.log("/", rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
-    size = scene.ball()[1]
-    for way in scene.ways:
-        _draw_way(stream, way, size)
-    if scene.arm is not None:
-        _draw_arm(stream, scene.arm, size)
-
-
-def _draw_arm(stream: RecordingStream, arm: Arm, size: float) -> None:
-    """Draw the skeleton: a line through the points, a ball at each in the colour of its joint."""
-    import rerun as rr
-
-    skeleton = arm.skeleton.astype(np.float32)
-    count, points = skeleton.shape[:2]
-    links = rr.LineStrips3D.from_fields(colors=[rgb(LINK_COLOUR)], radii=[LINK_RADIUS * size])
-    stream.log("/robot/links", links, static=True)
-    for start in range(0, count, STRIPS):
-        rows = slice(start, start + STRIPS)
-        times = time_columns(arm.t_ns[rows], "sample", arm.sample[rows])
-        stream.send_columns("/robot/links", times, rr.LineStrips3D.columns(strips=skeleton[rows]))
-    joints = rr.Points3D.from_fields(
-        colors=[rgb(colour) for colour in arm.colours], radii=[JOINT_RADIUS * size]
-    )
-    stream.log("/robot/joints", joints, static=True)
-    columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3)).partition(np.full(count, points))
-    stream.send_columns("/robot/joints", time_columns(arm.t_ns, "sample", arm.sample), columns)
-
-
-def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:
-    """Draw a path as lines, broad if it is what was asked for, and the point that moves on it."""
-    import rerun as rr
-
-    colour = rgb(way.colour)
-    radius = (WANTED_RADIUS if way.wanted else DONE_RADIUS) * size
-    lines = rr.LineStrips3D(
-        [strip.astype(np.float32) for strip in way.strips], colors=[colour], radii=[radius]
-    )
-    stream.log(way.path, lines, static=True)
-    style = rr.Points3D.from_fields(colors=[colour], radii=[POINT_RADIUS * size])
-    stream.log(way.point, style, static=True)
-    track = way.track
-    columns = rr.Points3D.columns(positions=track.position.astype(np.float32))
-    stream.send_columns(way.point, time_columns(track.t_ns, "sample", track.sample), columns)

@@ -80,7 +80,7 @@ REFERENCE_ARRAYS: dict[str, tuple[str, Series]] = {
 SINGULAR = "tcp/singular"
 SUMMARY = "/summary"
 
-RESERVED = ("reference", "recorded", "tolerance")
+RESERVED = ("reference", "recorded", "tolerance", "enlarged", "worst")
 """Names below path/, point/ and delta/ that are no run's."""
 
 

@@ -1,34 +1,22 @@
-"""What the 3D view shows: the arm, the paths and where the points are on them, thinned out for drawing.
-
-The exact data stand in the scalars. A viewer is slow with a strip a sample, so the arm moves at
-50 Hz or less, in 20,000 poses at most, and a path has as many vertices at most.
-"""
+"""What the 3D view shows: the arm, the paths, where the points are on them, and the worst deviation."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import points_over_log
 from urmpipe_pipeline.comparison import Comparison, Deviation, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
-from urmpipe_pipeline.recording.entities import Place, entity_path, places_of
+from urmpipe_pipeline.recording.bodies import Body, bodies_over_log, lacks_shapes
+from urmpipe_pipeline.recording.enlarged import enlarged
+from urmpipe_pipeline.recording.entities import Place, entity_path, places_of, printable
+from urmpipe_pipeline.recording.ways import Way, dashed, lines_of, thinned, track_of
 from urmpipe_pipeline.results import Run
-
-POSE_PERIOD = 0.02
-"""Time between two poses drawn in [s], at least."""
-
-DASHES = 120
-"""Dashes of a line that was asked for."""
-
-MOST = 20_000
-"""Poses of the arm, and vertices of a path, at most."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -40,48 +28,29 @@ class Arm:
         sample: Its grid sample, shape (m,).
         skeleton: Base, p1..pn of each pose in [m], shape (m, n + 1, 3).
         colours: One a point: a joint's own, or the reference's where nothing moves.
+        bodies: Its links as they look, each with the frame it moves with; none where that is not known.
+        bare: True if a moving link has nothing to show: then lines stand for the links.
     """
 
     t_ns: IntArray
     sample: IntArray
     skeleton: FloatArray
     colours: tuple[str, ...]
+    bodies: tuple[Body, ...]
+    bare: bool
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Track:
-    """A moving point.
-
-    Attributes:
-        t_ns: Time of each position in integer [ns], shape (m,).
-        sample: Its sample, shape (m,).
-        position: In [m], shape (m, 3).
-    """
-
-    t_ns: IntArray
-    sample: IntArray
-    position: FloatArray
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Way:
-    """Where a point goes: as lines, and as the point that moves on them.
+@dataclass(frozen=True, slots=True)
+class Mark:
+    """A place with a name.
 
     Attributes:
-        path: Entity of the lines.
-        point: Entity of the moving point.
-        colour: As #rrggbb.
-        wanted: True for what was asked for: drawn broad and dashed, so that what was done shows in the gaps.
-        strips: Lines, each in [m], shape (any, 3).
-        track: The moving point.
+        position: In [m].
+        text: Its label.
     """
 
-    path: str
-    point: str
-    colour: str
-    wanted: bool
-    strips: tuple[FloatArray, ...]
-    track: Track
+    position: tuple[float, float, float]
+    text: str
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -91,19 +60,28 @@ class Scene:
     Attributes:
         arm: The arm of the first run, or None without a robot.
         ways: The paths.
+        enlarged: The deviation as a path whose distance from the reference is a multiple of the true one.
+        worst: Where the largest deviation of all runs stands.
     """
 
     arm: Arm | None
     ways: tuple[Way, ...]
+    enlarged: Way | None = None
+    worst: Mark | None = None
 
     @property
     def empty(self) -> bool:
         """True if there is nothing to see."""
         return self.arm is None and not self.ways
 
+    @property
+    def _every_way(self) -> tuple[Way, ...]:
+        """The paths, the enlarged one among them."""
+        return self.ways if self.enlarged is None else (*self.ways, self.enlarged)
+
     def ball(self) -> tuple[FloatArray, float]:
         """Return centre, shape (3,), and radius of a ball around everything, in [m]; 1 m around one point."""
-        points = [part for way in self.ways for part in (*way.strips, way.track.position) if len(part)]
+        points = [part for way in self._every_way for part in (*way.strips, way.track.position) if len(part)]
         if self.arm is not None:
             points.append(self.arm.skeleton.reshape(-1, 3))
         every = np.concatenate(points) if points else np.zeros((1, 3))
@@ -122,7 +100,17 @@ def scene_of(result: Run | Comparison) -> Scene:
         _done(one, place, run_colour(i))
         for i, (place, one) in enumerate(zip(standing, result.runs, strict=True))
     ]
-    return Scene(_arm(first.run, int(first.t_ns[first.worst])), (_asked(result.reference, first), *ways))
+    scene = Scene(_arm(first.run, int(first.t_ns[first.worst])), (_asked(result.reference, first), *ways))
+    return replace(scene, enlarged=enlarged(result, scene.ball()[1]), worst=_worst(result))
+
+
+def _worst(result: Comparison) -> Mark:
+    """Return where the largest deviation of all runs stands, with its size and its time."""
+    one = max(result.runs, key=lambda run: run.statistics["norm"].max)
+    norm = one.statistics["norm"]
+    x, y, z = one.actual[one.worst].tolist()
+    whose = f", {printable(one.name)}" if len(result.runs) > 1 else ""
+    return Mark((x, y, z), f"worst {1e3 * norm.max:.3f} mm at {norm.t_max:.4f} s{whose}")
 
 
 def _run_ways(run: Run, place: Place) -> Iterator[Way]:
@@ -131,36 +119,34 @@ def _run_ways(run: Run, place: Place) -> Iterator[Way]:
     if run.tcp_recorded is not None:
         entities = entity_path("path", "recorded"), entity_path("point", "recorded")
         colour = REFERENCE_COLOUR if wanted else run_colour(0)
-        strips = _strips(run.tcp_recorded)
-        track = _track(run.t_ns, run.tcp_recorded)
-        yield Way(*entities, colour, wanted, _dashes(strips) if wanted else strips, track)
+        strips = lines_of(run.tcp_recorded)
+        track = track_of(run.t_ns, run.tcp_recorded)
+        yield Way(*entities, colour, wanted, dashed(strips) if wanted else strips, track)
     if run.tcp is not None:
         entities = place.named("path"), place.named("point")
-        track = _track(run.t_ns, run.tcp.position)
-        yield Way(*entities, run_colour(0), False, _strips(run.tcp.position), track)
+        track = track_of(run.t_ns, run.tcp.position)
+        yield Way(*entities, run_colour(0), False, lines_of(run.tcp.position), track)
 
 
 def _asked(reference: Trajectory, first: Deviation) -> Way:
     """Return the reference: its lines whole, its point where it is at the first run's samples."""
     entities = entity_path("path", "reference"), entity_path("point", "reference")
-    strips = _dashes(_strips(reference.position))
-    track = _track(first.t_ns, first.reference, first.sample, first.worst)
+    strips = dashed(lines_of(reference.position))
+    track = track_of(first.t_ns, first.reference, first.sample, first.worst)
     return Way(*entities, REFERENCE_COLOUR, True, strips, track)
 
 
 def _done(one: Deviation, place: Place, colour: str) -> Way:
     """Return where a compared run was."""
-    track = _track(one.t_ns, one.actual, one.sample, one.worst)
+    track = track_of(one.t_ns, one.actual, one.sample, one.worst)
     return Way(
-        place.named("path"), place.named("point"), colour, False, _strips(one.actual, one.sample), track
+        place.named("path"),
+        place.named("point"),
+        colour,
+        False,
+        lines_of(one.actual, one.sample, one.worst),
+        track,
     )
-
-
-def _track(
-    t_ns: IntArray, position: FloatArray, sample: IntArray | None = None, worst: int | None = None
-) -> Track:
-    rows = _thinned(t_ns, position, worst)
-    return Track(t_ns[rows], rows if sample is None else sample[rows], position[rows])
 
 
 def _arm(run: Run, worst_ns: int | None) -> Arm | None:
@@ -168,10 +154,19 @@ def _arm(run: Run, worst_ns: int | None) -> Arm | None:
     if run.robot is None or run.tcp is None:
         return None
     worst = None if worst_ns is None else min(int(np.searchsorted(run.t_ns, worst_ns)), len(run.t_ns) - 1)
-    rows = _thinned(run.t_ns, run.q, worst)
+    rows = thinned(run.t_ns, run.q, worst)
     if not len(rows):
         return None
-    return Arm(run.t_ns[rows], rows, points_over_log(run.robot, run.q[rows]), _point_colours(run.robot))
+    q = run.q[rows]
+    bodies = bodies_over_log(run.robot, q)
+    return Arm(
+        t_ns=run.t_ns[rows],
+        sample=rows,
+        skeleton=points_over_log(run.robot, q),
+        colours=_point_colours(run.robot),
+        bodies=bodies,
+        bare=lacks_shapes(run.robot, bodies),
+    )
 
 
 def _point_colours(robot: Chain) -> tuple[str, ...]:
@@ -182,50 +177,3 @@ def _point_colours(robot: Chain) -> tuple[str, ...]:
         for joint in robot.joints
     ]
     return (*joints, run_colour(0))
-
-
-def _thinned(t_ns: IntArray, values: FloatArray, worst: int | None) -> IntArray:
-    """Return the rows to draw: at 50 Hz or less, the last and the worst among them, none without a value."""
-    count = len(t_ns)
-    if not count:
-        return np.empty(0, dtype=np.int64)
-    seconds = float(t_ns[-1] - t_ns[0]) / 1e9
-    most = min(MOST, math.floor(seconds / POSE_PERIOD + 1e-6) + 1)
-    step = max(1, math.ceil(count / most))
-    rows = np.union1d(np.arange(0, count, step), [count - 1, worst if worst is not None else 0])
-    drawn: IntArray = rows[np.isfinite(values[rows]).all(axis=1)]
-    return drawn
-
-
-def _strips(position: FloatArray, sample: IntArray | None = None) -> tuple[FloatArray, ...]:
-    """Return the lines through the positions, broken where a sample is missing or has no value."""
-    missing: NDArray[np.bool_] = np.asarray(~np.isfinite(position).all(axis=1))
-    broken = missing[1:] | missing[:-1]
-    if sample is not None:
-        broken |= np.diff(sample) > 1
-    cuts = np.flatnonzero(broken) + 1
-    starts, ends = np.r_[0, cuts], np.r_[cuts, len(position)]
-    lines = np.flatnonzero(ends - starts > 1)
-    step = max(1, math.ceil(len(position) / MOST))
-    return tuple(
-        position[np.union1d(np.arange(start, end, step), [end - 1])]
-        for start, end in zip(starts[lines].tolist(), ends[lines].tolist(), strict=True)
-    )
-
-
-def _dashes(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return every second piece of the lines, all pieces of a line equally long."""
-    lengths = [np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(strip, axis=0), axis=1))] for strip in strips]
-    dash = sum(float(length[-1]) for length in lengths) / (2 * DASHES)
-    return tuple(
-        _piece(strip, length, start, start + dash)
-        for strip, length in zip(strips, lengths, strict=True)
-        for start in (np.arange(0.0, length[-1], 2 * dash) if dash > 0.0 else ())
-    )
-
-
-def _piece(strip: FloatArray, length: FloatArray, start: float, end: float) -> FloatArray:
-    """Return a line from one arc length to another."""
-    inner = strip[(length > start) & (length < end)]
-    first, last = (np.array([np.interp(at, length, column) for column in strip.T]) for at in (start, end))
-    return np.vstack((first, inner, last))

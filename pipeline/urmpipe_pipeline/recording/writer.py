@@ -16,13 +16,14 @@ from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import FloatArray, JointLog
 from urmpipe_pipeline.outputs import guarded_output
-from urmpipe_pipeline.recording.drawing import draw, time_columns
+from urmpipe_pipeline.recording.drawing import draw
 from urmpipe_pipeline.recording.entities import Block, blocks, printable
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, load_rerun, settle_pyarrow
 from urmpipe_pipeline.recording.layout import viewer_layout
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import PROPERTY
+from urmpipe_pipeline.recording.times import time_columns
 from urmpipe_pipeline.recording.verify import verify
 from urmpipe_pipeline.results import Run
 

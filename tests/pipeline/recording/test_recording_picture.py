@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -13,9 +14,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from urmpipe_models.kinematics import frames_over_log, points_over_log
+from urmpipe_models.urdf_reader import read_urdf
 from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.recording.layout import EYE
+from urmpipe_pipeline.recording.scene import Scene, scene_of
 from urmpipe_pipeline.results import Run
 
 MakeRun = Callable[..., Run]
@@ -25,6 +31,10 @@ Picture = NDArray[np.uint8]
 DRIVERS = sorted(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
 PATIENCE = 40.0
 """Time in [s] that the viewer has to load and draw: a software rasterizer on a busy machine is slow."""
+
+SCENE_VIEW = "Arm and paths [m]"
+FIELD_OF_VIEW = math.radians(55.0)
+"""Of the viewer's eye, from the bottom to the top of a view (re_view_spatial, Eye::DEFAULT_FOV_Y)."""
 
 pytestmark = [
     pytest.mark.slow,
@@ -85,6 +95,43 @@ def complaints(viewer: Any) -> list[str]:
     return said + [entry.message for entry in logged if "Software rasterizer" not in entry.message]
 
 
+def scene_at(viewer: Any, at: float, path: Path, drawn: Callable[[Picture], bool]) -> Picture:
+    """Return the picture of the 3D view at a time in [s], once it is drawn as wanted or patience ends."""
+    from PIL import Image
+
+    end, target = time.monotonic() + PATIENCE, path.with_suffix(".png")
+    while not (views := [view for view in viewer.get_state().views if view.name == SCENE_VIEW]):
+        assert time.monotonic() < end, "the viewer showed no 3D view"
+        time.sleep(0.1)
+    viewer.set_time(timeline="t", duration=at)
+    while True:
+        time.sleep(0.5)
+        viewer.save_screenshot(str(target), view_id=views[0].view_id)
+        picture = np.asarray(Image.open(target).convert("RGB"))
+        if drawn(picture) or time.monotonic() > end:
+            return picture
+
+
+def projected(scene: Scene, points: FloatArray, picture: Picture) -> FloatArray:
+    """Return where points in [m], shape (n, 3), stand in a picture of the 3D view, in pixels x, y."""
+    centre, radius = scene.ball()
+    eye = centre + radius * EYE
+    forward = (centre - eye) / np.linalg.norm(centre - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    seen = (points - eye) @ np.column_stack((right, np.cross(forward, right), forward))
+    height, width = picture.shape[:2]
+    focal = height / 2 / np.tan(FIELD_OF_VIEW / 2)
+    places: FloatArray = focal * seen[:, :2] / seen[:, 2:] + [width / 2, height / 2]
+    return places
+
+
+def around(picture: Picture, place: FloatArray, reach: int) -> Picture:
+    """Return the pixels of a picture at most `reach` from a place."""
+    x, y = np.rint(place).astype(int)
+    return picture[max(0, y - reach) : y + reach + 1, max(0, x - reach) : x + reach + 1]
+
+
 def view_names(viewer: Any) -> set[str]:
     return {view.name for view in viewer.get_state().views}
 
@@ -123,3 +170,80 @@ def test_a_log_without_a_robot_in_the_viewer(viewer: Any, make_run: MakeRun, tmp
     assert complaints(viewer) == []
     assert_drawn(picture, left=[], right=JOINT_COLOURS[:6])
     assert "Arm and paths [m]" not in view_names(viewer)
+
+
+def missed(scene: Scene, points: FloatArray, colours: Sequence[str], picture: Picture) -> list[str]:
+    """Return the colours that do not stand where the points with them are projected.
+
+    A joint's ball is 17 pixels wide, and up to half of it is hidden by the links that meet there: of the 169
+    pixels at most 6 from its middle, 20 are of its colour. That leaves room for rounding, for smoothed edges
+    and for what hides it, not for a ball that stands beside the place.
+    """
+    places = projected(scene, points, picture)
+    return [
+        colour
+        for colour, place in zip(colours, places, strict=True)
+        if pixels(around(picture, place, 6), colour) < 20
+    ]
+
+
+def assert_stands(
+    viewer: Any,
+    run: Run,
+    folder: Path,
+    colours: Sequence[str],
+    points: Callable[[FloatArray], FloatArray],
+    times: tuple[float, float],
+) -> None:
+    """Hold the pictures at two times in [s] against the points that joint values, shape (1, joints), give.
+
+    The times are such that nothing hides a point.
+    """
+    scene, path = scene_of(run), folder / "run.rrd"
+    viewer.open(str(write_recording(run, path)))
+    at_both = [points(run.q[round(at / run.tsp)][np.newaxis]) for at in times]
+    for at, standing in zip(times, at_both, strict=True):
+
+        def drawn(picture: Picture, wanted: FloatArray = standing) -> bool:
+            """Tell whether all points are where they should be."""
+            return not missed(scene, wanted, colours, picture)
+
+        picture = scene_at(viewer, at, path, drawn)
+        assert missed(scene, standing, colours, picture) == [], f"at {at} s"
+    # The last two move by more than twice the reach in which they are looked for.
+    first, second = (projected(scene, standing, picture) for standing in at_both)
+    assert (np.linalg.norm(second - first, axis=1)[-2:] > 2 * 6).all()
+    assert complaints(viewer) == []
+
+
+def test_the_arm_stands_where_its_kinematics_project_it(
+    viewer: Any, make_run: MakeRun, tmp_path: Path
+) -> None:
+    run = make_run(rows=4000)
+    robot = run.robot
+    assert robot is not None
+
+    def joints(q: FloatArray) -> FloatArray:
+        """Return the base and p1..p5, where the six joints are."""
+        result: FloatArray = points_over_log(robot, q)[0, :6]
+        return result
+
+    assert_stands(viewer, run, tmp_path, JOINT_COLOURS[:6], joints, (3.0, 17.0))
+
+
+def test_a_robot_of_shapes_stands_where_its_kinematics_project_it(
+    viewer: Any, make_run: MakeRun, shapes: Path, tmp_path: Path
+) -> None:
+    robot = read_urdf(shapes)
+    run = make_run(rows=4000, robot=robot)
+    carriers = ["turn1", "turn2", "turn3", "turn4"]
+    numbers = [1 + [joint.name for joint in robot.joints].index(name) for name in carriers]
+    middle = np.array([0.0, 0.0, 0.1])  # of each shape, in the frame that carries it
+
+    def middles(q: FloatArray) -> FloatArray:
+        """Return the middles of the shapes in [m]."""
+        position, rotation = frames_over_log(robot, q)
+        result: FloatArray = position[0, numbers] + rotation[0, numbers] @ middle
+        return result
+
+    assert_stands(viewer, run, tmp_path, ["#ff3333", "#33ff33", "#3366ff", "#ffff33"], middles, (8.5, 13.0))

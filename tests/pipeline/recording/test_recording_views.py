@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -18,8 +18,9 @@ from urmpipe_pipeline.audit_entry import AuditEntry, AuditKind
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
-from urmpipe_pipeline.recording.scene import DASHES, MOST, scene_of
+from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.summary import summary
+from urmpipe_pipeline.recording.ways import DASHES, LEAST_DASH, MOST
 from urmpipe_pipeline.results import Run
 
 MakeRun = Callable[..., Run]
@@ -183,19 +184,26 @@ def test_lines_are_broken_where_values_are_missing(make_run: MakeRun) -> None:
         np.testing.assert_array_equal(strip, position[rows])
 
 
-def test_what_was_asked_for_is_dashed(make_comparison: MakeComparison) -> None:
-    comparison = make_comparison()
+def length(strips: Sequence[Any]) -> float:
+    """Return the length of lines in [m]."""
+    return sum(float(np.linalg.norm(np.diff(strip, axis=0), axis=1).sum()) for strip in strips)
+
+
+@pytest.mark.parametrize(("rows", "dashes"), [(9000, DASHES), (1500, 50)])
+def test_what_was_asked_for_is_dashed(make_comparison: MakeComparison, rows: int, dashes: int) -> None:
+    """A short path has fewer dashes: they would run together."""
+    comparison = make_comparison(rows=rows)
     asked, done, _ = scene_of(comparison).ways
-
-    def length(strips: tuple[Any, ...]) -> float:
-        return sum(float(np.linalg.norm(np.diff(strip, axis=0), axis=1).sum()) for strip in strips)
-
-    whole = length((comparison.reference.position,))
+    whole = length([comparison.reference.position])
     assert (asked.wanted, done.wanted) == (True, False)
-    assert DASHES <= len(asked.strips) <= DASHES + 1  # the last may begin at the very end, by rounding
-    # Only the corners at the ends of a dash are cut off.
-    assert length(asked.strips) == pytest.approx(whole / 2, rel=1e-3)
+    assert dashes <= len(asked.strips) <= dashes + 1  # the last may begin at the very end, by rounding
+    # Only the corners at the ends of a dash are cut off; the last dash may be cut short.
+    assert length(asked.strips) == pytest.approx(whole / 2, rel=0.02)
     assert length(done.strips) == pytest.approx(whole, rel=0.02)  # a neighbouring path
+    lengths = [length([strip]) for strip in asked.strips[:-1]]
+    extent = float(np.linalg.norm(np.ptp(comparison.reference.position, axis=0))) / 2
+    assert min(lengths) == pytest.approx(max(lengths), rel=1e-2)
+    assert min(lengths) >= 0.99 * LEAST_DASH * extent
 
 
 def test_there_is_no_scene_without_positions(make_run: MakeRun, tmp_path: Path) -> None:

@@ -1,0 +1,98 @@
+"""Send the links of the arm as they look: shapes that stand still below frames that move."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urmpipe_models.orientation import quaternions
+from urmpipe_models.visual import Box, Capsule, Colour, Cylinder, Mesh, Visual
+from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.meshes import MEDIA_TYPES
+from urmpipe_pipeline.palette import rgb
+from urmpipe_pipeline.recording.bodies import Body
+from urmpipe_pipeline.recording.entities import entity_path, printable
+
+if TYPE_CHECKING:
+    from rerun import AsComponents, RecordingStream, TimeColumn
+
+SHAPE_COLOUR = "#c8d0d4"
+"""A shape without a colour of its own: neutral, so that the joints stand out in theirs."""
+
+
+def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> None:
+    """Send a link: its frame at the times given, its shapes once.
+
+    Translation and quaternion both stand in every row: Rerun takes a row as the whole transform.
+    """
+    import rerun as rr
+
+    place = (
+        ("robot", "base") if body.joint is None else ("robot", "joint", printable(body.joint) or "unnamed")
+    )
+    position, rotation = body.position.astype(np.float32), body.quat_xyzw.astype(np.float32)
+    if body.joint is None:  # the base does not move
+        still = rr.Transform3D(translation=position[0], quaternion=rotation[0])
+        stream.log(entity_path(*place), still, static=True)
+    else:
+        columns = rr.Transform3D.columns(translation=position, quaternion=rotation)
+        stream.send_columns(entity_path(*place), times, columns)
+    for number, visual in enumerate(body.visuals, start=1):
+        if (shape := _shape(visual)) is not None:
+            entity = entity_path(*place, f"visual {number}")
+            stream.log(entity, _placed(visual), static=True)
+            stream.log(entity, shape, static=True)
+
+
+def _placed(visual: Visual) -> AsComponents:
+    """Return where a shape stands in the frame that carries it, and the scale of a mesh."""
+    import rerun as rr
+
+    rotation: FloatArray = np.array(visual.origin.rotation, dtype=float).reshape(1, 9)
+    return rr.Transform3D(
+        translation=visual.origin.translation,
+        quaternion=quaternions(rotation, "matrix")[0],
+        scale=visual.shape.scale if isinstance(visual.shape, Mesh) else None,
+    )
+
+
+def _shape(visual: Visual) -> AsComponents | None:
+    """Return what is drawn; nothing for a mesh whose file went away meanwhile."""
+    import rerun as rr
+
+    shape = visual.shape
+    if isinstance(shape, Mesh):
+        return _mesh(Path(shape.file), visual.colour)
+    look: dict[str, Any] = {"colors": [_rgba(visual.colour)], "fill_mode": rr.components.FillMode.Solid}
+    if isinstance(shape, Box):
+        return rr.Boxes3D(sizes=[shape.size], **look)
+    if isinstance(shape, Cylinder):
+        return rr.Cylinders3D(lengths=[shape.length], radii=[shape.radius], **look)
+    if isinstance(shape, Capsule):  # Rerun's begins in the middle of its lower ball
+        begin = (0.0, 0.0, -shape.length / 2)
+        return rr.Capsules3D(lengths=[shape.length], radii=[shape.radius], translations=[begin], **look)
+    return rr.Ellipsoids3D(radii=[shape.radius], **look)
+
+
+def _mesh(path: Path, colour: Colour | None) -> AsComponents | None:
+    """Return a mesh with its file's contents, so that the recording shows it wherever it is opened."""
+    import rerun as rr
+
+    try:
+        contents = path.read_bytes()
+    except OSError:
+        return None
+    # Collada and glTF bring colours along; a triangle of the others has none.
+    coloured = path.suffix.lower() not in (".stl", ".obj")
+    factor = None if coloured and colour is None else _rgba(colour)
+    return rr.Asset3D(contents=contents, media_type=MEDIA_TYPES[path.suffix.lower()], albedo_factor=factor)
+
+
+def _rgba(colour: Colour | None) -> tuple[int, int, int, int]:
+    """Return a colour as four numbers 0..255."""
+    if colour is None:
+        return (*rgb(SHAPE_COLOUR), 255)
+    red, green, blue, opacity = (round(255 * share) for share in colour)
+    return red, green, blue, opacity
