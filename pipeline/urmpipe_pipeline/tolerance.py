@@ -25,8 +25,8 @@ UNITS: dict[str, dict[str, Decimal]] = {
 }
 """What a tolerance may be of, and the units that it may be written in.
 
-axis holds for x, y and z each; joint for each joint: a number without a unit is in rad where the joint turns and
-in m where it slides. A unit of length is refused there, since an arm whose joints turn would take it for rad.
+axis holds for x, y and z each; joint for each joint: a number without a unit is in rad where the joint turns
+and in m where it slides. A unit of length is refused there: joints that turn would take it for rad.
 """
 
 ALLOWED = (
