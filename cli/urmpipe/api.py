@@ -10,10 +10,18 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.comparing import compare
-from urmpipe.guards import PathLike, Robot, place_robot, refuse_foreign, refuse_shared, refuse_warnings
+from urmpipe.guards import (
+    PathLike,
+    Robot,
+    offset_of,
+    place_robot,
+    refuse_foreign,
+    refuse_shared,
+    refuse_warnings,
+)
 from urmpipe_models.catalogue import robot_names
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_models.transform import Transform
 from urmpipe_pipeline.audit_file import write_audit
 from urmpipe_pipeline.compare import Tcp
 from urmpipe_pipeline.comparison import Comparison
@@ -178,7 +186,7 @@ def _write_map(run: Run, part: Path, path: Path, robot: str | None) -> None:
         robot = os.path.relpath(robot, path.parent)
     frames = (arm.base, arm.tool) if arm else ()
     given = run.provenance.options.get("read") or {}
-    text = map_of(run.log, robot, *(_offset(frame) for frame in frames), given=given)
+    text = map_of(run.log, robot, *(offset_of(frame) for frame in frames), given=given)
     part.write_text(text, encoding="utf-8", newline="\n")
     read_map(part)
 
@@ -191,14 +199,6 @@ def _files_and_name(log: PathLike | Sequence[PathLike]) -> tuple[list[Path], str
         raise LogError(*(Finding("found a recording, allowed: a log (CSV)", file) for file in recordings))
     name = given[0].resolve().name if given[0].is_dir() else None
     return [file for path in given for file in log_files(path)], name
-
-
-def _offset(frame: Transform) -> tuple[float, ...]:
-    """Return a frame as X, Y, Z in [m], with RX, RY, RZ in [rad] if it turns; nothing for none at all."""
-    if frame == Transform():
-        return ()
-    turn = () if frame.rotation == Transform().rotation else rpy_of(frame.rotation)
-    return tuple(float(value) + 0.0 for value in (*frame.translation, *turn))  # + 0.0: no -0.0 in the file
 
 
 def export(

@@ -91,9 +91,7 @@ def compare(
     options = CompareOptions(allowed, tcp, sync, align)
     level = complete_noise(noise)
     if noise is not None and baseline is None:
-        raise OptionError(
-            "--noise: found without --baseline, allowed: with an earlier comparison"
-        )
+        raise OptionError("--noise: found without --baseline, allowed: with an earlier comparison")
     named: dict[OutputKind, PathLike | None] = {
         "recording": output, "junit": junit, "statistics": statistics,
     }  # fmt: skip

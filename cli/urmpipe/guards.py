@@ -8,7 +8,7 @@ from pathlib import Path
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
-from urmpipe_models.transform import Transform
+from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.recording import is_recording
@@ -71,3 +71,11 @@ def refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:
     """Raise a `LogError` with all warnings if they are to be errors."""
     if strict and warnings:
         raise LogError(*(Finding(f"{w.kind}: {w.message} (--strict)", row=w.row) for w in warnings))
+
+
+def offset_of(frame: Transform) -> tuple[float, ...]:
+    """Return a frame as X, Y, Z in [m], with RX, RY, RZ in [rad] if it turns; nothing for none at all."""
+    if frame == Transform():
+        return ()
+    turn = () if frame.rotation == Transform().rotation else rpy_of(frame.rotation)
+    return tuple(float(value) + 0.0 for value in (*frame.translation, *turn))  # + 0.0: no -0.0 in the file

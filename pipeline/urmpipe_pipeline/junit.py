@@ -10,8 +10,8 @@ There is no one schema. What the consumers take, and what is written here:
 
 GitLab shows the class names in place of the suites, and of a failure the text alone. Times are in s, without
 exponents; the time of a suite is that of the motion that was compared. A test case is a quantity with a
-tolerance and, against a baseline, a quantity that both comparisons have. XML holds no control characters and no
-lone surrogates: they are written as they are escaped in Python.
+tolerance and, against a baseline, a quantity that both comparisons have. XML holds no control characters and
+no lone surrogates: they are written as they are escaped in Python.
 """
 
 from __future__ import annotations

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
-from urmpipe.options import about_recordings, log_options, output_options, take_log_options
+from urmpipe.options import Command, about_recordings, log_options, output_options, take_log_options
 from urmpipe.process import tune_pyarrow
 from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE
 
@@ -43,9 +44,9 @@ def _noise(ctx: click.Context, param: click.Parameter, value: str | None) -> dic
     return None if value is None else parse_noise(value)
 
 
-def _file(name: str, *names: str, help: str) -> Any:
+def _file(name: str, *names: str, help: str) -> Callable[[Command], Command]:
     """Return an option that names a file to write or to read."""
-    return click.option(name, *names, metavar="FILE", type=click.Path(dir_okay=False, path_type=Path), help=help)
+    return click.option(name, *names, metavar="FILE", type=click.Path(path_type=Path), help=help)
 
 
 @click.command(short_help="Hold logs against a reference and give a verdict.")
@@ -63,9 +64,9 @@ def _file(name: str, *names: str, help: str) -> Any:
     show_default=True,
     callback=_tolerance,
     metavar="M|KIND=VALUE,...",
-    help="Largest deviation allowed: on an axis in m, or of kinds: axis, x, y, z, norm, path (m, mm, um), angle,"
-    " joint (rad, mrad, deg; m of joints that slide), as axis=3.5mm,norm=5mm,angle=0.5deg. It replaces the"
-    " default whole: what is not named is not judged.",
+    help="Largest deviation allowed: on an axis in m, or of kinds: axis, x, y, z, norm, path (m, mm, um),"
+    " angle, joint (rad, mrad, deg; m of joints that slide), as axis=3.5mm,norm=5mm,angle=0.5deg. It replaces"
+    " the default whole: what is not named is not judged.",
 )
 @click.option(
     "--tcp",
@@ -187,8 +188,8 @@ def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:
     ]
     if made is not None and given:
         raise click.UsageError(
-            f"{', '.join(given)}: found with the recording of a comparison ({reference}), which stands as it was"
-            " made, allowed: with the logs themselves"
+            f"{', '.join(given)}: found with the recording of a comparison ({reference}), which stands as it"
+            " was made, allowed: with the logs themselves"
         )
     return made
 
