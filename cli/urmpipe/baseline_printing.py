@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe.columns import Column, print_columns
 from urmpipe.printing import LISTED, count
-from urmpipe.wording import UNITS, figure, judged, label
+from urmpipe.wording import UNITS, figure, judged, label, limit
 from urmpipe_pipeline.baseline import Absent, BaselineComparison, Change, Worse
 from urmpipe_pipeline.report import text
 from urmpipe_pipeline.results import json_ready
@@ -74,10 +74,9 @@ def _verdicts(change: Change) -> str:
 
 def _lines(found: BaselineComparison) -> Iterator[str]:
     """Yield what else is to be known of the two, a line each."""
-    steps = (
-        f"{kind} {figure(value, _unit(kind))} {UNITS[_unit(kind)]}" for kind, value in found.noise.items()
-    )
-    yield f"noise: {', '.join(steps)}"
+    levels = [(kind, value, _unit(kind)) for kind, value in found.noise.items()]
+    noise = ", ".join(f"{kind} {limit(value, unit)} {UNITS[unit]}" for kind, value, unit in levels)
+    yield f"noise: {noise}"
     for word, absent in (("new", found.new), ("gone", found.gone)):
         if absent:
             yield f"{word}: {_listed(absent)}"

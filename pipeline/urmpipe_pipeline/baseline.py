@@ -314,9 +314,9 @@ def _made(result: Comparison) -> dict[str, Any]:
     reference = result.reference
     options = {name: value for name, value in result.provenance.options.items() if name != "tolerance"}
     versions = {f"version of {name}": value for name, value in result.provenance.versions.items()}
-    files = [{"name": file.name, "sha256": file.sha256} for file in reference.files]
     return {
-        "reference": {"name": reference.name, "files": files},
+        "reference": reference.name,
+        "files of the reference": [f"{file.name} {file.sha256[:12]}" for file in reference.files],
         "tolerance": dict(result.tolerance),
         **options,
         **versions,
