@@ -45,8 +45,9 @@ def _clocks(sync: Sync) -> str:
         return "clocks: both from their first samples"
     sure = "" if sync.precision is None else f" ± {sync.precision:.2g} s"
     alike = "" if sync.similarity is None else f" (similarity {sync.similarity:.4g})"
-    why = "as given" if sync.mode == "given" else f"estimated by {sync.by}{alike}"
-    return f"clocks: t_reference = t_log {sync.offset:+.6g} s{sure}, {why}"
+    why = "as given" if sync.mode == "given" else f"estimated by the {sync.by}{alike}"
+    sign = "-" if sync.offset < 0.0 else "+"
+    return f"clocks: t_reference = t_log {sign} {abs(sync.offset):.6g} s{sure}, {why}"
 
 
 def _place(run: Deviation) -> Iterator[str]:
