@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.columns import Column, print_columns
-from urmpipe.printing import LISTED, count
+from urmpipe.printing import LISTED
 from urmpipe.wording import UNITS, figure, judged, label, limit
 from urmpipe_pipeline.baseline import Absent, BaselineComparison, Change, Worse
 from urmpipe_pipeline.report import text
@@ -24,10 +24,12 @@ WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out"}
 
 def print_baseline(console: Console, found: BaselineComparison) -> None:
     """Print whether anything is worse, what changed beyond the noise, and what was made otherwise."""
-    worse = f"{count(len(found.worse), 'quantity')} worse".replace("quantitys", "quantities")
+    number = len(found.worse)
+    worse = f"{number} {'quantity' if number == 1 else 'quantities'} worse"
     gone = f", {len(found.gone)} gone" if found.gone else ""
     said = "nothing worse" if found.verdict == "pass" else worse + gone
-    line = judged(found.verdict).append(f"  {said} than in {found.name}", style="not bold default")
+    line = judged(found.verdict)
+    line.append(f"  against the baseline {found.name}: {said}", style="not bold default")
     console.print()
     console.print(line, soft_wrap=True)
     changed = [change for change in found.changes if change.changed]

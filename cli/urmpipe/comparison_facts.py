@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe.guards import offset_of
 from urmpipe.printing import count
+from urmpipe.wording import limit
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.comparison import Alignment, Deviation, Sync
 from urmpipe_pipeline.report import text
@@ -35,6 +36,7 @@ def facts(run: Deviation) -> Iterator[str]:
     if turned:
         yield f"whole turns counted apart at the start, taken out: {', '.join(turned)}"
     yield from _place(run)
+    yield from _sliding(run)
     if run.speed_correlation is not None:
         yield f"the norm goes with the speed by r = {run.speed_correlation:+.3f}"
 
@@ -62,6 +64,15 @@ def _place(run: Deviation) -> Iterator[str]:
         turn = math.degrees(turn_of(moved))
         by = _vector(moved.translation)
         yield f"aligned ({moved.mode}): turned by {turn:.4f} deg about the origin, then moved by {by} mm"
+
+
+def _sliding(run: Deviation) -> Iterator[str]:
+    """Say what a tolerance for joints is where they slide."""
+    sliding = [one for one in run.joint_statistics.values() if one.unit == "m" and one.tolerance]
+    if sliding:
+        names = ", ".join(one.quantity for one in sliding)
+        allowed = limit(sliding[0].tolerance, "m")
+        yield f"the tolerance of joints is in m where they slide: {names} {allowed} mm"
 
 
 def turn_of(alignment: Alignment) -> float:

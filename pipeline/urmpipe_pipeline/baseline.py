@@ -330,5 +330,6 @@ def _facts(run: Deviation) -> dict[str, Any]:
         "tsp": run.run.tsp,
         "samples": len(run.sample),
         "sync_offset": run.sync.offset,
-        "alignment": run.alignment.to_dict(),
+        "translation": list(run.alignment.translation),
+        "tool": list(run.alignment.tool),
     }

@@ -175,6 +175,7 @@ def test_joints_that_slide_have_a_column_of_their_own_in_mm(capsys: Captured) ->
     row = next(line for line in lines if line.startswith("slides "))
     assert row[head.index("max slide") : head.index("max slide") + 9].strip() == "12.0000"
     assert any(line.startswith("q3 [mm]") and "    10  " in line for line in lines)
+    assert "  the tolerance of joints is in m where they slide: q3 10 mm" in lines
 
 
 def test_how_the_clocks_were_put_together_is_said(capsys: Captured) -> None:
