@@ -59,10 +59,13 @@ def _columns(changes: Sequence[Change]) -> Iterator[Column]:
 
 
 def _both(change: Change, name: str) -> str:
-    """Return a statistic before and now."""
+    """Return a statistic before and now, with more digits only where they tell a change beyond the noise."""
     before, now = (getattr(one, name) for one in (change.before, change.now))
+    apart = abs(now - before) > change.noise
     unit = change.now.unit
-    return figure(before, unit, now) + ARROW + figure(now, unit, before)
+    return ARROW.join(
+        figure(one, unit, other if apart else None) for one, other in ((before, now), (now, before))
+    )
 
 
 def _shares(change: Change) -> str:

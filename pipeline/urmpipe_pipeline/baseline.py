@@ -113,6 +113,7 @@ class Change:
         return {
             "run": self.run,
             "quantity": self.now.quantity,
+            "kind": self.now.kind,
             "unit": self.now.unit,
             "noise": self.noise,
             **both,

@@ -156,6 +156,14 @@ def test_a_lab_says_its_tolerance_as_text_or_as_a_table(
     assert json.loads(capsys.readouterr().out)["tolerance"] == tolerance
 
 
+def test_a_lab_says_its_noise_for_the_calls_that_have_a_baseline(folder: Path, capsys: Captured) -> None:
+    (folder / "urmpipe.toml").write_text("noise = {axis = '2um'}")
+    assert compare("good.csv", "-q", "-o", "a.rrd") == 0
+    assert run(["compare", "a.rrd", "--baseline", "a.rrd", "--json"]) == 0
+    noise = json.loads(capsys.readouterr().out)["baseline"]["noise"]
+    assert noise == {"axis": 2e-6, **dict.fromkeys(("norm", "path", "angle", "joint"), 1e-6)}
+
+
 def test_a_table_that_is_no_tolerance_is_refused(folder: Path, capsys: Captured) -> None:
     (folder / "urmpipe.toml").write_text("tolerance = {roll = 1, axis = {x = 1}}")
     assert compare("good.csv", "-q") == 2
