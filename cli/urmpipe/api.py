@@ -9,32 +9,40 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.catalogue import load_robot, robot_names
-from urmpipe_models.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
-from urmpipe_models.transform import Transform, rpy_of
+from urmpipe.comparing import compare
+from urmpipe.guards import (
+    PathLike,
+    Robot,
+    offset_of,
+    place_robot,
+    refuse_foreign,
+    refuse_shared,
+    refuse_warnings,
+)
+from urmpipe_models.catalogue import robot_names
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.transform import Transform
 from urmpipe_pipeline.audit_file import write_audit
-from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison import AlignMode, Comparison
+from urmpipe_pipeline.compare import Tcp
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import ingest_log
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.operands import load_run, log_files
+from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.outputs import OutputKind, guarded_output
-from urmpipe_pipeline.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.recording import is_recording, read_recording, record
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.sources import ReadOptions, map_of, read_map
-from urmpipe_pipeline.sync import SyncOption
-from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     import pandas as pd
 
     from urmpipe_pipeline.export import Exported, Format, Rows
 
-PathLike = str | Path
-Robot = Chain | str | Path
+__all__ = [
+    "PathLike", "Report", "Robot", "compare", "export", "ingest", "place_robot", "read_options", "report",
+    "write_map",
+]  # fmt: skip
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -110,7 +118,7 @@ def ingest(
     arm = place_robot(robot, base, tool)
     named: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": log_map}
     targets = {kind: Path(path) for kind, path in named.items() if path is not None}
-    _refuse_shared(targets)
+    refuse_shared(targets)
     kept = [*files, *map(Path, inputs)]
     with ExitStack() as stack:
         parts = {
@@ -123,7 +131,7 @@ def ingest(
             run = ingest_log(
                 files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name, early=early
             )
-            _refuse_warnings(strict, run.warnings)
+            refuse_warnings(strict, run.warnings)
             if "audit" in parts:
                 write_audit(run, parts["audit"], targets["audit"])
             if "map" in parts:
@@ -131,75 +139,6 @@ def ingest(
             return run
 
         return make(None) if output is None else record(make, Path(output), kept, progress)
-
-
-def compare(
-    reference: PathLike | Run,
-    logs: Sequence[PathLike | Run] = (),
-    *,
-    robot: Robot | None = None,
-    base: Transform | None = None,
-    tool: Transform | None = None,
-    read: ReadOptions | None = None,
-    tsp: float | None = None,
-    derivative: Method | None = None,
-    tolerance: float | Mapping[str, float] = DEFAULT_TOLERANCE,
-    tcp: Tcp = "fk",
-    sync: SyncOption = "start",
-    align: AlignMode = "none",
-    strict: bool = False,
-    output: PathLike | None = None,
-    progress: Callable[[float], None] | None = None,
-) -> Comparison:
-    """Hold logs against a reference: deviation, statistics and verdict.
-
-    Args:
-        reference: A path (t, x, y, z), a log, or a recording. Without `logs` it is a log that
-            recorded its own tool centre point: its forward kinematics are held against that.
-        logs: The logs or recordings to judge.
-        robot: Name, file (TOML, URDF) or chain of the arm; a recording brings its own.
-        base: Where the arm stands in the world.
-        tool: The tool centre point in the frame of the arm's tip.
-        read: How to read a file where it cannot tell by itself.
-        tsp: Period of the grid in [s]; default: each log's own.
-        derivative: central or savgol; default: savgol for quantised logs, else central.
-        tolerance: Largest deviation allowed on an axis in [m], or in [m] and [rad] by kind: axis, norm, path,
-            angle, joint, or x, y, z.
-        tcp: fk or recorded: where a log was.
-        sync: How the clocks are put together: start (both start together), auto (by the motion), or the
-            offset in [s]: t_reference = t_log + offset.
-        align: How a log is moved in space before it is compared: none, start (the first poses agree), rigid
-            (the best rigid motion), tool (the best constant offset of the tool centre point).
-        strict: Whether a warning is an error.
-        output: The recording (.rrd) to write.
-        progress: Told the share of the recording that is written, 0..1.
-
-    Returns:
-        The comparison: its verdict, `to_frame()`, `to_dict()`.
-
-    Raises:
-        UrmpipeError: With everything that is wrong with the input or the output.
-
-    Source: [UrmArm2021]_ eq. 19-23.
-    """
-    allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
-    options = CompareOptions(allowed, tcp, sync, align)
-    arm = place_robot(robot, base, tool)
-
-    def run_of(operand: PathLike | Run) -> Run:
-        if isinstance(operand, Run):
-            return operand
-        return load_run(Path(operand), robot=arm, read=read, tsp=tsp, derivative=derivative)
-
-    first, others = run_of(reference), [run_of(log) for log in logs]
-    result = compare_runs(first, others, options) if others else compare_recorded(first, options)
-    judged = others or [first]  # the reference's own stand among those of the comparison
-    doubts = [w for w in result.warnings if w.kind != LACKING_TOOL]  # that one explains a verdict of fail
-    _refuse_warnings(strict, (*(w for run in judged for w in run.warnings), *doubts))
-    if output is None:
-        return result
-    inputs = [Path(operand) for operand in (reference, *logs) if not isinstance(operand, Run)]
-    return record(lambda early: result, Path(output), inputs, progress)
 
 
 def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> Report:
@@ -215,7 +154,7 @@ def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> 
     from urmpipe_pipeline.report import write_report
 
     files = [Path(one) for one in results if isinstance(one, (str, Path))]
-    _refuse_foreign(files)
+    refuse_foreign(files)
     shown = tuple(read_recording(Path(one)) if isinstance(one, (str, Path)) else one for one in results)
     return Report(write_report(shown, Path(output), inputs=files), shown)
 
@@ -247,7 +186,7 @@ def _write_map(run: Run, part: Path, path: Path, robot: str | None) -> None:
         robot = os.path.relpath(robot, path.parent)
     frames = (arm.base, arm.tool) if arm else ()
     given = run.provenance.options.get("read") or {}
-    text = map_of(run.log, robot, *(_offset(frame) for frame in frames), given=given)
+    text = map_of(run.log, robot, *(offset_of(frame) for frame in frames), given=given)
     part.write_text(text, encoding="utf-8", newline="\n")
     read_map(part)
 
@@ -260,23 +199,6 @@ def _files_and_name(log: PathLike | Sequence[PathLike]) -> tuple[list[Path], str
         raise LogError(*(Finding("found a recording, allowed: a log (CSV)", file) for file in recordings))
     name = given[0].resolve().name if given[0].is_dir() else None
     return [file for path in given for file in log_files(path)], name
-
-
-def _refuse_shared(targets: Mapping[OutputKind, Path]) -> None:
-    """Raise an `OptionError` if two outputs have one name."""
-    places: dict[Path, OutputKind] = {}
-    for kind, path in targets.items():
-        other = places.setdefault(path.resolve(), kind)
-        if other != kind:
-            raise OptionError(f"found {path} as {other} and as {kind}; allowed: a name for each")
-
-
-def _offset(frame: Transform) -> tuple[float, ...]:
-    """Return a frame as X, Y, Z in [m], with RX, RY, RZ in [rad] if it turns; nothing for none at all."""
-    if frame == Transform():
-        return ()
-    turn = () if frame.rotation == Transform().rotation else rpy_of(frame.rotation)
-    return tuple(float(value) + 0.0 for value in (*frame.translation, *turn))  # + 0.0: no -0.0 in the file
 
 
 def export(
@@ -307,54 +229,8 @@ def export(
     options = ExportOptions(format_of(to, target), rows, tcp)
     if isinstance(result, (Run, Comparison)):
         return export_result(result, target, options, [result.recording] if result.recording else [])
-    _refuse_foreign([Path(result)])
+    refuse_foreign([Path(result)])
     return export_result(read_recording(Path(result)), target, options, [Path(result)])
-
-
-def place_robot(
-    robot: Robot | None,
-    base: Transform | None = None,
-    tool: Transform | None = None,
-    *,
-    base_link: str | None = None,
-    tip_link: str | None = None,
-) -> Chain | None:
-    """Return the arm on its base and with its tool; None without a robot.
-
-    Args:
-        robot: Name, file (TOML, URDF) or chain of the arm.
-        base: Where the arm stands in the world.
-        tool: The tool centre point in the frame of the arm's tip.
-        base_link: Link of a URDF where the arm begins.
-        tip_link: Link of a URDF where it ends.
-
-    Raises:
-        RobotError: If the robot is unknown, or with everything that is wrong with its file.
-        OptionError: If the arm is placed or cut, but there is none.
-    """
-    if robot is not None:
-        chain = (
-            robot if isinstance(robot, Chain) else load_robot(robot, base_link=base_link, tip_link=tip_link)
-        )
-        return chain.placed(base, tool)
-    if any(value is not None for value in (base, tool, base_link, tip_link)):
-        raise OptionError(
-            "found --base, --tool, --base-link or --tip without a robot; allowed: with --robot NAME|FILE"
-        )
-    return None
-
-
-def _refuse_foreign(files: Sequence[Path]) -> None:
-    """Raise a `RecordingError` with all files that are there and are no recordings."""
-    foreign = [path for path in files if path.exists() and not is_recording(path)]
-    if foreign:
-        message = "found no recording of urmpipe, allowed: a .rrd that ingest or compare wrote"
-        raise RecordingError(*(Finding(message, file=str(path)) for path in foreign))
-
-
-def _refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:
-    if strict and warnings:
-        raise LogError(*(Finding(f"{w.kind}: {w.message} (--strict)", row=w.row) for w in warnings))
 
 
 def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None) -> ReadOptions:

@@ -4,7 +4,7 @@
     tool = [0, 0, 0.15]
 
     [compare]               # for one command
-    tolerance = 0.002
+    tolerance = {axis = 0.002, angle = "0.5deg"}
 
 A key is the name of an option without its dashes. The file is looked for in the working folder and those
 above it; options on the command line come first. Files named in it are seen from its own folder.
@@ -20,11 +20,16 @@ import click
 
 NAME = "urmpipe.toml"
 
-EACH_TIME = ("--output", "--audit", "--write-map", "--explain", "--json")
+EACH_TIME = (
+    "--output", "--audit", "--write-map", "--explain", "--json", "--junit", "--csv", "--baseline",
+)  # fmt: skip
 """Options of what one call is to give: no file says them for all."""
 
 FILES = ("robot", "map")
 """Options whose value may be a file."""
+
+TABLES = ("tolerance", "noise")
+"""Options whose value may be a table: what the command line has as KIND=VALUE,..."""
 
 
 def find_defaults() -> Path | None:
@@ -57,7 +62,7 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
         values = {key: value} if own is None else value
         place, allowed = ("", every) if own is None else (f"{key}.", sorted(own))
         for name, inner in values.items():
-            if isinstance(inner, Mapping) and name in allowed:
+            if isinstance(inner, Mapping) and name in allowed and name not in TABLES:
                 faults.append(Finding(f"key {place}{name}: found a table, allowed: a value", str(path)))
             if name not in allowed:
                 near = get_close_matches(name, allowed, 1)
@@ -67,7 +72,11 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
     if faults:
         raise OptionError(*faults)
     own = _options(command)
-    given = {key: value for key, value in data.items() if key in own and not isinstance(value, Mapping)}
+    given = {
+        key: value
+        for key, value in data.items()
+        if key in own and (key in TABLES or not isinstance(value, Mapping))
+    }
     given |= data.get(command.name or "", {})
     return {own[key].name or key: _text(key, value, own[key], path.parent) for key, value in given.items()}
 
@@ -91,4 +100,6 @@ def _text(key: str, value: Any, option: click.Option, folder: Path) -> Any:
         return [str(one) for one in value] if isinstance(value, list) else [str(value)]
     if isinstance(value, list):
         return ",".join(map(str, value))
+    if isinstance(value, Mapping):
+        return ",".join(f"{name}={inner}" for name, inner in value.items())
     return value if option.is_flag else str(value)

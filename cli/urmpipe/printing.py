@@ -15,9 +15,7 @@ import click
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
-    from rich.text import Text
 
-    from urmpipe_pipeline.comparison import Comparison
     from urmpipe_pipeline.joint_log import LogWarning
     from urmpipe_pipeline.results import Run
 
@@ -101,38 +99,6 @@ def _print_audit(console: Console, run: Run) -> None:
         console.print(f"... and {len(run.audit) - LISTED} more; --audit FILE.csv lists all")
 
 
-def print_comparison(result: Comparison) -> None:
-    """Print the statistics, the verdict of each log and the verdict of all."""
-    console = new_console()
-    tolerance = result.tolerance["axis"] * 1e3
-    table = new_table(
-        "Log", "Axis", "max |Δ| [mm]", "rms", "mean", "std", "p95", "at t [s]", "Verdict",
-        title=f"Deviation from {result.reference.name}, tolerance ±{tolerance:.4g} mm an axis",
-    )  # fmt: skip
-    for run in result.runs:
-        for axis, one in run.statistics.items():
-            figures = (one.max, one.rms, one.mean, one.std, one.p95)
-            table.add_row(
-                run.name if axis == "x" else "",
-                axis,
-                *(f"{value * 1e3:.4f}" for value in figures),
-                f"{one.t_max:.4g}",
-                _verdict(one.verdict),
-                end_section=axis == "norm",
-            )
-    console.print(table)
-    for run in result.runs:
-        worst = run.worst
-        left_out = f", {run.left_out} left out" if run.left_out else ""
-        arm = f", robot {run.run.robot.name}" if run.run.robot else ""
-        said = (
-            f" {run.name}{arm}: {len(run.sample)} samples compared{left_out}, {run.share_out:.2%} out of"
-            f" tolerance, worst |Δ| {run.delta[worst, 3] * 1e3:.4f} mm at t = {run.t[worst]:.4g} s,"
-            f" {run.start[3] * 1e3:.4f} mm at the start"
-        )
-        console.print(_verdict(run.verdict).append(said, style="not bold default"), soft_wrap=True)
-
-
 def count(number: int, noun: str) -> str:
     """Return a number of things, in the singular if it is one."""
     return f"{number} {noun}{'' if number == 1 else 's'}"
@@ -150,14 +116,6 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda share: bar.update(task, completed=share)
-
-
-def _verdict(verdict: str | None) -> Text:
-    """Return a verdict as a word, with a colour on a terminal."""
-    from rich.text import Text
-
-    style = {"pass": "bold green", "fail": "bold red"}
-    return Text("-") if verdict is None else Text(verdict.upper(), style=style[verdict])
 
 
 def new_console() -> Console:

@@ -18,6 +18,8 @@ from urmpipe_pipeline.results import SCHEMA, Run
 if TYPE_CHECKING:
     import pandas as pd
 
+    from urmpipe_pipeline.baseline import BaselineComparison
+
 Verdict = Literal["pass", "fail"]
 
 Kind = Literal["axis", "norm", "path", "angle", "joint"]
@@ -338,6 +340,7 @@ class Comparison:
         warnings: What a person should know about the comparison itself.
         provenance: How to repeat it.
         recording: Where it was written.
+        baseline: What changed since an earlier comparison, if it was held against one; not in the recording.
     """
 
     name: str
@@ -347,11 +350,17 @@ class Comparison:
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
     recording: Path | None = None
+    baseline: BaselineComparison | None = None
 
     @property
     def verdict(self) -> Verdict:
         """Pass if every log passes."""
         return "pass" if all(run.verdict == "pass" for run in self.runs) else "fail"
+
+    @property
+    def accepted(self) -> bool:
+        """Whether every log passes and, where there is a baseline, nothing is worse than there."""
+        return self.verdict == "pass" and (self.baseline is None or self.baseline.verdict == "pass")
 
     @property
     def ranking(self) -> tuple[Deviation, ...]:
@@ -361,13 +370,13 @@ class Comparison:
         )
 
     def rows(self) -> Iterator[dict[str, Any]]:
-        """Yield one row a log and quantity: the statistics and the verdict."""
+        """Yield one row a log and quantity: the offset of the clocks, the statistics and the verdict."""
         for run in self.runs:
             for one in run.all_statistics:
-                yield {"run": run.name, **asdict(one)}
+                yield {"run": run.name, "sync_offset": run.sync.offset, **asdict(one)}
 
     def to_frame(self) -> pd.DataFrame:
-        """Return one row a log and quantity: the statistics and the verdict."""
+        """Return one row a log and quantity, as `rows`."""
         import pandas as pd
 
         return pd.DataFrame(list(self.rows()))
@@ -382,5 +391,6 @@ class Comparison:
             "runs": [run.to_dict() for run in self.runs],
             "ranking": [run.name for run in self.ranking],
             "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+            "baseline": None if self.baseline is None else self.baseline.to_dict(),
             "recording": str(self.recording) if self.recording else None,
         }

@@ -14,6 +14,11 @@ from urmpipe_pipeline.recording import is_recording, read_recording
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.sources import ReadOptions
 
+COMPARISON = (
+    "found the recording of a comparison, allowed: one that ingest wrote; to hold it against another"
+    " comparison, give it alone, with --baseline OTHER.rrd"
+)
+
 
 def load_run(
     operand: Path,
@@ -36,22 +41,34 @@ def load_run(
         LogError: If the CSV is bad.
         RecordingError: If the recording is bad, or holds a comparison.
     """
-    if not (operand.suffix == ".rrd" or (operand.is_file() and is_recording(operand))):
+    if not _is_recording(operand):
         name = operand.resolve().name if operand.is_dir() else None
         return ingest_log(
             log_files(operand), robot=robot, read=read, tsp=tsp, derivative=derivative, name=name
         )
     result = read_recording(operand)
     if isinstance(result, Comparison):
-        raise RecordingError(
-            Finding("found the recording of a comparison, allowed: one that ingest wrote", file=str(operand))
-        )
+        raise RecordingError(Finding(COMPARISON, file=str(operand)))
     if robot is not None and robot != result.robot:
         tcp, warnings = kinematics(robot, result.q, result.qd, result.qdd)
         others = [warning for warning in result.warnings if warning.kind not in OF_ROBOT]
         made = replace(result.provenance, options={**result.provenance.options, "robot": robot.name})
         return replace(result, robot=robot, tcp=tcp, warnings=(*others, *warnings), provenance=made)
     return result
+
+
+def load_comparison(operand: Path) -> Comparison | None:
+    """Return the comparison that an operand is the recording of; None if it is anything else.
+
+    Raises:
+        RecordingError: If it is a recording, and bad.
+    """
+    result = read_recording(operand) if _is_recording(operand) else None
+    return result if isinstance(result, Comparison) else None
+
+
+def _is_recording(operand: Path) -> bool:
+    return operand.suffix == ".rrd" or (operand.is_file() and is_recording(operand))
 
 
 def log_files(operand: Path) -> list[Path]:

@@ -14,7 +14,10 @@ from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
 
-OutputKind = Literal["recording", "report", "map", "export", "audit"]
+OutputKind = Literal["recording", "report", "map", "export", "audit", "junit", "statistics"]
+
+NOUNS: dict[str, str] = {"junit": "JUnit file", "statistics": "table of statistics"}
+"""What people call a kind, where that is not its name."""
 
 AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")
 """The header of an audit, by which one of ours is known."""
@@ -25,8 +28,22 @@ GENERATOR = re.compile(rb"<meta\s+name=\"generator\"\s+content=\"urmpipe\b", re.
 MAP_HEADER = "# How urmpipe reads these logs: urmpipe ingest LOG --map THIS"
 """The first line of a map of ours."""
 
+STATISTICS_HEADER = "run,sync_offset,quantity,kind,unit,max,"
+"""How the first line of a table of statistics of ours begins; a later version may have more columns."""
+
+JUNIT_HEADER = '<?xml version="1.0" encoding="UTF-8"?><!-- urmpipe: verdict of a comparison -->'
+"""The first line of a JUnit file of ours."""
+
+FIRST_LINES: dict[str, str] = {
+    "map": MAP_HEADER,
+    "audit": ",".join(AUDIT_COLUMNS),
+    "statistics": STATISTICS_HEADER,
+    "junit": JUNIT_HEADER,
+}
+"""How the first line of a text of ours begins, by kind."""
+
 HEAD = 4096
-"""The mark of a report stands within so many bytes of its start."""
+"""The mark of an output stands within so many bytes of its start."""
 
 
 @contextmanager
@@ -76,33 +93,31 @@ def _refuse(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
 
 def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None:
     """Return what speaks against writing there, or None."""
+    noun = NOUNS.get(kind, kind)
     if path.is_dir():
-        return f"found a folder, allowed: the name of a file for the {kind}"
+        return f"found a folder, allowed: the name of a file for the {noun}"
     if not path.parent.is_dir():
         return f"found no folder {path.parent}, allowed: a folder that exists"
     if not path.exists():
         return None
     if any(one.exists() and path.samefile(one) for one in inputs):
-        return f"found an input of this command, allowed: any other name for the {kind}"
+        return f"found an input of this command, allowed: any other name for the {noun}"
     if not path.is_file() or not _is_ours(path, kind):
-        such = f"such {'an' if kind in ('audit', 'export') else 'a'} {kind}"
-        return f"found a file that is no {kind} of urmpipe's, allowed: a new name, or {such} to replace"
+        such = f"such {'an' if kind in ('audit', 'export') else 'a'} {noun}"
+        return f"found a file that is no {noun} of urmpipe's, allowed: a new name, or {such} to replace"
     return None
 
 
 def _is_ours(path: Path, kind: OutputKind) -> bool:
     if kind == "report":
         return is_report(path)
-    if kind == "map":
-        with path.open("rb") as file:
-            return file.readline().strip() == MAP_HEADER.encode()
     if kind == "export":
         from urmpipe_pipeline.export.identity import is_export
 
         return is_export(path)
-    if kind == "audit":
-        with path.open("rb") as file:
-            return file.readline(HEAD).strip() == ",".join(AUDIT_COLUMNS).encode()
-    from urmpipe_pipeline.recording.identity import is_ours
+    if kind == "recording":
+        from urmpipe_pipeline.recording.identity import is_ours
 
-    return is_ours(path)
+        return is_ours(path)
+    with path.open("rb") as file:
+        return file.read(HEAD).startswith(FIRST_LINES[kind].encode())

@@ -4,57 +4,87 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
+from decimal import Decimal
+from numbers import Real
 
 from urmpipe_models.errors import OptionError
 
 DEFAULT_TOLERANCE = 0.0035
 """Largest deviation allowed on an axis in [m]. Source: [UrmArm2021]_ section 2.4."""
 
-LENGTHS = {"": 1.0, "m": 1.0, "mm": 1e-3, "um": 1e-6}
-ANGLES = {"": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180}
-UNITS: dict[str, dict[str, float]] = {
+SI, MILLI, MICRO = Decimal(1), Decimal("1e-3"), Decimal("1e-6")
+DEGREE = Decimal("0.01745329251994329576923690768")
+"""pi / 180."""
+
+LENGTHS = {"": SI, "m": SI, "mm": MILLI, "um": MICRO}
+ANGLES = {"": SI, "rad": SI, "mrad": MILLI, "deg": DEGREE}
+UNITS: dict[str, dict[str, Decimal]] = {
     **dict.fromkeys(("axis", "x", "y", "z", "norm", "path"), LENGTHS),
-    "angle": ANGLES,
-    "joint": ANGLES | LENGTHS,
+    **dict.fromkeys(("angle", "joint"), ANGLES),
 }
-"""What a tolerance may be of, and the units that it may be written in: axis holds for x, y and z each."""
+"""What a tolerance may be of, and the units that it may be written in.
 
-ALLOWED = "a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg)"
+axis holds for x, y and z each; joint for each joint: a number without a unit is in rad where the joint turns
+and in m where it slides. A unit of length is refused there: joints that turn would take it for rad.
+"""
+
+ALLOWED = (
+    "a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
+    " m of a joint that slides)"
+)
+
+QUANTITY = re.compile(r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?|\.[0-9]+(?:[eE][-+]?[0-9]+)?)\s*([a-z]*)\s*")
+"""A number in plain digits and its unit."""
 
 
-def parse_tolerance(text: str, option: str = "--tolerance") -> dict[str, float]:
+def parse_tolerance(
+    text: str, option: str = "--tolerance", bare: Sequence[str] = ("axis",), *, zero: bool = False
+) -> dict[str, float]:
     """Return what is allowed in [m] and [rad] by kind, from "0.0035", "3.5mm" or "axis=3.5mm,angle=0.5deg".
 
     Args:
-        text: One length for every axis, or some kinds with theirs. What is not named has no tolerance.
+        text: One length, or some kinds with theirs. What is not named has no tolerance.
         option: Where it was given, for messages.
+        bare: The kinds that a length without a name is for.
+        zero: Whether 0 is allowed.
 
     Raises:
         OptionError: With everything that is wrong.
     """
     found: dict[str, float] = {}
+    named: set[str] = set()
     faults = []
     for part in text.split(","):
-        kind, _, value = part.rpartition("=") if "=" in part else ("axis", "", part)
-        kind = kind.strip()
-        number = _number(value, UNITS.get(kind, {}))
-        if kind in found or number is None:
-            twice = " twice" if kind in found else ""
+        name, sign, value = part.rpartition("=")
+        kinds = (name.strip(),) if sign else tuple(bare)
+        number = _number(value, UNITS.get(kinds[0], {}), zero)
+        twice = " twice" if number is not None and not named.isdisjoint(kinds) else ""
+        if number is None or twice:
             faults.append(f"{option}: found {part.strip()!r}{twice}, allowed: {ALLOWED}")
-        else:
-            found[kind] = number
+            continue
+        named.update(kinds)
+        found |= dict.fromkeys(kinds, number)
     if faults:
         raise OptionError(*faults)
     return found
 
 
-def check_tolerance(tolerance: Mapping[str, float], option: str = "--tolerance") -> None:
-    """Raise an `OptionError` with everything in a tolerance that is no kind or no positive number."""
+def check_tolerance(
+    tolerance: Mapping[str, float], option: str = "--tolerance", *, zero: bool = False
+) -> None:
+    """Raise an `OptionError` with everything in a tolerance that is no kind or no positive number.
+
+    Args:
+        tolerance: In [m] or [rad], by kind.
+        option: Where it was given, for messages.
+        zero: Whether 0 is allowed.
+    """
+    sign = "0 or positive" if zero else "positive"
     faults = [
-        f"{option}: found {kind}={value}, allowed: {ALLOWED}; positive"
+        f"{option}: found {kind}={value}, allowed: {ALLOWED}; {sign}"
         for kind, value in tolerance.items()
-        if kind not in UNITS or not (math.isfinite(value) and value > 0)
+        if kind not in UNITS or not isinstance(value, Real) or not _fits(float(value), zero)
     ]
     if not tolerance:
         faults = [f"{option}: found nothing, allowed: {ALLOWED}"]
@@ -68,11 +98,17 @@ def allowed_for(quantity: str, kind: str, tolerance: Mapping[str, float]) -> flo
     return own if own is not None else tolerance.get(kind)
 
 
-def _number(text: str, units: Mapping[str, float]) -> float | None:
-    """Return a positive number with one of the units, in SI; None if it is none."""
-    match = re.fullmatch(r"\s*(.*?)\s*([a-z]*)\s*", text)
-    try:
-        value = float(match[1]) * units[match[2]] if match else math.nan
-    except (ValueError, KeyError):
+def _number(text: str, units: Mapping[str, Decimal], zero: bool) -> float | None:
+    """Return a number with one of the units, in SI; None if it is none that is allowed.
+
+    It is rounded once: 1.1mm and 0.0011 are one number.
+    """
+    match = QUANTITY.fullmatch(text)
+    if match is None or match[2] not in units:
         return None
-    return value if 0.0 < value < math.inf else None
+    value = float(Decimal(match[1]) * units[match[2]])
+    return value if _fits(value, zero) else None
+
+
+def _fits(value: float, zero: bool) -> bool:
+    return 0.0 < value < math.inf or (zero and value == 0.0)

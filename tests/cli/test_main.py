@@ -107,11 +107,3 @@ def test_shell_completion_offers_commands_and_robots() -> None:
 
     robots = RobotType().shell_complete(click.Context(cli), click.Option(["--robot"]), "ur5")
     assert {item.value for item in robots} >= {"ur5", "ur5e"}
-
-
-def test_the_default_tolerance_of_the_command_is_that_of_the_function() -> None:
-    """The command spells it again, so that its --help needs not import NumPy."""
-    from urmpipe.commands.compare import TOLERANCE
-    from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE
-
-    assert TOLERANCE == DEFAULT_TOLERANCE

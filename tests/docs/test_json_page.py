@@ -13,8 +13,8 @@ from urmpipe_datasets import LOGS
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"`(\w+)`", PAGE))
-FREE = {"units", "tolerance", "delta", "start", "joints", "joint_turns"}
-"""Objects whose keys are names of columns, axes, joints or kinds."""
+FREE = {"units", "tolerance", "noise", "before", "now", "delta", "start", "joints", "joint_turns"}
+"""Objects whose keys are names of columns, axes, joints, kinds or options."""
 
 
 def keys(value: Any) -> set[str]:
@@ -31,7 +31,8 @@ def keys(value: Any) -> set[str]:
 def printed() -> list[dict[str, Any]]:
     """What ingest and compare print of a log with wraps."""
     run = urmpipe.ingest(LOGS / "coppeliasim.csv", robot="urm6")
-    result = urmpipe.compare(LOGS / "path.csv", [run])
+    before = urmpipe.compare(LOGS / "path.csv", [run], tolerance=0.001)
+    result = urmpipe.compare(LOGS / "path.csv", [run], baseline=before)
     return [run.to_dict(), result.to_dict(), *(one["delta"]["x"] for one in result.to_dict()["runs"])]
 
 

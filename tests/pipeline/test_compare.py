@@ -161,7 +161,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
         CompareOptions({"axis": -1.0})
     assert str(option_error.value) == (
         "--tolerance: found axis=-1.0, allowed: a length in m, or axis=, x=, y=, z=, norm=,"
-        " path= (m, mm, um), angle=, joint= (rad, mrad, deg); positive"
+        " path= (m, mm, um), angle=, joint= (rad, mrad, deg; m of a joint that slides); positive"
     )
 
 

@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+from click.core import ParameterSource
 
-from urmpipe.options import about_recordings, log_options, output_options, take_log_options
+from urmpipe.options import Command, about_recordings, log_options, output_options, take_log_options
 from urmpipe.process import tune_pyarrow
+from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE
 
-TOLERANCE = 0.0035
+if TYPE_CHECKING:
+    from urmpipe_pipeline.comparison import Comparison
+
+OF_RESULTS = {"baseline", "noise", "junit", "statistics", "strict", "as_json", "quiet", "debug"}
+"""Parameters that a comparison takes that was made before; the others say how one is made."""
 
 
 def _sync(ctx: click.Context, param: click.Parameter, value: str) -> str | float:
@@ -23,11 +30,23 @@ def _sync(ctx: click.Context, param: click.Parameter, value: str) -> str | float
         raise click.BadParameter(f"found {value!r}, allowed: start, auto, or a time in s") from None
 
 
-def _tolerance(ctx: click.Context, param: click.Parameter, value: str | float) -> dict[str, float]:
+def _tolerance(ctx: click.Context, param: click.Parameter, value: str) -> dict[str, float]:
     """Return what is allowed, by kind."""
     from urmpipe_pipeline.tolerance import parse_tolerance
 
-    return parse_tolerance(str(value))
+    return parse_tolerance(value)
+
+
+def _noise(ctx: click.Context, param: click.Parameter, value: str | None) -> dict[str, float] | None:
+    """Return what of a change means nothing, by kind."""
+    from urmpipe_pipeline.baseline import parse_noise
+
+    return None if value is None else parse_noise(value)
+
+
+def _file(name: str, *names: str, help: str) -> Callable[[Command], Command]:
+    """Return an option that names a file to write or to read."""
+    return click.option(name, *names, metavar="FILE", type=click.Path(path_type=Path), help=help)
 
 
 @click.command(short_help="Hold logs against a reference and give a verdict.")
@@ -41,11 +60,13 @@ def _tolerance(ctx: click.Context, param: click.Parameter, value: str | float) -
 )
 @click.option(
     "--tolerance",
-    default=str(TOLERANCE),
+    default=str(DEFAULT_TOLERANCE),
     show_default=True,
     callback=_tolerance,
     metavar="M|KIND=VALUE,...",
-    help="Largest deviation allowed: on an axis in m, or of kinds: axis, norm, path, angle, joint, x, y, z.",
+    help="Largest deviation allowed: on an axis in m, or of kinds: axis, x, y, z, norm, path (m, mm, um),"
+    " angle, joint (rad, mrad, deg; m of joints that slide), as axis=3.5mm,norm=5mm,angle=0.5deg. It replaces"
+    " the default whole: what is not named is not judged.",
 )
 @click.option(
     "--tcp",
@@ -69,6 +90,15 @@ def _tolerance(ctx: click.Context, param: click.Parameter, value: str | float) -
     show_default=True,
     help="Move the log first: to the same start pose, by the best rigid motion, by the best tool offset.",
 )
+@_file("--junit", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
+@_file("--csv", "statistics", help="Write the statistics as a table, one line a log and quantity.")
+@_file("--baseline", help="Tell what changed since an earlier comparison (its .rrd); worse is exit code 1.")
+@click.option(
+    "--noise",
+    callback=_noise,
+    metavar="M|KIND=VALUE,...",
+    help="Changes since the baseline that mean nothing, as --tolerance [default: 1um, 1e-6 rad].",
+)
 @log_options
 @output_options
 @click.pass_context
@@ -86,30 +116,40 @@ def compare(
 
     REFERENCE is a path (t, x, y, z), a log, or a recording; so is each LOG. With REFERENCE alone, the
     forward kinematics of that log are held against the tool centre point that it recorded itself. A
-    folder stands for the files of one log.
+    folder stands for the files of one log. With --baseline, REFERENCE alone may be the recording of a
+    comparison, which stands as it was made.
 
     \b
     Examples:
       urmpipe compare path.csv log.csv --robot urm6
       urmpipe compare path.csv coppelia.csv matlab.csv solidworks/ --robot urm6 --json
-      urmpipe compare robot_data.csv --robot ur5e --tolerance 0.002
+      urmpipe compare robot_data.csv --robot ur5e --tolerance axis=2mm,norm=3mm,angle=0.5deg
+      urmpipe compare path.csv log.csv --robot urm6 --junit verdict.xml --csv verdict.csv
+      urmpipe compare today.rrd --baseline released.rrd --noise 5um
 
-    Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
+    Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
     """
     tune_pyarrow()
     from urmpipe import api
-    from urmpipe.printing import print_comparison, print_json, print_recording, print_warnings, progress_bar
+    from urmpipe.comparison_printing import print_comparison
+    from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar
 
     said = about_recordings(ctx, (reference, *logs))
     if said and not quiet:
         click.echo(f"note: {said}", err=True)
+    made = None if logs or not options["baseline"] else _made_before(ctx, reference)
+    if not options["baseline"] and ctx.get_parameter_source("noise") != ParameterSource.COMMANDLINE:
+        options["noise"] = None  # what a lab says for the calls that have a baseline
     robot, read = take_log_options(options)
-    names = ("tsp", "derivative", "strict", "tolerance", "tcp", "sync", "align")
+    names = (
+        "tsp", "derivative", "strict", "tolerance", "tcp", "sync", "align", "baseline", "noise", "junit",
+        "statistics",
+    )  # fmt: skip
     shared = {name: options.pop(name) for name in names}
-    target = output or Path(default_name(reference, logs))
-    with progress_bar(f"Writing {target}", quiet=quiet) as progress:
+    target = None if made else output or Path(default_name(reference, logs))
+    with progress_bar(f"Writing {target}", quiet=quiet or made is not None) as progress:
         result = api.compare(
-            reference,
+            made or reference,
             logs,
             robot=robot,
             read=read,
@@ -125,8 +165,35 @@ def compare(
         print_json(result.to_dict())
     elif not quiet:
         print_comparison(result)
+        for title, path in (("JUnit", shared["junit"]), ("Statistics", shared["statistics"])):
+            if path:
+                click.echo(f"{title}: {path}")
         print_recording(result.recording)
-    return 0 if result.verdict == "pass" else 1
+    return 0 if result.accepted else 1
+
+
+def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:
+    """Return the comparison that the reference is the recording of; None if it is anything else.
+
+    Raises:
+        UsageError: If options were given that say how a comparison is made.
+    """
+    from urmpipe_pipeline.operands import load_comparison
+
+    made = load_comparison(reference)
+    given = [
+        max(param.opts, key=len)
+        for param in ctx.command.params
+        if isinstance(param, click.Option)
+        and param.name not in OF_RESULTS
+        and ctx.get_parameter_source(param.name or "") == ParameterSource.COMMANDLINE
+    ]
+    if made is not None and given:
+        raise click.UsageError(
+            f"{', '.join(given)}: found with the recording of a comparison ({reference}), which stands as it"
+            " was made, allowed: with the logs themselves"
+        )
+    return made
 
 
 def default_name(reference: Path, logs: tuple[Path, ...]) -> str:

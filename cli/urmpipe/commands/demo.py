@@ -40,7 +40,8 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
     """
     tune_pyarrow()
     from urmpipe import api
-    from urmpipe.printing import print_comparison, print_json, print_recording, progress_bar
+    from urmpipe.comparison_printing import print_comparison
+    from urmpipe.printing import print_json, print_recording, progress_bar
     from urmpipe_datasets import LOGS
 
     output.mkdir(parents=True, exist_ok=True)

@@ -1,0 +1,42 @@
+"""The statistics of a comparison as CSV: one line a log and quantity, numbers that read back bit for bit."""
+
+from __future__ import annotations
+
+import csv
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.comparison import Comparison, Statistics
+
+COLUMNS = ("run", "sync_offset", *(field.name for field in fields(Statistics)))
+"""The header; lengths are in m, angles in rad, times in s."""
+
+
+def write_statistics(result: Comparison, part: Path, path: Path) -> None:
+    """Write the statistics of a comparison and read them back.
+
+    Numbers stand in the shortest digits that are theirs; a cell is empty where there is no value.
+
+    Args:
+        result: The comparison.
+        part: Where to write it, as `guarded_output` gives it.
+        path: The name it is to have, for messages.
+
+    Raises:
+        OutputError: If it did not read back as it was written.
+    """
+    rows = [list(COLUMNS), *([_cell(row[name]) for name in COLUMNS] for row in result.rows())]
+    with part.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)
+    with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:
+        if list(csv.reader(file)) != rows:
+            raise OutputError(Finding("reads back otherwise than written", str(path)))
+
+
+def _cell(value: Any) -> str:
+    """Return a value as text; repr of a float is the shortest that reads back as the same number."""
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else repr(value)

@@ -1,0 +1,337 @@
+"""compare on the command line: tolerances, JUnit, CSV and a baseline; all numbers are the same."""
+
+from __future__ import annotations
+
+import csv
+import json
+import xml.etree.ElementTree as ET
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pytest
+from click.shell_completion import ShellComplete
+from numpy.typing import NDArray
+
+import urmpipe
+from urmpipe.main import cli, run
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.comparison import Comparison, Statistics
+from urmpipe_pipeline.recording import read_recording
+
+Captured = pytest.CaptureFixture[str]
+
+ALLOWED = (
+    "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
+    " m of a joint that slides)"
+)
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a path and three logs: within tolerance, a little worse, and out of it."""
+    monkeypatch.chdir(tmp_path)
+    t = 0.005 * np.arange(200)
+    q = np.cos(np.outer(t, 0.5 + 0.1 * np.arange(6)))
+    for name, off in (("wanted", 0.0), ("good", 0.0005), ("slack", 0.0006), ("bad", 0.02)):
+        write_log(f"{name}.csv", t, q - off * np.sin(t)[:, np.newaxis])
+    return tmp_path
+
+
+def write_log(name: str, t: NDArray[Any], q: NDArray[Any]) -> None:
+    """Write a log of six joints."""
+    header = "t [s]," + ",".join(f"q{i} [rad]" for i in range(1, 7))
+    np.savetxt(name, np.column_stack([t, q]), fmt="%.9f", delimiter=",", header=header, comments="")
+
+
+def compare(*arguments: str) -> int:
+    """Run `urmpipe compare wanted.csv ...` with an arm."""
+    return run(["compare", "wanted.csv", *arguments, "--robot", "ur5e"])
+
+
+def recorded(name: str) -> Comparison:
+    """Return the comparison that a recording holds."""
+    result = read_recording(Path(name))
+    assert isinstance(result, Comparison)
+    return result
+
+
+def said(capsys: Captured) -> str:
+    """Return the last line on standard error."""
+    return capsys.readouterr().err.splitlines()[-1]
+
+
+def names() -> set[str]:
+    """Return what stands in the folder beside the logs."""
+    return {path.name for path in Path.cwd().iterdir()} - {
+        f"{n}.csv" for n in ("wanted", "good", "slack", "bad")
+    }
+
+
+def test_json_csv_junit_and_recording_agree_bit_for_bit(capsys: Captured) -> None:
+    tolerance = "axis=3.5mm,norm=5mm,path=3mm,angle=0.5deg,joint=2mrad"
+    files = ["--csv", "a.csv", "--junit", "a.xml", "-o", "a.rrd", "--json"]
+    assert compare("good.csv", "bad.csv", "--tolerance", tolerance, *files) == 1
+    told = json.loads(capsys.readouterr().out)
+    stored = recorded("a.rrd")
+    with Path("a.csv").open(encoding="utf-8", newline="") as file:
+        rows = {(row["run"], row["kind"], row["quantity"]): row for row in csv.DictReader(file)}
+    suites = {suite.get("name"): suite for suite in ET.parse("a.xml").getroot()}
+    for one, in_json in zip(stored.runs, told["runs"], strict=True):
+        properties = {p.attrib["name"]: p.attrib["value"] for p in suites[one.name].iter("property")}
+        for statistics in one.all_statistics:
+            kept = {
+                key: value for key, value in asdict(statistics).items() if key not in ("quantity", "kind")
+            }
+            assert kept == in_json_of(in_json, statistics)
+            prefix = f"{'joint ' if statistics.kind == 'joint' else ''}{statistics.quantity}"
+            for field, value in kept.items():
+                text = "" if value is None else value if isinstance(value, str) else repr(value)
+                assert rows[one.name, statistics.kind, statistics.quantity][field] == text
+                assert properties[f"{prefix}.{field}"] == text
+    assert [row["verdict"] for row in rows.values()].count("fail") == len(
+        [case for suite in suites.values() for case in suite.findall("testcase/failure")]
+    )
+    assert {
+        (case.get("classname"), case[0].get("type"))
+        for case in ET.parse("a.xml").iter("testcase")
+        if len(case)
+    } == {("bad", "out-of-tolerance")}
+
+
+def in_json_of(told: dict[str, Any], one: Statistics) -> dict[str, Any]:
+    """Return the statistics of a quantity in the JSON object of a run."""
+    place = told["joints"] if one.kind == "joint" else told["delta"] if one.kind in ("axis", "norm") else told
+    found: dict[str, Any] = place[one.quantity]
+    return found
+
+
+def test_what_is_given_replaces_the_default_tolerance_whole(capsys: Captured) -> None:
+    assert compare("bad.csv", "--json") == 1
+    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.0035}
+    assert compare("bad.csv", "--tolerance", "angle=5deg", "--json") == 0
+    told = json.loads(capsys.readouterr().out)
+    assert told["tolerance"] == {"angle": np.radians(5.0)}
+    assert told["runs"][0]["delta"]["x"]["verdict"] is None
+
+
+def test_the_help_says_what_a_tolerance_is(capsys: Captured) -> None:
+    assert run(["compare", "--help"]) == 0
+    text = " ".join(capsys.readouterr().out.split())
+    assert "[default: 0.0035]" in text
+    assert (
+        "as axis=3.5mm,norm=5mm,angle=0.5deg. It replaces the default whole: what is not named is not judged."
+        in text
+    )
+    assert "joint (rad, mrad, deg; m of joints that slide)" in text
+    assert "worse is exit code 1" in text
+
+
+def test_all_that_is_wrong_with_a_tolerance_is_told_at_once(capsys: Captured) -> None:
+    assert compare("good.csv", "--tolerance", "axis=3 inch,roll=1deg,norm=5mm") == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"error: --tolerance: found 'axis=3 inch', {ALLOWED}",
+        f"error: --tolerance: found 'roll=1deg', {ALLOWED}",
+    ]
+    assert names() == set()
+
+
+@pytest.mark.parametrize(
+    ("text", "tolerance"),
+    [
+        ("[compare]\ntolerance = 0.002", {"axis": 0.002}),
+        ("tolerance = '2mm,norm=3mm'", {"axis": 0.002, "norm": 0.003}),
+        ("[compare]\ntolerance = {axis = 0.002, angle = '10mrad'}", {"axis": 0.002, "angle": 0.01}),
+        ("tolerance = {x = 0.002}", {"x": 0.002}),
+        ("[compare.tolerance]\npath = '1mm'", {"path": 0.001}),
+    ],
+)
+def test_a_lab_says_its_tolerance_as_text_or_as_a_table(
+    folder: Path, capsys: Captured, text: str, tolerance: dict[str, float]
+) -> None:
+    (folder / "urmpipe.toml").write_text(text)
+    compare("good.csv", "--json")
+    assert json.loads(capsys.readouterr().out)["tolerance"] == tolerance
+
+
+def test_a_lab_says_its_noise_for_the_calls_that_have_a_baseline(folder: Path, capsys: Captured) -> None:
+    (folder / "urmpipe.toml").write_text("noise = {axis = '2um'}")
+    assert compare("good.csv", "-q", "-o", "a.rrd") == 0
+    assert run(["compare", "a.rrd", "--baseline", "a.rrd", "--json"]) == 0
+    noise = json.loads(capsys.readouterr().out)["baseline"]["noise"]
+    assert noise == {"axis": 2e-6, **dict.fromkeys(("norm", "path", "angle", "joint"), 1e-6)}
+
+
+def test_a_table_that_is_no_tolerance_is_refused(folder: Path, capsys: Captured) -> None:
+    (folder / "urmpipe.toml").write_text("tolerance = {roll = 1, axis = {x = 1}}")
+    assert compare("good.csv", "-q") == 2
+    assert capsys.readouterr().err.splitlines() == [
+        f"error: --tolerance: found 'roll=1', {ALLOWED}",
+        f"""error: --tolerance: found "axis={{'x': 1}}", {ALLOWED}""",
+    ]
+
+
+@pytest.mark.parametrize("name", ["junit", "csv", "baseline"])
+def test_what_one_call_is_to_give_is_no_default(folder: Path, capsys: Captured, name: str) -> None:
+    (folder / "urmpipe.toml").write_text(f"{name} = 'x'\n")
+    assert compare("good.csv") == 2
+    assert f"key {name}: unknown" in capsys.readouterr().err
+
+
+def test_options_complete_in_the_shell() -> None:
+    shell = ShellComplete(cli, {}, "urmpipe", "_URMPIPE_COMPLETE")
+    for option in ("--junit", "--csv", "--baseline", "--noise", "--tolerance"):
+        assert [item.value for item in shell.get_completions(["compare"], option)] == [option]
+    for option in ("--junit", "--csv", "--baseline"):
+        assert [item.type for item in shell.get_completions(["compare", option], "")] == ["file"]
+
+
+def test_a_verdict_of_fail_writes_all_and_bad_input_nothing(folder: Path, capsys: Captured) -> None:
+    files = ["--junit", "v.xml", "--csv", "v.csv", "-o", "v.rrd"]
+    assert compare("bad.csv", *files) == 1
+    out = capsys.readouterr().out.splitlines()
+    assert {"JUnit: v.xml", "Statistics: v.csv"} <= set(out)
+    assert names() == {"v.xml", "v.csv", "v.rrd"}
+    before = {name: (folder / name).read_bytes() for name in names()}
+    assert compare("good.csv", "missing.csv", *files, "-q") == 2
+    assert compare("good.csv", "--strict", "--tsp", "7ms", *files, "-q") == 2
+    assert compare("good.csv", "--tolerance", "0", *files, "-q") == 2
+    (folder / "notes.txt").write_text("mine")
+    assert compare("good.csv", "--junit", "v.xml", "--csv", "notes.txt", "-o", "v.rrd", "-q") == 2
+    assert compare("good.csv", "--junit", "v.xml", "--csv", "v.csv", "-o", "notes.txt", "-q") == 2
+    assert {name: (folder / name).read_bytes() for name in before} == before
+    assert names() == {"v.xml", "v.csv", "v.rrd", "notes.txt"}
+    assert (folder / "notes.txt").read_text() == "mine"
+    capsys.readouterr()
+    assert compare("good.csv", *files, "-q") == 0
+    assert capsys.readouterr() == ("", "")
+
+
+def test_an_output_is_no_input_and_no_other_output(capsys: Captured) -> None:
+    assert compare("good.csv", "--csv", "good.csv", "-q") == 2
+    assert said(capsys) == (
+        "error: good.csv: found an input of this command, allowed: any other name for the table of statistics"
+    )
+    assert compare("good.csv", "--csv", "a", "--junit", "./a", "-q") == 2
+    assert said(capsys) == "error: found a as junit and as statistics; allowed: a name for each"
+    assert names() == set()
+
+
+def test_a_log_of_the_baseline_that_is_missing_is_exit_code_1() -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    assert compare("good.csv", "slack.csv", "--baseline", "before.rrd", "-q", "-o", "now.rrd") == 0
+    assert compare("slack.csv", "--baseline", "before.rrd", "-q", "-o", "now.rrd") == 1
+    assert names() == {"before.rrd", "now.rrd"}
+
+
+def test_a_comparison_is_held_against_another(folder: Path, capsys: Captured) -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    (folder / "good.csv").write_bytes((folder / "slack.csv").read_bytes())
+    assert compare("good.csv", "-q", "-o", "now.rrd") == 0
+    capsys.readouterr()
+    assert run(["compare", "now.rrd", "--baseline", "before.rrd", "--json", "--junit", "v.xml"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert (told["verdict"], told["recording"], told["baseline"]["verdict"]) == ("pass", "now.rrd", "fail")
+    assert told["baseline"]["recording"] == "before.rrd"
+    x = next(one for one in told["baseline"]["changes"] if one["quantity"] == "x")
+    before, now = (recorded(name).runs[0] for name in ("before.rrd", "now.rrd"))
+    assert x["max"] == {"before": before.statistics["x"].max, "now": now.statistics["x"].max}
+    assert x["largest_change"] == np.abs(now.delta[:, 0] - before.delta[:, 0]).max()
+    types = {one.get("type") for one in ET.parse("v.xml").iter("failure")}
+    assert types == {"worse-than-baseline"}
+    assert names() == {"before.rrd", "now.rrd", "v.xml"}
+
+    noise = ["--noise", "1mm,angle=1deg,joint=1deg"]
+    assert run(["compare", "now.rrd", "--baseline", "before.rrd", "-q", *noise]) == 0
+    assert run(["compare", "before.rrd", "--baseline", "now.rrd", "-q"]) == 0
+    assert (
+        run(["compare", "before.rrd", "--baseline", "before.rrd", "-q", "--noise", "0,angle=0,joint=0"]) == 0
+    )
+    assert compare("good.csv", "--baseline", "before.rrd", "-q") == 1
+    assert recorded("good-against-wanted.rrd").baseline is None
+
+
+def test_what_changed_is_printed(folder: Path, capsys: Captured) -> None:
+    assert compare("good.csv", "bad.csv", "-q", "-o", "before.rrd") == 1
+    (folder / "good.csv").write_bytes((folder / "slack.csv").read_bytes())
+    assert compare("good.csv", "slack.csv", "-q", "-o", "now.rrd", "--tolerance", "4mm") == 0
+    capsys.readouterr()
+    assert run(["compare", "now.rrd", "--baseline", "before.rrd"]) == 1
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    begin = lines.index("FAIL  against the baseline against-wanted: 12 quantities worse, 1 gone")
+    assert lines[begin + 2] == "Changed since against-wanted by more than the noise"
+    before, now = (recorded(name).runs[0].statistics["x"] for name in ("before.rrd", "now.rrd"))
+    row = next(line for line in lines[begin:] if line.startswith("good") and "Δx" in line)
+    assert f"{before.max * 1e3:.4f} → {now.max * 1e3:.4f}" in row
+    assert f"{before.rms * 1e3:.4f} → {now.rms * 1e3:.4f}" in row
+    assert {
+        "noise: axis 0.001 mm, norm 0.001 mm, path 0.001 mm, angle 5.72958e-05 deg, joint 5.72958e-05 deg",
+        "new: slack",
+        "gone: bad",
+        'made otherwise: tolerance: {"axis": 0.0035} → {"axis": 0.004}',
+    } <= set(lines)
+
+
+def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -> None:
+    assert compare("good.csv", "-q", "-o", "a.rrd") == 0
+    given = ["--tolerance", "1mm", "--align", "none", "-o", "b.rrd"]
+    assert run(["compare", "a.rrd", "--baseline", "a.rrd", *given]) == 2
+    assert said(capsys) == (
+        "Error: --output, --tolerance, --align: found with the recording of a comparison (a.rrd),"
+        " which stands as it was made, allowed: with the logs themselves"
+    )
+    assert run(["compare", "a.rrd"]) == 2
+    assert said(capsys) == (
+        "error: a.rrd: found the recording of a comparison, allowed: one that ingest wrote; to hold it"
+        " against another comparison, give it alone, with --baseline OTHER.rrd"
+    )
+
+
+def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
+    assert run(["ingest", "good.csv", "--robot", "ur5e", "-q"]) == 0
+    for baseline, found in (
+        ("good.rrd", "found the recording of one log, allowed: that of a comparison (--baseline)"),
+        ("good.csv", "found no recording of urmpipe, allowed: a .rrd that ingest or compare wrote"),
+        ("missing.rrd", "found no such file, allowed: a recording (.rrd) that urmpipe wrote"),
+    ):
+        assert compare("good.csv", "--baseline", baseline, "-q") == 2
+        assert said(capsys) == f"error: {baseline}: {found}"
+    assert compare("good.csv", "--noise", "1um", "-q") == 2
+    assert said(capsys) == "error: --noise: found without --baseline, allowed: with an earlier comparison"
+    assert compare("good.csv", "--baseline", "good.rrd", "--noise", "-1", "-q") == 2
+    assert said(capsys) == f"error: --noise: found '-1', {ALLOWED}"
+
+
+def test_a_baseline_is_never_replaced(capsys: Captured) -> None:
+    assert compare("good.csv", "-q") == 0
+    assert compare("good.csv", "--baseline", "good-against-wanted.rrd", "-q") == 2
+    assert said(capsys) == (
+        "error: good-against-wanted.rrd: found an input of this command,"
+        " allowed: any other name for the recording"
+    )
+
+
+def test_results_are_operands_of_the_function() -> None:
+    before = urmpipe.compare("wanted.csv", ["good.csv"], robot="ur5e")
+    now = urmpipe.compare(before, baseline=before, noise=0.0, junit="v.xml", statistics="v.csv")
+    assert now.accepted
+    assert now.baseline is not None
+    assert (now.baseline.worse, now.baseline.noise["axis"]) == ((), 0.0)
+    assert names() == {"v.xml", "v.csv"}
+    with pytest.raises(OptionError) as error:
+        urmpipe.compare(before)
+    assert str(error.value) == (
+        "found a comparison as the reference, allowed: with a baseline, and without logs"
+    )
+    with pytest.raises(OptionError) as error:
+        urmpipe.compare(before, baseline=before, output="a.rrd")
+    assert str(error.value) == "-o: found a.rrd with a comparison that stands already, allowed: without"
+
+
+def test_the_option_of_a_file_is_a_path() -> None:
+    command = cli.get_command(click.Context(cli), "compare")
+    assert command is not None
+    kinds = {param.name: type(param.type) for param in command.params}
+    assert {kinds[name] for name in ("junit", "statistics", "baseline")} == {click.Path}
