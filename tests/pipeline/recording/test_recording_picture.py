@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.recording.viewer import open_window, opening_times
 from urmpipe_pipeline.results import Run
 
 MakeRun = Callable[..., Run]
@@ -103,7 +104,9 @@ def test_a_run_in_the_viewer(viewer: Any, make_run: MakeRun, tmp_path: Path) -> 
     assert complaints(viewer) == []
     # The arm's joints are balls in the colours of the series; the path is in the run's colour.
     assert_drawn(picture, left=[*JOINT_COLOURS[:5], run_colour(0)], right=JOINT_COLOURS[:6])
-    assert {"Arm and paths [m]", "Joints in the file [rad]", "Joints repolarized [rad]"} <= view_names(viewer)
+    wraps = len(make_run(rows=4000).repolarizations)
+    wanted = {"Arm and paths [m]", "Joints in the file [rad]", f"Joints repolarized ({wraps} marked) [rad]"}
+    assert wanted <= view_names(viewer)
 
 
 def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison, tmp_path: Path) -> None:
@@ -114,7 +117,7 @@ def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison
     picture = look(viewer, path, 12.0, right)
     assert complaints(viewer) == []
     assert_drawn(picture, left=[*JOINT_COLOURS[:5], REFERENCE_COLOUR], right=right)
-    assert "delta of a b/c.d [x] Ω [m]" in view_names(viewer)
+    assert "delta = asked for - a b/c.d [x] Ω [m]" in view_names(viewer)
 
 
 def test_a_log_without_a_robot_in_the_viewer(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:
@@ -123,3 +126,27 @@ def test_a_log_without_a_robot_in_the_viewer(viewer: Any, make_run: MakeRun, tmp
     assert complaints(viewer) == []
     assert_drawn(picture, left=[], right=JOINT_COLOURS[:6])
     assert "Arm and paths [m]" not in view_names(viewer)
+
+
+def test_a_long_log_is_seen_whole(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:
+    """The viewer would open so long a log on one minute of it."""
+    run = make_run(rows=120_000)
+    path = write_recording(run, tmp_path / "long.rrd")
+    # Both joints that turn on and on are seen up to the end of the log, left of the legend.
+    picture = look(viewer, path, 12.0, JOINT_COLOURS[:6])
+    assert complaints(viewer) == []
+    width = picture.shape[1]
+    late = picture[:, round(0.85 * width) : round(0.93 * width)]
+    assert all(pixels(late, colour) >= 20 for colour in (JOINT_COLOURS[0], JOINT_COLOURS[5]))
+    assert "Joints in the file [rad], every peak of 120,000 rows" in view_names(viewer)
+
+
+def test_view_opens_at_the_worst_sample(make_comparison: MakeComparison, tmp_path: Path) -> None:
+    comparison = make_comparison()
+    path = write_recording(comparison, tmp_path / "both.rrd")
+    worst = comparison.ranking[-1]
+    with open_window(path, opening_times([path])[path], headless=True) as (process, client):
+        (shown,) = client.get_state().recordings
+        assert (shown.current_timeline, shown.current_time) == ("t", worst.t_ns[worst.worst])
+        assert complaints(client) == []
+    assert process.poll() is not None
