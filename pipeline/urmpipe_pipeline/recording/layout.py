@@ -29,7 +29,7 @@ EYE = np.array([0.62, -0.66, 0.42]) * 1.8
 HEIGHTS = {"delta": 4, "joints in the file": 3.5, "joints repolarized": 3, "speed": 2, "events": 2.2}
 """Shares of the height that the plots have."""
 
-HEAD_SHARE, LINE_SHARE, MOST_TEXT = 0.08, 0.025, 0.45
+HEAD_SHARE, LINE_SHARE, MOST_TEXT = 0.12, 0.022, 0.45
 """Shares of the height for the summary: its title, each line, and all of it at most."""
 
 
@@ -79,7 +79,10 @@ def _of_run(run: Run) -> Container:
     rows = _joint_rows(plots, run, place)
     if speed := plots.speed(run, place):
         rows.append((_tabs(speed), HEIGHTS["speed"]))
-    rows.append((_tabs([_events(place), *plots.motion(run, place)]), HEIGHTS["events"]))
+    motion, events = plots.motion(run, place), _events(place)
+    if not rows and motion:  # a path: there is room for where it was
+        return _stacked([(_tabs(motion), HEIGHTS["delta"]), (events, HEIGHTS["events"])])
+    rows.append((_tabs([events, *motion]), HEIGHTS["events"]))
     return _stacked(rows)
 
 

@@ -65,19 +65,18 @@ def draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
 
     # A line between two values at one time is drawn as a point: one of them is a nanosecond later.
     t_ns = one.t_ns[one.worst] + np.arange(2)
+    style = rr.SeriesLines(
+        colors=[rgb(WORST_COLOUR)],
+        names=["worst"],
+        widths=[WORST_WIDTH],
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,
+    )
     for plot, values in _plots(one):
-        known = values[np.isfinite(values)]
-        if len(known):
-            style = rr.SeriesLines(
-                colors=[rgb(WORST_COLOUR)],
-                names=["worst"],
-                widths=[WORST_WIDTH],
-                aggregation_policy=rr.components.AggregationPolicy.MinMax,
-            )
+        ends = [ufunc.reduce(values, axis=None) for ufunc in (np.fmin, np.fmax)]  # of what is no NaN
+        if np.isfinite(ends).all():
             entity = worst_entity(place, plot)
             stream.log(entity, style, static=True)
-            ends = scalar_column(np.array([[known.min()], [known.max()]]))
-            stream.send_columns(entity, time_columns(t_ns), [ends])
+            stream.send_columns(entity, time_columns(t_ns), [scalar_column(np.array(ends)[:, np.newaxis])])
 
 
 def _plots(one: Deviation) -> Iterator[tuple[str, FloatArray]]:

@@ -30,14 +30,13 @@ def _of_run(run: Run) -> Iterator[str]:
     if run.robot is not None:
         robot = f"Arm: {_text(run.robot.name)}."
     wraps, others = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
-    doubts = f" and {others} other findings (crosses)" if others else ""
+    marked = ", marked by triangles in the joint's colour" if wraps else ""
+    doubts = f"; other findings: {others}, marked by crosses" if others else ""
     yield f"### {_text(run.name)}"
     yield f"{files}, read as {_text(run.log.source)}: {run.log.rows} rows, {run.duration:.6g} s. {robot}"
     yield ""
-    yield (
-        f"Grid: {len(run.t_ns)} samples, one in {1e3 * run.tsp:.6g} ms. Repolarizations: {wraps},"
-        f" marked by triangles in the joint's colour{doubts}."
-    )
+    grid = f"Grid: {len(run.t_ns)} samples, one in {1e3 * run.tsp:.6g} ms."
+    yield f"{grid} Repolarizations: {wraps}{marked}{doubts}." if run.log.joints else grid
     yield from _warnings(run.warnings)
 
 
