@@ -40,7 +40,7 @@ def draw_comparison_events(stream: RecordingStream, place: Place, one: Deviation
     """List how a log was put beside the reference, and where it deviates most."""
     found = sorted(_events(one), key=lambda event: event[0])
     t_ns = np.array([event[0] for event in found], dtype=np.int64)
-    texts, levels = [event[1] for event in found], [event[2] for event in found]
+    texts, levels = [printable(event[1]) for event in found], [event[2] for event in found]
     _draw(stream, f"{place.prefix}events/deviation", t_ns, texts, levels)
 
 

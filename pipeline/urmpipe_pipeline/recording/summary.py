@@ -77,12 +77,12 @@ def _worst(one: Deviation, several: bool) -> str:
 
 
 def _allowed(result: Comparison) -> str:
-    """Return what is allowed of each kind."""
-    units = {"angle": "rad", "joint": "rad"}
-    if any("m" in one.run.joint_units for one in result.runs):
-        units["joint"] = "m"
+    """Return what is allowed of each kind; what holds for joints in [rad] and in [m] is said of both."""
+    joints = sorted({unit for one in result.runs for unit in one.run.joint_units}, reverse=True)
+    units = {"angle": ["rad"], "joint": joints}
     return ", ".join(
-        f"{kind} {limit(value, units.get(kind, 'm'))}" for kind, value in result.tolerance.items()
+        f"{kind} {' or '.join(limit(value, unit) for unit in units.get(kind, ['m']))}"
+        for kind, value in result.tolerance.items()
     )
 
 

@@ -437,6 +437,24 @@ def test_the_summary_of_a_comparison_says_the_verdict_first(make_comparison: Mak
     ]
 
 
+def test_the_summary_says_each_tolerance_in_its_unit(make_comparison: MakeComparison) -> None:
+    allowed = {"axis": 0.0035, "path": 0.002, "angle": 0.01, "joint": 0.0005}
+    assert (
+        "Reference: asked for (grey, dashed)."
+        " Tolerance: axis 3.5 mm, path 2 mm, angle 10 mrad, joint 0.5 mrad."
+    ) in summary(replace(make_comparison(), tolerance=allowed)).splitlines()
+
+
+def test_what_no_text_can_hold_is_told_all_the_same(make_comparison: MakeComparison, tmp_path: Path) -> None:
+    """A file's name or header of undecodable bytes ends up in the verdict's words."""
+    one = make_comparison(("coppeliasim",)).runs[0]
+    worst = replace(one.joint_statistics["phi2"], quantity="q\udcff", tolerance=1e-9)
+    one = replace(one, joint_statistics={"q\udcff": worst})
+    path = write_recording(replace(make_comparison(), runs=(one,)), tmp_path / "odd.rrd")
+    said = [row[0] for row in columns(path, "/events/deviation", "TextLog:text")]
+    assert any("decides: q? reaches 2.0000 mrad of 1e-06 mrad allowed" in line for line in said)
+
+
 def test_the_summary_tells_how_clocks_and_places_were_put_together(make_comparison: MakeComparison) -> None:
     comparison = make_comparison(("coppeliasim",))
     turn = 0.01
