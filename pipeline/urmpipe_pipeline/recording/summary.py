@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -54,7 +55,9 @@ def _of_comparison(result: Comparison) -> Iterator[str]:
     yield from _table(result)
     yield from _set_up(result, several)
     told = [
-        LogWarning("", f"{one.name}: {w.message}", w.row) for one in result.runs for w in one.run.warnings
+        replace(warning, message=f"{one.name}: {warning.message}")
+        for one in result.runs
+        for warning in one.run.warnings
     ]
     yield from _warnings([*result.warnings, *told])
     yield ""
@@ -126,7 +129,7 @@ def _warnings(warnings: Sequence[LogWarning]) -> Iterator[str]:
         row = f" (row {one.row})" if one.row is not None else ""
         yield f"- {_text(one.message)}{row}"
     if len(warnings) > LISTED:
-        yield f"- and {len(warnings) - LISTED} more, in the list of events"
+        yield f"- and {len(warnings) - LISTED} more, all in the report"
 
 
 def _row(cells: Iterable[str]) -> str:
