@@ -43,7 +43,9 @@ def overviews(result: Run | Comparison, every: Sequence[Block]) -> Iterator[Bloc
         result: What is recorded.
         every: Its arrays.
     """
-    plotted = {entity for place in places_of(result) for entity in _plotted(place)}
+    runs = [result] if isinstance(result, Run) else [one.run for one in result.runs]
+    standing = zip(runs, places_of(result), strict=True)
+    plotted = {entity for run, place in standing for entity in _plotted(run, place)}
     for block in every:
         if block.entity in plotted and len(block.t_ns) > LONG:
             yield _overview(block, ROWS)
@@ -59,8 +61,10 @@ def speed_entity(place: Place) -> str:
     return f"{place.prefix}tcp/speed"
 
 
-def _plotted(place: Place) -> Iterator[str]:
+def _plotted(run: Run, place: Place) -> Iterator[str]:
     """Yield the entities that the layout shows first."""
+    if not run.log.joints:
+        yield f"{place.prefix}tcp/recorded"
     yield f"{place.prefix}joints/raw"
     yield f"{place.prefix}joints/repolarized"
     yield place.named("delta")

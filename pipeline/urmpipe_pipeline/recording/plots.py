@@ -117,8 +117,10 @@ class Plots:
             found.append(("TCP velocity [m/s]", "tcp/velocity"))
             found.append(("TCP acceleration [m/s2]", "tcp/acceleration"))
             found.append(("TCP rz, ry, rx [rad]", "tcp/euler_zyx"))
-        elif run.tcp_recorded is not None:
+        elif run.tcp_recorded is not None and run.log.joints:
             found.append(("Recorded TCP [m]", "tcp/recorded"))
+        elif run.tcp_recorded is not None:
+            return self.array("Recorded TCP", "m", f"{place.prefix}tcp/recorded", len(run.t_ns))
         return [self.series(name, place.prefix + entity) for name, entity in found]
 
 

@@ -194,6 +194,21 @@ def test_a_long_array_has_an_overview_that_keeps_every_extreme(
     assert "all 50,001 rows [m]" in names
 
 
+def test_a_long_path_has_an_overview_of_its_positions(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=LONG + 1)
+    assert run.tcp is not None
+    position, none = run.tcp.position, np.empty((LONG + 1, 0))
+    log = replace(run.log, joints=(), q=none, columns=(), tcp_position=position)
+    path = replace(
+        run, log=log, robot=None, tcp=None, q=none, qd=none, qdd=none, tcp_recorded=position, audit=()
+    )
+    file = write_recording(path, tmp_path / "path.rrd")
+    few = np.array(columns(file, "/overview/tcp/recorded", "Scalars:scalars"))
+    assert len(few) <= ROWS
+    np.testing.assert_array_equal(few.max(axis=0), position.max(axis=0))
+    assert "Recorded TCP [m], every peak of 50,001 rows" in views(file)["ViewBlueprint:display_name"]
+
+
 def test_of_a_short_log_only_the_speed_is_thinned_out(make_run: MakeRun, tmp_path: Path) -> None:
     run = make_run(rows=8000)
     assert run.tcp is not None
