@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from urmpipe.api import export as export
     from urmpipe.api import ingest as ingest
     from urmpipe.api import report as report
+    from urmpipe.api import view as view
     from urmpipe.api import write_map as write_map
     from urmpipe_models.catalogue import load_robot as load_robot
     from urmpipe_models.catalogue import robot_names as robot_names
@@ -50,6 +51,7 @@ _HOME = {
     "read_recording": "urmpipe_pipeline.recording",
     "report": "urmpipe.api",
     "robot_names": "urmpipe_models.catalogue",
+    "view": "urmpipe.api",
     "write_map": "urmpipe.api",
     "write_recording": "urmpipe_pipeline.recording",
 }

@@ -159,6 +159,21 @@ def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> 
     return Report(write_report(shown, Path(output), inputs=files), shown)
 
 
+def view(recordings: PathLike | Sequence[PathLike]) -> None:
+    """Open recordings in the viewer, each in a window paused at its worst sample; return when all are closed.
+
+    Args:
+        recordings: Recordings (.rrd) that urmpipe wrote.
+
+    Raises:
+        UrmpipeError: With every file that is no recording, or if the viewer cannot be shown here.
+    """
+    from urmpipe_pipeline.recording.viewer import view_recordings
+
+    given = [recordings] if isinstance(recordings, (str, Path)) else recordings
+    view_recordings([Path(one) for one in given])
+
+
 def write_map(run: Run, output: PathLike, inputs: Sequence[PathLike] = (), robot: str | None = None) -> Path:
     """Write the map (TOML) by which further logs read as this one was read.
 

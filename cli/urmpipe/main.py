@@ -27,6 +27,7 @@ COMMANDS = {
     "ingest": "Turn one log into a recording.",
     "compare": "Hold logs against a reference and give a verdict.",
     "report": "Write the HTML report of recordings.",
+    "view": "Open recordings in the viewer.",
     "export": "Write a recording as CSV, Parquet, MAT or TUM.",
     "robot": "List, show and export robots.",
 }
@@ -96,6 +97,7 @@ def cli() -> None:
       urmpipe ingest log.csv --robot urm6
       urmpipe compare path.csv log.csv --robot urm6 --tolerance 0.0035
       urmpipe report log-against-path.rrd
+      urmpipe view log-against-path.rrd
 
     Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
     """

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -34,12 +33,8 @@ def print_json(value: Any) -> None:
 
 
 def print_recording(recording: Path | None) -> None:
-    """Print where a recording is and how to open it, with the viewer that was installed with urmpipe."""
-    viewer = "rerun"
-    if shutil.which(viewer) is None:  # not on the path, as in an environment that was not activated
-        installed = Path(sys.executable).parent / viewer
-        viewer = str(installed.relative_to(Path.cwd()) if installed.is_relative_to(Path.cwd()) else installed)
-    click.echo(f"Recording: {recording}  (open it: {viewer} {recording})")
+    """Print where a recording is and how to open it."""
+    click.echo(f"Recording: {recording}  (open it: urmpipe view {recording})")
 
 
 def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:

@@ -69,3 +69,7 @@ class OutputError(UrmpipeError):
 
 class OptionError(UrmpipeError):
     """An option's value, or two options together, make no sense."""
+
+
+class ViewerError(UrmpipeError):
+    """A recording cannot be shown here: there is no display, or the viewer does not start."""

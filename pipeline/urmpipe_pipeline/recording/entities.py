@@ -13,6 +13,13 @@ A run stands at the root; of a comparison the first run does, and each further o
 Everything is in SI: [rad] or [m] and their derivatives, times in integer [ns]. joints/raw and
 joints/repolarized always stand, with no value a row for a log without joints: they carry the times.
 Flags (tcp/singular, matched/<key>/outside) stand only at the samples where they are true.
+
+What is there to be looked at only, and is not read back:
+
+    overview/...                                                few rows of what is long, and a run's speed
+    marks/repolarization/up, down, doubt; marks/worst/<plot>    in the plots of a run
+    tolerance/delta, path, angle, joints                        what is allowed, in the plot of each
+    events/..., summary, robot/..., path/..., point/...
 """
 
 from __future__ import annotations
@@ -117,6 +124,10 @@ class Block:
         """The colour of each column as #rrggbb."""
         if self.series == "joints":
             return [joint_colour(j) for j in range(len(self.names))]
+        if self.series == "number":
+            return [AXIS_COLOURS["norm"]]
+        if self.series == "euler":
+            return [AXIS_COLOURS[name[1]] for name in self.names]
         palette = [*AXIS_COLOURS.values(), *JOINT_COLOURS]
         return palette[: len(self.names)]
 

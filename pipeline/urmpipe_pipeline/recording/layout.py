@@ -1,4 +1,8 @@
-"""What the viewer opens with: the arm and the paths at the left, the series and the events at the right."""
+"""What the viewer opens with: verdict, arm and paths at the left; the plots and the events at the right.
+
+No blueprint says at which time the viewer opens: a `time_selection` moves the cursor only while it plays, and
+keeps it there. So `urmpipe view` sets the time, and a line through the worst sample stands in every plot.
+"""
 
 from __future__ import annotations
 
@@ -7,32 +11,41 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
+from urmpipe_pipeline.recording.plots import Plots, decisive_plot
 from urmpipe_pipeline.recording.scene import Scene
+from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.results import Run
 
 if TYPE_CHECKING:
-    from rerun.blueprint import Blueprint, Container, Spatial3DView, TextLogView, TimeSeriesView, View
+    from rerun.blueprint import Blueprint, Container, Spatial3DView, TextLogView, View
 
     Row: TypeAlias = tuple[View | Container, float]
 
 EYE = np.array([0.62, -0.66, 0.42]) * 1.8
 """From the middle of the scene to the eye, in radii of the scene: from the front right, a little above."""
 
+HEIGHTS = {"delta": 4, "joints in the file": 3.5, "joints repolarized": 3, "speed": 2, "events": 2.2}
+"""Shares of the height that the plots have."""
+
+HEAD_SHARE, LINE_SHARE, MOST_TEXT = 0.12, 0.022, 0.45
+"""Shares of the height for the summary: its title, each line, and all of it at most."""
+
 
 def viewer_layout(result: Run | Comparison, scene: Scene) -> Blueprint:
     """Return the views of a run or a comparison, each with its unit, on the timeline t."""
     import rerun.blueprint as rrb
 
-    rows = _run_rows(result) if isinstance(result, Run) else _comparison_rows(result)
-    # The table in it has a line a run.
-    height = 2.0 if isinstance(result, Run) else 1.2 + 0.4 * max(2, len(result.runs))
-    text: Row = (rrb.TextDocumentView(origin=SUMMARY, name="Summary"), height)
-    if scene.empty:
-        root = _stacked([text, *rows])
-    else:
-        root = rrb.Horizontal(_stacked([(_scene_view(scene), 7), text]), _stacked(rows), column_shares=[1, 1])
+    right = _of_run(result) if isinstance(result, Run) else _of_comparison(result)
+    text = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
+    lines = [line for line in summary(result).splitlines() if line]
+    share = min(MOST_TEXT, HEAD_SHARE + LINE_SHARE * len(lines))
+    shares = [share, 1 - share]
+    root: Container = rrb.Vertical(text, right, row_shares=shares)
+    if not scene.empty:
+        left = rrb.Vertical(text, _scene_view(scene), row_shares=shares)
+        root = rrb.Horizontal(left, right, column_shares=[1, 1])
     return rrb.Blueprint(
         root,
         rrb.TimePanel(state="collapsed", timeline="t", play_state="paused"),
@@ -41,6 +54,14 @@ def viewer_layout(result: Run | Comparison, scene: Scene) -> Blueprint:
         auto_layout=False,
         auto_views=False,
     )
+
+
+def opening_time(result: Run | Comparison) -> int:
+    """Return where the viewer should stand in [ns]: at the worst sample of the log that is open."""
+    if isinstance(result, Run):
+        return int(result.t_ns[0])
+    open_first = result.ranking[-1]
+    return int(open_first.t_ns[open_first.worst])
 
 
 def _scene_view(scene: Scene) -> Spatial3DView:
@@ -52,100 +73,66 @@ def _scene_view(scene: Scene) -> Spatial3DView:
     return rrb.Spatial3DView(origin="/", contents=entities, name="Arm and paths [m]", eye_controls=eye)
 
 
-def _run_rows(run: Run) -> list[Row]:
-    """Return the views of a run from top to bottom, each with its share of the height."""
-    place = places_of(run)[0]
-    rows: list[Row] = [(view, 3) for view in _joint_views(run, place, "")]
-    if motion := _motion_views(run, place):
-        rows.append((_tabs(motion), 3))
-    if run.audit or run.warnings:
-        rows.append((_events([place]), 2))
-    return rows
+def _of_run(run: Run) -> Container:
+    """Return the plots of an ingested log from top to bottom."""
+    plots, place = Plots(run), places_of(run)[0]
+    rows = _joint_rows(plots, run, place)
+    if speed := plots.speed(run, place):
+        rows.append((_tabs(speed), HEIGHTS["speed"]))
+    motion, events = plots.motion(run, place), _events(place)
+    if not rows and motion:  # a path: there is room for where it was
+        return _stacked([(_tabs(motion), HEIGHTS["delta"]), (events, HEIGHTS["events"])])
+    rows.append((_tabs([events, *motion]), HEIGHTS["events"]))
+    return _stacked(rows)
 
 
-def _comparison_rows(result: Comparison) -> list[Row]:
-    """Return the views of a comparison from top to bottom.
-
-    Where there are several runs, each has a tab, and that of the first that fails is open.
-    """
-    standing = places_of(result)
-    several = len(standing) > 1
-    deltas: list[View] = []
-    joints: list[list[View]] = []
-    for one, place in zip(result.runs, standing, strict=True):
-        name = f"delta {'of' if several else '= reference -'} {printable(one.name)} [m]"
-        deltas.append(_series(name, place.named("delta"), "/delta/tolerance/**"))
-        if views := _joint_views(one.run, place, f", {printable(one.name)}" if several else ""):
-            joints.append(views)
-    failing = next((i for i, one in enumerate(result.runs) if one.verdict == "fail"), 0)
-    rows: list[Row] = [(_tabs(deltas, failing), 4)]
-    active = failing if len(joints) == len(deltas) else 0
-    rows += [(_tabs(views, active), 3) for views in zip(*joints, strict=True)]
-    return [*rows, (_tabs([_events(standing), *_motion_views(result.runs[0].run, standing[0])]), 2)]
-
-
-def _joint_views(run: Run, place: Place, label: str) -> list[View]:
-    """Return the joints before and after; none for a path."""
-    if not run.log.joints:
-        return []
-    unit = run.joint_unit()
-    return [
-        _series(f"Joints in the file{label} [{unit}]", f"{place.prefix}joints/raw"),
-        _series(f"Joints repolarized{label} [{unit}]", f"{place.prefix}joints/repolarized"),
-    ]
-
-
-def _motion_views(run: Run, place: Place) -> list[View]:
-    """Return the derivatives and the tool centre point, as far as the run has them."""
-    views: list[View] = []
-    if run.log.joints:
-        views.append(_series(f"Joint rates [{run.joint_unit('/s')}]", f"{place.prefix}joints/velocity"))
-        views.append(
-            _series(f"Joint accelerations [{run.joint_unit('/s2')}]", f"{place.prefix}joints/acceleration")
-        )
-    if run.tcp is not None:
-        views += [
-            _series("TCP [m]", f"{place.prefix}tcp/position"),
-            _series("TCP velocity [m/s]", f"{place.prefix}tcp/velocity"),
-            _series("TCP acceleration [m/s2]", f"{place.prefix}tcp/acceleration"),
-            _series("TCP rz, ry, rx [rad]", f"{place.prefix}tcp/euler_zyx"),
-        ]
-    elif run.tcp_recorded is not None:
-        views.append(_series("Recorded TCP [m]", f"{place.prefix}tcp/recorded"))
-    return views
-
-
-def _events(standing: Sequence[Place]) -> TextLogView:
-    """Return the list of the events."""
+def _of_comparison(result: Comparison) -> Container:
+    """Return the plots of each log; of several, each has a tab, and that of the worst is open."""
     import rerun.blueprint as rrb
 
-    entities = [f"{place.prefix}events/**" for place in standing]
+    plots, standing = Plots(result), places_of(result)
+    name = result.reference.name
+    columns = [_of_log(plots, one, place, name) for one, place in zip(result.runs, standing, strict=True)]
+    if len(columns) == 1:
+        return columns[0]
+    return rrb.Tabs(*columns, active_tab=result.runs.index(result.ranking[-1]))
+
+
+def _of_log(plots: Plots, one: Deviation, place: Place, reference: str) -> Container:
+    """Return the plots of a compared log from top to bottom, what decides on it open in the first."""
+    deviations = plots.deviations(one, place, reference)
+    before = sum(len(views) for views in deviations[: decisive_plot(one)])
+    rows: list[Row] = [(_tabs([view for views in deviations for view in views], before), HEIGHTS["delta"])]
+    rows += _joint_rows(plots, one.run, place)
+    rows.append((_tabs(plots.compared_speed(one, place)), HEIGHTS["speed"]))
+    rows.append((_tabs([_events(place), *plots.motion(one.run, place)]), HEIGHTS["events"]))
+    return _stacked(rows, f"{one.verdict.upper()} {printable(one.name)}")
+
+
+def _joint_rows(plots: Plots, run: Run, place: Place) -> list[Row]:
+    """Return the joints before and after; nothing for a path."""
+    heights = HEIGHTS["joints in the file"], HEIGHTS["joints repolarized"]
+    return [(_tabs(views), height) for views, height in zip(plots.joints(run, place), heights, strict=False)]
+
+
+def _events(place: Place) -> TextLogView:
+    """Return the list of the events of a log."""
+    import rerun.blueprint as rrb
+
     # Its own column of times is too narrow to be read, so each line begins with its time.
     columns = rrb.TextLogColumns(
         timeline_columns=[rrb.encodings.TimelineColumn("t", visible=False)],
         text_log_columns=["LogLevel", "Body"],
     )
+    entities = f"{place.prefix}events/**"
     return rrb.TextLogView(origin="/", contents=entities, name="Events, at t [s]", columns=columns)
 
 
-def _series(name: str, *entities: str) -> TimeSeriesView:
-    """Return a plot over time; all plots share their time axis."""
-    import rerun.blueprint as rrb
-
-    return rrb.TimeSeriesView(
-        origin="/",
-        contents=list(entities),
-        name=name,
-        axis_x=rrb.TimeAxis(link="LinkToGlobal"),
-        plot_legend=rrb.PlotLegend("RightTop"),
-    )
-
-
-def _stacked(rows: Sequence[Row]) -> Container:
+def _stacked(rows: Sequence[Row], name: str | None = None) -> Container:
     """Return views one below the other."""
     import rerun.blueprint as rrb
 
-    return rrb.Vertical(*(view for view, _ in rows), row_shares=[share for _, share in rows])
+    return rrb.Vertical(*(view for view, _ in rows), row_shares=[share for _, share in rows], name=name)
 
 
 def _tabs(views: Sequence[View], active: int = 0) -> View | Container:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_pipeline.palette import DEVIATION_COLOUR, rgb
+from urmpipe_pipeline.recording.columns import time_columns
 from urmpipe_pipeline.recording.scene import Arm, Mark, Scene
 from urmpipe_pipeline.recording.shape_drawing import draw_body
-from urmpipe_pipeline.recording.times import time_columns
 from urmpipe_pipeline.recording.ways import Way
 
 if TYPE_CHECKING:

@@ -46,6 +46,7 @@ class Store:
         path: The file.
         rows: How many rows each entity has.
         metadata: The JSON text in its property.
+        opens_at_ns: Where the viewer should stand in [ns]; 0 if nothing is said.
     """
 
     def __init__(self, path: Path) -> None:
@@ -58,6 +59,7 @@ class Store:
         self._store = self._open()
         self.rows = _row_counts(self._store.summary())
         self.metadata = self._metadata()
+        self.opens_at_ns = int(self._property("opens_at_ns") or 0)
 
     def error(self, message: str) -> RecordingError:
         """Return an error that names this file."""
@@ -117,11 +119,19 @@ class Store:
 
     def _metadata(self) -> str:
         """Return the JSON text in the recording's property."""
-        for chunk in self._store.stream().filter(content=f"/__properties/{PROPERTY}", components="metadata"):
-            texts = chunk.to_record_batch().column("metadata").to_pylist()
-            if texts and texts[0]:
-                return str(texts[0][0])
-        raise self.error("found a recording without urmpipe's metadata, allowed: one that urmpipe wrote")
+        text = self._property("metadata")
+        if text is None:
+            raise self.error("found a recording without urmpipe's metadata, allowed: one that urmpipe wrote")
+        return str(text)
+
+    def _property(self, name: str) -> str | int | None:
+        """Return a value of the recording's property; None if it is not there."""
+        for chunk in self._store.stream().filter(content=f"/__properties/{PROPERTY}", components=name):
+            values = chunk.to_record_batch().column(name).to_pylist()
+            if values and values[0]:
+                value: str | int = values[0][0]
+                return value
+        return None
 
 
 def _decoded(batch: RecordBatch) -> Chunk:

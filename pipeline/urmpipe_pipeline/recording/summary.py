@@ -1,60 +1,135 @@
-"""The text beside the arm: what was recorded, and how it came out."""
+"""The text beside the arm: the verdict first, then how much, where and when, then what to know about it."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
 
 from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import run_colour_word
 from urmpipe_pipeline.recording.entities import printable
+from urmpipe_pipeline.recording.wording import alignment_words, excess, limit, sync_words
 from urmpipe_pipeline.results import Run
+
+LISTED = 4
+"""Warnings that are listed; the others are counted."""
 
 
 def summary(result: Run | Comparison) -> str:
     """Return a run or a comparison in a few lines of Markdown; lengths in [mm] here, where people read."""
-    return _of_run(result) if isinstance(result, Run) else _of_comparison(result)
+    lines = _of_run(result) if isinstance(result, Run) else _of_comparison(result)
+    return "\n".join(lines)
 
 
-def _of_run(run: Run) -> str:
+def _of_run(run: Run) -> Iterator[str]:
     files = ", ".join(_text(file.name) for file in run.log.files) or "no file"
     robot = "No robot, so no kinematics." if run.log.joints else "A path, without joints."
     if run.robot is not None:
         robot = f"Arm: {_text(run.robot.name)}."
-    return "\n".join(
-        (
-            f"### {_text(run.name)}",
-            f"{files}, read as {_text(run.log.source)}: {run.log.rows} rows, {run.duration:.6g} s. {robot}",
-            "",
-            f"Grid: {len(run.t_ns)} samples, one in {1e3 * run.tsp:.6g} ms. Repolarizations:"
-            f" {len(run.repolarizations)}. Warnings: {len(run.warnings)}.",
-        )
+    wraps, others = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
+    marked = ", marked by triangles in the joint's colour" if wraps else ""
+    doubts = f"; other findings: {others}, marked by crosses" if others else ""
+    yield f"### {_text(run.name)}"
+    yield f"{files}, read as {_text(run.log.source)}: {run.log.rows} rows, {run.duration:.6g} s. {robot}"
+    yield ""
+    grid = f"Grid: {len(run.t_ns)} samples, one in {1e3 * run.tsp:.6g} ms."
+    yield f"{grid} Repolarizations: {wraps}{marked}{doubts}." if run.log.joints else grid
+    yield from _warnings(run.warnings)
+
+
+def _of_comparison(result: Comparison) -> Iterator[str]:
+    failing = sum(one.verdict == "fail" for one in result.runs)
+    several = len(result.runs) > 1
+    yield f"### {result.verdict.upper()}" + (
+        f": {failing} of {len(result.runs)} logs out of tolerance" if several and failing else ""
+    )
+    worst = result.ranking[-1]
+    yield _worst(worst, several)
+    yield ""
+    yield f"Reference: {_text(result.reference.name)} (grey, dashed). Tolerance: {_allowed(result)}."
+    yield ""
+    yield from _table(result)
+    yield from _set_up(result, several)
+    told = [
+        replace(warning, message=f"{one.name}: {warning.message}")
+        for one in result.runs
+        for warning in one.run.warnings
+    ]
+    yield from _warnings([*result.warnings, *told])
+    yield ""
+    yield "All figures, statistics and provenance: `urmpipe report` with this file."
+
+
+def _worst(one: Deviation, several: bool) -> str:
+    """Return how much, where and when of the log that comes out worst."""
+    decisive = one.decisive
+    used = "" if decisive.used is None else f" ({decisive.used:.3g} times)"
+    said = f"**{_text(one.name)}**: " if several else ""
+    said += f"{_text(excess(decisive))}{used}, at {decisive.t_max:.4f} s."
+    if one.verdict == "fail":
+        out = int(np.count_nonzero(one.outside))
+        said += f" Out of tolerance: {out} of {len(one.sample)} samples ({100 * one.share_out:.2f} %)"
+        if (longest := one.longest_out) is not None:
+            said += f", longest for {longest.duration:.4f} s from {longest.t:.4f} s"
+        said += "."
+    return said
+
+
+def _allowed(result: Comparison) -> str:
+    """Return what is allowed of each kind; what holds for joints in [rad] and in [m] is said of both."""
+    joints = sorted({unit for one in result.runs for unit in one.run.joint_units}, reverse=True)
+    units = {"angle": ["rad"], "joint": joints}
+    return ", ".join(
+        f"{kind} {' or '.join(limit(value, unit) for unit in units.get(kind, ['m']))}"
+        for kind, value in result.tolerance.items()
     )
 
 
-def _of_comparison(result: Comparison) -> str:
-    allowed = ", ".join(f"{_text(name)} {1e3 * limit:.6g} mm" for name, limit in result.tolerance.items())
-    heads = ("run", "path drawn", *(f"largest {axis} [mm]" for axis in AXES), "out of tolerance", "verdict")
-    return "\n".join(
-        (
-            f"### {result.verdict.upper()}",
-            f"Reference: {_text(result.reference.name)}, drawn grey and dashed."
-            f" Tolerance: {allowed or 'none'}.",
-            "",
-            _row(heads),
-            _row("---" for _ in heads),
-            *(_row(_cells(i, one)) for i, one in enumerate(result.runs)),
-        )
-    )
+def _table(result: Comparison) -> Iterator[str]:
+    """Yield the logs from best to worst."""
+    heads = ("log", "drawn", *(f"{axis} [mm]" for axis in AXES), "worst at [s]", "out", "verdict")
+    yield _row(heads)
+    yield _row("---" for _ in heads)
+    for one in result.ranking:
+        yield _row(_cells(result.runs.index(one), one))
 
 
 def _cells(index: int, one: Deviation) -> Iterable[str]:
     yield _text(one.name)
     yield run_colour_word(index)
     for axis in AXES:
-        yield f"{1e3 * one.statistics[axis].max:.3f}"
+        yield f"{1e3 * one.statistics[axis].max:.4f}"
+    yield f"{one.t[one.worst]:.4f}"
     yield f"{100 * one.share_out:.2f} %"
     yield one.verdict.upper()
+
+
+def _set_up(result: Comparison, several: bool) -> Iterator[str]:
+    """Yield how each log was put beside the reference, where that is not trivial, and what was left out."""
+    for one in result.runs:
+        said = [text for text in (sync_words(one.sync), alignment_words(one.alignment)) if text]
+        if one.reference_left_out:
+            said.append(f"{one.reference_left_out} samples of the reference outside its time")
+        if said:
+            yield ""
+            yield (f"{_text(one.name)}: " if several else "") + _text("; ".join(said))
+
+
+def _warnings(warnings: Sequence[LogWarning]) -> Iterator[str]:
+    """Yield the first warnings as a list."""
+    if warnings:
+        yield ""
+        yield f"Warnings: {len(warnings)}"
+        yield ""
+    for one in warnings[:LISTED]:
+        row = f" (row {one.row})" if one.row is not None else ""
+        yield f"- {_text(one.message)}{row}"
+    if len(warnings) > LISTED:
+        yield f"- and {len(warnings) - LISTED} more, all in the report"
 
 
 def _row(cells: Iterable[str]) -> str:

@@ -10,25 +10,23 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
-import numpy as np
-
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.joint_log import FloatArray, JointLog
+from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.recording.columns import block_columns
 from urmpipe_pipeline.recording.drawing import draw
 from urmpipe_pipeline.recording.entities import Block, blocks, printable
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, load_rerun, settle_pyarrow
-from urmpipe_pipeline.recording.layout import viewer_layout
+from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import PROPERTY
-from urmpipe_pipeline.recording.times import time_columns
 from urmpipe_pipeline.recording.verify import verify
 from urmpipe_pipeline.results import Run
 
 if TYPE_CHECKING:
-    from rerun import ComponentColumn, RecordingStream, TimeColumn
+    from rerun import RecordingStream
 
 Result = TypeVar("Result", bound=Run | Comparison)
 
@@ -177,7 +175,7 @@ class _Sender:
         slices = [(block, rows) for block in due for rows in _slices(block)]
         for number, (block, rows) in enumerate(slices):
             values = block.values[rows]
-            times, column = _times(block, rows), _scalars(values)
+            times, column = block_columns(block, rows)
             if number % AHEAD == 0:
                 stream.flush()  # waits until all that was sent is in the file
             self._refuse_full_disk()
@@ -201,7 +199,7 @@ def _describe(stream: RecordingStream, result: Run | Comparison, every: list[Blo
 
     scene = scene_of(result)
     stream.send_recording_name(printable(result.name))
-    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata))
+    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, opens_at_ns=opening_time(result)))
     stream.send_blueprint(viewer_layout(result, scene))
     draw(stream, result, every, scene)
 
@@ -215,20 +213,3 @@ def _slices(block: Block) -> list[slice]:
 
 def _verified(block: Block, start: int) -> bool:
     return any(start <= row < start + SLICE for row in block.verified)
-
-
-def _scalars(values: FloatArray) -> ComponentColumn:
-    """Return an array as a column of lists; `Scalars.columns` takes six times as long over it."""
-    import rerun as rr
-
-    offsets = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.shape[1])
-    return rr.ComponentColumn(
-        rr.Scalars.descriptor_scalars(), rr.components.ScalarBatch(values), offsets=offsets
-    )
-
-
-def _times(block: Block, rows: slice) -> list[TimeColumn]:
-    if block.numbers is None:
-        return time_columns(block.t_ns[rows])
-    name, numbers = block.numbers
-    return time_columns(block.t_ns[rows], name, numbers[rows])

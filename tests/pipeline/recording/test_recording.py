@@ -253,6 +253,7 @@ def test_metadata_of_any_text_come_back(
     )  # fmt: skip
     run = replace(
         run, name=name, log=log, tsp=abs(number), warnings=log.warnings,
+        audit=tuple(replace(entry, joint=joints[0]) for entry in run.audit),
         provenance=Provenance(command, options, log.files, {unit: value}, created),
     )  # fmt: skip
     path = tmp_path / "odd.rrd"

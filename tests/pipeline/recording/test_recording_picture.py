@@ -22,6 +22,7 @@ from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLO
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.layout import EYE
 from urmpipe_pipeline.recording.scene import Scene, scene_of
+from urmpipe_pipeline.recording.viewer import open_window, opening_times
 from urmpipe_pipeline.results import Run
 
 MakeRun = Callable[..., Run]
@@ -150,7 +151,9 @@ def test_a_run_in_the_viewer(viewer: Any, make_run: MakeRun, tmp_path: Path) -> 
     assert complaints(viewer) == []
     # The arm's joints are balls in the colours of the series; the path is in the run's colour.
     assert_drawn(picture, left=[*JOINT_COLOURS[:5], run_colour(0)], right=JOINT_COLOURS[:6])
-    assert {"Arm and paths [m]", "Joints in the file [rad]", "Joints repolarized [rad]"} <= view_names(viewer)
+    wraps = len(make_run(rows=4000).repolarizations)
+    wanted = {"Arm and paths [m]", "Joints in the file [rad]", f"Joints repolarized ({wraps} marked) [rad]"}
+    assert wanted <= view_names(viewer)
 
 
 def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison, tmp_path: Path) -> None:
@@ -161,7 +164,7 @@ def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison
     picture = look(viewer, path, 12.0, right)
     assert complaints(viewer) == []
     assert_drawn(picture, left=[*JOINT_COLOURS[:5], REFERENCE_COLOUR], right=right)
-    assert "delta of a b/c.d [x] Ω [m]" in view_names(viewer)
+    assert "delta = asked for - a b/c.d [x] Ω [m]" in view_names(viewer)
 
 
 def test_a_log_without_a_robot_in_the_viewer(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:
@@ -247,3 +250,27 @@ def test_a_robot_of_shapes_stands_where_its_kinematics_project_it(
         return result
 
     assert_stands(viewer, run, tmp_path, ["#ff3333", "#33ff33", "#3366ff", "#ffff33"], middles, (8.5, 13.0))
+
+
+def test_a_long_log_is_seen_whole(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:
+    """The viewer would open so long a log on one minute of it."""
+    run = make_run(rows=120_000)
+    path = write_recording(run, tmp_path / "long.rrd")
+    # Both joints that turn on and on are seen up to the end of the log, left of the legend.
+    picture = look(viewer, path, 12.0, JOINT_COLOURS[:6])
+    assert complaints(viewer) == []
+    width = picture.shape[1]
+    late = picture[:, round(0.85 * width) : round(0.93 * width)]
+    assert all(pixels(late, colour) >= 20 for colour in (JOINT_COLOURS[0], JOINT_COLOURS[5]))
+    assert "Joints in the file [rad], every peak of 120,000 rows" in view_names(viewer)
+
+
+def test_view_opens_at_the_worst_sample(make_comparison: MakeComparison, tmp_path: Path) -> None:
+    comparison = make_comparison()
+    path = write_recording(comparison, tmp_path / "both.rrd")
+    worst = comparison.ranking[-1]
+    with open_window(path, opening_times([path])[path], headless=True) as (process, client):
+        (shown,) = client.get_state().recordings
+        assert (shown.current_timeline, shown.current_time) == ("t", worst.t_ns[worst.worst])
+        assert complaints(client) == []
+    assert process.poll() is not None

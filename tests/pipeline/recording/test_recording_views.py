@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -15,10 +16,14 @@ from rerun.chunk import RrdReader
 
 from urmpipe_models.kinematics import points_over_log
 from urmpipe_pipeline.audit_entry import AuditEntry, AuditKind
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison import Alignment, Comparison, Sync
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.recording.layout import viewer_layout
+from urmpipe_pipeline.recording.overview import LONG, ROWS, SPEED_ROWS
+from urmpipe_pipeline.recording.plots import SHARED_AXIS
 from urmpipe_pipeline.recording.scene import scene_of
+from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.recording.ways import DASHES, LEAST_DASH, MOST
 from urmpipe_pipeline.results import Run
@@ -31,6 +36,26 @@ def columns(path: Path, entity: str, component: str) -> list[Any]:
     """Return the values of one component of an entity, row by row."""
     stream = RrdReader(path).store().stream().filter(content=entity, components=component)
     return [row for chunk in stream for row in chunk.to_record_batch().column(component).to_pylist()]
+
+
+def times_of(path: Path, entity: str) -> list[int]:
+    """Return the times of an entity in [ns], in the order of writing."""
+    stream = RrdReader(path).store().stream().filter(content=entity, is_static=False)
+    return [at for chunk in stream for at in chunk.to_record_batch().column("t").cast("int64").to_pylist()]
+
+
+def views(path: Path) -> dict[str, list[Any]]:
+    """Return what the layout says, by component."""
+    reader = RrdReader(path)
+    (entry,) = reader.blueprints()
+    found: dict[str, list[Any]] = {}
+    for chunk in reader.stream(store=entry):
+        batch = chunk.to_record_batch()
+        for name in batch.schema.names:
+            if ":" in name:
+                values = batch.column(name).to_pylist()
+                found.setdefault(name, []).extend(itertools.chain.from_iterable(filter(None, values)))
+    return found
 
 
 def packed(colour: str) -> int:
@@ -55,17 +80,146 @@ def test_peaks_are_drawn_where_samples_are_closer_than_pixels(make_run: MakeRun,
     assert columns(path, "/joints/raw", "SeriesLines:aggregation_policy") == [[wanted]]
 
 
-def test_delta_has_axes_and_both_signs_of_the_tolerance(
+def test_a_colour_is_an_axis_whatever_the_order(make_run: MakeRun, tmp_path: Path) -> None:
+    path = write_recording(make_run(rows=50), tmp_path / "run.rrd")
+    wanted = [packed(AXIS_COLOURS[axis]) for axis in "zyx"]
+    assert columns(path, "/tcp/euler_zyx", "SeriesLines:colors") == [wanted]
+    assert columns(path, "/overview/tcp/speed", "SeriesLines:colors") == [[packed(AXIS_COLOURS["norm"])]]
+
+
+def test_each_tolerance_stands_in_the_plot_of_its_unit(
     make_comparison: MakeComparison, tmp_path: Path
 ) -> None:
-    comparison = replace(make_comparison(rows=50), tolerance={"axis": 0.0035, "norm": 0.005})
-    path = write_recording(comparison, tmp_path / "both.rrd")
+    allowed = {"axis": 0.0035, "z": 0.002, "norm": 0.005, "path": 0.003, "angle": 0.01, "joint": 0.02}
+    path = write_recording(replace(make_comparison(rows=50), tolerance=allowed), tmp_path / "both.rrd")
     assert columns(path, "/delta/coppeliasim", "SeriesLines:names") == [["x", "y", "z", "norm"]]
     wanted = [packed(colour) for colour in AXIS_COLOURS.values()]
     assert columns(path, "/delta/matlab", "SeriesLines:colors") == [wanted]
-    assert columns(path, "/delta/tolerance/axis", "Scalars:scalars") == [[0.0035, -0.0035]] * 2
-    assert columns(path, "/delta/tolerance/norm", "Scalars:scalars") == [[0.005]] * 2
-    assert columns(path, "/delta/tolerance/norm", "SeriesLines:names") == [["+tolerance of norm"]]
+    lines = {
+        "delta/axis": ([0.0035, -0.0035], ["+tolerance", "-tolerance"], REFERENCE_COLOUR),
+        "delta/z": ([0.002, -0.002], ["+tolerance of z", "-tolerance of z"], AXIS_COLOURS["z"]),
+        "delta/norm": ([0.005], ["tolerance of norm"], AXIS_COLOURS["norm"]),
+        "path/path": ([0.003], ["tolerance"], REFERENCE_COLOUR),
+        "angle/angle": ([0.01], ["tolerance"], REFERENCE_COLOUR),
+        "joints/joint": ([0.02, -0.02], ["+tolerance", "-tolerance"], REFERENCE_COLOUR),
+    }
+    for entity, (values, names, colour) in lines.items():
+        assert columns(path, f"/tolerance/{entity}", "Scalars:scalars") == [values] * 2
+        assert columns(path, f"/tolerance/{entity}", "SeriesLines:names") == [names]
+        assert columns(path, f"/tolerance/{entity}", "SeriesLines:colors") == [[packed(colour)] * len(names)]
+
+
+def test_repolarizations_are_marked_at_their_instants_on_the_joints_line(
+    make_run: MakeRun, tmp_path: Path
+) -> None:
+    run = make_run()
+    path = write_recording(run, tmp_path / "run.rrd")
+    up, down = sorted(run.audit, key=lambda one: one.before - one.after)
+    assert (up.joint, down.joint) == ("phi1", "phi6")
+    for mark, one, shape in (("down", down, "Down"), ("up", up, "Up")):
+        entity = f"/marks/repolarization/{mark}"
+        j = run.log.joints.index(one.joint)
+        assert times_of(path, entity) == [round(one.t * 1e9)]
+        (values,) = columns(path, entity, "Scalars:scalars")
+        on_line = (run.q[one.sample - 1, j] + run.q[one.sample, j]) / 2
+        # Of two samples and the instant half way between them, as interpolated.
+        np.testing.assert_allclose(values[j], on_line, rtol=1e-12)
+        assert np.isnan(np.delete(values, j)).all()
+        assert columns(path, entity, "SeriesPoints:names") == [list(run.log.joints)]
+        assert columns(path, entity, "SeriesPoints:colors") == [[packed(c) for c in JOINT_COLOURS[:6]]]
+        wanted = rr.components.MarkerShape[shape].value
+        assert columns(path, entity, "SeriesPoints:markers") == [[wanted] * 6]
+
+
+def test_what_is_doubtful_has_a_mark_of_its_own(make_run: MakeRun, tmp_path: Path) -> None:
+    kinds: tuple[AuditKind, ...] = ("in-between", "repaired", "unexplained", "ambiguous")
+    audit = [
+        AuditEntry("phi2", 2 + i, 0.005 * (1 + i), 0.0, -1.5, 0, 0, kind) for i, kind in enumerate(kinds)
+    ]
+    run = make_run(rows=50)
+    path = write_recording(replace(run, audit=tuple(reversed(audit))), tmp_path / "run.rrd")
+    entity = "/marks/repolarization/doubt"
+    assert times_of(path, entity) == [5_000_000, 10_000_000, 15_000_000, 20_000_000]
+    assert [row[1] for row in columns(path, entity, "Scalars:scalars")] == run.q[1:5, 1].tolist()
+    wanted = rr.components.MarkerShape.Cross.value
+    assert columns(path, entity, "SeriesPoints:markers") == [[wanted] * 6]
+
+
+def test_a_line_through_the_worst_sample_stands_in_every_plot(
+    make_comparison: MakeComparison, tmp_path: Path
+) -> None:
+    comparison = make_comparison(rows=400)
+    path = write_recording(comparison, tmp_path / "both.rrd")
+    one = comparison.runs[1]
+    assert one.joint_delta is not None and one.angle is not None
+    plots = {
+        "delta": one.delta, "raw": one.run.log.q, "repolarized": one.run.q, "speed": one.speed,
+        "path": one.path, "angle": one.angle, "joints": one.joint_delta,
+    }  # fmt: skip
+    at = int(one.t_ns[one.worst])
+    for plot, values in plots.items():
+        entity = f"/runs/matlab/marks/worst/{plot}"
+        assert times_of(path, entity) == [at, at + 1]
+        assert columns(path, entity, "Scalars:scalars") == [[values.min()], [values.max()]]
+
+
+def test_a_comparison_opens_at_the_worst_sample_of_the_worst_log(
+    make_run: MakeRun, make_comparison: MakeComparison, tmp_path: Path
+) -> None:
+    comparison = make_comparison(("solidworks", "coppeliasim"))
+    worst = comparison.ranking[-1]
+    path = write_recording(comparison, tmp_path / "both.rrd")
+    assert Store(path).opens_at_ns == worst.t_ns[worst.worst] > 0
+    assert Store(write_recording(make_run(), tmp_path / "run.rrd")).opens_at_ns == 0
+
+
+def test_a_long_array_has_an_overview_that_keeps_every_extreme(
+    make_comparison: MakeComparison, tmp_path: Path
+) -> None:
+    comparison = make_comparison(("coppeliasim",), rows=LONG + 1)
+    path = write_recording(comparison, tmp_path / "long.rrd")
+    one = comparison.runs[0]
+    arrays = {
+        "/joints/raw": one.run.log.q, "/joints/repolarized": one.run.q, "/delta/coppeliasim": one.delta,
+        "/matched/coppeliasim/speed": one.speed[:, np.newaxis],
+    }  # fmt: skip
+    for entity, values in arrays.items():
+        few = np.array(columns(path, f"/overview{entity}", "Scalars:scalars"))
+        times = times_of(path, f"/overview{entity}")
+        assert len(few) <= ROWS
+        np.testing.assert_array_equal(few, values[np.searchsorted(one.run.t_ns, times)])
+        np.testing.assert_array_equal(few.min(axis=0), values.min(axis=0))
+        np.testing.assert_array_equal(few.max(axis=0), values.max(axis=0))
+    names = views(path)["ViewBlueprint:display_name"]
+    assert "delta = asked for - coppeliasim [m], every peak of 50,001 rows" in names
+    assert "all 50,001 rows [m]" in names
+
+
+def test_a_long_path_has_an_overview_of_its_positions(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=LONG + 1)
+    assert run.tcp is not None
+    position, none = run.tcp.position, np.empty((LONG + 1, 0))
+    log = replace(run.log, joints=(), q=none, columns=(), tcp_position=position)
+    path = replace(
+        run, log=log, robot=None, tcp=None, q=none, qd=none, qdd=none, tcp_recorded=position, audit=()
+    )
+    file = write_recording(path, tmp_path / "path.rrd")
+    few = np.array(columns(file, "/overview/tcp/recorded", "Scalars:scalars"))
+    assert len(few) <= ROWS
+    np.testing.assert_array_equal(few.max(axis=0), position.max(axis=0))
+    assert "Recorded TCP [m], every peak of 50,001 rows" in views(file)["ViewBlueprint:display_name"]
+
+
+def test_of_a_short_log_only_the_speed_is_thinned_out(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=8000)
+    assert run.tcp is not None
+    path = write_recording(run, tmp_path / "short.rrd")
+    speed = np.linalg.norm(run.tcp.velocity, axis=1)
+    few = np.array(columns(path, "/overview/tcp/speed", "Scalars:scalars"))[:, 0]
+    assert len(few) <= SPEED_ROWS
+    assert (few.min(), few.max()) == (speed.min(), speed.max())
+    entities = {chunk.entity_path for chunk in RrdReader(path).store().stream()}
+    assert [entity for entity in entities if entity.startswith("/overview")] == ["/overview/tcp/speed"]
 
 
 def test_times_are_exact_and_samples_count_from_zero(make_run: MakeRun, tmp_path: Path) -> None:
@@ -104,43 +258,96 @@ def test_events_tell_the_whole_audit(make_run: MakeRun, tmp_path: Path) -> None:
 
 
 def test_events_name_joint_row_and_turns(make_comparison: MakeComparison, tmp_path: Path) -> None:
-    comparison = make_comparison()
-    path = write_recording(comparison, tmp_path / "both.rrd")
+    path = write_recording(make_comparison(), tmp_path / "both.rrd")
     assert columns(path, "/events/repolarization", "TextLog:text") == [
-        ["0.0025 s  coppeliasim: phi6 repolarized in row 2: step +6.2808 rad, +0 to -1 turns, +-2.5 ms"],
-        ["6.2625 s  coppeliasim: phi1 repolarized in row 1254: step -6.2817 rad, +0 to +1 turns, +-2.5 ms"],
+        ["0.0025 s  phi6 repolarized in row 2: step +6.2808 rad, +0 to -1 turns, +-2.5 ms"],
+        ["6.2625 s  phi1 repolarized in row 1254: step -6.2817 rad, +0 to +1 turns, +-2.5 ms"],
     ]
     assert columns(path, "/runs/matlab/events/warning", "TextLog:text") == [
-        ["0.0300 s  matlab: gap in row 7: two rows lie far apart"]
+        ["0.0300 s  gap in row 7: two rows lie far apart"]
     ]
-    one = comparison.runs[1]
+
+
+def test_events_tell_how_a_log_compares(make_comparison: MakeComparison, tmp_path: Path) -> None:
+    one = replace(
+        make_comparison(("solid",)).runs[0],
+        sync=Sync("auto", 3.4, "joints", 0.0002, 0.99999),
+        alignment=Alignment("tool", tool=(0.001, 0.0, -0.0025)),
+        left_out=12,
+    )
+    outside = np.zeros(1500, dtype=bool)
+    outside[[3, 100, 101, 102]] = True
+    one = replace(one, outside=outside, verdict="fail")
+    path = write_recording(replace(make_comparison(), runs=(one,)), tmp_path / "one.rrd")
     x, y, z, norm = 1e3 * one.delta[one.worst]
-    assert columns(path, "/runs/matlab/events/deviation", "TextLog:text") == [
-        [
-            f"{one.t[one.worst]:.4f} s  largest deviation of matlab: {norm:.3f} mm"
-            f" (x {x:.3f}, y {y:.3f}, z {z:.3f})"
-        ]
+    decisive = one.decisive
+    wanted = [
+        (0.0, "clocks: reference = log +3.4 s, estimated from joints, +-0.2 ms, similarity 1.0000"),
+        (0.0, "aligned: tool centre point moved by (1.0000, 0.0000, -2.5000) mm in the tool's frame"),
+        (0.0, "12 of 1512 samples left out: no reference or no value"),
+        (0.5, "longest stretch out of tolerance begins: 3 samples, 0.0100 s"),
+        (
+            decisive.t_max,
+            f"decides: {decisive.quantity} reaches {1e3 * decisive.max:.4f} mm of 3.5 mm allowed",
+        ),
+        (
+            one.t[one.worst],
+            f"largest deviation: {norm:.4f} mm (x {x:.4f} mm, y {y:.4f} mm, z {z:.4f} mm)",
+        ),
     ]
+    said = [row[0] for row in columns(path, "/events/deviation", "TextLog:text")]
+    assert said == [f"{t:.4f} s  {text}" for t, text in sorted(wanted, key=lambda event: event[0])]
+    levels = [row[0] for row in columns(path, "/events/deviation", "TextLog:level")]
+    assert levels == ["INFO", "INFO", "WARN", "ERROR", "ERROR", "ERROR"]
 
 
 def test_the_layout_is_in_the_file(make_comparison: MakeComparison, tmp_path: Path) -> None:
-    path = write_recording(make_comparison(("a b", "reference")), tmp_path / "both.rrd")
-    reader = RrdReader(path)
-    (entry,) = reader.blueprints()
-    found: dict[str, list[Any]] = {"ViewBlueprint:display_name": [], "ViewContents:query": []}
-    for chunk in reader.stream(store=entry):
-        batch = chunk.to_record_batch()
-        for name in set(found) & set(batch.schema.names):
-            found[name] += itertools.chain.from_iterable(batch.column(name).to_pylist())
+    found = views(write_recording(make_comparison(("a b", "reference")), tmp_path / "both.rrd"))
     names = found["ViewBlueprint:display_name"]
-    assert "Arm and paths [m]" in names
-    assert "delta of a b [m]" in names
-    assert "Joints in the file, reference [rad]" in names
-    assert "Joints repolarized, a b [rad]" in names
+    assert {
+        "Arm and paths [m]",
+        "delta = asked for - a b [m]",
+        "Distance from the path [m]",
+        "Angle between the orientations [rad]",
+        "Joints, reference - log [rad]",
+        "Joints in the file [rad]",
+        "Joints repolarized (2 marked) [rad]",
+        "Speed of the TCP [m/s]",
+    } <= set(names)
     assert all("[" in name for name in names if name != "Summary")
-    assert {"/delta/a\\ b", "/delta/reference\\ \\(2\\)", "/delta/tolerance/**"} <= set(
+    assert {"PASS a b", "PASS reference"} <= set(found["ContainerBlueprint:display_name"])
+    assert {"/delta/a\\ b", "/delta/reference\\ \\(2\\)", "/tolerance/delta/**"} <= set(
         found["ViewContents:query"]
     )
+
+
+def test_the_worst_log_and_what_decides_are_open(make_comparison: MakeComparison) -> None:
+    comparison = make_comparison(("far", "near", "farther"))
+    far, near, farther = comparison.runs
+    layout = viewer_layout(replace(comparison, runs=(far, farther, near)), scene_of(comparison))
+    tabs: Any = list(layout.root_container.contents)[1]
+    assert (tabs.contents[tabs.active_tab].name, len(tabs.contents)) == ("FAIL farther", 3)
+    assert tabs.contents[0].contents[0].active_tab == 0
+    joint = replace(far.joint_statistics["phi2"], tolerance=1e-9)
+    decided = replace(far, joint_statistics={"phi2": joint})
+    alone = viewer_layout(replace(comparison, runs=(decided,)), scene_of(comparison))
+    column: Any = list(alone.root_container.contents)[1]
+    first = column.contents[0]
+    assert first.contents[first.active_tab].name == "Joints, reference - log [rad]"
+
+
+def test_every_plot_shows_the_whole_time(make_run: MakeRun, tmp_path: Path) -> None:
+    """Else the viewer opens a long log on a minute of it; linked plots take the range of one known view."""
+    path = write_recording(make_run(rows=2001), tmp_path / "run.rrd")
+    reader = RrdReader(path)
+    (entry,) = reader.blueprints()
+    (batch,) = (
+        chunk.to_record_batch()
+        for chunk in reader.stream(store=entry)
+        if chunk.entity_path == f"/view/{SHARED_AXIS}/TimeAxis"
+    )
+    (axis,) = batch.column("TimeAxis:view_range").to_pylist()
+    assert [axis[0][end] for end in ("start", "end")] == [-100_000_000, 11_200_000_000]
 
 
 def test_the_arm_moves_at_50_hz_through_its_own_kinematics(make_run: MakeRun) -> None:
@@ -211,21 +418,81 @@ def test_there_is_no_scene_without_positions(make_run: MakeRun, tmp_path: Path) 
     assert scene_of(run).empty
     path = write_recording(run, tmp_path / "run.rrd")
     entities = {chunk.entity_path.split("/")[1] for chunk in RrdReader(path).store().stream()}
-    assert entities == {"__properties", "events", "joints", "summary"}
+    assert entities == {"__properties", "events", "joints", "marks", "summary"}
 
 
 def test_the_summary_of_a_run(make_run: MakeRun) -> None:
     assert summary(make_run("a_b|c", rows=201)) == (
         "### a\\_b\\|c\n"
         "a\\_b\\|c.csv, read as table: 201 rows, 1 s. Arm: urm6.\n\n"
-        "Grid: 201 samples, one in 5 ms. Repolarizations: 1. Warnings: 1."
+        "Grid: 201 samples, one in 5 ms. Repolarizations: 1, marked by triangles in the joint's colour.\n\n"
+        "Warnings: 1\n\n"
+        "- two rows lie far apart (row 7)"
     )
 
 
-def test_the_summary_of_a_comparison(make_comparison: MakeComparison) -> None:
-    comparison = make_comparison(("coppeliasim", "matlab", "solid*"))
+def test_the_summary_of_a_comparison_says_the_verdict_first(make_comparison: MakeComparison) -> None:
+    comparison = make_comparison(("coppeliasim", "solid*", "matlab"))
+    worst = comparison.runs[2]
+    decisive, longest = worst.decisive, worst.longest_out
+    assert longest is not None and decisive.used is not None
     lines = summary(comparison).splitlines()
-    assert lines[:2] == ["### FAIL", "Reference: asked for, drawn grey and dashed. Tolerance: axis 3.5 mm."]
-    assert lines[-2].startswith("| matlab | sky blue | 2.667 | ")
-    assert lines[-1].startswith("| solid\\* | violet | ")
-    assert [line.split(" | ")[-1] for line in lines[-3:]] == ["PASS |", "PASS |", "FAIL |"]
+    assert lines[0] == "### FAIL: 1 of 3 logs out of tolerance"
+    assert lines[1] == (
+        f"**matlab**: {decisive.quantity} reaches {1e3 * decisive.max:.4f} mm of 3.5 mm allowed"
+        f" ({decisive.used:.3g} times), at {decisive.t_max:.4f} s. Out of tolerance:"
+        f" {np.count_nonzero(worst.outside)} of 1500 samples ({100 * worst.share_out:.2f} %), longest for"
+        f" {longest.duration:.4f} s from {longest.t:.4f} s."
+    )
+    assert lines[3] == "Reference: asked for (grey, dashed). Tolerance: axis 3.5 mm."
+    rows = [line.split(" | ") for line in lines if line.startswith("| ")][2:]
+    assert [(row[0], row[1], row[-1]) for row in rows] == [
+        ("| coppeliasim", "orange", "PASS |"),
+        ("| solid\\*", "sky blue", "PASS |"),
+        ("| matlab", "violet", "FAIL |"),
+    ]
+    assert rows[2][2:6] == [f"{1e3 * worst.statistics[axis].max:.4f}" for axis in ("x", "y", "z", "norm")]
+    assert lines[-6:-2] == [
+        "- asked for: two rows lie far apart (row 7)",
+        "- coppeliasim: two rows lie far apart (row 7)",
+        "- solid\\*: two rows lie far apart (row 7)",
+        "- matlab: two rows lie far apart (row 7)",
+    ]
+
+
+def test_the_summary_says_each_tolerance_in_its_unit(make_comparison: MakeComparison) -> None:
+    allowed = {"axis": 0.0035, "path": 0.002, "angle": 0.01, "joint": 0.0005}
+    assert (
+        "Reference: asked for (grey, dashed)."
+        " Tolerance: axis 3.5 mm, path 2 mm, angle 10 mrad, joint 0.5 mrad."
+    ) in summary(replace(make_comparison(), tolerance=allowed)).splitlines()
+
+
+def test_what_no_text_can_hold_is_told_all_the_same(make_comparison: MakeComparison, tmp_path: Path) -> None:
+    """A file's name or header of undecodable bytes ends up in the verdict's words."""
+    one = make_comparison(("coppeliasim",)).runs[0]
+    worst = replace(one.joint_statistics["phi2"], quantity="q\udcff", tolerance=1e-9)
+    one = replace(one, joint_statistics={"q\udcff": worst})
+    path = write_recording(replace(make_comparison(), runs=(one,)), tmp_path / "odd.rrd")
+    said = [row[0] for row in columns(path, "/events/deviation", "TextLog:text")]
+    assert any("decides: q? reaches 2.0000 mrad of 1e-06 mrad allowed" in line for line in said)
+
+
+def test_the_summary_tells_how_clocks_and_places_were_put_together(make_comparison: MakeComparison) -> None:
+    comparison = make_comparison(("coppeliasim",))
+    turn = 0.01
+    rotation = (
+        (math.cos(turn), -math.sin(turn), 0.0),
+        (math.sin(turn), math.cos(turn), 0.0),
+        (0.0, 0.0, 1.0),
+    )
+    one = replace(
+        comparison.runs[0],
+        sync=Sync("given", -0.25),
+        alignment=Alignment("rigid", rotation, (0.001, 0.002, 0.003)),
+        reference_left_out=50,
+    )
+    assert (
+        "clocks: reference = log \\-0.25 s, as given; aligned by the best rigid motion: turned by 10.0000"
+        " mrad, moved by (1.0000, 2.0000, 3.0000) mm; 50 samples of the reference outside its time"
+    ) in summary(replace(comparison, runs=(one,))).splitlines()

@@ -1,0 +1,34 @@
+"""`urmpipe view`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import click
+
+from urmpipe import __version__
+
+
+@click.command(short_help="Open recordings in the viewer.")
+@click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=click.Path(path_type=Path))
+@click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
+@click.version_option(__version__, prog_name="urmpipe")
+def view(recordings: tuple[Path, ...]) -> int:
+    """Open recordings that ingest or compare wrote in Rerun's viewer, each paused at its worst sample.
+
+    Each opens in a window of its own; the command ends when all are closed, and Ctrl-C closes them. The
+    viewer is the one that was installed with urmpipe; it needs no network and listens on 127.0.0.1 only.
+    Where there is no display, the command says how to look at a recording from another computer.
+
+    \b
+    Examples:
+      urmpipe view log-against-path.rrd
+      urmpipe view monday.rrd tuesday.rrd
+    """
+    from urmpipe import api
+
+    try:
+        api.view(recordings)
+    except KeyboardInterrupt:
+        click.echo("Closed.", err=True)
+    return 0

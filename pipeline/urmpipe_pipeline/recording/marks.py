@@ -1,0 +1,115 @@
+"""Marks in the plots: where a joint was repolarized, what is doubtful, and the worst sample."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from urmpipe_pipeline.audit_entry import AuditEntry
+from urmpipe_pipeline.comparison import Deviation
+from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.palette import joint_colour, rgb
+from urmpipe_pipeline.recording.columns import scalar_column, time_columns
+from urmpipe_pipeline.recording.entities import Place, printable
+from urmpipe_pipeline.recording.overview import COMPARED
+from urmpipe_pipeline.results import Run
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
+Mark = Literal["up", "down", "doubt"]
+
+SHAPES: dict[Mark, Literal["up", "down", "cross"]] = {"up": "up", "down": "down", "doubt": "cross"}
+"""Turns were added, turns were taken away, or neither: Rerun's markers for them."""
+
+MARK_SIZE = 5.0
+"""Size of a mark in points of the screen."""
+
+WORST_COLOUR, WORST_WIDTH = "#c8d0d4", 2.5
+"""The line through the worst sample: neutral, for it stands in every plot."""
+
+
+def mark_entity(place: Place, mark: Mark | Literal["**"]) -> str:
+    """Return the entity of the marks of one kind in the plot of a run's repolarized joints."""
+    return f"{place.prefix}marks/repolarization/{mark}"
+
+
+def worst_entity(place: Place, plot: str) -> str:
+    """Return the entity of the line through the worst sample in one plot of a run."""
+    return f"{place.prefix}marks/worst/{plot}"
+
+
+def draw_repolarizations(stream: RecordingStream, place: Place, run: Run) -> None:
+    """Mark every entry of the audit at its instant, on its joint's line and in its colour."""
+    import rerun as rr
+
+    names = [printable(name) for name in run.log.joints]
+    for mark, entries in _kinds(run.audit).items():
+        t_ns, values = _on_lines(run, entries)
+        style = rr.SeriesPoints(
+            colors=[rgb(joint_colour(j)) for j in range(len(names))],
+            names=names,
+            markers=[SHAPES[mark]] * len(names),
+            marker_sizes=[MARK_SIZE] * len(names),
+        )
+        entity = mark_entity(place, mark)
+        stream.log(entity, style, static=True)
+        stream.send_columns(entity, time_columns(t_ns), [scalar_column(values)])
+
+
+def draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
+    """Draw a line through the worst sample in every plot, as high as what is plotted there."""
+    import rerun as rr
+
+    # A line between two values at one time is drawn as a point: one of them is a nanosecond later.
+    t_ns = one.t_ns[one.worst] + np.arange(2)
+    style = rr.SeriesLines(
+        colors=[rgb(WORST_COLOUR)],
+        names=["worst"],
+        widths=[WORST_WIDTH],
+        aggregation_policy=rr.components.AggregationPolicy.MinMax,
+    )
+    for plot, values in _plots(one):
+        ends = [ufunc.reduce(values, axis=None) for ufunc in (np.fmin, np.fmax)]  # of what is no NaN
+        if np.isfinite(ends).all():
+            entity = worst_entity(place, plot)
+            stream.log(entity, style, static=True)
+            stream.send_columns(entity, time_columns(t_ns), [scalar_column(np.array(ends)[:, np.newaxis])])
+
+
+def _plots(one: Deviation) -> Iterator[tuple[str, FloatArray]]:
+    """Yield what is plotted of a compared run, by the names of the plots."""
+    yield "delta", one.delta
+    yield "raw", one.run.log.q
+    yield "repolarized", one.run.q
+    for plot, values in zip(COMPARED, (one.speed, one.path, one.angle, one.joint_delta), strict=True):
+        if values is not None:
+            yield plot, values
+
+
+def _kinds(audit: Sequence[AuditEntry]) -> dict[Mark, list[AuditEntry]]:
+    """Return the entries of an audit by their marks."""
+    found: dict[Mark, list[AuditEntry]] = {}
+    for one in audit:
+        mark: Mark = "doubt" if one.kind != "wrap" else "up" if one.after > one.before else "down"
+        found.setdefault(mark, []).append(one)
+    return found
+
+
+def _on_lines(run: Run, entries: Sequence[AuditEntry]) -> tuple[IntArray, FloatArray]:
+    """Return the instants of the entries in [ns], in order, and where the joint is there on its plotted line.
+
+    Returns:
+        Shape (entries,), and shape (entries, joints): NaN but at the entry's own joint.
+    """
+    ordered = sorted(entries, key=lambda one: one.t)
+    t_ns = np.array([round(one.t * 1e9) for one in ordered], dtype=np.int64)
+    joint = np.array([run.log.joints.index(one.joint) for one in ordered])
+    values = np.full((len(ordered), len(run.log.joints)), np.nan)
+    for j in np.unique(joint):
+        own, known = joint == j, np.isfinite(run.q[:, j])
+        if known.any():
+            values[own, j] = np.interp(t_ns[own], run.t_ns[known], run.q[known, j])
+    return t_ns, values

@@ -1,0 +1,88 @@
+"""Few rows of what is long, so that the viewer shows it whole and at once: every peak stays.
+
+They stand beside the arrays that they are of, below overview/, and are there to be looked at only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.decimate import decimate
+from urmpipe_pipeline.recording.entities import Block, Place, places_of
+from urmpipe_pipeline.results import Run
+
+LONG = 50_000
+"""Rows that the viewer still draws whole at once; of more an overview is shown first."""
+
+ROWS = 20_000
+"""Rows of an overview, at most."""
+
+SLICE = 65_536
+"""Rows decimated at a time: what is computed on the way stays in the cache, and memory low."""
+
+SPEED_ROWS = 2_000
+"""Rows of the speed of a log that is not long: it is drawn only, so its recording hardly grows by it."""
+
+COMPARED = ("speed", "path", "angle", "joints")
+"""What is plotted of a deviation besides delta: entities below matched/<key>."""
+
+
+def overview_entity(entity: str) -> str:
+    """Return where the overview of an array stands."""
+    return f"/overview{entity}"
+
+
+def overviews(result: Run | Comparison, every: Sequence[Block]) -> Iterator[Block]:
+    """Yield the overview of each long array that has a plot, and the speed of a run.
+
+    Args:
+        result: What is recorded.
+        every: Its arrays.
+    """
+    runs = [result] if isinstance(result, Run) else [one.run for one in result.runs]
+    standing = zip(runs, places_of(result), strict=True)
+    plotted = {entity for run, place in standing for entity in _plotted(run, place)}
+    for block in every:
+        if block.entity in plotted and len(block.t_ns) > LONG:
+            yield _overview(block, ROWS)
+    if isinstance(result, Run) and result.tcp is not None:
+        velocity = result.tcp.velocity
+        speed = np.sqrt(np.einsum("ij,ij->i", velocity, velocity))[:, np.newaxis]
+        whole = Block(speed_entity(places_of(result)[0]), result.t_ns, speed, "number", ("speed",))
+        yield _overview(whole, ROWS if len(speed) > LONG else SPEED_ROWS)
+
+
+def speed_entity(place: Place) -> str:
+    """Return the entity that the speed of a run would have: only its overview stands in a recording."""
+    return f"{place.prefix}tcp/speed"
+
+
+def _plotted(run: Run, place: Place) -> Iterator[str]:
+    """Yield the entities that the layout shows first."""
+    if not run.log.joints:
+        yield f"{place.prefix}tcp/recorded"
+    yield f"{place.prefix}joints/raw"
+    yield f"{place.prefix}joints/repolarized"
+    yield place.named("delta")
+    yield from (place.named("matched", leaf) for leaf in COMPARED)
+
+
+def _overview(block: Block, most: int) -> Block:
+    """Return the rows of an array that a drawing needs, so many at most."""
+    starts = range(0, len(block.t_ns), SLICE)
+    each = most // len(starts)
+    parts = [start + decimate(block.values[start : start + SLICE], each) for start in starts]
+    rows = np.concatenate(parts)
+    numbers = None if block.numbers is None else (block.numbers[0], block.numbers[1][rows])
+    return replace(
+        block,
+        entity=overview_entity(block.entity),
+        t_ns=block.t_ns[rows],
+        values=block.values[rows],
+        numbers=numbers,
+        worst=None,
+    )

@@ -1,0 +1,146 @@
+"""The plots over time of a recording: one unit in each, one time axis for all."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+from uuid import UUID
+
+from urmpipe_pipeline.comparison import Comparison, Deviation
+from urmpipe_pipeline.recording.entities import Place, printable
+from urmpipe_pipeline.recording.marks import mark_entity, worst_entity
+from urmpipe_pipeline.recording.overview import LONG, overview_entity, speed_entity
+from urmpipe_pipeline.recording.tolerances import tolerance_entities
+from urmpipe_pipeline.results import Run
+
+if TYPE_CHECKING:
+    from rerun.blueprint import TimeSeriesView
+    from rerun.encodings import TimeRange
+
+SHARED_AXIS = UUID("5c0dca6a-e63f-9cf7-f657-2602590474cc")
+"""The view of which the viewer keeps the time axis that linked plots share. Without a range there, it opens a
+log of more than some minutes on a minute of it."""
+
+BEFORE, AFTER = 0.01, 0.12
+"""Time shown before the first sample and after the last, as shares of all: there stands the legend."""
+
+
+class Plots:
+    """Makes the plots of a recording; all of them show its whole time."""
+
+    def __init__(self, result: Run | Comparison) -> None:
+        self._range = _whole_time(result)
+        self._shares_axis = True
+
+    def series(self, name: str, *entities: str, legend: bool = True) -> TimeSeriesView:
+        """Return a plot of some entities."""
+        import rerun.blueprint as rrb
+
+        view = rrb.TimeSeriesView(
+            origin="/",
+            contents=list(entities),
+            name=name,
+            axis_x=rrb.TimeAxis(link="LinkToGlobal", view_range=self._range),
+            plot_legend=rrb.PlotLegend("RightTop", visible=legend),
+        )
+        if self._shares_axis:
+            view.id, self._shares_axis = SHARED_AXIS, False
+        return view
+
+    def array(
+        self, name: str, unit: str, entity: str, rows: int, *beside: str, legend: bool = True
+    ) -> list[TimeSeriesView]:
+        """Return the plot of an array; of a long one that of its overview, and after it that of all.
+
+        Args:
+            name: What is plotted.
+            unit: Its unit.
+            entity: The array.
+            rows: How many it has.
+            beside: What else stands in the plot.
+            legend: Whether it has room for one.
+        """
+        if rows <= LONG:
+            return [self.series(f"{name} [{unit}]", entity, *beside, legend=legend)]
+        said = f"{name} [{unit}], every peak of {rows:,} rows"
+        return [
+            self.series(said, overview_entity(entity), *beside, legend=legend),
+            self.series(f"all {rows:,} rows [{unit}]", entity, *beside, legend=legend),
+        ]
+
+    def joints(self, run: Run, place: Place) -> Iterator[list[TimeSeriesView]]:
+        """Yield the joints before and after, which share the legend of the first; nothing for a path."""
+        if not run.log.joints:
+            return
+        unit, raw, after = run.joint_unit(), f"{place.prefix}joints/raw", f"{place.prefix}joints/repolarized"
+        yield self.array("Joints in the file", unit, raw, run.log.rows, worst_entity(place, "raw"))
+        marks = mark_entity(place, "**"), worst_entity(place, "repolarized")
+        wraps = len(run.repolarizations)
+        name = f"Joints repolarized ({wraps} marked)" if run.audit else "Joints repolarized (none was needed)"
+        yield self.array(name, unit, after, len(run.t_ns), *marks, legend=False)
+
+    def speed(self, run: Run, place: Place) -> list[TimeSeriesView]:
+        """Return the speed of an ingested log's tool centre point; nothing without kinematics."""
+        if run.tcp is None:
+            return []
+        return [self.series("Speed of the TCP [m/s]", overview_entity(speed_entity(place)), legend=False)]
+
+    def compared_speed(self, one: Deviation, place: Place) -> list[TimeSeriesView]:
+        """Return the speed of a compared log's tool centre point."""
+        entity, worst = place.named("matched", "speed"), worst_entity(place, "speed")
+        return self.array("Speed of the TCP", "m/s", entity, len(one.sample), worst, legend=False)
+
+    def deviations(self, one: Deviation, place: Place, reference: str) -> list[list[TimeSeriesView]]:
+        """Return what was held against a tolerance or can be: delta, path, angle and joints."""
+        found = [("delta", f"delta = {printable(reference)} - {printable(one.name)}", "m")]
+        found.append(("path", "Distance from the path", "m"))
+        if one.angle is not None:
+            found.append(("angle", "Angle between the orientations", "rad"))
+        if one.joint_delta is not None:
+            found.append(("joints", "Joints, reference - log", one.run.joint_unit()))
+        return [
+            self.array(
+                name, unit, place.named("delta") if plot == "delta" else place.named("matched", plot),
+                len(one.sample), tolerance_entities(plot), worst_entity(place, plot),
+            )
+            for plot, name, unit in found
+        ]  # fmt: skip
+
+    def motion(self, run: Run, place: Place) -> list[TimeSeriesView]:
+        """Return the derivatives and the tool centre point, as far as the run has them."""
+        found: list[tuple[str, str]] = []
+        if run.log.joints:
+            found.append((f"Joint rates [{run.joint_unit('/s')}]", "joints/velocity"))
+            found.append((f"Joint accelerations [{run.joint_unit('/s2')}]", "joints/acceleration"))
+        if run.tcp is not None:
+            found.append(("TCP [m]", "tcp/position"))
+            found.append(("TCP velocity [m/s]", "tcp/velocity"))
+            found.append(("TCP acceleration [m/s2]", "tcp/acceleration"))
+            found.append(("TCP rz, ry, rx [rad]", "tcp/euler_zyx"))
+        elif run.tcp_recorded is not None and run.log.joints:
+            found.append(("Recorded TCP [m]", "tcp/recorded"))
+        elif run.tcp_recorded is not None:
+            return self.array("Recorded TCP", "m", f"{place.prefix}tcp/recorded", len(run.t_ns))
+        return [self.series(name, place.prefix + entity) for name, entity in found]
+
+
+def decisive_plot(one: Deviation) -> int:
+    """Return which of the deviations decides: its place among `Plots.deviations`."""
+    kind = one.decisive.kind
+    plots = ["delta", "path", *(["angle"] if one.angle is not None else []), "joint"]
+    return plots.index("delta" if kind in ("axis", "norm") else kind)
+
+
+def _whole_time(result: Run | Comparison) -> TimeRange | None:
+    """Return from the first to the last sample, with a margin; None if there is but one."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    runs: Sequence[Run] = [result] if isinstance(result, Run) else [one.run for one in result.runs]
+    every = [t_ns for run in runs for t_ns in (run.log.t_ns, run.t_ns) if len(t_ns)]
+    first, last = min(int(t_ns[0]) for t_ns in every), max(int(t_ns[-1]) for t_ns in every)
+    if first == last:
+        return None
+    edges = first - BEFORE * (last - first), last + AFTER * (last - first)
+    start, end = (rr.TimeRangeBoundary.absolute(nanos=round(at)) for at in edges)
+    return rrb.TimeRange(start=start, end=end)

@@ -1,0 +1,59 @@
+"""The lines of what is allowed, each in the plot of its own unit."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.joint_log import IntArray
+from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, rgb
+from urmpipe_pipeline.recording.columns import scalar_column, time_columns
+from urmpipe_pipeline.recording.entities import entity_path
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+
+PLOTS = {
+    **dict.fromkeys(("axis", "x", "y", "z", "norm"), "delta"),
+    "path": "path",
+    "angle": "angle",
+    "joint": "joints",
+}
+"""In which plot a tolerance belongs."""
+
+UNSIGNED = ("norm", "path", "angle")
+"""What is never negative, so that its tolerance is one line."""
+
+LIMIT_WIDTH = 1.5
+"""Width of a tolerance's line in points of the screen."""
+
+
+def draw_tolerances(stream: RecordingStream, result: Comparison) -> None:
+    """Draw what is allowed as lines over the compared times: both signs of what has a sign."""
+    import rerun as rr
+
+    ends = _ends([one.t_ns for one in result.runs])
+    numbers = _ends([one.sample for one in result.runs])
+    for kind, allowed in result.tolerance.items():
+        signs = (1,) if kind in UNSIGNED else (1, -1)
+        colour = rgb(AXIS_COLOURS.get(kind, REFERENCE_COLOUR))
+        what = "tolerance" if kind not in AXIS_COLOURS else f"tolerance of {kind}"
+        names = [f"{'+' if sign > 0 else '-'}{what}" if len(signs) > 1 else what for sign in signs]
+        style = rr.SeriesLines(colors=[colour] * len(signs), names=names, widths=[LIMIT_WIDTH] * len(signs))
+        entity = entity_path("tolerance", PLOTS[kind], kind)
+        stream.log(entity, style, static=True)
+        values = np.array([[sign * allowed for sign in signs]] * len(ends))
+        stream.send_columns(entity, time_columns(ends, "sample", numbers), [scalar_column(values)])
+
+
+def tolerance_entities(plot: str) -> str:
+    """Return the entities of the tolerances in one plot."""
+    return f"{entity_path('tolerance', plot)}/**"
+
+
+def _ends(ranges: Sequence[IntArray]) -> IntArray:
+    """Return the least and the largest number in all of the ranges."""
+    return np.array([min(int(one[0]) for one in ranges), max(int(one[-1]) for one in ranges)], dtype=np.int64)

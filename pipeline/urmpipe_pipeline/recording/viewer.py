@@ -1,0 +1,165 @@
+"""Open recordings in the viewer that was installed with Rerun, each paused at its worst sample.
+
+One window a recording: within one, the viewer shows all recordings of a program in the layout of the first.
+"""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from urmpipe_models.errors import Finding, RecordingError, ViewerError
+from urmpipe_pipeline.recording.store import Store
+
+if TYPE_CHECKING:
+    from rerun.experimental import ViewerClient
+
+LOOPBACK = "127.0.0.1"
+"""The only address that the viewer listens on: a recording is nobody else's business."""
+
+PATIENCE = 60.0
+"""Time in [s] that the viewer has to start and to open a recording."""
+
+DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
+
+
+def view_recordings(paths: Sequence[Path]) -> None:
+    """Open a window for each recording, and return when all of them are closed.
+
+    Ctrl-C (KeyboardInterrupt) closes them.
+
+    Args:
+        paths: Recordings (.rrd) that urmpipe wrote, at least one.
+
+    Raises:
+        RecordingError: With every file that is none.
+        ViewerError: If there is no display, or the viewer does not start.
+    """
+    times = opening_times(paths)
+    refuse_without_display(paths, os.environ)
+    with ExitStack() as windows:
+        processes = [windows.enter_context(open_window(path, at)) for path, at in times.items()]
+        for process, _ in processes:
+            process.wait()
+
+
+def opening_times(paths: Sequence[Path]) -> dict[Path, int]:
+    """Return at which time in [ns] each recording opens.
+
+    Raises:
+        RecordingError: With every file that is no recording of urmpipe's.
+    """
+    times: dict[Path, int] = {}
+    faults: list[Finding] = []
+    for path in paths:
+        try:
+            times[path] = Store(path).opens_at_ns
+        except RecordingError as error:
+            faults += error.findings
+    if faults:
+        raise RecordingError(*faults)
+    return times
+
+
+def refuse_without_display(
+    paths: Sequence[Path], environment: Mapping[str, str], platform: str = sys.platform
+) -> None:
+    """Raise a `ViewerError` that says what to do if there is no display for a window.
+
+    Args:
+        paths: What is to be opened.
+        environment: The environment's variables.
+        platform: As `sys.platform` tells it: others than Linux always have a display.
+    """
+    if not platform.startswith("linux") or any(environment.get(name) for name in DISPLAYS):
+        return
+    files = " ".join(str(path) for path in paths)
+    raise ViewerError(
+        f"found no display (neither {' nor '.join(DISPLAYS)} is set), allowed: a copy on a computer with one,"
+        f" there: urmpipe view {files}; or a browser there, here: rerun --serve-web --bind {LOOPBACK}"
+        f" {files}, there: ssh -L 9090:{LOOPBACK}:9090 -L 9876:{LOOPBACK}:9876 THIS-HOST,"
+        " and the address that rerun prints"
+    )
+
+
+@contextmanager
+def open_window(
+    path: Path, at_ns: int, *, headless: bool = False
+) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
+    """Run the viewer with a recording open in it, paused at a time; close it at the end.
+
+    Args:
+        path: The recording.
+        at_ns: The time on the timeline t in [ns].
+        headless: Without a window, such as to take a picture; needs a Vulkan driver, be it in software.
+
+    Yields:
+        The viewer's process, and what it is controlled by.
+
+    Raises:
+        ViewerError: If it does not start.
+    """
+    port = _free_port()
+    options = ["--bind", LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
+    command = [str(_program()), *options, *(["--headless"] if headless else [])]
+    quiet = subprocess.DEVNULL
+    with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) as process:
+        try:
+            yield process, _shown(process, port, path, at_ns)
+        finally:
+            process.terminate()
+
+
+def _program() -> Path:
+    """Return the viewer that was installed with Rerun: another on the path may be of another version."""
+    import rerun_cli
+
+    return Path(rerun_cli.__file__).parent / ("rerun.exe" if sys.platform == "win32" else "rerun")
+
+
+def _free_port() -> int:
+    """Return a port that nobody listens on."""
+    with socket.socket() as free:
+        free.bind((LOOPBACK, 0))
+        return int(free.getsockname()[1])
+
+
+def _shown(process: subprocess.Popen[bytes], port: int, path: Path, at_ns: int) -> ViewerClient:
+    """Wait until the viewer shows the recording at the time, and return what it is controlled by."""
+    from rerun.experimental import ViewerClient
+
+    end = time.monotonic() + PATIENCE
+    while process.poll() is None and time.monotonic() < end:
+        try:
+            client = ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
+            client.open(str(path.resolve()))
+            while not _stands(client, at_ns) and time.monotonic() < end:
+                time.sleep(0.1)
+            return client
+        except OSError:  # it does not listen yet, or has just ended
+            time.sleep(0.1)
+    code = process.poll()
+    how = f"did not answer within {PATIENCE:.0f} s" if code is None else f"ended with exit code {code}"
+    raise ViewerError(
+        f"the viewer {how}, allowed: a display and a graphics driver that it can use; what is wrong it says"
+        f" itself: {_program()} {path}"
+    )
+
+
+def _stands(client: ViewerClient, at_ns: int) -> bool:
+    """Tell whether the viewer stands at a time, and put it there if not: it must know the timeline first."""
+    for one in client.get_state().recordings:
+        if any(timeline.name == "t" for timeline in one.timelines):
+            if one.current_timeline == "t" and one.current_time == at_ns:
+                return True
+            client.set_time("t", duration=np.timedelta64(at_ns, "ns"), play_state="paused")
+    return False
