@@ -202,7 +202,9 @@ def recorded(rotation: Rotation, way: str) -> FloatArray:
         return rotation.as_rotvec()
     if way == "quat":
         return rotation.as_quat()
-    return rotation.as_matrix().reshape(-1, 9) if way == "matrix" else rotation.as_euler(way)
+    if way == "matrix":
+        return rotation.as_matrix().reshape(-1, 9)
+    return rotation.as_euler(way)  # type: ignore[call-overload,no-any-return]
 
 
 @pytest.mark.parametrize(("form", "way"), FORMS)
@@ -322,7 +324,7 @@ def test_a_correlation_is_that_of_numpy() -> None:
 def test_what_does_not_change_correlates_with_nothing() -> None:
     rng = np.random.default_rng(7)
     speed = rng.uniform(0.0, 0.5, 500)
-    rounding = 0.0025 + 1e-16 * rng.integers(-3, 4, 500)
+    rounding = 0.0025 + 1e-16 * rng.integers(-3, 4, 500).astype(np.float64)
     assert correlation(rounding, speed) is None
     assert correlation(speed, np.full(500, 0.3)) is None
     assert correlation(0.0025 + UNCHANGING * speed, speed) is None
