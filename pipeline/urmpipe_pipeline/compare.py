@@ -17,7 +17,7 @@ from urmpipe_pipeline.measure import measure
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.recorded_tcp import lacking_tool
 from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.sync import SyncOption, check_sync, synchronise
+from urmpipe_pipeline.sync import SyncOption, check_sync, sync_doubts, synchronise
 from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE, check_tolerance
 
 Tcp = Literal["fk", "recorded"]
@@ -147,6 +147,7 @@ def _comparison(
 ) -> Comparison:
     warnings = [
         *told,
+        *(doubt for one in deviations for doubt in sync_doubts(one.name, one.sync, one.run.tsp)),
         *(
             LogWarning(
                 "left-out",
@@ -183,7 +184,7 @@ def _deviation(
     name: str, run: Run, reference: Trajectory, actual: Trajectory, options: CompareOptions
 ) -> Deviation:
     """Return the deviation of one trajectory, at its own samples."""
-    sync = synchronise(reference, actual, options.sync)
+    sync = synchronise(reference, actual, options.sync, options.align)
     matched = _matched(run, reference, actual, sync)
     alignment, aligned = align(matched, options.align, name)
     return measure(name, run, reference, aligned, sync, alignment, options.tolerance)

@@ -107,7 +107,7 @@ def match(reference: Trajectory, log: Trajectory, offset: float) -> Matched:
     quats: tuple[FloatArray | None, FloatArray | None] = None, None
     if reference.quat_xyzw is not None and log.quat_xyzw is not None:
         quats = _between(at_ns, reference.t_ns, reference.quat_xyzw), log.quat_xyzw[sample]
-    order = _order(reference.joints, log.joints)
+    order = joint_order(reference.joints, log.joints)
     joints: tuple[FloatArray | None, FloatArray | None] = None, None
     if order is not None and reference.q is not None and log.q is not None:
         joints = interpolate(at_ns, reference.t_ns, reference.q[:, order]), log.q[sample]
@@ -129,8 +129,13 @@ def lacking(run: Run, message: str) -> Finding:
     return Finding(message, file=run.log.files[0].name if run.log.files else run.name)
 
 
-def _order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int] | None:
-    """Return where the reference has the log's joints: by name, else by place; None if it has others."""
+def joint_order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int] | None:
+    """Return where the reference has the log's joints: by name, else by place; None if it has others.
+
+    Args:
+        reference: Names of the reference's joints.
+        log: Names of the log's.
+    """
     if not log or len(reference) != len(log):
         return None
     if set(reference) == set(log):
