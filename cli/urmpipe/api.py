@@ -19,6 +19,7 @@ from urmpipe_pipeline.comparison import AlignMode, Comparison
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.left_out import BEYOND
 from urmpipe_pipeline.operands import load_run, log_files
 from urmpipe_pipeline.outputs import OutputKind, guarded_output
 from urmpipe_pipeline.recorded_tcp import LACKING_TOOL
@@ -194,7 +195,7 @@ def compare(
     first, others = run_of(reference), [run_of(log) for log in logs]
     result = compare_runs(first, others, options) if others else compare_recorded(first, options)
     judged = others or [first]  # the reference's own stand among those of the comparison
-    doubts = [w for w in result.warnings if w.kind != LACKING_TOOL]  # that one explains a verdict of fail
+    doubts = [w for w in result.warnings if w.kind not in (LACKING_TOOL, BEYOND)]  # that explain the result
     _refuse_warnings(strict, (*(w for run in judged for w in run.warnings), *doubts))
     if output is None:
         return result

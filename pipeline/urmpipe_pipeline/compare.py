@@ -12,6 +12,7 @@ from urmpipe_pipeline.alignment import align, check_align
 from urmpipe_pipeline.audit import audit_log
 from urmpipe_pipeline.comparison import AlignMode, Comparison, Deviation, Sync, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning
+from urmpipe_pipeline.left_out import left_out_warnings
 from urmpipe_pipeline.matching import Matched, as_recorded, by_kinematics, lacking, match
 from urmpipe_pipeline.measure import measure
 from urmpipe_pipeline.provenance import provenance
@@ -21,6 +22,8 @@ from urmpipe_pipeline.sync import SyncOption, check_sync, sync_doubts, synchroni
 from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE, check_tolerance
 
 Tcp = Literal["fk", "recorded"]
+
+ONE_CLOCK = "its joints and its recorded tool centre point stand in the same rows"
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,9 +113,12 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     Where samples left on a wrap were repaired, the repaired ones count.
 
     Raises:
+        OptionError: If another time than its own is asked for.
         LogError: If the log has no joints, no robot, or recorded no position.
     """
     chosen = options or CompareOptions()
+    if chosen.sync != "start":
+        raise OptionError(f"--sync: found {chosen.sync} for one log, allowed: start, since {ONE_CLOCK}")
     log = run.log
     if not log.joints:
         raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to hold against it"))
@@ -124,7 +130,7 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         )
     recorded = Trajectory(f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files)
     computed = Trajectory(run.name, log.t_ns, positions_over_log(run.robot, _on_rows(run)), log.files)
-    deviation = _deviation(run.name, run, recorded, computed, replace(chosen, sync="start"))
+    deviation = _deviation(run.name, run, recorded, computed, chosen)
     found = _comparison(recorded, [deviation], chosen)
     doubts = lacking_tool(run.robot, log) if deviation.verdict == "fail" else []
     return replace(found, warnings=(*found.warnings, *doubts))
@@ -145,19 +151,10 @@ def _comparison(
     options: CompareOptions,
     told: Sequence[LogWarning] = (),
 ) -> Comparison:
-    warnings = [
-        *told,
-        *(doubt for one in deviations for doubt in sync_doubts(one.name, one.sync, one.run.tsp)),
-        *(
-            LogWarning(
-                "left-out",
-                f"{one.name}: {one.left_out} of {one.left_out + len(one.sample)} samples have no reference"
-                " or no value",
-            )
-            for one in deviations
-            if one.left_out
-        ),
-    ]
+    warnings = list(told)
+    for one in deviations:
+        warnings += sync_doubts(one.name, one.sync, one.run.tsp)
+        warnings += left_out_warnings(one, reference)
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
     given = {
         "tolerance": dict(options.tolerance),
