@@ -143,6 +143,8 @@ def peaks(found: Rates, turned: bool) -> list[Peak]:
         found: The rates of both sides.
         turned: Whether the frames may be turned against each other.
     """
+    if not all(np.nansum(side**2) for side in (found.reference, found.log)):
+        return []
     likeness = _over_lags(found.reference, found.log, turned)
     tops = _separate_tops(likeness, 1.0 - 2.0 * (1.0 - likeness.max()) - NEAR)
     best = sorted(tops, key=lambda index: -likeness[index])[:MOST_PEAKS]

@@ -88,7 +88,7 @@ def refine(view: View, found: Rates, peak: Peak) -> Estimate:
         if abs(step_ns) < 1.0:
             break
     precision = _precision(line)
-    if precision > found.period_ns / 1e9:
+    if precision > found.period_ns / 1e9 or abs(step_ns) > max(1.0, 1e9 * precision):
         return _lost(peak)
     return Estimate(round(offset_ns) / 1e9, precision, _similarity_at(view, found, round(offset_ns)))
 

@@ -271,6 +271,16 @@ def test_logs_without_samples_to_speak_of_are_refused() -> None:
         assert refused(whole, joints(q[:rows], t[:rows])).startswith("log.csv: --sync auto: found ")
 
 
+def test_a_log_without_two_values_in_a_row_has_no_rates() -> None:
+    t = times(0.0, 20.0, 0.005)
+    q = smooth(11, 2)(t)
+    holes = q.copy()
+    holes[::2] = np.nan
+    assert refused(joints(q, t, "wanted"), joints(holes, t)) == (
+        f"log.csv: --sync auto: found no offset at which the joints move as in wanted; {ALLOWED}"
+    )
+
+
 def test_what_is_not_known_well_is_told() -> None:
     assert sync_doubts("log", Sync("auto", 0.25, "joints", 0.0005, 0.9), 0.005) == []
     assert sync_doubts("log", Sync("given", 0.25), 0.005) == []
