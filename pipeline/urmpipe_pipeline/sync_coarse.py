@@ -35,7 +35,7 @@ NEAR = 0.1
 """A peak is looked at closely if it is less alike than the best by no more than this and twice over: between
 two lags of the coarse stage a peak loses a few hundredths."""
 
-MOST_PEAKS = 12
+MOST_PEAKS = 6
 """So many peaks are looked at closely, the highest."""
 
 
@@ -80,13 +80,15 @@ def mean_rates(view: View) -> Rates | None:
         view: The channels.
 
     Returns:
-        The rates; None if a side has fewer than three samples.
+        The rates; None if a side has fewer than three samples, or is too short for a period of the other.
     """
     sides = ((view.reference_ns, view.reference), (view.log_ns, view.log))
     if min(len(t_ns) for t_ns, _ in sides) < 3:
         return None
     spans = [int(t_ns[-1] - t_ns[0]) for t_ns, _ in sides]
     period = max(*(float(np.median(np.diff(t_ns))) for t_ns, _ in sides), max(spans) / MOST)
+    if min(spans) < 2.0 * period:
+        return None
     base = min(int(np.ceil(period)), min(spans) // 2)
     levels = max(int(np.log2(max(min(spans) / base / LEAST, 1.0))), 0)
     times = [np.arange(t_ns[0], t_ns[-1] + 1, base, dtype=np.int64) for t_ns, _ in sides]
@@ -130,7 +132,7 @@ def similarity(reference: FloatArray, log: FloatArray, turned: bool) -> float:
     if not energy:
         return -1.0
     products = float(_turned_products((a.T @ b)[np.newaxis])[0]) if turned else float((a * b).sum())
-    return 2.0 * products / energy
+    return min(2.0 * products / energy, 1.0)  # but for rounding
 
 
 def peaks(found: Rates, turned: bool) -> list[Peak]:
@@ -143,8 +145,6 @@ def peaks(found: Rates, turned: bool) -> list[Peak]:
         found: The rates of both sides.
         turned: Whether the frames may be turned against each other.
     """
-    if not all(np.nansum(side**2) for side in (found.reference, found.log)):
-        return []
     likeness = _over_lags(found.reference, found.log, turned)
     tops = _separate_tops(likeness, 1.0 - 2.0 * (1.0 - likeness.max()) - NEAR)
     best = sorted(tops, key=lambda index: -likeness[index])[:MOST_PEAKS]
@@ -184,6 +184,8 @@ def _over_lags(a: FloatArray, b: FloatArray, turned: bool) -> FloatArray:
     there = [np.asarray(np.isfinite(side).all(axis=1)) for side in (a, b)]
     filled = [np.where(mask[:, np.newaxis], side, 0.0) for side, mask in zip((a, b), there, strict=True)]
     power = [(side**2).sum(axis=1) for side in filled]
+    if not all(side.any() for side in power):
+        return np.full(len(a) + len(b) - 1, -1.0)
     of_a, of_b = (np.fft.rfft(side, size, axis=0) for side in filled)
     masks = [np.fft.rfft(mask.astype(np.float64), size) for mask in there]
     powers = [np.fft.rfft(side, size) for side in power]
