@@ -31,8 +31,9 @@ ALIKE = 0.9
 can hold it down."""
 
 RIVAL = 2.0
-"""An offset is clearly better than another if it leaves less than half as much unexplained. Of 360 pairs of
-random motions of 5 to 60 s that had nothing to do with each other, one passed this and the likeness."""
+"""An offset is clearly better than another if it leaves less than half as much unexplained. Of 720 pairs of
+random motions of 5 to 60 s that had nothing to do with each other, six passed this and the likeness, all of
+them positions over 5 s or less, of a few moves."""
 
 CERTAIN = 0.1
 """An offset is certain if its standard error is below this share of the log's period."""
