@@ -15,6 +15,7 @@ from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, comp
 from urmpipe_pipeline.comparison import AlignMode, Comparison
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.junit import write_junit
+from urmpipe_pipeline.left_out import BEYOND
 from urmpipe_pipeline.operands import load_comparison, load_run
 from urmpipe_pipeline.outputs import OutputKind, guarded_output
 from urmpipe_pipeline.recorded_tcp import LACKING_TOOL
@@ -167,7 +168,7 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
     runs = [one.run for one in result.runs]
-    doubts = [w for w in result.warnings if w.kind != LACKING_TOOL]  # that one explains a verdict of fail
+    doubts = [w for w in result.warnings if w.kind not in (LACKING_TOOL, BEYOND)]  # those explain a result
     refuse_warnings(strict, (*(w for run in runs for w in run.warnings), *doubts))
 
 

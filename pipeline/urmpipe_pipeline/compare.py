@@ -14,15 +14,18 @@ from urmpipe_pipeline.alignment import align, check_align
 from urmpipe_pipeline.audit import audit_log
 from urmpipe_pipeline.comparison import AlignMode, Comparison, Deviation, Sync, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning
+from urmpipe_pipeline.left_out import left_out_warnings
 from urmpipe_pipeline.matching import Matched, as_recorded, by_kinematics, lacking, match
 from urmpipe_pipeline.measure import measure, unheld
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.recorded_tcp import lacking_tool
 from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.sync import SyncOption, check_sync, synchronise
+from urmpipe_pipeline.sync import SyncOption, check_sync, sync_doubts, synchronise
 from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE, check_tolerance
 
 Tcp = Literal["fk", "recorded"]
+
+ONE_CLOCK = "its joints and its recorded tool centre point stand in the same rows"
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,9 +116,12 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     Where samples left on a wrap were repaired, the repaired ones count.
 
     Raises:
+        OptionError: If another time than its own is asked for.
         LogError: If the log has no joints, no robot, or recorded no position.
     """
     chosen = options or CompareOptions()
+    if chosen.sync != "start":
+        raise OptionError(f"--sync: found {chosen.sync} for one log, allowed: start, since {ONE_CLOCK}")
     log = run.log
     if not log.joints:
         raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to hold against it"))
@@ -131,7 +137,7 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     position, rotation = poses_over_log(run.robot, _on_rows(run))
     quat = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
     computed = Trajectory(run.name, log.t_ns, position, log.files, quat_xyzw=quat)
-    deviation = _deviation(run.name, run, recorded, computed, replace(chosen, sync="start"))
+    deviation = _deviation(run.name, run, recorded, computed, chosen)
     found = _comparison(recorded, [deviation], chosen)
     doubts = lacking_tool(run.robot, log) if deviation.verdict == "fail" else []
     return replace(found, warnings=(*found.warnings, *doubts))
@@ -152,19 +158,12 @@ def _comparison(
     options: CompareOptions,
     told: Sequence[LogWarning] = (),
 ) -> Comparison:
-    warnings = [
-        *told,
-        *(
-            LogWarning(
-                "left-out",
-                f"{one.name}: {one.left_out} of {one.left_out + len(one.sample)} samples have no reference"
-                " or no value",
-            )
-            for one in deviations
-            if one.left_out
-        ),
-        *(_joints_not_compared(reference, one) for one in deviations if _lacks_joints(reference, one)),
-    ]
+    warnings = list(told)
+    for one in deviations:
+        warnings += sync_doubts(one.name, one.sync, one.run.tsp)
+        warnings += left_out_warnings(one, reference)
+        if _lacks_joints(reference, one):
+            warnings.append(_joints_not_compared(reference, one))
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
     given = {
         "tolerance": dict(options.tolerance),
@@ -203,7 +202,7 @@ def _deviation(
     name: str, run: Run, reference: Trajectory, actual: Trajectory, options: CompareOptions
 ) -> Deviation:
     """Return the deviation of one trajectory, at its own samples."""
-    sync = synchronise(reference, actual, options.sync)
+    sync = synchronise(reference, actual, options.sync, options.align)
     matched = _matched(run, reference, actual, sync)
     alignment, aligned = align(matched, options.align, run)
     return measure(name, run, reference, aligned, sync, alignment, options.tolerance)

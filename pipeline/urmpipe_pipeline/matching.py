@@ -147,9 +147,10 @@ def joints_apart(reference: Trajectory, joints: tuple[str, ...], units: tuple[st
     """
     if not reference.joints or not joints:
         return "a side has no joints"
-    if len(reference.joints) != len(joints):
+    order = joint_order(reference.joints, joints)
+    if order is None:
         return f"the log has {len(joints)} joints, the reference has {len(reference.joints)}"
-    turning = [reference.joint_units[place] for place in _order(reference.joints, joints)]
+    turning = [reference.joint_units[place] for place in order]
     apart = [name for name, *pair in zip(joints, units, turning, strict=True) if pair[0] != pair[1]]
     return f"{', '.join(apart)} turn on one side and slide on the other" if apart else ""
 
@@ -159,18 +160,29 @@ def lacking(run: Run, message: str) -> Finding:
     return Finding(message, file=run.log.files[0].name if run.log.files else run.name)
 
 
-def _order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int]:
-    """Return where the reference has the log's joints: by name if it has the same, else by place."""
-    return [reference.index(name) for name in log] if set(reference) == set(log) else list(range(len(log)))
+def joint_order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int] | None:
+    """Return where the reference has the log's joints: by name, else by place; None if it has others.
+
+    Args:
+        reference: Names of the reference's joints.
+        log: Names of the log's.
+    """
+    if not log or len(reference) != len(log):
+        return None
+    if set(reference) == set(log):
+        return [reference.index(name) for name in log]
+    return list(range(len(log)))
 
 
 def _joints(
     reference: Trajectory, log: Trajectory, sample: IntArray, at_ns: IntArray
 ) -> tuple[FloatArray | None, FloatArray | None]:
     """Return the joints of both sides at the compared samples; None where they cannot be compared."""
-    if reference.q is None or log.q is None or joints_apart(reference, log.joints, log.joint_units):
+    order = joint_order(reference.joints, log.joints)
+    if order is None or joints_apart(reference, log.joints, log.joint_units):
         return None, None
-    order = _order(reference.joints, log.joints)
+    if reference.q is None or log.q is None:
+        return None, None
     return interpolate(at_ns, reference.t_ns, reference.q[:, order]), log.q[sample]
 
 

@@ -11,6 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from urmpipe import api
+from urmpipe_models.errors import LogError
+
 FloatArray = NDArray[np.float64]
 Spoil = Callable[[FloatArray], FloatArray]
 
@@ -61,3 +64,25 @@ def test_a_doubt_is_a_warning_and_with_strict_an_error(
     assert strict.code == 2
     assert f"error: {kind}: {warnings[0]['message']} (--strict)" in strict.err.splitlines()
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
+
+
+def test_what_an_offset_leaves_out_is_no_doubt(tmp_path: Path) -> None:
+    t = 0.005 * np.arange(400)
+    q = np.cos(np.outer(t, 0.5 + 0.4 * np.arange(6)))
+    header = "t [s]," + ",".join(f"q{j} [rad]" for j in range(1, 7))
+    for name, rows in (("wanted", slice(300)), ("late", slice(100, 400))):
+        table = np.column_stack([t[:300], q[rows]])
+        np.savetxt(tmp_path / f"{name}.csv", table, fmt="%.9f", delimiter=",", header=header, comments="")
+    wanted, late = tmp_path / "wanted.csv", tmp_path / "late.csv"
+    result = api.compare(wanted, [late], robot="ur5e", sync="auto", strict=True)
+    assert result.runs[0].sync.offset == pytest.approx(0.5, abs=1e-7)  # of values to 1e-9 rad
+    assert [(one.kind, one.message) for one in result.warnings] == [
+        (
+            "sync-left-out",
+            "late: the offset of 0.5 s leaves 100 of 300 samples and 100 of 300 samples of wanted without the"
+            " other side",
+        )
+    ]
+    with pytest.raises(LogError) as error:
+        api.compare(wanted, [late], robot="ur5e", sync="auto", tsp=0.0051, strict=True)
+    assert "resampled" in str(error.value)

@@ -120,6 +120,48 @@ def test_an_offset_shifts_the_log_against_the_reference(q: FloatArray) -> None:
     assert len(late.sample) == 400
 
 
+def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: FloatArray) -> None:
+    wanted = path_run(positions_over_log(URM6, q)[:450])
+    broken = q[100:].copy()
+    broken[30, 2] = np.nan
+    result = compare_runs(wanted, [arm_run(broken)], CompareOptions(sync="auto"))
+    late = result.runs[0]
+    assert (late.sync.mode, late.sync.offset, late.sync.by) == ("auto", 0.5, "position")
+    assert late.statistics["norm"].max < 1e-12  # the same samples
+    assert (late.left_out, late.reference_left_out) == (51, 100)
+    assert result.warnings == (
+        LogWarning("left-out", "log: 1 of 400 samples have no reference or no value"),
+        LogWarning(
+            "sync-left-out",
+            "log: the offset of 0.5 s leaves 50 of 400 samples and 100 of 450 samples of path without the"
+            " other side",
+        ),
+    )
+
+
+def test_an_estimate_that_is_not_certain_is_told(q: FloatArray) -> None:
+    rng = np.random.default_rng(3)
+    wanted = path_run(positions_over_log(URM6, q) + rng.normal(scale=0.011, size=(500, 3)))
+    result = compare_runs(wanted, [arm_run(q)], CompareOptions(sync="auto"))
+    precision = result.runs[0].sync.precision
+    assert precision is not None
+    assert precision > 0.1 * TSP
+    said = [one.message for one in result.warnings if one.kind == "sync-uncertain"]
+    assert len(said) == 1
+    assert f"is known to +-{1e3 * precision:.2g} ms (standard error); the period is 5 ms" in said[0]
+
+
+def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
+    log = arm_run(q, recorded=positions_over_log(URM6, q))
+    for sync in ("auto", 0.25):
+        with pytest.raises(OptionError) as error:
+            compare_recorded(log, CompareOptions(sync=sync))
+        assert str(error.value) == (
+            f"--sync: found {sync} for one log, allowed: start, since its joints and its recorded tool centre"
+            " point stand in the same rows"
+        )
+
+
 def test_logs_with_one_name_are_told_apart(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     assert [r.name for r in compare_runs(wanted, [arm_run(q), arm_run(q), arm_run(q, name="b")]).runs] == [

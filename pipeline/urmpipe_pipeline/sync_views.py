@@ -1,0 +1,65 @@
+"""What the offset between two clocks is looked for in: joints or positions, as both sides have them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from urmpipe_models.orientation import product
+from urmpipe_pipeline.comparison import AlignMode, Trajectory
+from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.matching import joint_order
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """The same channels of two motions.
+
+    Attributes:
+        by: What the channels are.
+        turned: Whether the frames of the two sides may be turned against each other; of positions.
+        reference_ns: Times of the reference in integer [ns], shape (n,).
+        reference: Its channels in [rad] or [m], shape (n, k).
+        log_ns: Times of the log in integer [ns], shape (m,).
+        log: Its channels, shape (m, k).
+        tool_axes: Axes of the log's tool as the columns of rotation matrices, shape (m, 3, 3), where a tool
+            between the two sides is not known; else None.
+    """
+
+    by: Literal["joints", "position"]
+    turned: bool
+    reference_ns: IntArray
+    reference: FloatArray
+    log_ns: IntArray
+    log: FloatArray
+    tool_axes: FloatArray | None = None
+
+
+def views(reference: Trajectory, log: Trajectory, align: AlignMode) -> Iterator[View]:
+    """Yield the views of two trajectories, the one that assumes least about their frames and tools first.
+
+    Joints do not depend on frames, structure or tools. Positions do: they are taken as they stand, unless
+    the alignment that follows would turn the log anyway, and at last as if the frames were turned.
+
+    Args:
+        reference: What was asked for.
+        log: What was done.
+        align: How the log will be moved in space: start and rigid turn it, tool finds a tool.
+    """
+    order = joint_order(reference.joints, log.joints)
+    if order is not None and reference.q is not None and log.q is not None:
+        yield View("joints", False, reference.t_ns, reference.q[:, order], log.t_ns, log.q)
+    if align in ("none", "tool"):
+        axes = None if align == "none" or log.quat_xyzw is None else _axes(log.quat_xyzw)
+        yield View("position", False, reference.t_ns, reference.position, log.t_ns, log.position, axes)
+    yield View("position", True, reference.t_ns, reference.position, log.t_ns, log.position)
+
+
+def _axes(quat_xyzw: FloatArray) -> FloatArray:
+    """Return rotation matrices of unit quaternions, shape (m, 3, 3): q e q* for the unit vectors e."""
+    back = quat_xyzw * np.array([-1.0, -1.0, -1.0, 1.0])
+    units = np.eye(4)[:3, np.newaxis] + np.zeros((1, len(back), 1))
+    return np.stack([product(product(quat_xyzw, unit), back)[:, :3] for unit in units], axis=2)
