@@ -14,7 +14,7 @@ from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
 
-OutputKind = Literal["recording", "report", "map", "export", "audit"]
+OutputKind = Literal["recording", "report", "map", "export", "audit", "figure"]
 
 AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")
 """The header of an audit, by which one of ours is known."""
@@ -24,6 +24,9 @@ GENERATOR = re.compile(rb"<meta\s+name=\"generator\"\s+content=\"urmpipe\b", re.
 
 MAP_HEADER = "# How urmpipe reads these logs: urmpipe ingest LOG --map THIS"
 """The first line of a map of ours."""
+
+FIGURE = re.compile(rb"\A<!-- Generator: urmpipe |\A\x89PNG.{29}.{4}tEXtSoftware\0urmpipe ", re.DOTALL)
+"""How a figure of ours (SVG, PNG) tells where it comes from."""
 
 HEAD = 4096
 """The mark of a report stands within so many bytes of its start."""
@@ -96,6 +99,9 @@ def _is_ours(path: Path, kind: OutputKind) -> bool:
     if kind == "map":
         with path.open("rb") as file:
             return file.readline().strip() == MAP_HEADER.encode()
+    if kind == "figure":
+        with path.open("rb") as file:
+            return FIGURE.match(file.read(HEAD)) is not None
     if kind == "export":
         from urmpipe_pipeline.export.identity import is_export
 

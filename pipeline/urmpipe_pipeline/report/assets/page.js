@@ -18,12 +18,17 @@
       displayModeBar: touch ? false : "hover",
       scrollZoom: false, // the wheel scrolls the page
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
-      toImageButtonOptions: { format: isScene(plot) ? "png" : "svg", filename: "urmpipe-figure" },
+      toImageButtonOptions: { format: isScene(plot) ? "png" : "svg", filename: plot.dataset.name },
     };
   }
 
   function isScene(plot) {
     return plot.classList.contains("space");
+  }
+
+  // Tells whether a drawn figure stands over the time of its part, so that its axis moves with its siblings'.
+  function isOverTime(plot) {
+    return !isScene(plot) && plot.layout && plot.layout.xaxis.title.text === "t [s]";
   }
 
   function draw(plot) {
@@ -39,7 +44,7 @@
     }
     try {
       Plotly.newPlot(plot, spec.data, spec.layout, config(plot));
-      if (isScene(plot)) return;
+      if (!isOverTime(plot)) return;
       if (ranges.has(plot.dataset.link)) show(plot, ranges.get(plot.dataset.link));
       plot.on("plotly_relayout", () => follow(plot));
     } catch (error) {
@@ -63,8 +68,7 @@
     const range = plot.layout.xaxis.range.slice();
     ranges.set(link, range);
     for (const other of plots) {
-      const linked = other !== plot && other.dataset.link === link && !isScene(other);
-      if (linked && other.dataset.drawn) show(other, range);
+      if (other !== plot && other.dataset.link === link && isOverTime(other)) show(other, range);
     }
   }
 
