@@ -3,12 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import click
 from click.core import ParameterSource
 
 from urmpipe.options import output_options
 from urmpipe.process import tune_pyarrow
+
+if TYPE_CHECKING:
+    from urmpipe_pipeline.report.headless import FigureFormat
+
+FORMATS: dict[str, tuple[FigureFormat, ...]] = {
+    "svg": ("svg",),
+    "png": ("png",),
+    "both": ("svg", "png"),
+}
 
 
 @click.command(short_help="Write the HTML report of recordings.")
@@ -23,8 +33,10 @@ from urmpipe.process import tune_pyarrow
 @click.option(
     "--format",
     "figure_format",
-    type=click.Choice(["svg", "png", "both"]),
-    help="What the files of figures are [default: both].",
+    type=click.Choice(list(FORMATS)),
+    default="both",
+    show_default=True,
+    help="What the files of figures are.",
 )
 @output_options
 @click.pass_context
@@ -34,7 +46,7 @@ def report(
     recordings: tuple[Path, ...],
     output: Path | None,
     figures: Path | None,
-    figure_format: str | None,
+    figure_format: str,
     as_json: bool,
     quiet: bool,
 ) -> int:
@@ -57,9 +69,10 @@ def report(
     from urmpipe.printing import print_json, progress_bar
 
     target = output or Path(f"{recordings[0].stem}.html")
-    formats = ("svg", "png") if figure_format in (None, "both") else (figure_format,)
     with progress_bar(f"Writing {target}", quiet=quiet) as progress:
-        result = api.report(recordings, target, figures=figures, formats=formats, progress=progress)
+        result = api.report(
+            recordings, target, figures=figures, formats=FORMATS[figure_format], progress=progress
+        )
     if as_json:
         print_json(result.to_dict())
     elif not quiet:
