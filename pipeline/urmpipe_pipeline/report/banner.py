@@ -92,7 +92,7 @@ def _against(comparisons: Sequence[Comparison]) -> tuple[Fact, ...]:
     references = sorted({comparison.reference.name for comparison in comparisons})
     tolerances = sorted({allowed(comparison) for comparison in comparisons})
     return (
-        Fact("Reference", references[0] if len(references) == 1 else f"{len(references)} of them"),
+        Fact("Reference" if len(references) == 1 else "References", ", ".join(references)),
         Fact("Tolerance", tolerances[0] if len(tolerances) == 1 else "as each comparison says"),
     )
 

@@ -164,7 +164,7 @@ def _turn(alignment: Alignment) -> float:
 def _left_out(deviation: Deviation, reference_samples: int) -> str:
     total = deviation.left_out + len(deviation.sample)
     return (
-        f"{deviation.left_out} of {total} samples of the log,"
+        f"{deviation.left_out} of {total} samples,"
         f" {deviation.reference_left_out} of {reference_samples} of the reference"
     )
 

@@ -45,7 +45,7 @@ def ingest_table(runs: Sequence[Run], links: Sequence[str]) -> Table:
         )
         for run, link in zip(runs, links, strict=True)
     )
-    return Table("Ingested logs", columns, rows)
+    return Table("What was read", columns, rows)
 
 
 def audit_table(run: Run) -> Table:

@@ -56,7 +56,7 @@ def _how_far(comparison: Comparison, links: Sequence[str]) -> Table:
     columns: tuple[Column, ...] = (
         *words("Log", "Verdict", "Decided by"),
         *numbers(*(f"max |{text.SYMBOLS[axis]}| [mm]" for axis in "xyz"), "max ‖Δ‖ [mm]", "max path [mm]"),
-        *numbers("max angle [deg]", "max joint [deg]", "max joint [mm]", "Samples out"),
+        *numbers("max angle [deg]", "max joint [deg]", "max joint [mm]", "Share out"),
     )
     rows = tuple(_how_far_row(run, link) for run, link in zip(comparison.ranking, links, strict=True))
     note = "The bars show how much of a tolerance is used up; the logs are ranked by the fullest of theirs."

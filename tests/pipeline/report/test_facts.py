@@ -81,7 +81,7 @@ def test_what_is_left_out_is_counted_on_both_sides(everything: Comparison) -> No
     deviation = next(run for run in everything.runs if run.name == "shifted")
     told = facts.deviation_facts(deviation, len(everything.reference.t_ns))
     (left,) = [fact.value for fact in told if fact.name == "Left out"]
-    assert left == "100 of 3000 samples of the log, 100 of 3000 of the reference"
+    assert left == "100 of 3000 samples, 100 of 3000 of the reference"
 
 
 def test_turns_counted_apart_are_told(comparison: Comparison) -> None:

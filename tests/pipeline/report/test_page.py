@@ -60,7 +60,9 @@ class Page(HTMLParser):
     def tables(self, title: str) -> list[list[dict[str, str]]]:
         """Every table under such a heading: a dict of its cells by the column's head, one a row."""
         found: list[list[dict[str, str]]] = []
-        heading, heads, row = "", [], []
+        heading = ""
+        heads: list[str] = []
+        row: list[str] = []
         for tag, attrs, parts in self.elements:
             said = "".join(parts).strip().replace("\u00a0", " ").removeprefix("out of tolerance: ")
             if tag in ("h2", "h3", "h4"):

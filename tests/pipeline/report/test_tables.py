@@ -47,7 +47,7 @@ def test_the_ranking_holds_every_kind_of_deviation(everything: Comparison) -> No
         "max path [mm]": text.millimetres(found["path"].max, 0.002),
         "max angle [deg]": text.number(found["angle"].max, "rad", 0.01),
         "max joint [deg]": text.number(joint.max, "rad", 0.002),
-        "Samples out": text.percent(off.share_out),
+        "Share out": text.percent(off.share_out),
     }
     failed = {cell.text for cell in far.rows[0] if cell.used == 1.0}
     assert failed == {cell.text for cell in far.rows[0][3:] if cell.state == "fail"}
