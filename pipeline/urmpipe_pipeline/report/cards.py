@@ -75,7 +75,7 @@ def _facts(deviation: Deviation) -> list[Fact]:
         Fact("Out of tolerance", text.percent(deviation.share_out)),
         Fact("Longest out", stretch(deviation.longest_out)),
         Fact("Clocks", sync_value(deviation.sync)),
-        Fact("Alignment", alignment_value(deviation.alignment)),
+        Fact("Alignment", alignment_value(deviation)),
         Fact("r(‖Δ‖, speed)", correlation(deviation)),
         Fact("Warnings", str(len(deviation.run.warnings))),
     ]

@@ -65,7 +65,7 @@ def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact,
     return _told(
         Fact("Clocks", sync_value(deviation.sync), _sync_note(deviation.sync)),
         Fact("Left out", _left_out(deviation, reference_samples), "no counterpart, or no value"),
-        Fact("Alignment", alignment_value(deviation.alignment), _alignment_note(deviation)),
+        Fact("Alignment", alignment_value(deviation), _alignment_note(deviation)),
         Fact("Turns", _turns(deviation), "counted apart at the start: taken out of the joints' deviation"),
         Fact("Out of tolerance", outside),
         Fact("Longest stretch out", stretch(deviation.longest_out)),
@@ -107,14 +107,15 @@ def sync_value(sync: Sync) -> str:
     return f"{text.offset(sync.offset)}{within}"
 
 
-def alignment_value(alignment: Alignment) -> str:
+def alignment_value(deviation: Deviation) -> str:
     """Return how a log was moved in space."""
+    alignment = deviation.alignment
     match alignment.mode:
         case "none":
             return "none"
         case "tool":
             return f"tool moved by {text.quantity(float(np.linalg.norm(alignment.tool)), 'm')}"
-    moved = f"moved by {text.quantity(float(np.linalg.norm(alignment.translation)), 'm')}"
+    moved = f"moved by up to {text.quantity(_farthest(deviation), 'm')}"
     return f"{alignment.mode}: {moved}, turned by {text.quantity(_turn(alignment), 'rad')}"
 
 
@@ -149,9 +150,16 @@ def _alignment_note(deviation: Deviation) -> str:
         robot = deviation.run.robot
         option = f", as {tool_option(robot, alignment.tool)} does" if robot else ""
         return f"the constant offset of the tool centre point that fits best{option}"
-    moved = ", ".join(text.millimetres(value) for value in alignment.translation)
-    what = "the first compared poses agree" if alignment.mode == "start" else "the best rigid motion"
-    return f"{what}; x, y, z by {moved} mm after the turn about the origin"
+    return (
+        "the first compared poses agree" if alignment.mode == "start" else "the rigid motion that fits best"
+    )
+
+
+def _farthest(deviation: Deviation) -> float:
+    """Return how far the position that was moved farthest was moved, in [m]: p' - p, p = R^T (p' - t)."""
+    alignment = deviation.alignment
+    before = (deviation.actual - np.asarray(alignment.translation)) @ np.asarray(alignment.rotation)
+    return float(np.linalg.norm(deviation.actual - before, axis=1).max())
 
 
 def _turn(alignment: Alignment) -> float:

@@ -103,7 +103,7 @@ def _when_and_where_row(run: Deviation, link: str) -> tuple[Cell, ...]:
         Cell(correlation(run) or text.NOTHING),
         Cell(str(run.left_out)),
         Cell(str(len(run.run.warnings))),
-        Cell(alignment_value(run.alignment)),
+        Cell(alignment_value(run)),
     )
 
 

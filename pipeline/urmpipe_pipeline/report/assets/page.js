@@ -26,11 +26,6 @@
     return plot.classList.contains("space");
   }
 
-  // Tells whether a drawn figure stands over the time of its part, so that its axis moves with its siblings'.
-  function isOverTime(plot) {
-    return !isScene(plot) && plot.layout && plot.layout.xaxis.title.text === "t [s]";
-  }
-
   function draw(plot) {
     if (plot.dataset.drawn) return;
     plot.dataset.drawn = "yes";
@@ -44,7 +39,7 @@
     }
     try {
       Plotly.newPlot(plot, spec.data, spec.layout, config(plot));
-      if (!isOverTime(plot)) return;
+      if (isScene(plot)) return;
       if (ranges.has(plot.dataset.link)) show(plot, ranges.get(plot.dataset.link));
       plot.on("plotly_relayout", () => follow(plot));
     } catch (error) {
@@ -68,7 +63,8 @@
     const range = plot.layout.xaxis.range.slice();
     ranges.set(link, range);
     for (const other of plots) {
-      if (other !== plot && other.dataset.link === link && isOverTime(other)) show(other, range);
+      const linked = other !== plot && other.dataset.link === link && !isScene(other);
+      if (linked && other.dataset.drawn) show(other, range);
     }
   }
 
