@@ -129,7 +129,8 @@ def tool_option(robot: Chain, tool: tuple[float, float, float]) -> str:
     frame = robot.tool @ translation(*tool)
     turn = rpy_of(frame.rotation)
     values = [*frame.translation, *(turn if any(abs(angle) > 1e-12 for angle in turn) else ())]
-    return "--tool " + ",".join(f"{float(value) + 0.0:.7g}" for value in values)
+    rounded = (f"{round(float(value), 7) + 0.0:.7f}" for value in values)  # + 0.0: no -0
+    return "--tool " + ",".join(value.rstrip("0").rstrip(".") for value in rounded)
 
 
 def _sync_note(sync: Sync) -> str:
