@@ -38,6 +38,8 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from urmpipe_pipeline.export import Exported, Format, Rows
+    from urmpipe_pipeline.report import FigureFile
+    from urmpipe_pipeline.report.headless import FigureFormat
 
 __all__ = [
     "PathLike", "Report", "Robot", "compare", "export", "ingest", "place_robot", "read_options", "report",
@@ -52,10 +54,12 @@ class Report:
     Attributes:
         path: The HTML file.
         results: What it shows.
+        figures: The files of its figures; none unless they were asked for.
     """
 
     path: Path
     results: tuple[Run | Comparison, ...]
+    figures: tuple[FigureFile, ...] = ()
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a compared log and quantity, as `Comparison.to_frame`, for all comparisons in it."""
@@ -70,7 +74,12 @@ class Report:
             {"name": result.name, "verdict": result.verdict if isinstance(result, Comparison) else None}
             for result in self.results
         ]
-        return {"schema": 1, "report": str(self.path), "recordings": kinds}
+        return {
+            "schema": 1,
+            "report": str(self.path),
+            "recordings": kinds,
+            "figures": [figure.to_dict() for figure in self.figures],
+        }
 
 
 def ingest(
@@ -141,22 +150,44 @@ def ingest(
         return make(None) if output is None else record(make, Path(output), kept, progress)
 
 
-def report(results: Sequence[PathLike | Run | Comparison], output: PathLike) -> Report:
-    """Write one self-contained HTML file about recordings or results.
+def report(
+    results: Sequence[PathLike | Run | Comparison],
+    output: PathLike,
+    *,
+    figures: PathLike | None = None,
+    formats: Sequence[FigureFormat] = ("svg", "png"),
+    progress: Callable[[float], None] | None = None,
+) -> Report:
+    """Write one self-contained HTML file about recordings or results, and its figures as files: all or none.
 
     Args:
         results: Recordings (.rrd), or what `ingest` and `compare` returned; at least one.
         output: The HTML file to write.
+        figures: A folder to write every figure to as a file; needs the extra `figures` and Chromium.
+        formats: svg, png or both.
+        progress: Told the share that is done, 0..1.
 
     Raises:
         UrmpipeError: With everything that is wrong with the recordings or the output.
     """
-    from urmpipe_pipeline.report import write_report
+    from urmpipe_pipeline.report import FigureOptions, write_report
 
+    wanted = None if figures is None else FigureOptions(Path(figures), tuple(formats))
     files = [Path(one) for one in results if isinstance(one, (str, Path))]
     refuse_foreign(files)
-    shown = tuple(read_recording(Path(one)) if isinstance(one, (str, Path)) else one for one in results)
-    return Report(write_report(shown, Path(output), inputs=files), shown)
+    reading, writing = _halves(progress)
+    shown = []
+    for number, one in enumerate(results, start=1):
+        shown.append(read_recording(Path(one)) if isinstance(one, (str, Path)) else one)
+        reading(number / len(results))
+    written = write_report(shown, Path(output), files, wanted, writing)
+    return Report(written.path, tuple(shown), written.figures)
+
+
+def _halves(progress: Callable[[float], None] | None) -> tuple[Callable[[float], None], ...]:
+    """Return what to tell the progress of the first and of the second half of some work."""
+    tell = progress or (lambda share: None)
+    return lambda share: tell(share / 2), lambda share: tell((1 + share) / 2)
 
 
 def view(recordings: PathLike | Sequence[PathLike]) -> None:

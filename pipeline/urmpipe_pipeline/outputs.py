@@ -14,7 +14,7 @@ from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
 
-OutputKind = Literal["recording", "report", "map", "export", "audit", "junit", "statistics"]
+OutputKind = Literal["recording", "report", "map", "export", "audit", "junit", "statistics", "figure"]
 
 NOUNS: dict[str, str] = {"junit": "JUnit file", "statistics": "table of statistics"}
 """What people call a kind, where that is not its name."""
@@ -41,6 +41,9 @@ FIRST_LINES: dict[str, str] = {
     "junit": JUNIT_HEADER,
 }
 """How the first line of a text of ours begins, by kind."""
+
+FIGURE = re.compile(rb"\A<!-- Generator: urmpipe |\A\x89PNG.{29}.{4}tEXtSoftware\0urmpipe ", re.DOTALL)
+"""How a figure of ours (SVG, PNG) tells where it comes from."""
 
 HEAD = 4096
 """The mark of an output stands within so many bytes of its start."""
@@ -111,6 +114,9 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
 def _is_ours(path: Path, kind: OutputKind) -> bool:
     if kind == "report":
         return is_report(path)
+    if kind == "figure":
+        with path.open("rb") as file:
+            return FIGURE.match(file.read(HEAD)) is not None
     if kind == "export":
         from urmpipe_pipeline.export.identity import is_export
 

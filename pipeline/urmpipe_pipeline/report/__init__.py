@@ -1,9 +1,11 @@
 """The report: one HTML file that a person reads in a minute and can keep, send and print.
 
-Data goes one way: results -> `tables`, `figures`, `paths` (plain dicts for plotly.js, built on `spec`
-and `decimate`), `banner` -> `page` -> assets/template.html.jinja.
+Data goes one way: results -> `facts`, `cards`, `banner`, `verdict_tables`, `log_tables`, `gallery` (figures
+for plotly.js as plain dicts, built on `spec` and `decimate`) -> `page` (what stands where) -> `render`
+(assets/template.html.jinja) and `figure_files` (SVG, PNG, drawn by `headless`).
 """
 
-from urmpipe_pipeline.report.page import render_report, write_report
+from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions
+from urmpipe_pipeline.report.render import Written, render_report, write_report
 
-__all__ = ["render_report", "write_report"]
+__all__ = ["FigureFile", "FigureOptions", "Written", "render_report", "write_report"]

@@ -1,12 +1,13 @@
-"""The first thing on the page: pass or fail in words, how much, when."""
+"""The first thing on the page: pass or fail in words, how much of how much, when, where."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
+from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.report import text
+from urmpipe_pipeline.report.facts import Fact, allowed, place
 from urmpipe_pipeline.results import Run
 
 NAMED = 3
@@ -21,68 +22,78 @@ class Banner:
         state: pass, fail, or ingested where nothing was compared.
         word: The same in capitals.
         headline: One sentence.
-        detail: How much, where and when.
+        facts: How much, when, where, against what.
+        detail: What else is to be said.
     """
 
     state: str
     word: str
     headline: str
-    detail: str
+    facts: tuple[Fact, ...] = ()
+    detail: str = ""
 
 
-def banner(comparisons: Sequence[Comparison], runs: Sequence[Run]) -> Banner:
-    """Return the verdict over all comparisons, or what was ingested if there are none."""
+def banner(comparisons: Sequence[Comparison], runs: Sequence[Run], links: Sequence[Sequence[str]]) -> Banner:
+    """Return the verdict over all comparisons, or what was ingested if there are none.
+
+    Args:
+        comparisons: Those of the page.
+        runs: The logs of the page that were only ingested.
+        links: Where each log of each comparison is told of, best to worst.
+    """
     if not comparisons:
         return _ingested(runs)
-    deviations = [run for comparison in comparisons for run in comparison.runs]
-    failed = [run for run in deviations if run.verdict == "fail"]
-    state = "fail" if failed else "pass"
+    places = [
+        (run, link)
+        for comparison, some in zip(comparisons, links, strict=True)
+        for run, link in zip(comparison.ranking, some, strict=True)
+    ]
+    failed = [run for run, _ in places if run.verdict == "fail"]
+    run, href = max(places, key=lambda one: one[0].decisive.used or 0.0)
+    total = len(places)
     if failed:
-        headline = f"{_who(failed, len(deviations))} out of tolerance{_named(failed, len(deviations))}"
+        headline = f"{_who(failed, total)} out of tolerance{_named(failed, total)}"
     else:
-        headline = f"{_who(deviations, len(deviations))} within tolerance"
-    return Banner(state, state.upper(), headline, f"{_nearest(failed or deviations)} {_against(comparisons)}")
+        headline = f"{_who([one for one, _ in places], total)} within tolerance"
+    state = "fail" if failed else "pass"
+    return Banner(state, state.upper(), headline, (*_decisive(run, href), *_against(comparisons)))
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:
     """Return the subject and verb of the headline."""
     if total == 1:
         return f"{runs[0].name} is"
-    count = f"all {total} logs" if len(runs) == total else f"{len(runs)} of {total} logs"
+    every = "both logs" if total == 2 else f"all {total} logs"
+    count = every if len(runs) == total else f"{len(runs)} of {total} logs"
     return f"{count} {'is' if len(runs) == 1 else 'are'}"
 
 
 def _named(runs: Sequence[Deviation], total: int) -> str:
-    """Return the names of some of many logs, unless they are too many as well."""
-    return f": {', '.join(run.name for run in runs)}" if total > 1 and len(runs) <= NAMED else ""
+    """Return the names of some of many logs, unless they are all or too many as well."""
+    return f": {', '.join(run.name for run in runs)}" if len(runs) < total and len(runs) <= NAMED else ""
 
 
-def _against(comparisons: Sequence[Comparison]) -> str:
-    """Say what was the reference and what is allowed, where it is the same for all."""
-    references = sorted({comparison.reference.name for comparison in comparisons})
-    tolerances = sorted({text.tolerance(comparison.tolerance) for comparison in comparisons})
-    reference = references[0] if len(references) == 1 else f"{len(references)} of them"
-    allowed = tolerances[0] if len(tolerances) == 1 else "as each comparison says"
-    return f"Reference: {reference}. Tolerance: {allowed}."
-
-
-def _nearest(runs: Sequence[Deviation]) -> str:
-    """Say which quantity uses up the largest share of its tolerance, how much, and when."""
-    held = [
-        (statistics.max / statistics.tolerance, axis, run)
-        for run in runs
-        for axis in AXES
-        if (statistics := run.statistics[axis]).tolerance
-    ]
-    if not held:
-        return ""
-    _, axis, run = max(held, key=lambda item: item[0])
-    statistics = run.statistics[axis]
-    word = "Furthest out" if statistics.verdict == "fail" else "Closest to the limit"
+def _decisive(run: Deviation, href: str) -> tuple[Fact, ...]:
+    """Return which quantity uses up the largest share of its tolerance, how much, when and where."""
+    one = run.decisive
+    amount = f"{text.size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}"
+    if one.tolerance is not None:
+        amount += f" of {text.limit(one.tolerance, one.unit)} {text.SHOWN[one.unit][0]} allowed"
     return (
-        f"{word}: |{text.SYMBOLS[axis]}| = {text.millimetres(statistics.max, statistics.tolerance)} mm"
-        f" of {text.limit(statistics.tolerance)} mm allowed, at t = {text.seconds(statistics.t_max)} s"
-        f" ({run.name})."
+        Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", run.name, href=href),
+        Fact("How much", amount),
+        Fact("When", f"t = {text.seconds(one.t_max)} s"),
+        Fact("Where (x, y, z)", f"{text.point(place(run, one))} m"),
+    )
+
+
+def _against(comparisons: Sequence[Comparison]) -> tuple[Fact, ...]:
+    """Return what was the reference and what is allowed, where it is the same for all."""
+    references = sorted({comparison.reference.name for comparison in comparisons})
+    tolerances = sorted({allowed(comparison) for comparison in comparisons})
+    return (
+        Fact("Reference" if len(references) == 1 else "References", ", ".join(references)),
+        Fact("Tolerance", tolerances[0] if len(tolerances) == 1 else "as each comparison says"),
     )
 
 
@@ -96,5 +107,5 @@ def _ingested(runs: Sequence[Run]) -> Banner:
         "ingested",
         "INGESTED",
         f"{subject}: {text.counted(rows, 'row')}, {text.counted(wraps, 'repolarization')}",
-        f"{text.counted(warnings, 'warning')}. Nothing was compared: there is no verdict.",
+        detail=f"{text.counted(warnings, 'warning')}. Nothing was compared: there is no verdict.",
     )

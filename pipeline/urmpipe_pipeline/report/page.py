@@ -1,24 +1,38 @@
-"""The page: which tables and figures stand where, and the one HTML file that holds them."""
+"""The parts of the page: which facts, tables and figures stand where."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from importlib.metadata import version
-from pathlib import Path
 from typing import TypeAlias
 
-from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.outputs import guarded_output
-from urmpipe_pipeline.report import gallery, tables, text
-from urmpipe_pipeline.report.banner import banner
-from urmpipe_pipeline.report.markup import asset, environment, script_hash
+from urmpipe_pipeline.report import gallery, log_tables, text, verdict_tables
+from urmpipe_pipeline.report.banner import Banner, banner
+from urmpipe_pipeline.report.cards import Card, card
+from urmpipe_pipeline.report.facts import Fact, allowed, comparison_facts, deviation_facts, run_facts
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
 from urmpipe_pipeline.results import Run
 
 Block: TypeAlias = Table | Figure
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """What a minute is enough to read about a comparison, or about the logs that were only ingested.
+
+    Attributes:
+        title: The heading.
+        cards: One a compared log, best to worst.
+        tables: One line a log.
+        note: A line under the cards.
+    """
+
+    title: str
+    cards: tuple[Card, ...]
+    tables: tuple[Table, ...]
+    note: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -31,7 +45,8 @@ class Part:
         parts: The parts below it.
         ident: Its anchor; figures of one part share their time axis.
         verdict: pass or fail, shown at the heading; empty where there is none.
-        facts: What it is about, as names and values.
+        facts: What it is about.
+        explained: Facts that need a word each, in a list of their own.
     """
 
     title: str
@@ -39,149 +54,124 @@ class Part:
     parts: tuple[Part, ...] = ()
     ident: str = ""
     verdict: str = ""
-    facts: tuple[tuple[str, str], ...] = ()
+    facts: tuple[Fact, ...] = ()
+    explained: tuple[Fact, ...] = ()
+
+    def figures(self) -> list[tuple[str, Figure]]:
+        """Return every figure of the part and of those below, each with the title of its part."""
+        own = [(self.title, block) for block in self.blocks if isinstance(block, Figure)]
+        return own + [found for part in self.parts for found in part.figures()]
 
 
-def render_report(results: Sequence[Run | Comparison]) -> str:
-    """Return the report as one HTML file that needs no network.
+@dataclass(frozen=True, slots=True)
+class Page:
+    """The page.
 
-    The verdict stands first, then a part a log with its figures, statistics, audit, warnings and
-    provenance. Everything that came from a file is escaped, and a content security policy lets only
-    the page's own two scripts run, known by their hashes.
-
-    Args:
-        results: Ingested logs and comparisons, in the order in which they are shown.
-
-    Raises:
-        OptionError: If there is nothing to report.
+    Attributes:
+        title: The names of what it shows.
+        banner: The verdict.
+        summaries: What a minute is enough for.
+        parts: All there is, one a comparison and one a log that was only ingested.
     """
-    if not results:
-        raise OptionError("a report needs at least one run or comparison; found none")
-    from plotly.offline import get_plotlyjs
 
+    title: str
+    banner: Banner
+    summaries: tuple[Summary, ...]
+    parts: tuple[Part, ...]
+
+    @property
+    def figures(self) -> list[tuple[str, Figure]]:
+        """Every figure from the top, each with the title of its part."""
+        return [found for part in self.parts for found in part.figures()]
+
+
+def lay_out(results: Sequence[Run | Comparison]) -> Page:
+    """Return the page about some results: comparisons first, then logs that were only ingested."""
     comparisons = [result for result in results if isinstance(result, Comparison)]
     runs = [result for result in results if isinstance(result, Run)]
-    plotly, script = get_plotlyjs(), asset("page.js")
-    return (
-        environment()
-        .get_template("template.html.jinja")
-        .render(
-            banner=banner(comparisons, runs),
-            summaries=_summaries(comparisons, runs),
-            parts=[_comparison_part(c, f"c{i}") for i, c in enumerate(comparisons, start=1)]
-            + [_run_part(run, f"r{i}") for i, run in enumerate(runs, start=1)],
-            title=", ".join(result.name for result in results),
-            version=version("urmpipe"),
-            hashes=[script_hash(plotly), script_hash(script)],
-            style=asset("style.css"),
-            plotly=plotly,
-            script=script,
-        )
+    links = [
+        [f"#c{i}-{k}" for k in range(1, len(comparison.runs) + 1)]
+        for i, comparison in enumerate(comparisons, start=1)
+    ]
+    summaries = [_summary(*pair) for pair in zip(comparisons, links, strict=True)]
+    if runs:
+        table = log_tables.ingest_table(runs, [f"#r{i}" for i in range(1, len(runs) + 1)])
+        summaries.append(Summary("Ingested logs", (), (table,)))
+    return Page(
+        title=", ".join(result.name for result in results),
+        banner=banner(comparisons, runs, links),
+        summaries=tuple(summaries),
+        parts=(
+            *(_comparison_part(comparison, f"c{i}") for i, comparison in enumerate(comparisons, start=1)),
+            *(_run_part(run, f"r{i}") for i, run in enumerate(runs, start=1)),
+        ),
     )
 
 
-def write_report(results: Sequence[Run | Comparison], path: Path, inputs: Sequence[Path] = ()) -> Path:
-    """Write the report; an existing file is replaced only if it is a report of ours and no input.
-
-    Args:
-        results: As `render_report` takes them.
-        path: Where to.
-        inputs: Files that must not be overwritten.
-
-    Returns:
-        The path written.
-
-    Raises:
-        OptionError: If there is nothing to report.
-        OutputError: If it may not be written there.
-    """
-    page = render_report(results)
-    with guarded_output(path, inputs, kind="report") as part:
-        part.write_bytes(page.encode("utf-8"))
-    return path
-
-
-def _summaries(comparisons: Sequence[Comparison], runs: Sequence[Run]) -> list[Table]:
-    """Return the tables under the banner: one line a log."""
-    found = [
-        tables.verdict_table(comparison, [f"#c{i}-{k}" for k in range(1, len(comparison.runs) + 1)])
-        for i, comparison in enumerate(comparisons, start=1)
-    ]
-    return found + ([tables.ingest_table(runs, [f"#r{i}" for i in range(1, len(runs) + 1)])] if runs else [])
+def _summary(comparison: Comparison, links: Sequence[str]) -> Summary:
+    """Return the cards of a comparison, and of several logs the tables that rank them."""
+    several = len(comparison.runs) > 1
+    return Summary(
+        f"Verdict{'s' if several else ''} against {comparison.reference.name}"
+        f"{', best to worst' if several else ''}",
+        tuple(card(run, link) for run, link in zip(comparison.ranking, links, strict=True)),
+        verdict_tables.ranking_tables(comparison, links) if several else (),
+        f"Tolerance: {allowed(comparison)}. The bars show how much of it is used up.",
+    )
 
 
 def _comparison_part(comparison: Comparison, ident: str) -> Part:
-    """Return the part of a comparison: one part a log, then how it was made."""
+    """Return the part of a comparison: all logs together, one part a log, then how it was made."""
     about = Part(
         "Provenance of the comparison",
         (
-            tables.inputs_table("Reference files", comparison.reference.files),
-            tables.provenance_table(comparison.provenance),
+            log_tables.inputs_table("Reference files", comparison.reference.files),
+            log_tables.provenance_table(comparison.provenance),
         ),
     )
-    logs = (_deviation_part(run, f"{ident}-{k}") for k, run in enumerate(comparison.runs, start=1))
-    facts = [
-        ("Reference", comparison.reference.name),
-        ("Reference samples", str(len(comparison.reference.t_ns))),
-        ("Tolerance", text.tolerance(comparison.tolerance)),
-        ("Recording", str(comparison.recording) if comparison.recording else ""),
-    ]
+    samples = len(comparison.reference.t_ns)
+    logs = (
+        _deviation_part(run, f"{ident}-{k}", samples) for k, run in enumerate(comparison.ranking, start=1)
+    )
+    warnings = (log_tables.warnings_table(comparison),) if comparison.warnings else ()
     return Part(
         f"Comparison {comparison.name}",
-        (
-            *((tables.warnings_table(comparison),) if comparison.warnings else ()),
-            *gallery.comparison_figures(comparison),
-        ),
+        (*warnings, *gallery.comparison_figures(comparison)),
         (*logs, about),
         ident,
         comparison.verdict,
-        _given(facts),
+        comparison_facts(comparison),
     )
 
 
-def _deviation_part(deviation: Deviation, ident: str) -> Part:
+def _deviation_part(deviation: Deviation, ident: str, reference_samples: int) -> Part:
     """Return the part of one compared log."""
-    facts = [
-        *_run_facts(deviation.run),
-        ("Compared", text.counted(len(deviation.sample), "sample")),
-        ("Out of tolerance", text.counted(int(deviation.outside.sum()), "sample")),
-        ("Left out", text.counted(deviation.left_out, "sample")),
-        ("Sync offset", f"{text.seconds(deviation.sync.offset)} s"),
-    ]
-    blocks = (
-        tables.statistics_table(deviation),
-        *gallery.deviation_figures(deviation),
-        *_run_tables(deviation.run),
+    return Part(
+        deviation.name,
+        (
+            *verdict_tables.statistics_tables(deviation),
+            *gallery.deviation_figures(deviation),
+            *_run_tables(deviation.run),
+        ),
+        (),
+        ident,
+        deviation.verdict,
+        (*run_facts(deviation.run), Fact("Compared", text.counted(len(deviation.sample), "sample"))),
+        deviation_facts(deviation, reference_samples),
     )
-    return Part(deviation.name, blocks, (), ident, deviation.verdict, _given(facts))
 
 
 def _run_part(run: Run, ident: str) -> Part:
     """Return the part of one log that was only ingested."""
     blocks = (*gallery.run_figures(run), *_run_tables(run))
-    return Part(f"Log {run.name}", blocks, (), ident, "", _given(_run_facts(run)))
+    return Part(f"Log {run.name}", blocks, (), ident, "", run_facts(run))
 
 
 def _run_tables(run: Run) -> tuple[Block, ...]:
     return (
-        *((tables.audit_table(run),) if run.log.joints else ()),
-        tables.warnings_table(run),
-        tables.inference_table(run),
-        tables.inputs_table("Input files", run.log.files),
-        tables.provenance_table(run.provenance),
+        *((log_tables.audit_table(run),) if run.log.joints else ()),
+        log_tables.warnings_table(run),
+        log_tables.inference_table(run),
+        log_tables.inputs_table("Input files", run.log.files),
+        log_tables.provenance_table(run.provenance),
     )
-
-
-def _run_facts(run: Run) -> list[tuple[str, str]]:
-    return [
-        ("Robot", run.robot.name if run.robot else "none: no kinematics"),
-        ("Source", run.log.source),
-        ("Rows", f"{run.log.rows} every {text.seconds(run.log.period)} s"),
-        ("Grid", f"{len(run.t_ns)} samples every {text.seconds(run.tsp)} s"),
-        ("Duration", f"{text.seconds(run.duration)} s"),
-        ("Recording", str(run.recording) if run.recording else ""),
-    ]
-
-
-def _given(facts: Sequence[tuple[str, str]]) -> tuple[tuple[str, str], ...]:
-    return tuple(fact for fact in facts if fact[1])

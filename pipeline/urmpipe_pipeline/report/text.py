@@ -4,47 +4,84 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from urmpipe_pipeline.comparison import AXES
+from urmpipe_pipeline.comparison import AXES, Statistics
 from urmpipe_pipeline.results import json_ready
 
 NOTHING = "–"
 """Stands where there is no value."""
 
 DIGITS = 4
-"""Digits after the point of a length in [mm]: a tenth of a micrometre."""
+"""Digits after the point of a length in [mm] or an angle in [deg]: 0.1 micrometres, 2 microradians."""
+
+SHOWN = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / math.pi)}
+"""The units that people read, and how many of them one of the SI unit is."""
 
 SYMBOLS = dict(zip(AXES, ("Δx", "Δy", "Δz", "‖Δ‖"), strict=True))
 """The quantities of a deviation as people read them."""
 
 
-def millimetres(value: float | None, against: float | None = None) -> str:
-    """Return a length in [m] as [mm].
+def symbol(statistics: Statistics) -> str:
+    """Return what a quantity is called: Δx, ‖Δ‖, path, angle, or a joint by its name."""
+    own = statistics.kind in ("axis", "norm")
+    return SYMBOLS[statistics.quantity] if own else statistics.quantity
 
-    Four digits after the point, or as many as tell it from what it is held against; below a micrometre
+
+def size_of(statistics: Statistics) -> str:
+    """Return what the absolute value of a quantity is called: |Δx|, ‖Δ‖, path, angle, |Δ phi1|."""
+    named = symbol(statistics)
+    if statistics.kind == "joint":
+        return f"|Δ {named}|"
+    return f"|{named}|" if statistics.kind == "axis" else named
+
+
+def number(value: float | None, unit: str, against: float | None = None) -> str:
+    """Return a length in [m] as [mm], or an angle in [rad] as [deg].
+
+    Four digits after the point, or as many as tell it from what it is held against; below a thousandth
     in exponent form.
 
     Args:
-        value: In [m].
-        against: What it is held against, in [m].
+        value: In [m] or [rad].
+        unit: m or rad.
+        against: What it is held against, in the same unit.
     """
     if value is None or not math.isfinite(value):
         return NOTHING
-    scaled = value * 1e3
+    factor = SHOWN[unit][1]
+    scaled = value * factor
     if 0.0 < abs(scaled) < 1e-3:
         return f"{scaled:.3e}"
     digits = DIGITS
     if against is not None and abs(value) != against:
-        while digits < 12 and f"{abs(scaled):.{digits}f}" == f"{against * 1e3:.{digits}f}":
+        while digits < 12 and f"{abs(scaled):.{digits}f}" == f"{against * factor:.{digits}f}":
             digits += 1
     return f"{scaled:.{digits}f}"
 
 
-def limit(value: float | None) -> str:
-    """Return a tolerance in [m] as [mm], with no more digits than it has."""
-    return NOTHING if value is None else f"{value * 1e3:.6g}"
+def quantity(value: float | None, unit: str, against: float | None = None) -> str:
+    """Return a number with the unit that people read: "2.5000 mm", "0.1234 deg"."""
+    return f"{number(value, unit, against)} {SHOWN[unit][0]}"
+
+
+def millimetres(value: float | None, against: float | None = None) -> str:
+    """Return a length in [m] as [mm], as `number` does."""
+    return number(value, "m", against)
+
+
+def limit(value: float | None, unit: str = "m") -> str:
+    """Return a tolerance in [m] as [mm] or in [rad] as [deg], with no more digits than it has."""
+    return NOTHING if value is None else f"{value * SHOWN[unit][1]:.6g}"
+
+
+def used(statistics: Statistics) -> str:
+    """Return how much of its tolerance a quantity uses up: "71.0 % of the tolerance"."""
+    share = statistics.used
+    if share is None:
+        return ""
+    return f"{percent(share)} of the tolerance" if share <= 1.0 else f"{share:.3g} times the tolerance"
 
 
 def metres(value: float) -> str:
@@ -65,6 +102,11 @@ def seconds(value: float) -> str:
     return text[:-3] + text[-3:].rstrip("0")
 
 
+def offset(value: float) -> str:
+    """Return a shift in time in [s] with its sign."""
+    return f"{'+' if value > 0 else ''}{seconds(value)} s"
+
+
 def percent(share: float) -> str:
     """Return a share 0..1 in [%], never rounded to 0 or to 100 when it is not."""
     scaled = share * 100.0
@@ -72,7 +114,7 @@ def percent(share: float) -> str:
         return f"{scaled:.0f} %"
     if scaled > 99.0:
         return f"{min(scaled, 99.99):.2f} %"
-    return f"{scaled:.2g} %" if scaled < 10.0 else f"{scaled:.1f} %"
+    return f"{scaled:.2g} %" if scaled < 1.0 else f"{scaled:.1f} %"
 
 
 def counted(count: int, noun: str) -> str:
@@ -80,12 +122,33 @@ def counted(count: int, noun: str) -> str:
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
 
 
-def tolerance(allowed: Mapping[str, float]) -> str:
-    """Return a comparison's tolerance in [mm]: "±3.5 mm per axis, 5 mm norm"."""
-    words = {"axis": ("±", "per axis"), "norm": ("", "norm")} | {axis: ("±", axis) for axis in "xyz"}
-    parts = [
-        "{0}{2} mm {1}".format(*words.get(name, ("±", name)), limit(value)) for name, value in allowed.items()
-    ]
+def enumerated(words: Sequence[str]) -> str:
+    """Return some words as a list in a sentence: "a", "a and b", "a, b and c"."""
+    return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
+
+
+def tolerance(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",)) -> str:
+    """Return a comparison's tolerance as people read it: "±3.5 mm per axis, 0.5 deg of orientation".
+
+    Args:
+        allowed: In [m] or [rad], by kind or coordinate.
+        joint_units: The units of the joints that are held to a tolerance, rad or m.
+    """
+    words = {
+        "axis": "±{} mm per axis",
+        "norm": "{} mm norm",
+        "path": "{} mm from the path",
+        "angle": "{} deg of orientation",
+        **{axis: f"±{{}} mm {axis}" for axis in "xyz"},
+    }
+    parts = []
+    for name, value in allowed.items():
+        if name == "joint":
+            units = sorted(set(joint_units), reverse=True)
+            shown = (f"±{limit(value, unit)} {SHOWN[unit][0]}" for unit in units)
+            parts.append(f"{' or '.join(shown)} per joint")
+        else:
+            parts.append(words[name].format(limit(value, "rad" if name == "angle" else "m")))
     return ", ".join(parts)
 
 

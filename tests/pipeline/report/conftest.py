@@ -12,7 +12,7 @@ from urmpipe_models.kinematics import point_over_log
 from urmpipe_models.repolarizer import repolarize
 from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.audit_entry import AuditEntry
-from urmpipe_pipeline.compare import compare_runs
+from urmpipe_pipeline.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.derivatives import derivatives
 from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
@@ -99,6 +99,17 @@ def comparison() -> Comparison:
     shifted = ingested("shifted", q, arm(LENGTHS[0] + 0.0025))
     off = ingested("joint-off", q + np.radians([0, 1, 0, 0, 0, 0]), arm(), (LogWarning("gap", "a gap", 7),))
     return compare_runs(reference, [shifted, off])
+
+
+@pytest.fixture(scope="session")
+def everything() -> Comparison:
+    """The same two, worst first, with a tolerance for every kind and the second log half a second late."""
+    q = motion()
+    reference = ingested("path", q, arm())
+    shifted = ingested("shifted", q, arm(LENGTHS[0] + 0.0025))
+    off = ingested("joint-off", q[100:] + np.radians([0, 1, 0, 0, 0, 0]), arm())
+    allowed = {"axis": 0.0035, "norm": 0.005, "path": 0.002, "angle": 0.01, "joint": 0.002}
+    return compare_runs(reference, [shifted, off], CompareOptions(allowed, sync=0.5))
 
 
 @pytest.fixture(scope="session")

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -11,16 +13,43 @@ import pytest
 
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.report import render_report
+from urmpipe_pipeline.report.page import lay_out
+from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.results import Run
 
 if TYPE_CHECKING:
-    from playwright.sync_api import Browser, Page
+    from playwright.sync_api import Browser, Locator, Page
 
 playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
 
 CHROMIUM = Path("/usr/bin/chromium")
 FLAGS = ["--no-sandbox", "--disable-gpu", "--disable-background-networking"]
-PLOTS = 7  # three a compared log, the joints of the log without a robot
+
+TAGS_OF_HEADINGS = """[...document.querySelectorAll("h1, h2, h3, h4, h5, h6")].map(h => h.tagName)"""
+
+CONTRASTS = """(() => {
+    const rgb = (colour) => colour.match(/[\\d.]+/g).map(Number);
+    const luminance = ([r, g, b]) => [r, g, b]
+        .map(c => c / 255).map(c => c <= 0.04045 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4)
+        .reduce((sum, c, i) => sum + c * [0.2126, 0.7152, 0.0722][i], 0);
+    const ground = (element) => {
+        for (let e = element; e; e = e.parentElement) {
+            const colour = rgb(getComputedStyle(e).backgroundColor);
+            if (colour.length === 3 || colour[3] === 1) return colour;
+        }
+        return [255, 255, 255];
+    };
+    const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT);
+    const found = [];
+    while (texts.nextNode()) {
+        const parent = texts.currentNode.parentElement;
+        if (!texts.currentNode.textContent.trim() || parent.closest("script, noscript, .plot")) continue;
+        const pair = [luminance(rgb(getComputedStyle(parent).color)), luminance(ground(parent))];
+        found.push([texts.currentNode.textContent, (Math.max(...pair) + 0.05) / (Math.min(...pair) + 0.05)]);
+    }
+    return found;
+})()"""
+"""Every text of the page with its contrast against what it stands on. Source: WCAG 2.2."""
 
 pytestmark = [
     pytest.mark.slow,
@@ -37,10 +66,22 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def report(comparison: Comparison, bare_run: Run, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def shown(comparison: Comparison, bare_run: Run) -> list[Run | Comparison]:
+    """A comparison and a log of which only the joints are known."""
+    return [comparison, bare_run]
+
+
+@pytest.fixture(scope="module")
+def report(shown: list[Run | Comparison], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
-    path.write_text(render_report([comparison, bare_run]), encoding="utf-8")
+    path.write_text(render_report(shown), encoding="utf-8")
     return path
+
+
+@pytest.fixture(scope="module")
+def figures(shown: list[Run | Comparison]) -> list[Figure]:
+    """Every figure of the page, from the top."""
+    return [figure for _, figure in lay_out(shown).figures]
 
 
 @contextmanager
@@ -88,34 +129,63 @@ def test_the_verdict_is_seen_first(browser: Browser, report: Path) -> None:
         assert page.locator("h1 svg.icon").count() == 1
 
 
-def test_figures_are_drawn_when_they_come_into_view(browser: Browser, report: Path) -> None:
+def test_figures_are_drawn_when_they_come_into_view(
+    browser: Browser, report: Path, figures: list[Figure]
+) -> None:
+    spaces = sum(figure.space for figure in figures)
     with opened(browser, report) as page:
+        page.locator(".plot").first.scroll_into_view_if_needed()
         page.wait_for_selector(".plot[data-drawn]")
-        assert page.locator(".plot").count() == PLOTS
-        assert page.locator(".plot[data-drawn]").count() < PLOTS
+        assert page.locator(".plot").count() == len(figures)
+        assert page.locator(".plot[data-drawn]").count() < len(figures)
         scroll_through(page)
-        assert page.locator(".plot[data-drawn]").count() == PLOTS
-        assert page.locator(".plot.space canvas").count() == 2
+        assert page.locator(".plot[data-drawn]").count() == len(figures)
+        assert page.locator(".plot.space").count() == spaces
+        assert page.locator(".plot.space canvas").count() >= spaces
         assert page.locator(".plot .scatterlayer .js-line").count() > 20
         assert sideways(page) == 0
 
 
-def test_the_pointer_tells_time_and_values(browser: Browser, report: Path) -> None:
-    with opened(browser, report) as page:
-        plot = page.locator(".plot").first
+def plot_of(page: Page, quantity: str) -> Locator:
+    """The first figure that draws such a quantity over time, in view and drawn."""
+    for plot in page.locator(".plot:not(.space)").all():
         plot.scroll_into_view_if_needed()
         plot.locator(".main-svg").first.wait_for()
+        names = plot.evaluate("p => p.data.map(trace => trace.name)")
+        if quantity in names:
+            return plot
+    raise AssertionError(f"no figure draws {quantity}")
+
+
+def test_the_pointer_tells_the_number_that_the_table_has(
+    browser: Browser, report: Path, comparison: Comparison
+) -> None:
+    best = comparison.ranking[0]
+    one = best.statistics["norm"]
+    with opened(browser, report) as page:
+        plot = plot_of(page, "‖Δ‖")
+        where = plot.evaluate(
+            """(plot, t) => {
+                const trace = plot.data.findIndex(trace => trace.name === "‖Δ‖");
+                const { _offset, _length, range } = plot._fullLayout.xaxis;
+                const axis = plot._fullLayout[plot.data[trace].yaxis.replace("y", "yaxis")];
+                const share = (t - range[0]) / (range[1] - range[0]);
+                return [_offset + share * _length, axis._offset + axis._length / 2];
+            }""",
+            one.t_max,
+        )
         box = plot.bounding_box()
         assert box is not None
-        for share in (0.4, 0.5):  # a pointer that appears from nowhere is not seen as moving
-            page.mouse.move(box["x"] + box["width"] * share, box["y"] + 80)
+        for aside in (40, 0):  # a pointer that appears from nowhere is not seen as moving
+            page.mouse.move(box["x"] + where[0] + aside, box["y"] + where[1])
         plot.locator(".hoverlayer .legend, .hoverlayer .hovertext").first.wait_for()
         said = plot.locator(".hoverlayer").text_content() or ""
         assert "t = " in said
-        # the first log stands 2.5 mm too high all the time
-        for words in ("Δx : ", "Δy : ", "Δz : -2.5000 mm", "‖Δ‖ : 2.5000 mm", "speed : "):
-            assert words in said
-        assert " m/s" in said
+        (row,) = page.locator("#c1-1 tr", has=page.locator("th[scope=row]", has_text="‖Δ‖")).all()
+        (largest,) = [cell for cell in row.locator("td").all_inner_texts() if cell == f"{one.max * 1e3:.4f}"][
+            :1
+        ]
+        assert f"‖Δ‖ : {largest} mm" in said
 
 
 def test_nothing_offers_to_send_the_data_away(browser: Browser, report: Path) -> None:
@@ -129,46 +199,129 @@ def test_nothing_offers_to_send_the_data_away(browser: Browser, report: Path) ->
 
 
 def test_time_axes_of_a_log_are_linked(browser: Browser, report: Path) -> None:
-    ranges = "[...document.querySelectorAll('.plot:not(.space)')].map(p => p.layout.xaxis.range)"
+    own = '.plot[data-link="c1-1"]:not(.space)'
+    ranges = """[...document.querySelectorAll(".plot:not(.space)")]
+        .map(p => [p.dataset.link, p.layout.xaxis.range])"""
     with opened(browser, report) as page:
         scroll_through(page)
-        whole = page.evaluate(ranges)
-        deviation, _, _, _, _ = whole
-        assert deviation == pytest.approx([0.0, 14.995])
-        page.evaluate("Plotly.relayout(document.querySelector('.plot'), {'xaxis.range': [5, 9]})")
-        page.wait_for_function(f"{ranges}[1][0] === 5")
-        zoomed = page.evaluate(ranges)
-        assert zoomed[:2] == [[5, 9], [5, 9]]
-        assert zoomed[2:] == whole[2:]
+        before = page.evaluate(ranges)
+        siblings = page.locator(own).count()
+        assert siblings > 1
+        page.evaluate(f"Plotly.relayout(document.querySelector('{own}'), {{'xaxis.range': [5, 9]}})")
+        page.wait_for_function(
+            f"[...document.querySelectorAll('{own}')].every(p => p.layout.xaxis.range[0] === 5)"
+        )
+        after = page.evaluate(ranges)
+        assert [one for one in after if one[0] == "c1-1"] == [["c1-1", [5, 9]]] * siblings
+        assert [one for one in after if one[0] != "c1-1"] == [one for one in before if one[0] != "c1-1"]
 
 
-def test_a_phone_shows_it_without_sideways_scroll(browser: Browser, report: Path) -> None:
-    with opened(browser, report, width=390, phone=True) as page:
+def open_all(page: Page) -> None:
+    """Unfold everything."""
+    page.evaluate("document.querySelectorAll('details').forEach(folded => { folded.open = true; })")
+
+
+def test_a_phone_shows_it_without_sideways_scroll(
+    browser: Browser, everything: Comparison, bare_run: Run, tmp_path: Path
+) -> None:
+    path = tmp_path / "report.html"
+    path.write_text(render_report([everything, bare_run]), encoding="utf-8")
+    with opened(browser, path, width=390, phone=True) as page:
+        open_all(page)
         scroll_through(page)
         assert sideways(page) == 0
-        for box in page.locator(".scroll").all():
+        for box in page.locator(".scroll, .card, .verdict, .facts, .plot").all():
             found = box.bounding_box()
-            if found is not None:  # folded tables have none
-                assert found["x"] + found["width"] <= 390
+            assert found is not None
+            assert found["x"] + found["width"] <= 390
         assert page.locator(".modebar-btn").count() == 0
+
+
+def test_every_ink_is_legible_where_it_stands(browser: Browser, report: Path) -> None:
+    with opened(browser, report) as page:
+        open_all(page)
+        found = page.evaluate(CONTRASTS)
+        assert len(found) > 200
+        faint = {said: ratio for said, ratio in found if ratio < 4.5}  # WCAG 2.2 AA
+        assert faint == {}
+
+
+def test_what_is_drawn_and_tabled_has_a_name(browser: Browser, report: Path) -> None:
+    with opened(browser, report) as page:
+        open_all(page)
+        levels = [int(tag[1]) for tag in page.evaluate(TAGS_OF_HEADINGS)]
+        assert levels[0] == 1
+        assert levels.count(1) == 1
+        assert all(after - before <= 1 for before, after in pairwise(levels))
+        for plot in page.locator(".plot").all():
+            assert plot.get_attribute("role") == "img"
+            assert len(plot.get_attribute("aria-label") or "") > 40
+        for table in page.locator("table").all():
+            assert table.locator("thead th[scope=col]").count() > 1
+            region = table.locator("xpath=..")
+            heading = table.locator("xpath=ancestor::section[1]").locator("h2, h3, h4, h5").first
+            assert region.get_attribute("aria-label") == heading.inner_text()
+
+
+def test_a_keyboard_reaches_the_links_and_what_is_folded(browser: Browser, report: Path) -> None:
+    with opened(browser, report) as page:
+        page.keyboard.press("Tab")
+        assert page.evaluate("document.activeElement.textContent") == "Skip to the details"
+        assert page.locator(".skip").bounding_box()["y"] >= 0  # type: ignore[index]
+        page.keyboard.press("Enter")
+        assert page.evaluate("document.activeElement.id") == "details"
+        page.locator("summary").first.focus()
+        page.keyboard.press("Enter")
+        assert page.locator("details").first.get_attribute("open") == ""
+
+
+def test_a_card_leads_to_its_part(browser: Browser, report: Path, comparison: Comparison) -> None:
+    with opened(browser, report) as page:
+        names = [name.strip() for name in page.locator(".card h3 a").all_inner_texts()]
+        assert names == [run.name for run in comparison.ranking]
+        page.locator(".card h3 a").last.click()
+        part = page.locator("#c1-2")
+        assert part.locator("h3").inner_text().startswith(names[-1])
+        box = part.bounding_box()
+        assert box is not None
+        assert 0 <= box["y"] < 200
 
 
 def test_print_shows_everything_and_the_screen_is_as_before(browser: Browser, report: Path) -> None:
     with opened(browser, report) as page:
         folded = page.locator("details:not([open])").count()
+        plots = page.locator(".plot").count()
         assert folded > 0
         page.evaluate("dispatchEvent(new Event('beforeprint'))")
         assert page.locator("details:not([open])").count() == 0
-        assert page.locator(".plot[data-drawn]").count() == PLOTS
+        assert page.locator(".plot[data-drawn]").count() == plots
         page.evaluate("dispatchEvent(new Event('afterprint'))")
         assert page.locator("details:not([open])").count() == folded
         assert sideways(page) == 0
-        assert page.pdf(format="A4", print_background=True).startswith(b"%PDF-")
+
+
+def test_printed_pages_are_a4_and_nothing_is_cut(browser: Browser, report: Path) -> None:
+    with opened(browser, report, width=688) as page:  # what an A4 page holds between margins of 14 mm
+        page.emulate_media(media="print")
+        open_all(page)
+        scroll_through(page)
+        cut = page.evaluate(
+            "[...document.querySelectorAll('.scroll')].map(s => s.scrollWidth - s.clientWidth)"
+        )
+        assert max(cut) == 0
+        assert sideways(page) == 0
+        page.emulate_media(media="screen")
+        printed = page.pdf(format="A4", print_background=True, prefer_css_page_size=True)
+        sizes = re.findall(rb"/MediaBox \[0 0 ([\d.]+) ([\d.]+)\]", printed)
+        assert len(sizes) > 5
+        assert {(round(float(w)), round(float(h))) for w, h in sizes} == {(595, 842)}  # A4 in points
 
 
 def test_without_scripts_the_numbers_are_there(browser: Browser, report: Path) -> None:
     with opened(browser, report, script=False) as page:
         assert page.locator("noscript p").is_visible()
+        assert page.locator("h1").inner_text().startswith("FAIL")
+        assert page.locator(".card strong", has_text="2.5000 mm").is_visible()
         assert page.locator("td", has_text="2.5000").first.is_visible()
         assert page.locator(".plot").first.is_hidden()
 
@@ -181,4 +334,6 @@ def test_hostile_texts_do_nothing(browser: Browser, hostile: Comparison, tmp_pat
         assert page.locator("img, b").count() == 0
         legend = page.locator(".plot .legendtext").all_text_contents()
         assert hostile.runs[0].run.log.joints[0] in legend
+        names = {plot.get_attribute("data-name") or "" for plot in page.locator(".plot").all()}
+        assert all(re.fullmatch(r"[a-z0-9-]+", name) for name in names)
         assert hostile.name in page.locator("#c1 > h2").inner_text()

@@ -30,6 +30,31 @@ def test_millimetres_have_the_digits_that_a_verdict_needs(
 
 
 @pytest.mark.parametrize(
+    ("radians", "against", "written"),
+    [
+        (math.radians(0.5), math.radians(0.5), "0.5000"),
+        (math.radians(0.5000004), math.radians(0.5), "0.5000004"),
+        (math.radians(-12.34567), None, "-12.3457"),
+        (1e-9, None, "5.730e-08"),
+        (math.nan, None, "–"),
+    ],
+)
+def test_angles_follow_the_rule_of_lengths_in_degrees(
+    radians: float, against: float | None, written: str
+) -> None:
+    assert text.number(radians, "rad", against) == written
+
+
+def test_a_quantity_has_the_unit_that_people_read() -> None:
+    assert text.quantity(0.0025, "m") == "2.5000 mm"
+    assert text.quantity(math.radians(30), "rad") == "30.0000 deg"
+    assert text.offset(0.0) == "0.000 s"
+    assert text.offset(0.5) == "+0.500 s"
+    assert text.enumerated(("a",)) == "a"
+    assert text.enumerated(("a", "b", "c")) == "a, b and c"
+
+
+@pytest.mark.parametrize(
     ("seconds", "written"),
     [(0.0, "0.000"), (36.91, "36.910"), (2.0625, "2.0625"), (1 / 3, "0.333333"), (math.nan, "–")],
 )
@@ -44,6 +69,7 @@ def test_seconds_have_milliseconds_at_least(seconds: float, written: str) -> Non
         (1.0, "100 %"),
         (1e-6, "0.0001 %"),
         (0.0734, "7.3 %"),
+        (0.0699, "7.0 %"),
         (0.5, "50.0 %"),
         (0.99999, "99.99 %"),
     ],
@@ -54,6 +80,10 @@ def test_a_share_is_never_rounded_to_none_or_all(share: float, written: str) -> 
 
 def test_a_tolerance_names_its_quantities() -> None:
     assert text.tolerance({"axis": 0.0035, "norm": 0.005}) == "±3.5 mm per axis, 5 mm norm"
+    every = {"x": 0.001, "path": 0.002, "angle": math.radians(0.5), "joint": 0.002}
+    assert text.tolerance(every, {"m", "rad"}) == (
+        "±1 mm x, 2 mm from the path, 0.5 deg of orientation, ±0.114592 deg or ±2 mm per joint"
+    )
     assert text.limit(None) == "–"
 
 

@@ -18,7 +18,7 @@
       displayModeBar: touch ? false : "hover",
       scrollZoom: false, // the wheel scrolls the page
       modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"],
-      toImageButtonOptions: { format: isScene(plot) ? "png" : "svg", filename: "urmpipe-figure" },
+      toImageButtonOptions: { format: isScene(plot) ? "png" : "svg", filename: plot.dataset.name },
     };
   }
 

@@ -1,0 +1,94 @@
+"""The cards under the banner: what a minute is enough to read about each compared log."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from urmpipe_pipeline.comparison import Deviation, Statistics
+from urmpipe_pipeline.report import text
+from urmpipe_pipeline.report.facts import (
+    Fact,
+    alignment_value,
+    correlation,
+    place,
+    stretch,
+    sync_value,
+)
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """One compared log.
+
+    Attributes:
+        name: Its name.
+        href: Where its part of the page is, such as "#c1-1".
+        state: pass or fail.
+        size: What decides, such as |Δx|.
+        amount: Its largest absolute value with the unit.
+        allowed: What is allowed; empty where nothing is.
+        share: Share of the tolerance that is used up, 0 to 1 at most, drawn as a bar; None without one.
+        used: The same in words.
+        facts: What else there is to know.
+    """
+
+    name: str
+    href: str
+    state: str
+    size: str
+    amount: str
+    allowed: str
+    share: float | None
+    used: str
+    facts: tuple[Fact, ...]
+
+
+def card(deviation: Deviation, href: str) -> Card:
+    """Return the card of a compared log."""
+    decisive = deviation.decisive
+    tolerance = decisive.tolerance
+    shown = text.SHOWN[decisive.unit][0]
+    return Card(
+        name=deviation.name,
+        href=href,
+        state=deviation.verdict,
+        size=text.size_of(decisive),
+        amount=text.quantity(decisive.max, decisive.unit, tolerance),
+        allowed="" if tolerance is None else f"{text.limit(tolerance, decisive.unit)} {shown}",
+        share=None if decisive.used is None else min(decisive.used, 1.0),
+        used=text.used(decisive),
+        facts=tuple(fact for fact in _facts(deviation) if fact.value),
+    )
+
+
+def _facts(deviation: Deviation) -> list[Fact]:
+    decisive = deviation.decisive
+    found = deviation.statistics
+    angle = found.get("angle")
+    return [
+        Fact("When", f"t = {text.seconds(decisive.t_max)} s"),
+        Fact("Where (x, y, z)", f"{text.point(place(deviation, decisive))} m"),
+        Fact("Largest ‖Δ‖", _largest(found["norm"])),
+        Fact("Off the path", _largest(found["path"])),
+        Fact("Largest angle", _largest(angle) if angle else ""),
+        Fact("Largest joint", _largest_joint(deviation)),
+        Fact("Out of tolerance", text.percent(deviation.share_out)),
+        Fact("Longest out", stretch(deviation.longest_out)),
+        Fact("Clocks", sync_value(deviation.sync)),
+        Fact("Alignment", alignment_value(deviation)),
+        Fact("r(‖Δ‖, speed)", correlation(deviation)),
+        Fact("Warnings", str(len(deviation.run.warnings))),
+    ]
+
+
+def _largest(statistics: Statistics) -> str:
+    return text.quantity(statistics.max, statistics.unit, statistics.tolerance)
+
+
+def _largest_joint(deviation: Deviation) -> str:
+    """Return the joint that is furthest off, of each unit, with its deviation."""
+    furthest: dict[str, Statistics] = {}
+    for one in deviation.joint_statistics.values():
+        if one.unit not in furthest or one.max > furthest[one.unit].max:
+            furthest[one.unit] = one
+    return ", ".join(f"{_largest(one)} ({one.quantity})" for one in furthest.values())

@@ -1,0 +1,188 @@
+"""Facts: names, values and a word on each, for who meets them for the first time."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.transform import rpy_of, translation
+from urmpipe_pipeline.comparison import Alignment, Comparison, Deviation, Statistics, Stretch, Sync
+from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.report import text
+from urmpipe_pipeline.results import Run
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """One fact.
+
+    Attributes:
+        name: What it is of.
+        value: What it is.
+        note: What that means; empty where it explains itself.
+        href: Where the value leads, such as "#c1-1"; empty where it leads nowhere.
+    """
+
+    name: str
+    value: str
+    note: str = ""
+    href: str = ""
+
+
+def run_facts(run: Run) -> tuple[Fact, ...]:
+    """Return what a log is: its arm, rows, grid and duration."""
+    return _told(
+        Fact("Robot", run.robot.name if run.robot else "none: no kinematics"),
+        Fact("Source", run.log.source),
+        Fact("Rows", f"{run.log.rows} every {text.seconds(run.log.period)} s"),
+        Fact("Grid", f"{len(run.t_ns)} samples every {text.seconds(run.tsp)} s"),
+        Fact("Duration", f"{text.seconds(run.duration)} s"),
+        Fact("Recording", str(run.recording) if run.recording else ""),
+    )
+
+
+def comparison_facts(comparison: Comparison) -> tuple[Fact, ...]:
+    """Return what was held against what, and what was allowed."""
+    return _told(
+        Fact("Reference", comparison.reference.name),
+        Fact("Reference samples", str(len(comparison.reference.t_ns))),
+        Fact("Tolerance", allowed(comparison)),
+        Fact("Recording", str(comparison.recording) if comparison.recording else ""),
+    )
+
+
+def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact, ...]:
+    """Return how a log was put together with the reference in time and space, and what stood out.
+
+    Args:
+        deviation: The compared log.
+        reference_samples: Samples of the whole reference.
+    """
+    out = int(np.count_nonzero(deviation.outside))
+    outside = f"{out} of {len(deviation.sample)} samples ({text.percent(deviation.share_out)})"
+    return _told(
+        Fact("Clocks", sync_value(deviation.sync), _sync_note(deviation.sync)),
+        Fact("Left out", _left_out(deviation, reference_samples), "no counterpart, or no value"),
+        Fact("Alignment", alignment_value(deviation), _alignment_note(deviation)),
+        Fact("Turns", _turns(deviation), "counted apart at the start: taken out of the joints' deviation"),
+        Fact("Out of tolerance", outside),
+        Fact("Longest stretch out", stretch(deviation.longest_out)),
+        Fact("r(‖Δ‖, speed)", correlation(deviation), "1: they grow together; 0: they are unrelated"),
+    )
+
+
+def allowed(comparison: Comparison) -> str:
+    """Return the tolerance of a comparison, that of joints in the units of its joints."""
+    units = {one.unit for run in comparison.runs for one in run.joint_statistics.values()}
+    return text.tolerance(comparison.tolerance, units or {"rad"})
+
+
+def place(deviation: Deviation, statistics: Statistics) -> FloatArray:
+    """Return where the log was when a quantity was largest, in [m], shape (3,)."""
+    return np.asarray(deviation.actual[np.searchsorted(deviation.sample, statistics.sample_max)])
+
+
+def stretch(found: Stretch | None) -> str:
+    """Return a stretch out of tolerance; nothing without one."""
+    if found is None:
+        return ""
+    if found.samples == 1:
+        return f"1 sample at t = {text.seconds(found.t)} s"
+    return f"{text.seconds(found.duration)} s from t = {text.seconds(found.t)} s"
+
+
+def correlation(deviation: Deviation) -> str:
+    """Return how the norm goes with the speed; nothing where that is not known."""
+    found = deviation.speed_correlation
+    return "" if found is None else f"{round(found, 2) + 0.0:.2f}"  # + 0.0: no -0.00
+
+
+def sync_value(sync: Sync) -> str:
+    """Return how two clocks were put together."""
+    if sync.mode == "start":
+        return "both start together"
+    within = "" if sync.precision is None else f" ± {sync.precision * 1e3:.2g} ms"
+    return f"{text.offset(sync.offset)}{within}"
+
+
+def alignment_value(deviation: Deviation) -> str:
+    """Return how a log was moved in space."""
+    alignment = deviation.alignment
+    match alignment.mode:
+        case "none":
+            return "none"
+        case "tool":
+            return f"tool moved by {text.quantity(float(np.linalg.norm(alignment.tool)), 'm')}"
+    moved = f"moved by up to {text.quantity(_farthest(deviation), 'm')}"
+    return f"{alignment.mode}: {moved}, turned by {text.quantity(_turn(alignment), 'rad')}"
+
+
+def tool_option(robot: Chain, tool: tuple[float, float, float]) -> str:
+    """Return the option that gives an arm the tool that a comparison found.
+
+    Args:
+        robot: The arm, perhaps with a tool already.
+        tool: What is missing, in the frame of that tool, in [m].
+    """
+    frame = robot.tool @ translation(*tool)
+    turn = rpy_of(frame.rotation)
+    values = [*frame.translation, *(turn if any(abs(angle) > 1e-12 for angle in turn) else ())]
+    rounded = (f"{round(float(value), 7) + 0.0:.7f}" for value in values)  # + 0.0: no -0
+    return "--tool " + ",".join(value.rstrip("0").rstrip(".") for value in rounded)
+
+
+def _sync_note(sync: Sync) -> str:
+    if sync.mode == "start":
+        return "each from its first sample"
+    meaning = "t of the reference = t of the log + this"
+    if sync.mode == "given":
+        return f"as asked for; {meaning}"
+    alike = "" if sync.similarity is None else f"; likeness of the motions there: {sync.similarity:.4f} of 1"
+    return f"found by the motion of the {sync.by or 'log'}; {meaning}{alike}"
+
+
+def _alignment_note(deviation: Deviation) -> str:
+    alignment = deviation.alignment
+    if alignment.mode == "none":
+        return "both stand where they say they stood"
+    if alignment.mode == "tool":
+        robot = deviation.run.robot
+        option = f", as {tool_option(robot, alignment.tool)} does" if robot else ""
+        return f"the constant offset of the tool centre point that fits best{option}"
+    return (
+        "the first compared poses agree" if alignment.mode == "start" else "the rigid motion that fits best"
+    )
+
+
+def _farthest(deviation: Deviation) -> float:
+    """Return how far the position that was moved farthest was moved, in [m]: p' - p, p = R^T (p' - t)."""
+    alignment = deviation.alignment
+    before = (deviation.actual - np.asarray(alignment.translation)) @ np.asarray(alignment.rotation)
+    return float(np.linalg.norm(deviation.actual - before, axis=1).max())
+
+
+def _turn(alignment: Alignment) -> float:
+    """Return the angle of an alignment's rotation in [rad]: atan2(|axial vector|, (trace - 1) / 2)."""
+    r = np.asarray(alignment.rotation)
+    axial = 0.5 * np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
+    return float(np.arctan2(np.linalg.norm(axial), (np.trace(r) - 1.0) / 2.0))
+
+
+def _left_out(deviation: Deviation, reference_samples: int) -> str:
+    total = deviation.left_out + len(deviation.sample)
+    return (
+        f"{deviation.left_out} of {total} samples,"
+        f" {deviation.reference_left_out} of {reference_samples} of the reference"
+    )
+
+
+def _turns(deviation: Deviation) -> str:
+    counts = zip(deviation.joint_statistics, deviation.joint_turns, strict=True)
+    return ", ".join(f"{name} {count:+d}" for name, count in counts if count)
+
+
+def _told(*facts: Fact) -> tuple[Fact, ...]:
+    """Return those that have a value."""
+    return tuple(fact for fact in facts if fact.value)

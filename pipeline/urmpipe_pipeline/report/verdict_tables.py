@@ -1,0 +1,165 @@
+"""The tables of a comparison: the logs from best to worst, and the statistics of every quantity of a log."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Statistics
+from urmpipe_pipeline.report import text
+from urmpipe_pipeline.report.facts import alignment_value, correlation
+from urmpipe_pipeline.report.tables import (
+    Cell,
+    Column,
+    Table,
+    judged,
+    numbers,
+    without_empty_columns,
+    words,
+)
+
+ABOUT = {"axis": "position", "norm": "position", "path": "path", "angle": "orientation", "joint": "joints"}
+"""What the kinds of deviation are about."""
+
+
+def ranking_tables(comparison: Comparison, links: Sequence[str]) -> tuple[Table, ...]:
+    """Return one line a log, best to worst: how far off it is; when, where and under which conditions.
+
+    Args:
+        comparison: Some logs.
+        links: Where each is told of, best to worst.
+    """
+    return (
+        _how_far(comparison, links),
+        _when_and_where(comparison, links),
+    )
+
+
+def statistics_tables(deviation: Deviation) -> tuple[Table, ...]:
+    """Return the statistics of every quantity: a table of those in [mm] and one of those in [deg]."""
+    starts = _at_start(deviation)
+    tables = []
+    for unit, (shown, _) in text.SHOWN.items():
+        pairs = zip(deviation.all_statistics, starts, strict=True)
+        rows = tuple(_statistics_row(one, start) for one, start in pairs if one.unit == unit)
+        if rows:
+            about = dict.fromkeys(ABOUT[one.kind] for one in deviation.all_statistics if one.unit == unit)
+            title = f"Statistics of {text.enumerated(tuple(about))}"
+            table = Table(title, _statistics_columns(shown), rows, note=_statistics_note(deviation))
+            tables.append(without_empty_columns(table))
+    return tuple(tables)
+
+
+def _how_far(comparison: Comparison, links: Sequence[str]) -> Table:
+    """Return the largest deviation of each kind and how much is out of tolerance, one line a log."""
+    columns: tuple[Column, ...] = (
+        *words("Log", "Verdict", "Decided by"),
+        *numbers(*(f"max |{text.SYMBOLS[axis]}| [mm]" for axis in "xyz"), "max ‖Δ‖ [mm]", "max path [mm]"),
+        *numbers("max angle [deg]", "max joint [deg]", "max joint [mm]", "Share out"),
+    )
+    rows = tuple(_how_far_row(run, link) for run, link in zip(comparison.ranking, links, strict=True))
+    note = "The bars show how much of a tolerance is used up; the logs are ranked by the fullest of theirs."
+    return without_empty_columns(Table("Largest deviations, best to worst", columns, rows, note=note))
+
+
+def _how_far_row(run: Deviation, link: str) -> tuple[Cell, ...]:
+    joints = list(run.joint_statistics.values())
+    found = [*(run.statistics[axis] for axis in AXES), run.statistics["path"], run.statistics.get("angle")]
+    found += [_furthest([one for one in joints if one.unit == unit]) for unit in ("rad", "m")]
+    return (
+        Cell(run.name, href=link),
+        judged(run.verdict),
+        Cell(text.size_of(run.decisive)),
+        *(_largest(one) for one in found),
+        Cell(text.percent(run.share_out)),
+    )
+
+
+def _when_and_where(comparison: Comparison, links: Sequence[str]) -> Table:
+    """Return when and where each log is worst, and how it was put together with the reference."""
+    columns = (
+        *words("Log"),
+        *numbers("Worst ‖Δ‖ at t [s]", "Worst at x, y, z [m]", "Longest out [s]", "Longest out from t [s]"),
+        *numbers("Sync offset [s]", "r(‖Δ‖, speed)", "Left out", "Warnings"),
+        *words("Alignment"),
+    )
+    rows = tuple(_when_and_where_row(run, link) for run, link in zip(comparison.ranking, links, strict=True))
+    note = "Left out: samples of the log without a counterpart or without a value."
+    return without_empty_columns(Table("When, where and how compared", columns, rows, note=note))
+
+
+def _when_and_where_row(run: Deviation, link: str) -> tuple[Cell, ...]:
+    worst, longest = run.worst, run.longest_out
+    stretch = (text.NOTHING,) * 2
+    if longest is not None:
+        stretch = (text.seconds(longest.duration), text.seconds(longest.t))
+    return (
+        Cell(run.name, href=link),
+        Cell(text.seconds(float(run.t[worst]))),
+        Cell(text.point(run.actual[worst])),
+        *(Cell(value) for value in stretch),
+        Cell(text.seconds(run.sync.offset)),
+        Cell(correlation(run) or text.NOTHING),
+        Cell(str(run.left_out)),
+        Cell(str(len(run.run.warnings))),
+        Cell(alignment_value(run)),
+    )
+
+
+def _statistics_columns(unit: str) -> tuple[Column, ...]:
+    return (
+        *words("Quantity", "Verdict"),
+        *numbers(f"tolerance [{unit}]", f"max |Δ| [{unit}]", "at t [s]", f"rms [{unit}]"),
+        *numbers(
+            f"p95 |Δ| [{unit}]",
+            f"mean [{unit}]",
+            f"std [{unit}]",
+            f"at start [{unit}]",
+            "samples out",
+            "share out",
+        ),
+    )
+
+
+def _statistics_row(one: Statistics, start: float) -> tuple[Cell, ...]:
+    return (
+        Cell(text.symbol(one)),
+        judged(one.verdict),
+        Cell(text.limit(one.tolerance, one.unit)),
+        _largest(one),
+        Cell(text.seconds(one.t_max)),
+        *(Cell(text.number(value, one.unit)) for value in (one.rms, one.p95, one.mean, one.std, start)),
+        Cell(text.NOTHING if one.out_of_tolerance is None else str(one.out_of_tolerance)),
+        Cell(text.NOTHING if one.share_out is None else text.percent(one.share_out)),
+    )
+
+
+def _statistics_note(deviation: Deviation) -> str:
+    return (
+        "max, rms and p95 are of absolute values, mean and std signed. At start: the agreement of the start"
+        f" poses (mutual calibration) at t = {text.seconds(float(deviation.t[0]))} s."
+    )
+
+
+def _at_start(deviation: Deviation) -> list[float]:
+    """Return every quantity at the first compared sample in [m] or [rad], in the order of the statistics."""
+    found = [*deviation.start, float(deviation.path[0])]
+    if deviation.angle is not None:
+        found.append(float(deviation.angle[0]))
+    if deviation.joint_delta is not None:
+        found += [float(value) for value in np.asarray(deviation.joint_delta[0])]
+    return found
+
+
+def _furthest(joints: Sequence[Statistics]) -> Statistics | None:
+    return max(joints, key=lambda one: one.max, default=None)
+
+
+def _largest(statistics: Statistics | None) -> Cell:
+    """Return the largest value, marked where it is out of tolerance."""
+    if statistics is None:
+        return Cell(text.NOTHING)
+    used = None if statistics.used is None else min(statistics.used, 1.0)
+    state = "fail" if statistics.verdict == "fail" else ""
+    return Cell(text.number(statistics.max, statistics.unit, statistics.tolerance), state, used=used)

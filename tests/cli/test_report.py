@@ -1,0 +1,79 @@
+"""report and its files of figures as a user runs them."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from urmpipe_datasets import LOGS
+
+RunCommand = Callable[..., Any]
+MATLAB = LOGS / "matlab.csv"
+
+
+@pytest.fixture
+def recording(urmpipe: RunCommand, tmp_path: Path) -> Path:
+    """The recording of one log against another one."""
+    path = tmp_path / "run.rrd"
+    tolerance = "axis=1mm,path=1mm,angle=0.5deg,joint=0.2deg"
+    ran = urmpipe(
+        "compare", MATLAB, LOGS / "coppeliasim.csv", "--robot", "urm6", "-o", path, "--tolerance", tolerance
+    )
+    assert ran.code == 1
+    return path
+
+
+def test_a_format_without_a_folder_is_refused(urmpipe: RunCommand, recording: Path) -> None:
+    ran = urmpipe("report", recording, "--format", "svg")
+    assert (ran.code, ran.out) == (2, "")
+    assert "--format: found without --figures, allowed: with --figures DIR" in ran.err
+    assert not recording.with_suffix(".html").exists()
+
+
+def test_json_lists_no_figures_where_none_were_asked_for(urmpipe: RunCommand, recording: Path) -> None:
+    ran = urmpipe("report", recording, "--json")
+    assert json.loads(ran.out) == {
+        "schema": 1,
+        "report": "run.html",
+        "recordings": [{"name": "coppeliasim-against-matlab", "verdict": "fail"}],
+        "figures": [],
+    }
+
+
+def test_the_numbers_of_compare_stand_in_the_report_of_its_recording(
+    urmpipe: RunCommand, recording: Path, tmp_path: Path
+) -> None:
+    tolerance = "axis=1mm,path=1mm,angle=0.5deg,joint=0.2deg"
+    logs = (MATLAB, LOGS / "coppeliasim.csv")
+    ran = urmpipe(
+        "compare", *logs, "--robot", "urm6", "--json", "--tolerance", tolerance, "-o", tmp_path / "b.rrd"
+    )
+    (run,) = json.loads(ran.out)["runs"]
+    assert urmpipe("report", recording).code == 0
+    page = recording.with_suffix(".html").read_text(encoding="utf-8")
+    for one in (*run["delta"].values(), run["path"]):
+        for key in ("max", "rms", "mean", "std", "p95"):
+            assert f">{one[key] * 1e3:.4f}<" in page
+    for one in (run["angle"], *run["joints"].values()):
+        for key in ("max", "rms", "mean", "std", "p95"):
+            assert f">{one[key] * 180 / 3.141592653589793:.4f}<" in page
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(
+    not Path("/usr/bin/chromium").exists(), reason="no /usr/bin/chromium: apt-get install chromium"
+)
+def test_figures_are_written_as_files_and_listed(
+    urmpipe: RunCommand, recording: Path, tmp_path: Path
+) -> None:
+    pytest.importorskip("kaleido")
+    ran = urmpipe("report", recording, "--figures", "new/figures", "--format", "svg", "--json")
+    assert (ran.code, ran.err) == (0, "")
+    listed = json.loads(ran.out)["figures"]
+    assert {tmp_path / one["file"] for one in listed} == set((tmp_path / "new/figures").iterdir())
+    assert all(one["file"].endswith(".svg") and one["title"] for one in listed)
+    assert {one["part"] for one in listed} >= {"coppeliasim"}

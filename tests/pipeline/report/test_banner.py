@@ -1,0 +1,113 @@
+"""What a minute is enough to read: the banner and the cards."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.report import text
+from urmpipe_pipeline.report.banner import banner
+from urmpipe_pipeline.report.cards import card
+from urmpipe_pipeline.results import Run
+
+LINKS = (("#a", "#b"),)
+
+
+def test_a_banner_of_a_log_that_passes_says_how_close_when_and_where(comparison: Comparison) -> None:
+    shifted = comparison.runs[0]
+    said = banner([replace(comparison, runs=(shifted,))], [], [["#a"]])
+    assert (said.state, said.word, said.headline) == ("pass", "PASS", "shifted is within tolerance")
+    z = shifted.statistics["z"]
+    index = shifted.sample.tolist().index(z.sample_max)
+    x, y, height = shifted.actual[index]
+    assert [(fact.name, fact.value, fact.href) for fact in said.facts] == [
+        ("Closest to the limit", "shifted", "#a"),
+        ("How much", "|Δz| = 2.5000 mm of 3.5 mm allowed", ""),
+        ("When", f"t = {text.seconds(z.t_max)} s", ""),
+        ("Where (x, y, z)", f"{x:.4f}, {y:.4f}, {height:.4f} m", ""),
+        ("Reference", "path", ""),
+        ("Tolerance", "±3.5 mm per axis", ""),
+    ]
+
+
+def test_a_banner_of_logs_that_fail_names_the_worst(comparison: Comparison) -> None:
+    said = banner([comparison], [], LINKS)
+    worst = comparison.runs[1].decisive
+    assert said.headline == "1 of 2 logs is out of tolerance: joint-off"
+    assert (said.facts[0].name, said.facts[0].value, said.facts[0].href) == (
+        "Furthest out",
+        "joint-off",
+        "#b",
+    )
+    assert said.facts[1].value.startswith(f"|Δ{worst.quantity}| = {worst.max * 1e3:.4f} mm of 3.5 mm")
+    every = replace(comparison, runs=comparison.runs[1:] * 2)
+    assert banner([every], [], LINKS).headline == "both logs are out of tolerance"
+    many = replace(comparison, runs=comparison.runs[1:] * 4)
+    assert banner([many], [], ("abcd",)).headline == "all 4 logs are out of tolerance"
+
+
+def test_a_banner_of_some_comparisons_counts_their_logs(
+    comparison: Comparison, everything: Comparison
+) -> None:
+    said = banner([comparison, everything], [], LINKS * 2)
+    assert said.headline == "3 of 4 logs are out of tolerance: joint-off, joint-off, shifted"
+    assert [fact.value for fact in said.facts[-2:]] == ["path", "as each comparison says"]
+
+
+def test_a_banner_without_a_comparison(bare_run: Run) -> None:
+    said = banner([], [bare_run], [])
+    count = len(bare_run.repolarizations)
+    assert said.word == "INGESTED"
+    assert said.headline == f"bare: 3000 rows, {count} repolarizations"
+    assert said.detail == "0 warnings. Nothing was compared: there is no verdict."
+    assert said.facts == ()
+
+
+def test_a_card_holds_what_decides_and_the_rest(everything: Comparison) -> None:
+    deviation = next(run for run in everything.runs if run.name == "joint-off")
+    decisive, found = deviation.decisive, card(deviation, "#x")
+    assert (found.name, found.href, found.state) == ("joint-off", "#x", "fail")
+    assert decisive.used is not None
+    assert found.share == 1.0
+    assert found.used == f"{decisive.used:.3g} times the tolerance"
+    facts = {fact.name: fact.value for fact in found.facts}
+    longest = deviation.longest_out
+    assert longest is not None
+    assert facts["Longest out"] == f"{text.seconds(longest.duration)} s from t = {text.seconds(longest.t)} s"
+    assert facts["Clocks"] == "+0.500 s"
+    assert facts["Alignment"] == "none"
+    assert facts["Largest ‖Δ‖"] == f"{deviation.statistics['norm'].max * 1e3:.4f} mm"
+    assert facts["Largest angle"] == text.quantity(deviation.statistics["angle"].max, "rad", 0.01)
+    assert facts["Largest joint"] == f"{text.quantity(deviation.joint_statistics['phi2'].max, 'rad')} (phi2)"
+    assert facts["Out of tolerance"] == text.percent(deviation.share_out)
+    assert facts["Warnings"] == "0"
+
+
+def test_a_card_leaves_out_what_there_is_not(comparison: Comparison) -> None:
+    deviation = replace(
+        comparison.runs[0],
+        statistics={
+            name: one for name, one in comparison.runs[0].statistics.items() if name != "angle"
+        },
+        joint_statistics={},
+        speed_correlation=None,
+    )  # fmt: skip
+    found = card(deviation, "#x")
+    assert [fact.name for fact in found.facts] == [
+        "When",
+        "Where (x, y, z)",
+        "Largest ‖Δ‖",
+        "Off the path",
+        "Out of tolerance",
+        "Clocks",
+        "Alignment",
+        "Warnings",
+    ]
+    assert (found.allowed, found.used) == ("3.5 mm", "71.4 % of the tolerance")
+
+
+def test_a_card_counts_the_warnings_of_its_log(comparison: Comparison) -> None:
+    deviation = comparison.runs[0]
+    run = replace(deviation.run, warnings=(LogWarning("gap", "a gap", 7),) * 3)
+    assert card(replace(deviation, run=run), "#x").facts[-1].value == "3"
