@@ -7,10 +7,9 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.columns import Column, print_columns
-from urmpipe.printing import LISTED
-from urmpipe.wording import UNITS, figure, judged, label, limit
+from urmpipe.printing import LISTED, judged
+from urmpipe_pipeline import text
 from urmpipe_pipeline.baseline import Absent, BaselineComparison, Change, Worse
-from urmpipe_pipeline.report import text
 from urmpipe_pipeline.results import json_ready
 
 if TYPE_CHECKING:
@@ -45,13 +44,15 @@ def print_baseline(console: Console, found: BaselineComparison) -> None:
 def _columns(changes: Sequence[Change]) -> Iterator[Column]:
     """Yield the columns of the table of changes."""
     yield Column("Log", [one.run for one in changes], key=True)
-    yield Column("Quantity", [f"{label(one.now)} [{UNITS[one.now.unit]}]" for one in changes], key=True)
+    yield Column(
+        "Quantity", [f"{text.symbol(one.now)} [{text.SHOWN[one.now.unit][0]}]" for one in changes], key=True
+    )
     yield Column("worse", [", ".join(WORDS[name] for name in one.worse) or None for one in changes])
     for name in ("max", "rms"):
         yield Column(name, [_both(one, name) for one in changes])
     if any(one.before.share_out or one.now.share_out for one in changes):
         yield Column("out", [_shares(one) for one in changes])
-    yield Column("most at\none sample", [figure(one.largest, one.now.unit) for one in changes])
+    yield Column("most at\none sample", [text.number(one.largest, one.now.unit) for one in changes])
     times = [one.t_largest for one in changes]
     yield Column("at t\n[s]", [None if t is None else text.seconds(t) for t in times])
     if any(one.before.verdict != one.now.verdict for one in changes):
@@ -64,7 +65,7 @@ def _both(change: Change, name: str) -> str:
     apart = abs(now - before) > change.noise
     unit = change.now.unit
     return ARROW.join(
-        figure(one, unit, other if apart else None) for one, other in ((before, now), (now, before))
+        text.number(one, unit, other if apart else None) for one, other in ((before, now), (now, before))
     )
 
 
@@ -80,7 +81,9 @@ def _verdicts(change: Change) -> str:
 def _lines(found: BaselineComparison) -> Iterator[str]:
     """Yield what else is to be known of the two, a line each."""
     levels = [(kind, value, _unit(kind)) for kind, value in found.noise.items()]
-    noise = ", ".join(f"{kind} {limit(value, unit)} {UNITS[unit]}" for kind, value, unit in levels)
+    noise = ", ".join(
+        f"{kind} {text.limit(value, unit)} {text.SHOWN[unit][0]}" for kind, value, unit in levels
+    )
     yield f"noise: {noise}"
     for word, absent in (("new", found.new), ("gone", found.gone)):
         if absent:

@@ -6,7 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from urmpipe_pipeline.report.text import NOTHING
+from urmpipe_pipeline.text import NOTHING
 
 if TYPE_CHECKING:
     from rich.console import Console

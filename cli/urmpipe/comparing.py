@@ -12,7 +12,7 @@ from urmpipe_models.errors import Finding, OptionError, RecordingError
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison import AlignMode, Comparison
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.junit import write_junit
 from urmpipe_pipeline.left_out import BEYOND
@@ -25,6 +25,7 @@ from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.statistics_table import write_statistics
 from urmpipe_pipeline.sync import SyncOption
 from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE
+from urmpipe_pipeline.trajectory import AlignMode
 
 Operand = PathLike | Run
 

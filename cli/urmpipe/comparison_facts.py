@@ -2,17 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 
-import numpy as np
-
-from urmpipe.guards import offset_of
 from urmpipe.printing import count
-from urmpipe.wording import limit
-from urmpipe_models.transform import translation
-from urmpipe_pipeline.comparison import Alignment, Deviation, Sync
-from urmpipe_pipeline.report import text
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison import Deviation
+from urmpipe_pipeline.wording import alignment_words, correlation, sync_words, tool_option
 
 
 def facts(run: Deviation) -> Iterator[str]:
@@ -30,7 +25,7 @@ def facts(run: Deviation) -> Iterator[str]:
             f" {text.seconds(longest.duration)} s ({count(longest.samples, 'sample')})"
             f" from t = {text.seconds(longest.t)} s"
         )
-    yield _clocks(run.sync)
+    yield sync_words(run.sync) or "clocks: both from their first samples"
     turns = zip(run.joint_statistics, run.joint_turns, strict=True)
     turned = [f"{name} by {number:+d}" for name, number in turns if number]
     if turned:
@@ -38,32 +33,15 @@ def facts(run: Deviation) -> Iterator[str]:
     yield from _place(run)
     yield from _sliding(run)
     if run.speed_correlation is not None:
-        yield f"the norm goes with the speed by r = {run.speed_correlation:+.3f}"
-
-
-def _clocks(sync: Sync) -> str:
-    """Say how the clocks were put together."""
-    if sync.mode == "start":
-        return "clocks: both from their first samples"
-    sure = "" if sync.precision is None else f" ± {sync.precision:.2g} s"
-    alike = "" if sync.similarity is None else f" (similarity {sync.similarity:.4g})"
-    why = "as given" if sync.mode == "given" else f"estimated by the {sync.by}{alike}"
-    sign = "-" if sync.offset < 0.0 else "+"
-    return f"clocks: t_reference = t_log {sign} {abs(sync.offset):.6g} s{sure}, {why}"
+        yield f"the norm goes with the speed by r = {correlation(run.speed_correlation)}"
 
 
 def _place(run: Deviation) -> Iterator[str]:
     """Say how the log was moved in space, and how to have a tool that was found so for good."""
-    moved, robot = run.alignment, run.run.robot
-    if moved.mode == "tool":
-        yield f"aligned (tool): the tool centre point moved by {_vector(moved.tool)} mm in the tool's frame"
-        if robot is not None:
-            placed = offset_of(robot.tool @ translation(*moved.tool))
-            yield f"to have it so from the start: --tool {','.join(f'{value:.6g}' for value in placed)}"
-    elif moved.mode != "none":
-        turn = math.degrees(turn_of(moved))
-        by = _vector(moved.translation)
-        yield f"aligned ({moved.mode}): turned by {turn:.4f} deg about the origin, then moved by {by} mm"
+    if words := alignment_words(run.alignment):
+        yield words
+    if run.alignment.mode == "tool" and run.run.robot is not None:
+        yield f"to have it so from the start: {tool_option(run.run.robot, run.alignment)}"
 
 
 def _sliding(run: Deviation) -> Iterator[str]:
@@ -71,17 +49,5 @@ def _sliding(run: Deviation) -> Iterator[str]:
     sliding = [one for one in run.joint_statistics.values() if one.unit == "m" and one.tolerance]
     if sliding:
         names = ", ".join(one.quantity for one in sliding)
-        allowed = limit(sliding[0].tolerance, "m")
+        allowed = text.limit(sliding[0].tolerance, "m")
         yield f"the tolerance of joints is in m where they slide: {names} {allowed} mm"
-
-
-def turn_of(alignment: Alignment) -> float:
-    """Return the angle of a rotation in [rad], exact near 0 as well."""
-    r = np.array(alignment.rotation)
-    twice_sine = np.linalg.norm([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    return float(np.arctan2(twice_sine, np.trace(r) - 1.0))
-
-
-def _vector(metres: tuple[float, ...]) -> str:
-    """Return a vector in [m] as (x, y, z) in [mm]."""
-    return f"({', '.join(text.millimetres(value) for value in metres)})"

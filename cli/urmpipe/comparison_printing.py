@@ -9,10 +9,10 @@ import numpy as np
 
 from urmpipe.columns import Column, print_columns
 from urmpipe.comparison_facts import facts
-from urmpipe.printing import count, new_console
-from urmpipe.wording import UNITS, figure, judged, label, limit
+from urmpipe.printing import count, judged, new_console
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Statistics
-from urmpipe_pipeline.report import text
+from urmpipe_pipeline.wording import correlation, of_allowed
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -62,17 +62,15 @@ def _decisive(run: Deviation, *, named: bool) -> str:
     one = run.decisive
     place = text.point(run.actual[int(np.searchsorted(run.sample, one.sample_max))])
     of = f" of {run.name}" if named else ""
-    unit = UNITS[one.unit]
-    allowed = "" if one.tolerance is None else f" of {limit(one.tolerance, one.unit)} {unit} allowed"
     return (
-        f"{_largest(one)}{of}: {figure(one.max, one.unit, one.tolerance)} {unit}{allowed}"
+        f"{_largest(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
         f"{_used(one)}, at t = {text.seconds(one.t_max)} s, at ({place}) m"
     )
 
 
 def _largest(one: Statistics) -> str:
     """Return what people call the largest value of a quantity."""
-    return f"max |{label(one)}|" if one.kind == "axis" else f"max {label(one)}"
+    return f"max |{text.symbol(one)}|" if one.kind == "axis" else f"max {text.symbol(one)}"
 
 
 def _used(one: Statistics) -> str:
@@ -107,7 +105,7 @@ def _ranking(runs: Sequence[Deviation]) -> Iterator[Column]:
     }
     for head, find in quantities.items():
         found = [find(run) for run in runs]
-        unit = next((UNITS[one.unit] for one in found if one), None)
+        unit = next((text.SHOWN[one.unit][0] for one in found if one), None)
         if unit:
             yield Column(f"{head}\n[{unit}]", [_cell(one) for one in found])
     yield from _when(runs)
@@ -122,7 +120,7 @@ def _when(runs: Sequence[Deviation]) -> Iterator[Column]:
         yield Column("from t\n[s]", [_seconds(one.t if one else None) for one in stretches])
     yield Column("worst at\nt [s]", [text.seconds(float(run.t[run.worst])) for run in runs])
     if any(run.speed_correlation is not None for run in runs):
-        yield Column("r(‖Δ‖,\nspeed)", [_signed(run.speed_correlation) for run in runs])
+        yield Column("r(‖Δ‖,\nspeed)", [correlation(run.speed_correlation) for run in runs])
     if any(run.sync.offset for run in runs):
         yield Column("offset\n[s]", [f"{run.sync.offset:+.4f}" for run in runs])
     if any(run.left_out for run in runs):
@@ -133,26 +131,22 @@ def _seconds(value: float | None) -> str | None:
     return None if value is None else text.seconds(value)
 
 
-def _signed(value: float | None) -> str | None:
-    return None if value is None else f"{value:+.3f}"
-
-
 def _cell(one: Statistics | None) -> str | None:
-    return None if one is None else figure(one.max, one.unit, one.tolerance)
+    return None if one is None else text.number(one.max, one.unit, one.tolerance)
 
 
 def _statistics(run: Deviation) -> Iterator[Column]:
     """Yield the columns of the statistics of one log, a row a quantity."""
     every = run.all_statistics
     start = dict(zip(AXES, run.start, strict=True))
-    yield Column("Quantity", [f"{label(one)} [{UNITS[one.unit]}]" for one in every], key=True)
+    yield Column("Quantity", [f"{text.symbol(one)} [{text.SHOWN[one.unit][0]}]" for one in every], key=True)
     yield Column("Verdict", [judged(one.verdict) for one in every])
-    yield Column("tolerance", [limit(one.tolerance, one.unit) for one in every])
+    yield Column("tolerance", [text.limit(one.tolerance, one.unit) for one in every])
     yield Column("max", [_cell(one) for one in every])
     yield Column("at t [s]", [text.seconds(one.t_max) for one in every])
     for name in ("rms", "p95", "mean", "std"):
-        yield Column(name, [figure(getattr(one, name), one.unit) for one in every])
+        yield Column(name, [text.number(getattr(one, name), one.unit) for one in every])
     known = [start.get(one.quantity) if one.kind in ("axis", "norm") else None for one in every]
-    yield Column("at start", [value if value is None else figure(value, "m") for value in known])
+    yield Column("at start", [value if value is None else text.number(value, "m") for value in known])
     if any(one.share_out for one in every):
         yield Column("out", [None if one.share_out is None else text.percent(one.share_out) for one in every])

@@ -14,6 +14,7 @@ import click
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
+    from rich.text import Text
 
     from urmpipe_pipeline.joint_log import LogWarning
     from urmpipe_pipeline.results import Run
@@ -111,6 +112,16 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
     with Progress(console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(title, total=1.0)
         yield lambda share: bar.update(task, completed=share)
+
+
+def judged(verdict: str | None) -> Text:
+    """Return a verdict as a word, with a colour on a terminal."""
+    from rich.text import Text
+
+    from urmpipe_pipeline.text import NOTHING
+
+    style = {"pass": "bold green", "fail": "bold red"}
+    return Text(NOTHING) if verdict is None else Text(verdict.upper(), style=style[verdict])
 
 
 def new_console() -> Console:

@@ -11,10 +11,10 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.orientation import conjugate, matrices, product, quaternions
 from urmpipe_models.transform import rpy_of, translation
-from urmpipe_pipeline.comparison import Alignment, AlignMode
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.matching import Matched, lacking
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import Alignment, AlignMode
 
 ALIGN_MODES: tuple[AlignMode, ...] = get_args(AlignMode)
 

@@ -12,7 +12,7 @@ from urmpipe_models.kinematics import poses_over_log
 from urmpipe_models.orientation import quaternions
 from urmpipe_pipeline.alignment import align, check_align
 from urmpipe_pipeline.audit import audit_log
-from urmpipe_pipeline.comparison import AlignMode, Comparison, Deviation, Sync, Trajectory
+from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning
 from urmpipe_pipeline.left_out import left_out_warnings
 from urmpipe_pipeline.matching import Matched, as_recorded, by_kinematics, lacking, match
@@ -22,6 +22,7 @@ from urmpipe_pipeline.recorded_tcp import lacking_tool
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.sync import SyncOption, check_sync, sync_doubts, synchronise
 from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE, check_tolerance
+from urmpipe_pipeline.trajectory import AlignMode, Sync, Trajectory
 
 Tcp = Literal["fk", "recorded"]
 

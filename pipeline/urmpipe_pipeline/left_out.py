@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_pipeline.comparison import Deviation, Trajectory
+from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.grid import ROUNDING_NS
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.trajectory import Trajectory
 
 BEYOND = "sync-left-out"
 """Kind of the warning that says what an offset between the clocks leaves out: no doubt about the log."""

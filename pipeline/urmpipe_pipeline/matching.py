@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.orientation import quaternions, slerp
-from urmpipe_pipeline.comparison import Trajectory
 from urmpipe_pipeline.grid import ROUNDING_NS, interpolate
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)

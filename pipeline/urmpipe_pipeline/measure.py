@@ -10,13 +10,14 @@ from urmpipe_models.delta import delta
 from urmpipe_models.errors import LogError
 from urmpipe_models.orientation import angle_between
 from urmpipe_models.repolarizer import FULL_TURN
-from urmpipe_pipeline.comparison import AXES, Alignment, Deviation, Kind, Sync, Trajectory
+from urmpipe_pipeline.comparison import AXES, Deviation, Kind
 from urmpipe_pipeline.grid import apart, interpolate
 from urmpipe_pipeline.joint_log import FloatArray, seconds
 from urmpipe_pipeline.matching import Matched, joints_apart, lacking
 from urmpipe_pipeline.nearest_path import distance_from_path
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.statistics import Measured, correlation, describe, overall
+from urmpipe_pipeline.trajectory import Alignment, Sync, Trajectory
 
 KINDS: tuple[Kind, ...] = ("axis", "axis", "axis", "norm")
 """What the columns of delta are measured of."""

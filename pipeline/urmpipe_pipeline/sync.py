@@ -8,11 +8,11 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError, OptionError
-from urmpipe_pipeline.comparison import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning
 from urmpipe_pipeline.sync_coarse import FLOOR, mean_rates, peaks
 from urmpipe_pipeline.sync_fine import Estimate, refine
 from urmpipe_pipeline.sync_views import View, views
+from urmpipe_pipeline.trajectory import AlignMode, Sync, Trajectory
 
 SyncOption: TypeAlias = Literal["start", "auto"] | float
 

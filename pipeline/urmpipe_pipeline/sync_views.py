@@ -9,9 +9,9 @@ from typing import Literal
 import numpy as np
 
 from urmpipe_models.orientation import product
-from urmpipe_pipeline.comparison import AlignMode, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.matching import joint_order
+from urmpipe_pipeline.trajectory import AlignMode, Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)

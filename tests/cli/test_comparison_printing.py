@@ -12,13 +12,13 @@ from rich.cells import cell_len
 
 import urmpipe
 from urmpipe import printing
-from urmpipe.comparison_facts import turn_of
 from urmpipe.comparison_printing import print_comparison
 from urmpipe.printing import new_console
-from urmpipe.wording import figure, limit
 from urmpipe_models.transform import from_rpy
-from urmpipe_pipeline.comparison import Alignment, Comparison, Deviation, Sync
+from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.text import limit, number
+from urmpipe_pipeline.trajectory import Alignment, Sync
 
 Captured = pytest.CaptureFixture[str]
 
@@ -229,11 +229,11 @@ def test_a_tool_that_was_found_is_advised_behind_the_one_that_is_there(capsys: C
 def test_the_angle_of_a_rotation_is_exact_near_none_and_near_half_a_turn(angle: float) -> None:
     # Near half a turn the sine is 0 / 0 in the trace alone; both together hold 1e-15.
     rotation = from_rpy(angle, 0.0, 0.0).rotation
-    assert turn_of(Alignment("rigid", rotation)) == pytest.approx(angle, abs=1e-15, rel=1e-9)
+    assert Alignment("rigid", rotation).angle == pytest.approx(angle, abs=1e-15, rel=1e-9)
 
 
 def test_a_figure_shows_as_many_digits_as_tell_it_from_its_limit() -> None:
-    assert figure(0.0035000001, "m", 0.0035) == "3.5000001"
-    assert figure(math.radians(0.50000001), "rad", math.radians(0.5)) == "0.50000001"
-    assert (figure(math.radians(0.5), "rad"), figure(None, "rad"), figure(None, "m")) == ("0.5000", "–", "–")
+    assert number(0.0035000001, "m", 0.0035) == "3.5000001"
+    assert number(math.radians(0.50000001), "rad", math.radians(0.5)) == "0.50000001"
+    assert (number(math.radians(0.5), "rad"), number(None, "rad"), number(None, "m")) == ("0.5000", "–", "–")
     assert (limit(math.radians(0.5), "rad"), limit(0.0035, "m"), limit(None, "rad")) == ("0.5", "3.5", "–")

@@ -17,10 +17,11 @@ from urmpipe_models.orientation import RotationForm
 from urmpipe_models.transform import Transform, from_offset, from_rpy
 from urmpipe_pipeline.alignment import RESOLVED, tool_with
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison import Alignment, AlignMode, Deviation
+from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import Alignment, AlignMode
 
 ROUNDING = 1e-12
 """Positions of some metres round at 1e-15, a fit over hundreds of them at some tens of that."""

@@ -15,13 +15,14 @@ from scipy.spatial.transform import Rotation
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_pipeline.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.comparison import AlignMode, Deviation
+from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.export import ExportOptions, export_result
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.trajectory import AlignMode
 
 METRES = 1e-12
 """Positions of some metres, turned and moved: some tens of rounding errors of 1e-15 m."""

@@ -14,10 +14,10 @@ from urmpipe_datasets import LOGS
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.compare import trajectory
-from urmpipe_pipeline.comparison import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning, SourceFile
 from urmpipe_pipeline.sync import sync_doubts, synchronise
 from urmpipe_pipeline.sync_coarse import similarity
+from urmpipe_pipeline.trajectory import AlignMode, Sync, Trajectory
 
 Motion = Callable[[FloatArray], FloatArray]
 

@@ -31,10 +31,11 @@ from typing import Literal
 import numpy as np
 
 from urmpipe_models.orientation import NAMES
-from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Trajectory
+from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import Trajectory
 
 LAYOUT_VERSION = 4
 """Raised when an older reader would misunderstand a newer recording."""

@@ -7,13 +7,14 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.joint_log import IntArray
 from urmpipe_pipeline.recording.columns import time_columns
 from urmpipe_pipeline.recording.entities import Place, printable
-from urmpipe_pipeline.recording.wording import alignment_words, amount, excess, sync_words
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.wording import alignment_words, excess, sync_words
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -53,12 +54,13 @@ def _events(one: Deviation) -> Iterator[Event]:
         yield start, f"{one.left_out} of {whole} samples left out: no reference or no value", "WARN"
     level = "INFO" if one.verdict == "pass" else "ERROR"
     if (longest := one.longest_out) is not None:
-        said = f"longest stretch out of tolerance begins: {longest.samples} samples, {longest.duration:.4f} s"
+        lasts = f"{longest.samples} samples, {text.seconds(longest.duration)} s"
+        said = f"longest stretch out of tolerance begins: {lasts}"
         yield round(longest.t * 1e9), said, level
     decisive = one.decisive
     if decisive.tolerance is not None:
         yield round(decisive.t_max * 1e9), f"decides: {excess(decisive)}", level
-    x, y, z, norm = (amount(float(value), "m") for value in one.delta[one.worst])
+    x, y, z, norm = (text.quantity(float(value), "m") for value in one.delta[one.worst])
     yield int(one.t_ns[one.worst]), f"largest deviation: {norm} (x {x}, y {y}, z {z})", level
 
 

@@ -14,11 +14,12 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.chain import Chain
 from urmpipe_pipeline.audit_entry import AuditEntry
-from urmpipe_pipeline.comparison import Alignment, Comparison, Deviation, Statistics, Sync, Trajectory
+from urmpipe_pipeline.comparison import Comparison, Deviation, Statistics
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, Block, Place, places_of
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import Alignment, Sync, Trajectory
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.errors import RecordingError
 from urmpipe_models.kinematics import PointLog
-from urmpipe_pipeline.comparison import Comparison, Deviation, Trajectory
+from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.recording import metadata
 from urmpipe_pipeline.recording.entities import (
@@ -27,6 +27,7 @@ from urmpipe_pipeline.recording.entities import (
 )
 from urmpipe_pipeline.recording.store import Chunk, Store
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import Trajectory
 
 Data: TypeAlias = Mapping[str, Any]
 

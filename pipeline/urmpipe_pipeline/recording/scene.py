@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import points_over_log
-from urmpipe_pipeline.comparison import Comparison, Deviation, Trajectory
+from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
 from urmpipe_pipeline.recording.bodies import Body, bodies_over_log, lacks_shapes
@@ -17,6 +17,7 @@ from urmpipe_pipeline.recording.enlarged import enlarged
 from urmpipe_pipeline.recording.entities import Place, entity_path, places_of, printable
 from urmpipe_pipeline.recording.ways import Way, dashed, lines_of, thinned, track_of
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import Trajectory
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +59,7 @@ class Scene:
     """Everything in the 3D view.
 
     Attributes:
-        arm: The arm of the first run, or None without a robot.
+        arm: The arm of a run, of several the worst that has kinematics; None without a robot.
         ways: The paths.
         enlarged: The deviation as a path whose distance from the reference is a multiple of the true one.
         worst: Where the largest deviation of all runs stands.
@@ -94,14 +95,22 @@ def scene_of(result: Run | Comparison) -> Scene:
     """Return what the 3D view shows of a run or a comparison."""
     standing = places_of(result)
     if isinstance(result, Run):
-        return Scene(_arm(result, None), tuple(_run_ways(result, standing[0])))
-    first = result.runs[0]
+        return Scene(_arm(result, None, run_colour(0)), tuple(_run_ways(result, standing[0])))
+    shown = arm_of(result)
     ways = [
         _done(one, place, run_colour(i))
         for i, (place, one) in enumerate(zip(standing, result.runs, strict=True))
     ]
-    scene = Scene(_arm(first.run, int(first.t_ns[first.worst])), (_asked(result.reference, first), *ways))
+    colour = run_colour(result.runs.index(shown))
+    arm = _arm(shown.run, int(shown.t_ns[shown.worst]), colour)
+    scene = Scene(arm, (_asked(result.reference, shown), *ways))
     return replace(scene, enlarged=enlarged(result, scene.ball()[1]), worst=_worst(result))
+
+
+def arm_of(result: Comparison) -> Deviation:
+    """Return the compared log whose arm is drawn: the worst that has kinematics, else the worst."""
+    worst_first = result.ranking[::-1]
+    return next((one for one in worst_first if one.run.tcp is not None), worst_first[0])
 
 
 def _worst(result: Comparison) -> Mark:
@@ -128,11 +137,11 @@ def _run_ways(run: Run, place: Place) -> Iterator[Way]:
         yield Way(*entities, run_colour(0), False, lines_of(run.tcp.position), track)
 
 
-def _asked(reference: Trajectory, first: Deviation) -> Way:
-    """Return the reference: its lines whole, its point where it is at the first run's samples."""
+def _asked(reference: Trajectory, shown: Deviation) -> Way:
+    """Return the reference: its lines whole, its point where it is at the samples of a run."""
     entities = entity_path("path", "reference"), entity_path("point", "reference")
     strips = dashed(lines_of(reference.position))
-    track = track_of(first.t_ns, first.reference, first.sample, first.worst)
+    track = track_of(shown.t_ns, shown.reference, shown.sample, shown.worst)
     return Way(*entities, REFERENCE_COLOUR, True, strips, track)
 
 
@@ -149,7 +158,7 @@ def _done(one: Deviation, place: Place, colour: str) -> Way:
     )
 
 
-def _arm(run: Run, worst_ns: int | None) -> Arm | None:
+def _arm(run: Run, worst_ns: int | None, tip: str) -> Arm | None:
     """Return the moving arm of a run, or None without kinematics or without a whole sample."""
     if run.robot is None or run.tcp is None:
         return None
@@ -163,17 +172,17 @@ def _arm(run: Run, worst_ns: int | None) -> Arm | None:
         t_ns=run.t_ns[rows],
         sample=rows,
         skeleton=points_over_log(run.robot, q),
-        colours=_point_colours(run.robot),
+        colours=_point_colours(run.robot, tip),
         bodies=bodies,
         bare=lacks_shapes(run.robot, bodies),
     )
 
 
-def _point_colours(robot: Chain) -> tuple[str, ...]:
-    """Return a colour a point: each joint's at its frame, the reference's at what does not move."""
+def _point_colours(robot: Chain, tip: str) -> tuple[str, ...]:
+    """Return a colour a point: each joint's at its frame, the reference's where none moves, the tip's."""
     moving = {name: joint_colour(i) for i, name in enumerate(robot.coordinates)}
     joints = [
         moving.get(joint.mimic.joint if joint.mimic else joint.name, REFERENCE_COLOUR)
         for joint in robot.joints
     ]
-    return (*joints, run_colour(0))
+    return (*joints, tip)

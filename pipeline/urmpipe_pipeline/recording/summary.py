@@ -8,12 +8,13 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import run_colour_word
 from urmpipe_pipeline.recording.entities import printable
-from urmpipe_pipeline.recording.wording import alignment_words, excess, limit, sync_words
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.wording import alignment_words, excess, sync_words
 
 LISTED = 4
 """Warnings that are listed; the others are counted."""
@@ -67,26 +68,22 @@ def _of_comparison(result: Comparison) -> Iterator[str]:
 def _worst(one: Deviation, several: bool) -> str:
     """Return how much, where and when of the log that comes out worst."""
     decisive = one.decisive
-    used = "" if decisive.used is None else f" ({decisive.used:.3g} times)"
+    used = "" if decisive.used is None else f" ({text.used(decisive)})"
     said = f"**{_text(one.name)}**: " if several else ""
-    said += f"{_text(excess(decisive))}{used}, at {decisive.t_max:.4f} s."
+    said += f"{_text(excess(decisive))}{used}, at {text.seconds(decisive.t_max)} s."
     if one.verdict == "fail":
         out = int(np.count_nonzero(one.outside))
-        said += f" Out of tolerance: {out} of {len(one.sample)} samples ({100 * one.share_out:.2f} %)"
+        said += f" Out of tolerance: {out} of {len(one.sample)} samples ({text.percent(one.share_out)})"
         if (longest := one.longest_out) is not None:
-            said += f", longest for {longest.duration:.4f} s from {longest.t:.4f} s"
+            said += f", longest for {text.seconds(longest.duration)} s from {text.seconds(longest.t)} s"
         said += "."
     return said
 
 
 def _allowed(result: Comparison) -> str:
     """Return what is allowed of each kind; what holds for joints in [rad] and in [m] is said of both."""
-    joints = sorted({unit for one in result.runs for unit in one.run.joint_units}, reverse=True)
-    units = {"angle": ["rad"], "joint": joints}
-    return ", ".join(
-        f"{kind} {' or '.join(limit(value, unit) for unit in units.get(kind, ['m']))}"
-        for kind, value in result.tolerance.items()
-    )
+    joints = {unit for one in result.runs for unit in one.run.joint_units}
+    return text.tolerance(result.tolerance, joints or {"rad"})
 
 
 def _table(result: Comparison) -> Iterator[str]:
@@ -102,16 +99,16 @@ def _cells(index: int, one: Deviation) -> Iterable[str]:
     yield _text(one.name)
     yield run_colour_word(index)
     for axis in AXES:
-        yield f"{1e3 * one.statistics[axis].max:.4f}"
-    yield f"{one.t[one.worst]:.4f}"
-    yield f"{100 * one.share_out:.2f} %"
+        yield text.millimetres(one.statistics[axis].max, one.statistics[axis].tolerance)
+    yield text.seconds(float(one.t[one.worst]))
+    yield text.percent(one.share_out)
     yield one.verdict.upper()
 
 
 def _set_up(result: Comparison, several: bool) -> Iterator[str]:
     """Yield how each log was put beside the reference, where that is not trivial, and what was left out."""
     for one in result.runs:
-        said = [text for text in (sync_words(one.sync), alignment_words(one.alignment)) if text]
+        said = [words for words in (sync_words(one.sync), alignment_words(one.alignment)) if words]
         if one.reference_left_out:
             said.append(f"{one.reference_left_out} samples of the reference outside its time")
         if said:

@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.report import text
 from urmpipe_pipeline.report.facts import Fact, allowed, place
 from urmpipe_pipeline.results import Run
 

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Deviation, Statistics
-from urmpipe_pipeline.report import text
 from urmpipe_pipeline.report.facts import (
     Fact,
     alignment_value,
-    correlation,
     place,
+    speed_correlation,
     stretch,
     sync_value,
 )
@@ -76,7 +76,7 @@ def _facts(deviation: Deviation) -> list[Fact]:
         Fact("Longest out", stretch(deviation.longest_out)),
         Fact("Clocks", sync_value(deviation.sync)),
         Fact("Alignment", alignment_value(deviation)),
-        Fact("r(‖Δ‖, speed)", correlation(deviation)),
+        Fact("r(‖Δ‖, speed)", speed_correlation(deviation)),
         Fact("Warnings", str(len(deviation.run.warnings))),
     ]
 

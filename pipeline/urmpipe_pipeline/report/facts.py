@@ -6,12 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.chain import Chain
-from urmpipe_models.transform import rpy_of, translation
-from urmpipe_pipeline.comparison import Alignment, Comparison, Deviation, Statistics, Stretch, Sync
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison import Comparison, Deviation, Statistics, Stretch
 from urmpipe_pipeline.joint_log import FloatArray
-from urmpipe_pipeline.report import text
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import Sync
+from urmpipe_pipeline.wording import correlation, tool_option
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +69,14 @@ def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact,
         Fact("Turns", _turns(deviation), "counted apart at the start: taken out of the joints' deviation"),
         Fact("Out of tolerance", outside),
         Fact("Longest stretch out", stretch(deviation.longest_out)),
-        Fact("r(‖Δ‖, speed)", correlation(deviation), "1: they grow together; 0: they are unrelated"),
+        Fact("r(‖Δ‖, speed)", speed_correlation(deviation), "1: they grow together; 0: they are unrelated"),
     )
+
+
+def speed_correlation(deviation: Deviation) -> str:
+    """Return how the norm goes with the speed; nothing where that is not known."""
+    found = deviation.speed_correlation
+    return "" if found is None else correlation(found)
 
 
 def allowed(comparison: Comparison) -> str:
@@ -93,12 +99,6 @@ def stretch(found: Stretch | None) -> str:
     return f"{text.seconds(found.duration)} s from t = {text.seconds(found.t)} s"
 
 
-def correlation(deviation: Deviation) -> str:
-    """Return how the norm goes with the speed; nothing where that is not known."""
-    found = deviation.speed_correlation
-    return "" if found is None else f"{round(found, 2) + 0.0:.2f}"  # + 0.0: no -0.00
-
-
 def sync_value(sync: Sync) -> str:
     """Return how two clocks were put together."""
     if sync.mode == "start":
@@ -115,22 +115,8 @@ def alignment_value(deviation: Deviation) -> str:
             return "none"
         case "tool":
             return f"tool moved by {text.quantity(float(np.linalg.norm(alignment.tool)), 'm')}"
-    moved = f"moved by up to {text.quantity(_farthest(deviation), 'm')}"
-    return f"{alignment.mode}: {moved}, turned by {text.quantity(_turn(alignment), 'rad')}"
-
-
-def tool_option(robot: Chain, tool: tuple[float, float, float]) -> str:
-    """Return the option that gives an arm the tool that a comparison found.
-
-    Args:
-        robot: The arm, perhaps with a tool already.
-        tool: What is missing, in the frame of that tool, in [m].
-    """
-    frame = robot.tool @ translation(*tool)
-    turn = rpy_of(frame.rotation)
-    values = [*frame.translation, *(turn if any(abs(angle) > 1e-12 for angle in turn) else ())]
-    rounded = (f"{round(float(value), 7) + 0.0:.7f}" for value in values)  # + 0.0: no -0
-    return "--tool " + ",".join(value.rstrip("0").rstrip(".") for value in rounded)
+    moved = f"moved by up to {text.quantity(float(alignment.moved(deviation.actual).max()), 'm')}"
+    return f"{alignment.mode}: {moved}, turned by {text.quantity(alignment.angle, 'rad')}"
 
 
 def _sync_note(sync: Sync) -> str:
@@ -149,25 +135,11 @@ def _alignment_note(deviation: Deviation) -> str:
         return "both stand where they say they stood"
     if alignment.mode == "tool":
         robot = deviation.run.robot
-        option = f", as {tool_option(robot, alignment.tool)} does" if robot else ""
+        option = f", as {tool_option(robot, alignment)} does" if robot else ""
         return f"the constant offset of the tool centre point that fits best{option}"
     return (
         "the first compared poses agree" if alignment.mode == "start" else "the rigid motion that fits best"
     )
-
-
-def _farthest(deviation: Deviation) -> float:
-    """Return how far the position that was moved farthest was moved, in [m]: p' - p, p = R^T (p' - t)."""
-    alignment = deviation.alignment
-    before = (deviation.actual - np.asarray(alignment.translation)) @ np.asarray(alignment.rotation)
-    return float(np.linalg.norm(deviation.actual - before, axis=1).max())
-
-
-def _turn(alignment: Alignment) -> float:
-    """Return the angle of an alignment's rotation in [rad]: atan2(|axial vector|, (trace - 1) / 2)."""
-    r = np.asarray(alignment.rotation)
-    axial = 0.5 * np.array([r[2, 1] - r[1, 2], r[0, 2] - r[2, 0], r[1, 0] - r[0, 1]])
-    return float(np.arctan2(np.linalg.norm(axial), (np.trace(r) - 1.0) / 2.0))
 
 
 def _left_out(deviation: Deviation, reference_samples: int) -> str:

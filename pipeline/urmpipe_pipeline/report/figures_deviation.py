@@ -6,10 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import AXES, Deviation, Statistics
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, joint_colour
-from urmpipe_pipeline.report import text
 from urmpipe_pipeline.report.spec import MUTED, Figure, Panel, Spec, axis, base_layout, stacked, typed
 from urmpipe_pipeline.report.traces import (
     DASHES,
@@ -24,6 +24,7 @@ from urmpipe_pipeline.report.traces import (
     stroke,
     told,
 )
+from urmpipe_pipeline.wording import correlation
 
 PANEL_PX = 112
 """Height of one plot among some on a common time axis."""
@@ -197,10 +198,11 @@ def _correlation(r: float | None) -> str:
         return "The norm or the speed does not change, so nothing can be said of how they go together."
     strength = next((word for least, word in STRENGTHS if abs(r) >= least), "")
     if not strength:
-        return f"r = {r:+.2f}: the deviation does not go with the speed."
+        return f"r = {correlation(r)}: the deviation does not go with the speed."
     if r > 0:
-        return f"r = {r:+.2f}: the deviation grows {strength} with the speed, as a lag in time makes it grow."
-    return f"r = {r:+.2f}: the deviation shrinks {strength} with the speed."
+        grows = f"the deviation grows {strength} with the speed"
+        return f"r = {correlation(r)}: {grows}, as a lag in time makes it grow."
+    return f"r = {correlation(r)}: the deviation shrinks {strength} with the speed."
 
 
 def _most(statistics: Statistics) -> str:

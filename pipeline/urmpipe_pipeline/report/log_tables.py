@@ -7,11 +7,11 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.audit_entry import AuditKind
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.report import text
 from urmpipe_pipeline.report.tables import Cell, Column, Table, listing, numbers, words
 from urmpipe_pipeline.results import Run
 

@@ -6,8 +6,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.report import gallery, log_tables, text, verdict_tables
+from urmpipe_pipeline.report import gallery, log_tables, verdict_tables
 from urmpipe_pipeline.report.banner import Banner, banner
 from urmpipe_pipeline.report.cards import Card, card
 from urmpipe_pipeline.report.facts import Fact, allowed, comparison_facts, deviation_facts, run_facts

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR
 from urmpipe_pipeline.playback import Playback
-from urmpipe_pipeline.report import text
 from urmpipe_pipeline.report.figures_motion import point_name
 from urmpipe_pipeline.report.figures_repolarization import BEFORE_POINTS, wrongness
 from urmpipe_pipeline.report.spec import FAULT, INK, Figure, Spec, base_layout, space_axis, typed

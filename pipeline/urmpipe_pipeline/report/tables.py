@@ -6,7 +6,7 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from urmpipe_pipeline.report import text
+from urmpipe_pipeline import text
 
 LONG = 12
 """A table with more rows is folded away."""

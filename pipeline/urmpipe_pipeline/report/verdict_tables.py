@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Statistics
-from urmpipe_pipeline.report import text
-from urmpipe_pipeline.report.facts import alignment_value, correlation
+from urmpipe_pipeline.report.facts import alignment_value, speed_correlation
 from urmpipe_pipeline.report.tables import (
     Cell,
     Column,
@@ -100,7 +100,7 @@ def _when_and_where_row(run: Deviation, link: str) -> tuple[Cell, ...]:
         Cell(text.point(run.actual[worst])),
         *(Cell(value) for value in stretch),
         Cell(text.seconds(run.sync.offset)),
-        Cell(correlation(run) or text.NOTHING),
+        Cell(speed_correlation(run) or text.NOTHING),
         Cell(str(run.left_out)),
         Cell(str(len(run.run.warnings))),
         Cell(alignment_value(run)),

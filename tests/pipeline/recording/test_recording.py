@@ -16,11 +16,12 @@ from hypothesis import strategies as st
 
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison import AlignMode, Comparison
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, record, write_recording
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import AlignMode
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

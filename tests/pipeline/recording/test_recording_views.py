@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 
 from urmpipe_models.kinematics import points_over_log
 from urmpipe_pipeline.audit_entry import AuditEntry, AuditKind
-from urmpipe_pipeline.comparison import Alignment, Comparison, Sync
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.layout import viewer_layout
@@ -27,6 +27,7 @@ from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.recording.ways import DASHES, LEAST_DASH, MOST
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import Alignment, Sync
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

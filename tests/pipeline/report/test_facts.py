@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from urmpipe_models.catalogue import load_robot, parse_offset
-from urmpipe_pipeline.comparison import Alignment, Comparison, Stretch, Sync
+from urmpipe_pipeline.comparison import Comparison, Stretch
 from urmpipe_pipeline.report import facts
+from urmpipe_pipeline.trajectory import Alignment, Sync
+from urmpipe_pipeline.wording import tool_option
 
 TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 
@@ -73,7 +75,7 @@ def test_a_rigid_motion_is_told_by_how_far_it_moves_and_turns(comparison: Compar
 def test_the_tool_option_repeats_a_tool_on_top_of_one_that_is_there() -> None:
     before = parse_offset("0.01,0,0.1,0,0,1.5707963267948966")
     arm = load_robot("urm6").placed(tool=before)
-    option = facts.tool_option(arm, (0.002, 0.0, 0.0))
+    option = tool_option(arm, Alignment("tool", tool=(0.002, 0.0, 0.0)))
     after = parse_offset(option.removeprefix("--tool "))
     wanted = before.point((0.002, 0.0, 0.0))
     # seven digits behind the point are printed
@@ -102,5 +104,5 @@ def test_a_stretch_of_one_sample_has_no_length() -> None:
 
 
 def test_a_correlation_of_nearly_nothing_has_no_sign(comparison: Comparison) -> None:
-    assert facts.correlation(replace(comparison.runs[0], speed_correlation=-0.001)) == "0.00"
-    assert facts.correlation(replace(comparison.runs[0], speed_correlation=None)) == ""
+    assert facts.speed_correlation(replace(comparison.runs[0], speed_correlation=-0.0001)) == "+0.000"
+    assert facts.speed_correlation(replace(comparison.runs[0], speed_correlation=None)) == ""

@@ -22,9 +22,10 @@ from urmpipe_pipeline.baseline import (
     complete_noise,
     parse_noise,
 )
-from urmpipe_pipeline.comparison import Comparison, Sync
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.results import json_ready
+from urmpipe_pipeline.trajectory import Sync
 
 Compared = Callable[..., Comparison]
 

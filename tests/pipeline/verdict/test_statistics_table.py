@@ -12,9 +12,10 @@ import pandas as pd
 import pytest
 
 from urmpipe_models.errors import OutputError
-from urmpipe_pipeline.comparison import Comparison, Sync
+from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.outputs import STATISTICS_HEADER, guarded_output
 from urmpipe_pipeline.statistics_table import COLUMNS, write_statistics
+from urmpipe_pipeline.trajectory import Sync
 
 Compared = Callable[..., Comparison]
 

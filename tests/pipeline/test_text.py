@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from urmpipe_pipeline.report import text
+from urmpipe_pipeline import text
 
 
 @pytest.mark.parametrize(
