@@ -182,7 +182,7 @@ def test_how_the_clocks_were_put_together_is_said(capsys: Captured) -> None:
     run = compared_arms().runs[0]
     found = Sync("auto", 3.4, "joints", 0.00021, 0.99876)
     assert fact(replace(run, sync=found), "clocks", capsys) == [
-        "clocks: t_reference = t_log + 3.4 s ± 0.00021 s, estimated by the joints (similarity 0.9988)"
+        "clocks: t_reference = t_log + 3.4 s, estimated from joints, ± 0.21 ms, similarity 0.9988"
     ]
     assert fact(replace(run, sync=Sync("given", -0.5)), "clocks", capsys) == [
         "clocks: t_reference = t_log - 0.5 s, as given"
@@ -221,7 +221,7 @@ def test_a_tool_that_was_found_is_advised_behind_the_one_that_is_there(capsys: C
     turned = replace(found, run=replace(run.run, robot=quarter))
     # In the frame of a tool that is turned by 90 deg, x is the tip's y and y its -x.
     assert fact(turned, "to have it", capsys) == [
-        "to have it so from the start: --tool -0.002,0.001,0,0,0,1.5708"
+        "to have it so from the start: --tool -0.002,0.001,0,0,0,1.5707963"
     ]
 
 

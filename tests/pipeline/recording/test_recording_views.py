@@ -283,10 +283,10 @@ def test_events_tell_how_a_log_compares(make_comparison: MakeComparison, tmp_pat
     x, y, z, norm = 1e3 * one.delta[one.worst]
     decisive = one.decisive
     wanted = [
-        (0.0, "clocks: reference = log +3.4 s, estimated from joints, +-0.2 ms, similarity 1.0000"),
-        (0.0, "aligned: tool centre point moved by (1.0000, 0.0000, -2.5000) mm in the tool's frame"),
+        (0.0, "clocks: t_reference = t_log + 3.4 s, estimated from joints, ± 0.2 ms, similarity 1.0000"),
+        (0.0, "aligned (tool): tool centre point moved by (1.0000, 0.0000, -2.5000) mm in the tool's frame"),
         (0.0, "12 of 1512 samples left out: no reference or no value"),
-        (0.5, "longest stretch out of tolerance begins: 3 samples, 0.0100 s"),
+        (0.5, "longest stretch out of tolerance begins: 3 samples, 0.010 s"),
         (
             decisive.t_max,
             f"decides: {decisive.quantity} reaches {1e3 * decisive.max:.4f} mm of 3.5 mm allowed",
@@ -441,11 +441,11 @@ def test_the_summary_of_a_comparison_says_the_verdict_first(make_comparison: Mak
     assert lines[0] == "### FAIL: 1 of 3 logs out of tolerance"
     assert lines[1] == (
         f"**matlab**: {decisive.quantity} reaches {1e3 * decisive.max:.4f} mm of 3.5 mm allowed"
-        f" ({decisive.used:.3g} times), at {decisive.t_max:.4f} s. Out of tolerance:"
-        f" {np.count_nonzero(worst.outside)} of 1500 samples ({100 * worst.share_out:.2f} %), longest for"
-        f" {longest.duration:.4f} s from {longest.t:.4f} s."
+        f" ({decisive.used:.3g} times the tolerance), at {decisive.t_max:.3f} s. Out of tolerance:"
+        f" {np.count_nonzero(worst.outside)} of 1500 samples ({100 * worst.share_out:.1f} %), longest for"
+        f" {longest.duration:.3f} s from {longest.t:.3f} s."
     )
-    assert lines[3] == "Reference: asked for (grey, dashed). Tolerance: axis 3.5 mm."
+    assert lines[3] == "Reference: asked for (grey, dashed). Tolerance: ±3.5 mm per axis."
     rows = [line.split(" | ") for line in lines if line.startswith("| ")][2:]
     assert [(row[0], row[1], row[-1]) for row in rows] == [
         ("| coppeliasim", "orange", "PASS |"),
@@ -462,10 +462,10 @@ def test_the_summary_of_a_comparison_says_the_verdict_first(make_comparison: Mak
 
 
 def test_the_summary_says_each_tolerance_in_its_unit(make_comparison: MakeComparison) -> None:
-    allowed = {"axis": 0.0035, "path": 0.002, "angle": 0.01, "joint": 0.0005}
+    allowed = {"axis": 0.0035, "path": 0.002, "angle": math.radians(0.5), "joint": math.radians(0.1)}
     assert (
         "Reference: asked for (grey, dashed)."
-        " Tolerance: axis 3.5 mm, path 2 mm, angle 10 mrad, joint 0.5 mrad."
+        " Tolerance: ±3.5 mm per axis, 2 mm from the path, 0.5 deg of orientation, ±0.1 deg per joint."
     ) in summary(replace(make_comparison(), tolerance=allowed)).splitlines()
 
 
@@ -476,7 +476,7 @@ def test_what_no_text_can_hold_is_told_all_the_same(make_comparison: MakeCompari
     one = replace(one, joint_statistics={"q\udcff": worst})
     path = write_recording(replace(make_comparison(), runs=(one,)), tmp_path / "odd.rrd")
     said = [row[0] for row in columns(path, "/events/deviation", "TextLog:text")]
-    assert any("decides: q? reaches 2.0000 mrad of 1e-06 mrad allowed" in line for line in said)
+    assert any("decides: q? reaches 0.1146 deg of 5.72958e-08 deg allowed" in line for line in said)
 
 
 def test_the_summary_tells_how_clocks_and_places_were_put_together(make_comparison: MakeComparison) -> None:
@@ -494,6 +494,6 @@ def test_the_summary_tells_how_clocks_and_places_were_put_together(make_comparis
         reference_left_out=50,
     )
     assert (
-        "clocks: reference = log \\-0.25 s, as given; aligned by the best rigid motion: turned by 10.0000"
-        " mrad, moved by (1.0000, 2.0000, 3.0000) mm; 50 samples of the reference outside its time"
+        "clocks: t\\_reference = t\\_log \\- 0.25 s, as given; aligned (rigid): turned by 0.5730 deg about the"
+        " origin, then moved by (1.0000, 2.0000, 3.0000) mm; 50 samples of the reference outside its time"
     ) in summary(replace(comparison, runs=(one,))).splitlines()

@@ -201,10 +201,10 @@ def test_each_point_over_speed_is_a_sample_and_the_worst_is_there(comparison: Co
 @pytest.mark.parametrize(
     ("r", "said"),
     [
-        (0.95, "r = +0.95: the deviation grows strongly with the speed, as a lag in time makes it grow."),
-        (-0.5, "r = -0.50: the deviation shrinks moderately with the speed."),
-        (0.25, "r = +0.25: the deviation grows weakly with the speed, as a lag in time makes it grow."),
-        (0.1, "r = +0.10: the deviation does not go with the speed."),
+        (0.95, "r = +0.950: the deviation grows strongly with the speed, as a lag in time makes it grow."),
+        (-0.5, "r = -0.500: the deviation shrinks moderately with the speed."),
+        (0.25, "r = +0.250: the deviation grows weakly with the speed, as a lag in time makes it grow."),
+        (0.1, "r = +0.100: the deviation does not go with the speed."),
         (None, "The norm or the speed does not change, so nothing can be said of how they go together."),
     ],
 )

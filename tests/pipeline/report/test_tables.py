@@ -66,7 +66,7 @@ def test_the_ranking_says_when_where_and_how(everything: Comparison) -> None:
         "Longest out [s]": text.seconds(longest.duration),
         "Longest out from t [s]": text.seconds(longest.t),
         "Sync offset [s]": "0.500",
-        "r(‖Δ‖, speed)": f"{off.speed_correlation:.2f}",
+        "r(‖Δ‖, speed)": f"{off.speed_correlation:+.3f}",
         "Left out": str(off.left_out),
         "Warnings": "0",
         "Alignment": "none",
