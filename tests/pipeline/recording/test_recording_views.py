@@ -494,6 +494,6 @@ def test_the_summary_tells_how_clocks_and_places_were_put_together(make_comparis
         reference_left_out=50,
     )
     assert (
-        "clocks: t\\_reference = t\\_log \\- 0.25 s, as given; aligned (rigid): turned by 0.5730 deg about the"
-        " origin, then moved by (1.0000, 2.0000, 3.0000) mm; 50 samples of the reference outside its time"
+        "clocks: t\\_reference = t\\_log \\- 0.25 s, as given; aligned (rigid): turned by 0.5730 deg about"
+        " the origin, then moved by (1.0000, 2.0000, 3.0000) mm; 50 samples of the reference outside its time"
     ) in summary(replace(comparison, runs=(one,))).splitlines()
