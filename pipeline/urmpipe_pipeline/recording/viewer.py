@@ -29,6 +29,9 @@ LOOPBACK = "127.0.0.1"
 PATIENCE = 60.0
 """Time in [s] that the viewer has to start and to open a recording."""
 
+GRACE = 5.0
+"""Time in [s] that a window has to close when it is asked to."""
+
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -112,11 +115,22 @@ def open_window(
     options = ["--bind", LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
     command = [str(_program()), *options, *(["--headless"] if headless else [])]
     quiet = subprocess.DEVNULL
-    with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) as process:
-        try:
-            yield process, _shown(process, port, path, at_ns)
-        finally:
-            process.terminate()
+    # Not as a context: after Ctrl-C, its end would not wait for the viewer, which would outlive us.
+    process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+    try:
+        yield process, _shown(process, port, path, at_ns)
+    finally:
+        _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End the viewer, and wait until it is gone."""
+    process.terminate()
+    try:
+        process.wait(GRACE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def _program() -> Path:
