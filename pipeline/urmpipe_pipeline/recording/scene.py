@@ -63,12 +63,14 @@ class Scene:
         ways: The paths.
         enlarged: The deviation as a path whose distance from the reference is a multiple of the true one.
         worst: Where the largest deviation of all runs stands.
+        whose: Name of the log whose arm it is, where there are several; else empty.
     """
 
     arm: Arm | None
     ways: tuple[Way, ...]
     enlarged: Way | None = None
     worst: Mark | None = None
+    whose: str = ""
 
     @property
     def empty(self) -> bool:
@@ -80,12 +82,16 @@ class Scene:
         """The paths, the enlarged one among them."""
         return self.ways if self.enlarged is None else (*self.ways, self.enlarged)
 
-    def ball(self) -> tuple[FloatArray, float]:
-        """Return centre, shape (3,), and radius of a ball around everything, in [m]; 1 m around one point."""
+    def points(self) -> FloatArray:
+        """Return every point that is drawn in [m], shape (n, 3); the origin if there is none."""
         points = [part for way in self._every_way for part in (*way.strips, way.track.position) if len(part)]
         if self.arm is not None:
             points.append(self.arm.skeleton.reshape(-1, 3))
-        every = np.concatenate(points) if points else np.zeros((1, 3))
+        return np.concatenate(points) if points else np.zeros((1, 3))
+
+    def ball(self) -> tuple[FloatArray, float]:
+        """Return centre, shape (3,), and radius of a ball around everything, in [m]; 1 m around one point."""
+        every = self.points()
         low, high = every.min(axis=0), every.max(axis=0)
         radius = float(np.linalg.norm(high - low)) / 2
         return (low + high) / 2, radius or 1.0
@@ -103,7 +109,8 @@ def scene_of(result: Run | Comparison) -> Scene:
     ]
     colour = run_colour(result.runs.index(shown))
     arm = _arm(shown.run, int(shown.t_ns[shown.worst]), colour)
-    scene = Scene(arm, (_asked(result.reference, shown), *ways))
+    whose = printable(shown.name) if arm is not None and len(result.runs) > 1 else ""
+    scene = Scene(arm, (_asked(result.reference, shown), *ways), whose=whose)
     return replace(scene, enlarged=enlarged(result, scene.ball()[1]), worst=_worst(result))
 
 

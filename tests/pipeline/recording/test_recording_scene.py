@@ -240,8 +240,12 @@ def test_the_worst_place_has_its_size_and_its_time(make_comparison: MakeComparis
     text = f"worst {1e3 * norm.max:.3f} mm at {norm.t_max:.4f} s"
     assert scene_of(comparison).worst == Mark((x, y, z), text)
     path = write_recording(comparison, tmp_path / "one.rrd")
-    assert column(path, "/point/worst", "Points3D:labels").tolist() == [[text]]
-    assert column(path, "/point/enlarged", "Points3D:labels").tolist() == [["deviation x50"]]
+    assert column(path, "/point/worst/label", "Points3D:labels").tolist() == [[text]]
+    assert column(path, "/point/enlarged/label", "Points3D:labels").tolist() == [["deviation x50"]]
+    moving = [
+        column(path, f"/point/enlarged{leaf}", "Points3D:positions").tolist() for leaf in ("", "/label")
+    ]
+    assert moving[0] == moving[1]
 
 
 def test_runs_may_be_called_like_the_enlarged_path(make_comparison: MakeComparison, tmp_path: Path) -> None:
