@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from urmpipe_models.chain import Chain
+from urmpipe_models.elementwise import Vector
 from urmpipe_models.kinematics import points_over_log
+from urmpipe_models.transform import Transform, translation
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
@@ -108,7 +111,7 @@ def scene_of(result: Run | Comparison) -> Scene:
         for i, (place, one) in enumerate(zip(standing, result.runs, strict=True))
     ]
     colour = run_colour(result.runs.index(shown))
-    arm = _arm(shown.run, int(shown.t_ns[shown.worst]), colour)
+    arm = _arm(_aligned(shown), int(shown.t_ns[shown.worst]), colour)
     whose = printable(shown.name) if arm is not None and len(result.runs) > 1 else ""
     scene = Scene(arm, (_asked(result.reference, shown), *ways), whose=whose)
     return replace(scene, enlarged=enlarged(result, scene.ball()[1]), worst=_worst(result))
@@ -163,6 +166,16 @@ def _done(one: Deviation, place: Place, colour: str) -> Way:
         lines_of(one.actual, one.sample, one.worst),
         track,
     )
+
+
+def _aligned(one: Deviation) -> Run:
+    """Return a compared log with its arm where the alignment puts it: there its path is drawn."""
+    robot, alignment = one.run.robot, one.alignment
+    if robot is None or alignment.mode == "none":
+        return one.run
+    rotation = cast("tuple[Vector, Vector, Vector]", alignment.rotation)
+    base = Transform(rotation, alignment.translation) @ robot.base
+    return replace(one.run, robot=robot.placed(base, robot.tool @ translation(*alignment.tool)))
 
 
 def _arm(run: Run, worst_ns: int | None, tip: str) -> Arm | None:
