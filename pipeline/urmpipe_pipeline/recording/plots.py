@@ -21,7 +21,7 @@ SHARED_AXIS = UUID("5c0dca6a-e63f-9cf7-f657-2602590474cc")
 """The view of which the viewer keeps the time axis that linked plots share. Without a range there, it opens a
 log of more than some minutes on a minute of it."""
 
-BEFORE, AFTER = 0.01, 0.12
+BEFORE, AFTER = 0.01, 0.17
 """Time shown before the first sample and after the last, as shares of all: there stands the legend."""
 
 

@@ -400,7 +400,7 @@ def test_every_plot_shows_the_whole_time(make_run: MakeRun, tmp_path: Path) -> N
         if chunk.entity_path == f"/view/{SHARED_AXIS}/TimeAxis"
     )
     (axis,) = batch.column("TimeAxis:view_range").to_pylist()
-    assert [axis[0][end] for end in ("start", "end")] == [-100_000_000, 11_200_000_000]
+    assert [axis[0][end] for end in ("start", "end")] == [-100_000_000, 11_700_000_000]
 
 
 def test_the_arm_moves_at_50_hz_through_its_own_kinematics(make_run: MakeRun) -> None:
