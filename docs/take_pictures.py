@@ -12,14 +12,15 @@ from __future__ import annotations
 
 import argparse
 import os
-import socket
 import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from rerun.experimental import ViewerClient
 
 HERE = Path(__file__).resolve().parent / "pictures"
 CHROMIUM = "/usr/bin/chromium"
@@ -28,30 +29,29 @@ QUIET = ("INFO", "DEBUG", "TRACE")
 
 
 def of_recording(source: Path, target: Path, at: float | None, settle: float = 12.0) -> list[str]:
-    """Picture a recording in the headless viewer, at a time in [s] or where it opens; return complaints."""
-    from rerun.experimental import ViewerClient
+    """Picture a recording without a window, at a time in [s] or where `view` opens it; return complaints."""
+    from urmpipe_pipeline.recording.viewer import open_window, opening_times
 
-    complaints = []
-    with headless_viewer() as url, ViewerClient.connect(url) as viewer:
-        viewer.open(str(source.resolve()))
-        deadline = time.monotonic() + 60.0
-        while not (state := viewer.get_state()).recordings or not state.views:
-            if time.monotonic() > deadline:
-                return ["the viewer showed no recording within a minute"]
-            time.sleep(0.2)
-        if at is not None:
-            viewer.set_time(timeline="t", duration=at)
+    draw_in_software()
+    opens_at = opening_times([source])[source]
+    at_ns = opens_at if at is None else round(at * 1e9)
+    with open_window(source, at_ns, headless=True) as (_, viewer):
         time.sleep(settle)  # data load lazily, and no event tells when they are there
         viewer.save_screenshot(str(target))
-        complaints += [
-            f"{view.name}: {report}" for view in viewer.get_state().views for report in view.reports
-        ]
-        complaints += [
-            entry.message
-            for entry in viewer.get_logs()
-            if entry.level not in QUIET and "Software rasterizer" not in entry.message
-        ]
-    return complaints
+        return complaints_of(viewer)
+
+
+def draw_in_software() -> None:
+    """Have the viewer draw by Mesa's software Vulkan where there is one: with the same pixels everywhere."""
+    for driver in sorted(VULKAN.glob("lvp_icd*.json"))[:1]:
+        os.environ.setdefault("VK_ICD_FILENAMES", str(driver))
+
+
+def complaints_of(viewer: ViewerClient) -> list[str]:
+    """Return what the viewer has to say against what it shows."""
+    shown = [f"{view.name}: {report}" for view in viewer.get_state().views for report in view.reports]
+    logged = [entry.message for entry in viewer.get_logs() if entry.level not in QUIET]
+    return shown + [message for message in logged if "Software rasterizer" not in message]
 
 
 def of_page(source: Path, target: Path, width: int, height: int = 1000) -> list[str]:
@@ -70,35 +70,6 @@ def of_page(source: Path, target: Path, width: int, height: int = 1000) -> list[
         page.screenshot(path=str(target))
         browser.close()
     return complaints
-
-
-@contextmanager
-def headless_viewer() -> Iterator[str]:
-    """Run the viewer without a window, on the loopback interface only; yield where it listens."""
-    import rerun_cli
-
-    icd = sorted(VULKAN.glob("lvp_icd*.json"))
-    environment = os.environ | ({"VK_ICD_FILENAMES": str(icd[0])} if icd else {})
-    with socket.socket() as free:
-        free.bind(("127.0.0.1", 0))
-        port = free.getsockname()[1]
-    binary = Path(rerun_cli.__file__).parent / "rerun"
-    command = [str(binary), "--headless", "--bind", "127.0.0.1", "--port", str(port), "--hide-welcome-screen"]
-    with subprocess.Popen(
-        command, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL
-    ) as process:
-        try:
-            deadline = time.monotonic() + 30.0
-            while not _listens(port) and time.monotonic() < deadline:
-                time.sleep(0.2)
-            yield f"rerun+http://127.0.0.1:{port}/proxy"
-        finally:
-            process.terminate()
-
-
-def _listens(port: int) -> bool:
-    with socket.socket() as probe:
-        return probe.connect_ex(("127.0.0.1", port)) == 0
 
 
 def of_readme() -> list[str]:
@@ -121,7 +92,7 @@ def main() -> None:
     )
     parser.add_argument("source", type=Path, nargs="?")
     parser.add_argument("target", type=Path, nargs="?")
-    parser.add_argument("--time", type=float, help="time on the timeline t, in s")
+    parser.add_argument("--time", type=float, help="time on the timeline t, in s [default: the worst]")
     parser.add_argument("--width", type=int, default=1280, help="width of a page, in px")
     options = parser.parse_args()
     if options.source is None:

@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import json
+import os
 import shutil
+import signal
 import subprocess
 import sys
-from collections.abc import Callable
+import time
+from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
 
@@ -17,6 +21,9 @@ from urmpipe_pipeline.recording.viewer import refuse_without_display
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
+
+PATIENCE = 60.0
+"""Time in [s] that the viewer has: a software rasterizer on a busy machine is slow."""
 
 NO_DISPLAY = (
     "found no display (neither DISPLAY nor WAYLAND_DISPLAY is set), allowed: a copy on a computer with one,"
@@ -80,16 +87,79 @@ def test_a_display_that_does_not_answer_is_one_line(
     assert ran.err.count("\n") == 1
 
 
+@pytest.fixture
+def display() -> Iterator[str]:
+    """Return the name of a display without a screen."""
+    read, write = os.pipe()
+    options = ["-displayfd", str(write), "-nolisten", "tcp", "-screen", "0", "1280x800x24"]
+    with subprocess.Popen(["Xvfb", *options], pass_fds=[write], stderr=subprocess.DEVNULL) as server:
+        os.close(write)
+        with os.fdopen(read) as told:
+            number = told.readline().strip()
+        yield f":{number}"
+        server.terminate()
+
+
+def family(pid: int) -> list[int]:
+    """Return a process and all that it has started."""
+    children = Path(f"/proc/{pid}/task/{pid}/children").read_text(encoding="ascii").split()
+    return [pid, *(one for child in children for one in family(int(child)))]
+
+
+def listening(pid: int) -> set[tuple[str, int]]:
+    """Return the addresses, as the kernel writes them, and the ports that a process listens on."""
+    links = [str(one.readlink()) for one in Path(f"/proc/{pid}/fd").iterdir()]
+    lines = [
+        line.split()
+        for table in ("tcp", "tcp6")
+        for line in Path(f"/proc/net/{table}").read_text(encoding="ascii").splitlines()[1:]
+    ]
+    listens = "0A"
+    open_here = [line[1] for line in lines if line[3] == listens and f"socket:[{line[9]}]" in links]
+    return {(address, int(port, 16)) for address, port in (one.split(":") for one in open_here)}
+
+
+def state_of(port: int, views: int) -> Any:
+    """Return the state of the viewer that listens on a port, once it shows so many views at a time."""
+    from rerun.experimental import ViewerClient
+
+    with ViewerClient.connect(f"rerun+http://127.0.0.1:{port}/proxy") as client:
+        end = time.monotonic() + PATIENCE
+        while time.monotonic() < end:
+            state = client.get_state()
+            if len(state.views) >= views and state.recordings[0].current_time:
+                break
+            time.sleep(0.2)
+        return state
+
+
 @pytest.mark.slow
-@pytest.mark.skipif(shutil.which("xvfb-run") is None, reason="needs a display: apt-get install xvfb")
-def test_it_stays_until_it_is_interrupted(urmpipe: RunCommand, tmp_path: Path) -> None:
-    urmpipe("ingest", LOGS / "path.csv", "-q", "-o", "run.rrd")
-    view = [sys.executable, "-m", "urmpipe", "view", "run.rrd"]
-    done = subprocess.run(
-        ["xvfb-run", "-a", "timeout", "--signal=INT", "20", *view],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
+@pytest.mark.skipif(shutil.which("Xvfb") is None, reason="needs a display: apt-get install xvfb")
+def test_a_window_opens_at_the_worst_sample_for_this_computer_only_and_closes_by_ctrl_c(
+    urmpipe: RunCommand, display: str, tmp_path: Path
+) -> None:
+    ran = urmpipe(
+        "compare", LOGS / "path.csv", LOGS / "matlab.csv", "--robot", "urm6", "--json", "-o", "both.rrd"
     )
-    assert (done.stdout, done.stderr) == ("", "Closed.\n")
+    (one,) = json.loads(ran.out)["runs"]
+    environment = {**os.environ, "DISPLAY": display}
+    environment.pop("WAYLAND_DISPLAY", None)
+    command = [sys.executable, "-m", "urmpipe", "view", "both.rrd"]
+    view = subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    end, ports = time.monotonic() + PATIENCE, set[tuple[str, int]]()
+    while not ports and view.poll() is None and time.monotonic() < end:
+        time.sleep(0.2)
+        started = family(view.pid)
+        ports = {port for pid in started[1:] for port in listening(pid)}
+    ((address, port),) = ports
+    assert address == "0100007F"  # 127.0.0.1
+    state = state_of(port, views=5)
+    (shown,) = state.recordings
+    assert (shown.current_timeline, shown.current_time) == ("t", round(one["worst"]["t"] * 1e9))
+    assert "delta = path - matlab [m]" in {found.name for found in state.views}
+    view.send_signal(signal.SIGINT)
+    assert view.communicate(timeout=PATIENCE) == ("", "Closed.\n")
+    assert view.returncode == 0
+    assert [pid for pid in started if Path(f"/proc/{pid}").exists()] == []

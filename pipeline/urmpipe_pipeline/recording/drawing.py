@@ -10,7 +10,7 @@ from urmpipe_pipeline.palette import rgb
 from urmpipe_pipeline.recording.columns import block_columns
 from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, places_of
 from urmpipe_pipeline.recording.events import draw_comparison_events, draw_log_events
-from urmpipe_pipeline.recording.marks import draw_repolarizations, draw_worst
+from urmpipe_pipeline.recording.marks import MARK_SIZE, draw_repolarizations, draw_worst
 from urmpipe_pipeline.recording.overview import overviews
 from urmpipe_pipeline.recording.scene import Scene
 from urmpipe_pipeline.recording.scene_drawing import draw_scene
@@ -58,12 +58,18 @@ def _draw_styles(stream: RecordingStream, every: Sequence[Block]) -> None:
     import rerun as rr
 
     for block in every:
-        if block.names:
-            style = rr.SeriesLines(
-                colors=[rgb(colour) for colour in block.colours],
-                names=list(block.names),
-                widths=[LINE_WIDTH] * len(block.names),
-                # Where samples are closer than pixels, the default draws their mean: peaks would vanish.
-                aggregation_policy=rr.components.AggregationPolicy.MinMax,
-            )
-            stream.log(block.entity, style, static=True)
+        if not block.names:
+            continue
+        colours, names = [rgb(colour) for colour in block.colours], list(block.names)
+        if len(block.t_ns) == 1:  # no line goes through one sample
+            points = rr.SeriesPoints(colors=colours, names=names, marker_sizes=[MARK_SIZE] * len(names))
+            stream.log(block.entity, points, static=True)
+            continue
+        style = rr.SeriesLines(
+            colors=colours,
+            names=names,
+            widths=[LINE_WIDTH] * len(names),
+            # Where samples are closer than pixels, the default draws their mean: peaks would vanish.
+            aggregation_policy=rr.components.AggregationPolicy.MinMax,
+        )
+        stream.log(block.entity, style, static=True)

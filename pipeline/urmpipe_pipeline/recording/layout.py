@@ -6,12 +6,14 @@ keeps it there. So `urmpipe view` sets the time, and a line through the worst sa
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
 from urmpipe_pipeline.comparison import Comparison, Deviation
+from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
 from urmpipe_pipeline.recording.plots import Plots, decisive_plot
 from urmpipe_pipeline.recording.scene import Scene
@@ -23,14 +25,21 @@ if TYPE_CHECKING:
 
     Row: TypeAlias = tuple[View | Container, float]
 
-EYE = np.array([0.62, -0.66, 0.42]) * 1.8
-"""From the middle of the scene to the eye, in radii of the scene: from the front right, a little above."""
+EYE = np.array([0.62, -0.66, 0.42]) / np.linalg.norm([0.62, -0.66, 0.42])
+"""The way from the middle of the scene to the eye [-]: from the front right, a little above."""
+
+FIELD_OF_VIEW, FILLED, WIDE = np.radians(55.0), 0.85, 1.2
+"""What the viewer's eye sees from the bottom to the top of a view in [rad] (re_view_spatial,
+Eye::DEFAULT_FOV_Y), the share of it that the scene fills, and how wide a view is at least, in heights."""
 
 HEIGHTS = {"delta": 4, "joints in the file": 3.5, "joints repolarized": 3, "speed": 2, "events": 2.2}
 """Shares of the height that the plots have."""
 
 HEAD_SHARE, LINE_SHARE, MOST_TEXT = 0.12, 0.022, 0.45
 """Shares of the height for the summary: its title, each line, and all of it at most."""
+
+LINE_LENGTH = 115
+"""Characters that fit in a line of the summary where it has half of a usual window's width."""
 
 
 def viewer_layout(result: Run | Comparison, scene: Scene) -> Blueprint:
@@ -39,8 +48,9 @@ def viewer_layout(result: Run | Comparison, scene: Scene) -> Blueprint:
 
     right = _of_run(result) if isinstance(result, Run) else _of_comparison(result)
     text = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
-    lines = [line for line in summary(result).splitlines() if line]
-    share = min(MOST_TEXT, HEAD_SHARE + LINE_SHARE * len(lines))
+    length = 2 * LINE_LENGTH if scene.empty else LINE_LENGTH
+    lines = sum(math.ceil(len(line) / length) for line in summary(result).splitlines())
+    share = min(MOST_TEXT, HEAD_SHARE + LINE_SHARE * lines)
     shares = [share, 1 - share]
     root: Container = rrb.Vertical(text, right, row_shares=shares)
     if not scene.empty:
@@ -64,13 +74,25 @@ def opening_time(result: Run | Comparison) -> int:
     return int(open_first.t_ns[open_first.worst])
 
 
+def eye_and_target(scene: Scene) -> tuple[FloatArray, FloatArray]:
+    """Return where the eye is and what it looks at in [m], shape (3,) each: all of the scene is in view."""
+    centre, radius = scene.ball()
+    right = np.cross((0.0, 0.0, 1.0), EYE)
+    right /= np.linalg.norm(right)
+    aside, above, ahead = ((scene.points() - centre) @ np.column_stack((right, np.cross(EYE, right), EYE))).T
+    slope = FILLED * np.tan(FIELD_OF_VIEW / 2)
+    distance = ahead + np.maximum(np.abs(above), np.abs(aside) / WIDE) / slope
+    return centre + max(radius, float(distance.max())) * EYE, centre
+
+
 def _scene_view(scene: Scene) -> Spatial3DView:
     import rerun.blueprint as rrb
 
-    centre, radius = scene.ball()
-    eye = rrb.EyeControls3D(position=centre + radius * EYE, look_target=centre, eye_up=(0.0, 0.0, 1.0))
+    position, target = eye_and_target(scene)
+    eye = rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0))
     entities = ["/robot/**", "/path/**", "/point/**"]
-    return rrb.Spatial3DView(origin="/", contents=entities, name="Arm and paths [m]", eye_controls=eye)
+    name = f"Arm of {scene.whose} and paths [m]" if scene.whose else "Arm and paths [m]"
+    return rrb.Spatial3DView(origin="/", contents=entities, name=name, eye_controls=eye)
 
 
 def _of_run(run: Run) -> Container:

@@ -109,7 +109,15 @@ def _on_lines(run: Run, entries: Sequence[AuditEntry]) -> tuple[IntArray, FloatA
     joint = np.array([run.log.joints.index(one.joint) for one in ordered])
     values = np.full((len(ordered), len(run.log.joints)), np.nan)
     for j in np.unique(joint):
-        own, known = joint == j, np.isfinite(run.q[:, j])
-        if known.any():
-            values[own, j] = np.interp(t_ns[own], run.t_ns[known], run.q[known, j])
+        own = joint == j
+        rows = _beside(run, t_ns[own], j)
+        if len(rows):
+            values[own, j] = np.interp(t_ns[own], run.t_ns[rows], run.q[rows, j])
     return t_ns, values
+
+
+def _beside(run: Run, t_ns: IntArray, j: int) -> IntArray:
+    """Return the samples before and after each time; where a value is missing, all that a joint has."""
+    after = np.searchsorted(run.t_ns, t_ns)
+    rows: IntArray = np.unique(np.clip(np.concatenate((after - 1, after)), 0, len(run.t_ns) - 1))
+    return rows if np.isfinite(run.q[rows, j]).all() else np.flatnonzero(np.isfinite(run.q[:, j]))

@@ -21,7 +21,7 @@ SHARED_AXIS = UUID("5c0dca6a-e63f-9cf7-f657-2602590474cc")
 """The view of which the viewer keeps the time axis that linked plots share. Without a range there, it opens a
 log of more than some minutes on a minute of it."""
 
-BEFORE, AFTER = 0.01, 0.12
+BEFORE, AFTER = 0.01, 0.17
 """Time shown before the first sample and after the last, as shares of all: there stands the legend."""
 
 
@@ -75,8 +75,9 @@ class Plots:
         unit, raw, after = run.joint_unit(), f"{place.prefix}joints/raw", f"{place.prefix}joints/repolarized"
         yield self.array("Joints in the file", unit, raw, run.log.rows, worst_entity(place, "raw"))
         marks = mark_entity(place, "**"), worst_entity(place, "repolarized")
-        wraps = len(run.repolarizations)
-        name = f"Joints repolarized ({wraps} marked)" if run.audit else "Joints repolarized (none was needed)"
+        wraps, doubts = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
+        found = f"{wraps} marked, {doubts} doubtful" if doubts else f"{wraps} marked"
+        name = f"Joints repolarized ({found if run.audit else 'none was needed'})"
         yield self.array(name, unit, after, len(run.t_ns), *marks, legend=False)
 
     def speed(self, run: Run, place: Place) -> list[TimeSeriesView]:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 
 from urmpipe_models.chain import Chain
+from urmpipe_models.elementwise import Vector
 from urmpipe_models.kinematics import points_over_log
+from urmpipe_models.transform import Transform, translation
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
@@ -63,12 +66,14 @@ class Scene:
         ways: The paths.
         enlarged: The deviation as a path whose distance from the reference is a multiple of the true one.
         worst: Where the largest deviation of all runs stands.
+        whose: Name of the log whose arm it is, where there are several; else empty.
     """
 
     arm: Arm | None
     ways: tuple[Way, ...]
     enlarged: Way | None = None
     worst: Mark | None = None
+    whose: str = ""
 
     @property
     def empty(self) -> bool:
@@ -80,12 +85,16 @@ class Scene:
         """The paths, the enlarged one among them."""
         return self.ways if self.enlarged is None else (*self.ways, self.enlarged)
 
-    def ball(self) -> tuple[FloatArray, float]:
-        """Return centre, shape (3,), and radius of a ball around everything, in [m]; 1 m around one point."""
+    def points(self) -> FloatArray:
+        """Return every point that is drawn in [m], shape (n, 3); the origin if there is none."""
         points = [part for way in self._every_way for part in (*way.strips, way.track.position) if len(part)]
         if self.arm is not None:
             points.append(self.arm.skeleton.reshape(-1, 3))
-        every = np.concatenate(points) if points else np.zeros((1, 3))
+        return np.concatenate(points) if points else np.zeros((1, 3))
+
+    def ball(self) -> tuple[FloatArray, float]:
+        """Return centre, shape (3,), and radius of a ball around everything, in [m]; 1 m around one point."""
+        every = self.points()
         low, high = every.min(axis=0), every.max(axis=0)
         radius = float(np.linalg.norm(high - low)) / 2
         return (low + high) / 2, radius or 1.0
@@ -102,8 +111,9 @@ def scene_of(result: Run | Comparison) -> Scene:
         for i, (place, one) in enumerate(zip(standing, result.runs, strict=True))
     ]
     colour = run_colour(result.runs.index(shown))
-    arm = _arm(shown.run, int(shown.t_ns[shown.worst]), colour)
-    scene = Scene(arm, (_asked(result.reference, shown), *ways))
+    arm = _arm(_aligned(shown), int(shown.t_ns[shown.worst]), colour)
+    whose = printable(shown.name) if arm is not None and len(result.runs) > 1 else ""
+    scene = Scene(arm, (_asked(result.reference, shown), *ways), whose=whose)
     return replace(scene, enlarged=enlarged(result, scene.ball()[1]), worst=_worst(result))
 
 
@@ -156,6 +166,16 @@ def _done(one: Deviation, place: Place, colour: str) -> Way:
         lines_of(one.actual, one.sample, one.worst),
         track,
     )
+
+
+def _aligned(one: Deviation) -> Run:
+    """Return a compared log with its arm where the alignment puts it: there its path is drawn."""
+    robot, alignment = one.run.robot, one.alignment
+    if robot is None or alignment.mode == "none":
+        return one.run
+    rotation = cast("tuple[Vector, Vector, Vector]", alignment.rotation)
+    base = Transform(rotation, alignment.translation) @ robot.base
+    return replace(one.run, robot=robot.placed(base, robot.tool @ translation(*alignment.tool)))
 
 
 def _arm(run: Run, worst_ns: int | None, tip: str) -> Arm | None:

@@ -14,7 +14,7 @@ from urmpipe_pipeline.recording.shape_drawing import draw_body
 from urmpipe_pipeline.recording.ways import Way
 
 if TYPE_CHECKING:
-    from rerun import RecordingStream
+    from rerun import Points3D, RecordingStream
 
 Skeleton: TypeAlias = NDArray[np.float32]
 """Base, p1..pn of each pose in [m], shape (m, n + 1, 3)."""
@@ -25,6 +25,9 @@ WANTED_RADIUS, DONE_RADIUS = 0.0065, 0.0035
 
 STRIPS = 256
 """Poses of the skeleton sent at a time: decoding a chunk of strips takes time by the square of its rows."""
+
+LABEL_COLOUR = "#ffffff"
+"""Labels: they stand on lines of any colour."""
 
 LINK_COLOUR = "#c8d0d4"
 """The links of the arm: neutral, so that the joints stand out in their own colours."""
@@ -86,23 +89,31 @@ def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:
         [strip.astype(np.float32) for strip in way.strips], colors=[colour], radii=[radius]
     )
     stream.log(way.path, lines, static=True)
-    labels = [way.label] if way.label else None
-    style = rr.Points3D.from_fields(colors=[colour], radii=[POINT_RADIUS * size], labels=labels)
+    style = rr.Points3D.from_fields(colors=[colour], radii=[POINT_RADIUS * size])
     stream.log(way.point, style, static=True)
+    entities = [way.point]
+    if way.label:
+        entities.append(f"{way.point}/label")
+        stream.log(entities[1], _label(way.label), static=True)
     track = way.track
-    columns = rr.Points3D.columns(positions=track.position.astype(np.float32))
-    stream.send_columns(way.point, time_columns(track.t_ns, "sample", track.sample), columns)
+    times = time_columns(track.t_ns, "sample", track.sample)
+    for entity in entities:
+        columns = rr.Points3D.columns(positions=track.position.astype(np.float32))
+        stream.send_columns(entity, times, columns)
+
+
+def _label(text: str) -> Points3D:
+    """Return the label of a point that stands elsewhere: in the point's colour it could hardly be read."""
+    import rerun as rr
+
+    return rr.Points3D.from_fields(colors=[rgb(LABEL_COLOUR)], radii=[0.0], labels=[text], show_labels=True)
 
 
 def _draw_mark(stream: RecordingStream, mark: Mark, size: float) -> None:
     """Draw a place that is there at all times, with its label."""
     import rerun as rr
 
-    point = rr.Points3D(
-        [mark.position],
-        colors=[rgb(DEVIATION_COLOUR)],
-        radii=[MARK_RADIUS * size],
-        labels=[mark.text],
-        show_labels=True,
-    )
+    point = rr.Points3D([mark.position], colors=[rgb(DEVIATION_COLOUR)], radii=[MARK_RADIUS * size])
     stream.log("/point/worst", point, static=True)
+    stream.log("/point/worst/label", rr.Points3D.from_fields(positions=[mark.position]), static=True)
+    stream.log("/point/worst/label", _label(mark.text), static=True)

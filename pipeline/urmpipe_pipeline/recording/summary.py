@@ -35,9 +35,11 @@ def _of_run(run: Run) -> Iterator[str]:
     marked = ", marked by triangles in the joint's colour" if wraps else ""
     doubts = f"; other findings: {others}, marked by crosses" if others else ""
     yield f"### {_text(run.name)}"
-    yield f"{files}, read as {_text(run.log.source)}: {run.log.rows} rows, {run.duration:.6g} s. {robot}"
+    rows = f"{text.counted(run.log.rows, 'row')}, {run.duration:.6g} s"
+    yield f"{files}, read as {_text(run.log.source)}: {rows}. {robot}"
     yield ""
-    grid = f"Grid: {len(run.t_ns)} samples, one in {1e3 * run.tsp:.6g} ms."
+    every = f", one in {1e3 * run.tsp:.6g} ms" if len(run.t_ns) > 1 else ""
+    grid = f"Grid: {text.counted(len(run.t_ns), 'sample')}{every}."
     yield f"{grid} Repolarizations: {wraps}{marked}{doubts}." if run.log.joints else grid
     yield from _warnings(run.warnings)
 

@@ -41,7 +41,9 @@ def draw_tolerances(stream: RecordingStream, result: Comparison) -> None:
         signs = (1,) if kind in UNSIGNED else (1, -1)
         colour = rgb(AXIS_COLOURS.get(kind, REFERENCE_COLOUR))
         what = "tolerance" if kind not in AXIS_COLOURS else f"tolerance of {kind}"
-        names = [f"{'+' if sign > 0 else '-'}{what}" if len(signs) > 1 else what for sign in signs]
+        # The axis of a plot may show no number but 0: what is allowed says how large the rest is.
+        said = f"{what} {allowed:.6g}"
+        names = [f"{'+' if sign > 0 else '-'}{said}" if len(signs) > 1 else said for sign in signs]
         style = rr.SeriesLines(colors=[colour] * len(signs), names=names, widths=[LIMIT_WIDTH] * len(signs))
         entity = entity_path("tolerance", PLOTS[kind], kind)
         stream.log(entity, style, static=True)

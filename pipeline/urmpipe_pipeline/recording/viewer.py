@@ -29,6 +29,9 @@ LOOPBACK = "127.0.0.1"
 PATIENCE = 60.0
 """Time in [s] that the viewer has to start and to open a recording."""
 
+GRACE = 5.0
+"""Time in [s] that a window has to close when it is asked to."""
+
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
@@ -108,15 +111,40 @@ def open_window(
     Raises:
         ViewerError: If it does not start.
     """
+    with run_viewer(headless=headless) as (process, url):
+        yield process, _shown(process, url, path, at_ns)
+
+
+@contextmanager
+def run_viewer(*, headless: bool = False) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
+    """Run the viewer with nothing open in it; end it at the end.
+
+    Args:
+        headless: Without a window.
+
+    Yields:
+        Its process, and the address that it will listen on.
+    """
     port = _free_port()
     options = ["--bind", LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
     command = [str(_program()), *options, *(["--headless"] if headless else [])]
     quiet = subprocess.DEVNULL
-    with subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet) as process:
-        try:
-            yield process, _shown(process, port, path, at_ns)
-        finally:
-            process.terminate()
+    # Not as a context: after Ctrl-C, its end would not wait for the viewer, which would outlive us.
+    process = subprocess.Popen(command, stdin=quiet, stdout=quiet, stderr=quiet)
+    try:
+        yield process, f"rerun+http://{LOOPBACK}:{port}/proxy"
+    finally:
+        _end(process)
+
+
+def _end(process: subprocess.Popen[bytes]) -> None:
+    """End the viewer, and wait until it is gone."""
+    process.terminate()
+    try:
+        process.wait(GRACE)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        process.wait()
 
 
 def _program() -> Path:
@@ -133,14 +161,14 @@ def _free_port() -> int:
         return int(free.getsockname()[1])
 
 
-def _shown(process: subprocess.Popen[bytes], port: int, path: Path, at_ns: int) -> ViewerClient:
+def _shown(process: subprocess.Popen[bytes], url: str, path: Path, at_ns: int) -> ViewerClient:
     """Wait until the viewer shows the recording at the time, and return what it is controlled by."""
     from rerun.experimental import ViewerClient
 
     end = time.monotonic() + PATIENCE
     while process.poll() is None and time.monotonic() < end:
         try:
-            client = ViewerClient.connect(f"rerun+http://{LOOPBACK}:{port}/proxy")
+            client = ViewerClient.connect(url)
             client.open(str(path.resolve()))
             while not _stands(client, at_ns) and time.monotonic() < end:
                 time.sleep(0.1)

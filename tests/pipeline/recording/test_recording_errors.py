@@ -17,7 +17,7 @@ import rerun as rr
 from urmpipe_models.errors import OutputError, RecordingError
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.recording import is_ours, is_recording, read_recording, write_recording
-from urmpipe_pipeline.recording.entities import blocks
+from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, blocks
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.verify import verify
 from urmpipe_pipeline.results import Run
@@ -91,6 +91,15 @@ def test_a_recording_of_a_newer_layout(tmp_path: Path) -> None:
     newer = rr.AnyValues(metadata=json.dumps({"layout_version": 99, "something": "new"}))
     path = foreign(tmp_path / "newer.rrd", "urmpipe", newer)
     assert trouble(path) == "found layout version 99, allowed: up to 4; a newer urmpipe wrote it"
+
+
+def test_a_recording_of_an_older_layout(tmp_path: Path) -> None:
+    older = rr.AnyValues(metadata=json.dumps({"layout_version": LAYOUT_VERSION - 1}))
+    path = foreign(tmp_path / "older.rrd", "urmpipe", older)
+    assert trouble(path) == (
+        f"found layout version {LAYOUT_VERSION - 1}, allowed: {LAYOUT_VERSION}; an older urmpipe wrote it:"
+        " make it again from its log"
+    )
 
 
 @pytest.mark.parametrize(

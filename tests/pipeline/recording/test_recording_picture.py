@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import importlib.util
-import math
+import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
@@ -20,9 +19,9 @@ from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
-from urmpipe_pipeline.recording.layout import EYE
+from urmpipe_pipeline.recording.layout import FIELD_OF_VIEW, eye_and_target
 from urmpipe_pipeline.recording.scene import Scene, scene_of
-from urmpipe_pipeline.recording.viewer import open_window, opening_times
+from urmpipe_pipeline.recording.viewer import open_window, opening_times, run_viewer
 from urmpipe_pipeline.results import Run
 
 MakeRun = Callable[..., Run]
@@ -34,8 +33,6 @@ PATIENCE = 40.0
 """Time in [s] that the viewer has to load and draw: a software rasterizer on a busy machine is slow."""
 
 SCENE_VIEW = "Arm and paths [m]"
-FIELD_OF_VIEW = math.radians(55.0)
-"""Of the viewer's eye, from the bottom to the top of a view (re_view_spatial, Eye::DEFAULT_FOV_Y)."""
 
 pytestmark = [
     pytest.mark.slow,
@@ -47,17 +44,24 @@ pytestmark = [
 
 
 @pytest.fixture
-def viewer() -> Iterator[Any]:
-    """Return Rerun's viewer, headless, on the loopback interface only, as the README's pictures are taken."""
+def viewer(monkeypatch: pytest.MonkeyPatch) -> Iterator[Any]:
+    """Return Rerun's viewer, headless, with nothing open in it; it draws in software."""
+    monkeypatch.setenv("VK_ICD_FILENAMES", str(DRIVERS[0]))
+    with run_viewer(headless=True) as (process, url):
+        yield connected(process, url)
+
+
+def connected(process: subprocess.Popen[bytes], url: str) -> Any:
+    """Return what controls a viewer, once it listens."""
     from rerun.experimental import ViewerClient
 
-    place = Path(__file__).resolve().parents[3] / "docs" / "take_pictures.py"
-    spec = importlib.util.spec_from_file_location("take_pictures", place)
-    assert spec is not None and spec.loader is not None
-    take_pictures = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(take_pictures)
-    with take_pictures.headless_viewer() as url, ViewerClient.connect(url) as client:
-        yield client
+    end = time.monotonic() + PATIENCE
+    while process.poll() is None and time.monotonic() < end:
+        try:
+            return ViewerClient.connect(url)
+        except OSError:
+            time.sleep(0.1)
+    raise AssertionError("the viewer does not listen")
 
 
 def pixels(picture: Picture, colour: str) -> int:
@@ -115,8 +119,7 @@ def scene_at(viewer: Any, at: float, path: Path, drawn: Callable[[Picture], bool
 
 def projected(scene: Scene, points: FloatArray, picture: Picture) -> FloatArray:
     """Return where points in [m], shape (n, 3), stand in a picture of the 3D view, in pixels x, y."""
-    centre, radius = scene.ball()
-    eye = centre + radius * EYE
+    eye, centre = eye_and_target(scene)
     forward = (centre - eye) / np.linalg.norm(centre - eye)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -14,8 +14,8 @@ from rerun.chunk import RrdReader
 
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.kinematics import frames_over_log
-from urmpipe_models.orientation import quaternions
-from urmpipe_models.transform import translation
+from urmpipe_models.orientation import matrices, quaternions
+from urmpipe_models.transform import rotation_x, translation
 from urmpipe_models.urdf_reader import read_urdf
 from urmpipe_models.visual import Box, Mesh, Sphere, Visual
 from urmpipe_pipeline.compare import CompareOptions, compare_runs
@@ -29,6 +29,7 @@ from urmpipe_pipeline.recording.enlarged import LEAST_SEEN
 from urmpipe_pipeline.recording.scene import Mark, scene_of
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.trajectory import AlignMode
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
@@ -177,6 +178,30 @@ def test_a_gltf_that_needs_other_files_is_not_drawn(document: object, whole: boo
     assert drawable(Visual(None, Mesh(str(path)), translation(0.0, 0.0, 0.0))) is whole
 
 
+@pytest.mark.parametrize("align", get_args(AlignMode))
+def test_the_arm_stands_where_the_alignment_puts_it(
+    align: AlignMode, make_run: MakeRun, shapes: Path
+) -> None:
+    """Else the arm of a log in a frame of its own would stand beside its path."""
+    robot = read_urdf(shapes)
+    elsewhere = robot.placed(
+        translation(0.3, -0.2, 0.1) @ rotation_x(0.7), translation(0.05, 0.0, 0.02) @ rotation_x(0.2)
+    )
+    reference, run = make_run("asked for", 400, robot=robot), make_run("log", 400, 0.1, robot=elsewhere)
+    comparison = compare_runs(reference, [run], CompareOptions(align=align))
+    (one,) = comparison.runs
+    arm = scene_of(comparison).arm
+    assert arm is not None
+    # The same sums in another order: rounding in a space of 2 m.
+    np.testing.assert_allclose(arm.skeleton[:, -1], one.actual[arm.sample], rtol=0, atol=1e-13)
+    turn, shift = np.array(one.alignment.rotation), np.array(one.alignment.translation)
+    assert run.robot is not None
+    position, rotation = frames_over_log(run.robot, run.q[arm.sample])
+    for k, body in enumerate(arm.bodies):
+        np.testing.assert_allclose(body.position, position[:, k] @ turn.T + shift, rtol=0, atol=1e-13)
+        np.testing.assert_allclose(matrices(body.quat_xyzw), turn @ rotation[:, k], rtol=0, atol=1e-13)
+
+
 # --- the deviation ---------------------------------------------------------------------------------
 
 
@@ -240,8 +265,12 @@ def test_the_worst_place_has_its_size_and_its_time(make_comparison: MakeComparis
     text = f"worst {1e3 * norm.max:.3f} mm at {norm.t_max:.4f} s"
     assert scene_of(comparison).worst == Mark((x, y, z), text)
     path = write_recording(comparison, tmp_path / "one.rrd")
-    assert column(path, "/point/worst", "Points3D:labels").tolist() == [[text]]
-    assert column(path, "/point/enlarged", "Points3D:labels").tolist() == [["deviation x50"]]
+    assert column(path, "/point/worst/label", "Points3D:labels").tolist() == [[text]]
+    assert column(path, "/point/enlarged/label", "Points3D:labels").tolist() == [["deviation x50"]]
+    moving = [
+        column(path, f"/point/enlarged{leaf}", "Points3D:positions").tolist() for leaf in ("", "/label")
+    ]
+    assert moving[0] == moving[1]
 
 
 def test_runs_may_be_called_like_the_enlarged_path(make_comparison: MakeComparison, tmp_path: Path) -> None:

@@ -19,9 +19,10 @@ from urmpipe_pipeline.audit_entry import AuditEntry, AuditKind
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
-from urmpipe_pipeline.recording.layout import viewer_layout
+from urmpipe_pipeline.recording.entities import places_of
+from urmpipe_pipeline.recording.layout import FIELD_OF_VIEW, FILLED, WIDE, eye_and_target, viewer_layout
 from urmpipe_pipeline.recording.overview import LONG, ROWS, SPEED_ROWS
-from urmpipe_pipeline.recording.plots import SHARED_AXIS
+from urmpipe_pipeline.recording.plots import SHARED_AXIS, Plots
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
@@ -97,12 +98,12 @@ def test_each_tolerance_stands_in_the_plot_of_its_unit(
     wanted = [packed(colour) for colour in AXIS_COLOURS.values()]
     assert columns(path, "/delta/matlab", "SeriesLines:colors") == [wanted]
     lines = {
-        "delta/axis": ([0.0035, -0.0035], ["+tolerance", "-tolerance"], REFERENCE_COLOUR),
-        "delta/z": ([0.002, -0.002], ["+tolerance of z", "-tolerance of z"], AXIS_COLOURS["z"]),
-        "delta/norm": ([0.005], ["tolerance of norm"], AXIS_COLOURS["norm"]),
-        "path/path": ([0.003], ["tolerance"], REFERENCE_COLOUR),
-        "angle/angle": ([0.01], ["tolerance"], REFERENCE_COLOUR),
-        "joints/joint": ([0.02, -0.02], ["+tolerance", "-tolerance"], REFERENCE_COLOUR),
+        "delta/axis": ([0.0035, -0.0035], ["+tolerance 0.0035", "-tolerance 0.0035"], REFERENCE_COLOUR),
+        "delta/z": ([0.002, -0.002], ["+tolerance of z 0.002", "-tolerance of z 0.002"], AXIS_COLOURS["z"]),
+        "delta/norm": ([0.005], ["tolerance of norm 0.005"], AXIS_COLOURS["norm"]),
+        "path/path": ([0.003], ["tolerance 0.003"], REFERENCE_COLOUR),
+        "angle/angle": ([0.01], ["tolerance 0.01"], REFERENCE_COLOUR),
+        "joints/joint": ([0.02, -0.02], ["+tolerance 0.02", "-tolerance 0.02"], REFERENCE_COLOUR),
     }
     for entity, (values, names, colour) in lines.items():
         assert columns(path, f"/tolerance/{entity}", "Scalars:scalars") == [values] * 2
@@ -144,6 +145,57 @@ def test_what_is_doubtful_has_a_mark_of_its_own(make_run: MakeRun, tmp_path: Pat
     assert [row[1] for row in columns(path, entity, "Scalars:scalars")] == run.q[1:5, 1].tolist()
     wanted = rr.components.MarkerShape.Cross.value
     assert columns(path, entity, "SeriesPoints:markers") == [[wanted] * 6]
+
+
+def test_a_mark_beside_missing_values_stands_between_the_nearest(make_run: MakeRun, tmp_path: Path) -> None:
+    run = make_run(rows=50)
+    q = run.q.copy()
+    q[9:12, 1] = np.nan
+    audit = (AuditEntry("phi2", 11, 0.0475, 0.0, -1.5, 0, 0, "unexplained"),)
+    path = write_recording(replace(run, q=q, audit=audit), tmp_path / "run.rrd")
+    (values,) = columns(path, "/marks/repolarization/doubt", "Scalars:scalars")
+    wanted = q[8, 1] + (0.0475 - 0.040) / 0.020 * (q[12, 1] - q[8, 1])
+    np.testing.assert_allclose(values[1], wanted, rtol=1e-12)  # rounding of the interpolation
+
+
+def test_the_one_sample_of_a_log_is_a_point(make_run: MakeRun, tmp_path: Path) -> None:
+    """The viewer draws no line through it."""
+    run = make_run(rows=1)
+    path = write_recording(run, tmp_path / "one.rrd")
+    for entity in ("/joints/raw", "/joints/repolarized"):
+        assert columns(path, entity, "SeriesPoints:names") == [list(run.log.joints)]
+        assert columns(path, entity, "SeriesPoints:colors") == [[packed(c) for c in JOINT_COLOURS[:6]]]
+        assert columns(path, entity, "SeriesLines:names") == []
+    assert "one.csv, read as table: 1 row, 0 s. Arm: urm6.\n\nGrid: 1 sample. " in summary(make_run("one", 1))
+
+
+def test_what_is_doubtful_is_counted_in_the_title(make_run: MakeRun) -> None:
+    doubt = AuditEntry("phi2", 2, 0.005, 0.0, -1.5, 0, 0, "unexplained")
+    run = make_run(rows=50)
+    titles = []
+    for audit in ((), run.audit, (*run.audit, doubt), (doubt,)):
+        _, (view,) = Plots(run).joints(replace(run, audit=audit), places_of(run)[0])
+        titles.append(view.name)
+    assert titles == [
+        "Joints repolarized (none was needed) [rad]",
+        "Joints repolarized (1 marked) [rad]",
+        "Joints repolarized (1 marked, 1 doubtful) [rad]",
+        "Joints repolarized (0 marked, 1 doubtful) [rad]",
+    ]
+
+
+@pytest.mark.parametrize("rows", [1, 2, 1500])
+def test_all_of_the_scene_is_in_view(rows: int, make_run: MakeRun) -> None:
+    scene = scene_of(make_run(rows=rows))
+    eye, target = eye_and_target(scene)
+    forward = (target - eye) / np.linalg.norm(target - eye)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    right /= np.linalg.norm(right)
+    above = np.cross(right, forward)
+    seen = (scene.points() - eye) @ np.column_stack((right, above, forward))
+    edge = np.tan(FIELD_OF_VIEW / 2)
+    reach = np.abs(seen[:, :2] / seen[:, 2:]).max(axis=0) / [WIDE * edge, edge]
+    assert reach.max() == pytest.approx(FILLED)
 
 
 def test_a_line_through_the_worst_sample_stands_in_every_plot(
@@ -306,7 +358,7 @@ def test_the_layout_is_in_the_file(make_comparison: MakeComparison, tmp_path: Pa
     found = views(write_recording(make_comparison(("a b", "reference")), tmp_path / "both.rrd"))
     names = found["ViewBlueprint:display_name"]
     assert {
-        "Arm and paths [m]",
+        "Arm of reference and paths [m]",
         "delta = asked for - a b [m]",
         "Distance from the path [m]",
         "Angle between the orientations [rad]",
@@ -348,7 +400,7 @@ def test_every_plot_shows_the_whole_time(make_run: MakeRun, tmp_path: Path) -> N
         if chunk.entity_path == f"/view/{SHARED_AXIS}/TimeAxis"
     )
     (axis,) = batch.column("TimeAxis:view_range").to_pylist()
-    assert [axis[0][end] for end in ("start", "end")] == [-100_000_000, 11_200_000_000]
+    assert [axis[0][end] for end in ("start", "end")] == [-100_000_000, 11_700_000_000]
 
 
 def test_the_arm_moves_at_50_hz_through_its_own_kinematics(make_run: MakeRun) -> None:
