@@ -123,7 +123,7 @@ def _way(
     name: str, position: FloatArray, t: FloatArray, colour: str, width: int, points: int = POINTS
 ) -> Spec:
     """Return a path of one colour."""
-    kept = decimate(position, points)
+    kept = decimate(position, points, t)
     return _trail(name, position[kept], t[kept], None, line={"color": colour, "width": width})
 
 

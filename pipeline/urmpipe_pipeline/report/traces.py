@@ -59,12 +59,12 @@ def line(
         points: How many of its samples may stay.
         **more: Further settings of the trace.
     """
-    kept = decimate(values, points)
+    kept = decimate(values, points, t)
     drawn = values[kept]
-    settings = {"line": stroke(colour)} | more
+    alone = np.count_nonzero(np.isfinite(drawn)) == 1  # a line through one point is nothing to see
+    settings = {"line": stroke(colour), "mode": "lines+markers" if alone else "lines"} | more
     return {
         "type": "scatter",
-        "mode": "lines",
         "name": label(name),
         "x": typed(t[kept], "f8"),
         "y": typed(drawn, precision(drawn, digits)),
