@@ -13,17 +13,19 @@ EACH = 4
 """Points that M4 keeps of a column's bucket: the first, the least, the largest and the last."""
 
 
-def decimate(values: FloatArray, points: int = POINTS) -> IntArray:
+def decimate(values: FloatArray, points: int = POINTS, t: FloatArray | None = None) -> IntArray:
     """Return the samples that a drawing of `values` needs, in order.
 
-    The samples are cut into buckets of equal size. Of each bucket stay the first and the last sample,
-    those of the least and the largest value of each column, and, if values are missing (NaN), the
-    first and the last missing one, so that a gap stays a gap. A line through what stays covers the
-    same pixels as the whole, as long as a bucket is not wider than a pixel.
+    The samples are cut into buckets of equal size, or of equal duration if their times are given. Of
+    each bucket stay the first and the last sample, those of the least and the largest value of each
+    column, and, if values are missing (NaN), the first and the last missing one, so that a gap stays a
+    gap. A line through what stays covers the same pixels as the whole, as long as a bucket is not wider
+    than a pixel.
 
     Args:
         values: What is drawn, shape (n,) or (n, k), any unit; NaN where there is no value.
         points: How many samples may stay (a column of a bucket counts for two, its ends for two).
+        t: Times of samples that are not evenly spaced, increasing, shape (n,).
 
     Returns:
         Indices into `values`, sorted and unique, shape (at most `points` + 2 k a bucket with a gap,).
@@ -40,9 +42,12 @@ def decimate(values: FloatArray, points: int = POINTS) -> IntArray:
     buckets = max(points // (2 + 2 * len(columns)), 1)
     m4 = M4Downsampler()
     kept = [np.array([0, count - 1])]
+    times = () if t is None else (np.ascontiguousarray(t, np.float64),)
     for column in columns:
-        # All columns share the ends of their buckets: the library cuts by the number of samples alone.
-        kept.append(m4.downsample(np.ascontiguousarray(column), n_out=EACH * buckets).astype(np.int64))
+        # All columns share the ends of their buckets: the library cuts by the number or the times alone.
+        kept.append(
+            m4.downsample(*times, np.ascontiguousarray(column), n_out=EACH * buckets).astype(np.int64)
+        )
         kept += _missing(column, -(-count // buckets))
     return np.unique(np.concatenate(kept))
 

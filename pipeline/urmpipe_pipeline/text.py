@@ -52,13 +52,11 @@ def number(value: float | None, unit: str, against: float | None = None) -> str:
         return NOTHING
     factor = SHOWN[unit][1]
     scaled = value * factor
-    if 0.0 < abs(scaled) < 1e-3:
-        return f"{scaled:.3e}"
-    digits = DIGITS
+    digits, form = (3, "e") if 0.0 < abs(scaled) < 1e-3 else (DIGITS, "f")
     if against is not None and abs(value) != against:
-        while digits < 12 and f"{abs(scaled):.{digits}f}" == f"{against * factor:.{digits}f}":
+        while digits < 12 and f"{abs(scaled):.{digits}{form}}" == f"{against * factor:.{digits}{form}}":
             digits += 1
-    return f"{scaled:.{digits}f}"
+    return f"{scaled:.{digits}{form}}"
 
 
 def quantity(value: float | None, unit: str, against: float | None = None) -> str:
@@ -81,7 +79,17 @@ def used(statistics: Statistics) -> str:
     share = statistics.used
     if share is None:
         return ""
-    return f"{percent(share)} of the tolerance" if share <= 1.0 else f"{share:.3g} times the tolerance"
+    return f"{percent(share)} of the tolerance" if share <= 1.0 else f"{_times(share)} times the tolerance"
+
+
+def _times(factor: float) -> str:
+    """Return a factor above 1 with three digits, or as many as tell it from 1, without an exponent."""
+    if factor >= 1000.0:
+        return f"{factor:.0f}"
+    digits = 3
+    while digits < 15 and f"{factor:.{digits}g}" == "1":
+        digits += 1
+    return f"{factor:.{digits}g}"
 
 
 def metres(value: float) -> str:
@@ -98,13 +106,13 @@ def seconds(value: float) -> str:
     """Return a time in [s]: milliseconds, and microseconds where they are not 0."""
     if not math.isfinite(value):
         return NOTHING
-    text = f"{value:.6f}"
+    text = f"{round(value, 6) + 0.0:.6f}"  # + 0.0: no -0.000
     return text[:-3] + text[-3:].rstrip("0")
 
 
 def offset(value: float) -> str:
     """Return a shift in time in [s] with its sign."""
-    return f"{'+' if value > 0 else ''}{seconds(value)} s"
+    return f"{'+' if round(value, 6) > 0 else ''}{seconds(value)} s"
 
 
 def percent(share: float) -> str:

@@ -7,6 +7,7 @@ import math
 import pytest
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison import Statistics
 
 
 @pytest.mark.parametrize(
@@ -19,6 +20,8 @@ from urmpipe_pipeline import text
         (0.0035, 0.0035, "3.5000"),
         (-0.4123456789, None, "-412.3457"),
         (8.5e-17, None, "8.500e-14"),
+        (5.00001e-7, 5e-7, "5.00001e-04"),
+        (5e-7, 5e-7, "5.000e-04"),
         (math.nan, None, "–"),
         (None, None, "–"),
     ],
@@ -50,6 +53,8 @@ def test_a_quantity_has_the_unit_that_people_read() -> None:
     assert text.quantity(math.radians(30), "rad") == "30.0000 deg"
     assert text.offset(0.0) == "0.000 s"
     assert text.offset(0.5) == "+0.500 s"
+    assert text.offset(1e-9) == "0.000 s"
+    assert text.offset(-1e-9) == "0.000 s"
     assert text.enumerated(("a",)) == "a"
     assert text.enumerated(("a", "b", "c")) == "a, b and c"
 
@@ -93,3 +98,18 @@ def test_sizes_counts_and_options() -> None:
     assert text.counted(0, "log") == "0 logs"
     assert text.plain("x") == "x"
     assert text.plain((0.0, None, "é")) == '[0.0, null, "é"]'
+
+
+@pytest.mark.parametrize(
+    ("largest", "written"),
+    [
+        (0.005, "50.0 % of the tolerance"),
+        (0.01, "100 % of the tolerance"),
+        (0.010001, "1.0001 times the tolerance"),
+        (0.0125, "1.25 times the tolerance"),
+        (10.9, "1090 times the tolerance"),
+    ],
+)
+def test_how_much_of_a_tolerance_is_used_is_never_rounded_to_all_of_it(largest: float, written: str) -> None:
+    one = Statistics("path", "path", "m", largest, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0.01, 1, 1.0, "fail")
+    assert text.used(one) == written

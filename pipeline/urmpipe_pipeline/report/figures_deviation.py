@@ -35,8 +35,8 @@ JOINTS_PX = 210
 AROUND_PX = 64
 """Height of what stands above and below them: legend and time axis."""
 
-SHOWN = {"m": (1e3, "mm"), "rad": (180.0 / np.pi, "deg")}
-"""What a deviation in SI is shown in: factor and unit."""
+LOW = 3.0
+"""Largest values above so many tolerances leave no room for a word between the tolerance and 0."""
 
 DOTS = 1500
 """Points of a cloud: a browser draws no more of them with ease."""
@@ -81,7 +81,7 @@ def pose_figure(deviation: Deviation) -> Figure | None:
     if angle is not None and deviation.angle is not None:
         panels.append(_panel(deviation, angle, "angle", REFERENCE_COLOUR, deviation.angle))
     joints = list(deviation.joint_statistics.values())
-    units = [unit for unit in SHOWN if any(one.unit == unit for one in joints)]
+    units = [unit for unit in text.SHOWN if any(one.unit == unit for one in joints)]
     panels += [_joints_panel(deviation, joints, unit) for unit in units]
     if not panels:
         return None
@@ -127,7 +127,7 @@ def _panel(
     deviation: Deviation, statistics: Statistics, symbol: str, colour: str, values: FloatArray
 ) -> Panel:
     """Return one quantity over time with its tolerance and its largest value."""
-    factor, unit = SHOWN[statistics.unit]
+    unit, factor = text.SHOWN[statistics.unit]
     shown = values * factor
     peak = np.searchsorted(deviation.sample, [statistics.sample_max])
     traces = [
@@ -141,7 +141,7 @@ def _panel(
 
 def _joints_panel(deviation: Deviation, joints: Sequence[Statistics], unit: str) -> Panel:
     """Return the deviation of the joints of one unit, each in its colour."""
-    factor, shown = SHOWN[unit]
+    shown, factor = text.SHOWN[unit]
     columns = [] if deviation.joint_delta is None else list(deviation.joint_delta.T)
     chosen = [(j, one) for j, one in enumerate(joints) if one.unit == unit]
     traces = [
@@ -166,12 +166,13 @@ def _tolerance(
     """Return what is allowed as a band between dashed lines, and the times at which a column is out of it."""
     if statistics.tolerance is None:
         return []
-    factor, unit = SHOWN[statistics.unit]
+    unit, factor = text.SHOWN[statistics.unit]
     high = statistics.tolerance * factor
     low = 0.0 if from_zero else -high
+    near_foot = from_zero and statistics.max > LOW * statistics.tolerance
     said = f"{'±' if low else ''}{high:.6g} {unit}"
     outside = np.any([np.abs(values) > statistics.tolerance for values in columns], axis=0)
-    lines = [level(high, said)] + ([level(low)] if low else [])
+    lines = [level(high, said, above=near_foot)] + ([level(low)] if low else [])
     return [band(low, high), *shaded(deviation.t, outside, deviation.run.duration), *lines]
 
 
@@ -207,9 +208,7 @@ def _correlation(r: float | None) -> str:
 
 def _most(statistics: Statistics) -> str:
     """Return a quantity's largest absolute value with its unit."""
-    if statistics.unit == "m":
-        return f"{text.millimetres(statistics.max)} mm"
-    return f"{np.degrees(statistics.max):.4f} deg"
+    return text.quantity(statistics.max, statistics.unit)
 
 
 def _out_of_tolerance(deviation: Deviation) -> str:

@@ -35,7 +35,8 @@ def overview_figure(comparison: Comparison) -> Figure | None:
     lines = [_line(comparison, place, one) for place, one in enumerate(ranking, start=1)]
     spec = stacked([Panel("‖Δ‖ [mm]", lines, shapes, from_zero=not logarithmic)], duration)
     if logarithmic:
-        ends = np.log10([1e3 * min(largest) / DEPTH, 1.5e3 * max(largest)])
+        top = max(*largest, tolerance or 0.0)
+        ends = np.log10([1e3 * min(largest) / DEPTH, 1.5e3 * top])
         spec["layout"]["yaxis"] |= {"type": "log", "range": ends.tolist()}
     order = "; ".join(
         f"{place}. {one.name}: at most {text.millimetres(one.statistics['norm'].max)} mm, {one.verdict}"

@@ -28,6 +28,9 @@ BEFORE_POINTS = 4000
 MARKED = 1000
 """Repolarizations marked at most: a browser draws no more of them with ease."""
 
+LEGEND_Y = 1.025
+"""Where the legend begins, in heights of the plot: above the word at the head of a line through it."""
+
 AROUND_PX = 64
 """Height of what stands above and below them: legend and time axis."""
 
@@ -81,12 +84,14 @@ def point_figure(run: Run, played: Playback) -> Figure | None:
     if worst is not None:
         at = float(played.t[worst])
         through = [instant(at, f"furthest off {text.seconds(at)} s", run.duration)]
+    spec = stacked(panels, run.duration, through)
+    spec["layout"]["legend"] |= {"y": LEGEND_Y}
     return Figure(
         "Tool centre point before and after repolarization",
         f"{wrongness(run, played)} {explained(run)}",
         f"Position, speed and acceleration of {point} of {run.name} over time, as the angles of the file move"
         f" it and after repolarization. {wrongness(run, played)}",
-        stacked(panels, run.duration, through),
+        spec,
         sum(round(POINT_PX * panel.share) for panel in panels) + AROUND_PX,
     )
 

@@ -18,7 +18,7 @@ from urmpipe_pipeline.results import Run
 DEVIATION_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
 """Small to large deviation: darker all the way, blue to red, legible on white and to the colour-blind."""
 
-CAMERA = {"eye": {"x": 1.3, "y": -1.3, "z": 0.75}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
+CAMERA = {"eye": {"x": 1.5, "y": -1.5, "z": 0.86}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
 """Looked at from the front right, a little from above; in lengths of the scene."""
 
 HANDLING = "Drag to turn; pinch to zoom, with a mouse by the bar at the top right."
@@ -123,7 +123,7 @@ def _way(
     name: str, position: FloatArray, t: FloatArray, colour: str, width: int, points: int = POINTS
 ) -> Spec:
     """Return a path of one colour."""
-    kept = decimate(position, points)
+    kept = decimate(position, points, t)
     return _trail(name, position[kept], t[kept], None, line={"color": colour, "width": width})
 
 

@@ -59,12 +59,12 @@ def line(
         points: How many of its samples may stay.
         **more: Further settings of the trace.
     """
-    kept = decimate(values, points)
+    kept = decimate(values, points, t)
     drawn = values[kept]
-    settings = {"line": stroke(colour)} | more
+    alone = np.count_nonzero(np.isfinite(drawn)) == 1  # a line through one point is nothing to see
+    settings = {"line": stroke(colour), "mode": "lines+markers" if alone else "lines"} | more
     return {
         "type": "scatter",
-        "mode": "lines",
         "name": label(name),
         "x": typed(t[kept], "f8"),
         "y": typed(drawn, precision(drawn, digits)),
@@ -123,10 +123,11 @@ def marks(t: FloatArray, values: FloatArray, colour: str, symbols: str | list[st
     } | more
 
 
-def level(value: float, text: str = "") -> Spec:
-    """Return a dashed line at one value, as wide as the plot, with a word at its end."""
+def level(value: float, text: str = "", *, above: bool = False) -> Spec:
+    """Return a dashed line at one value, as wide as the plot, with a word at its end, below it or above."""
     ends = {"xref": "x domain", "x0": 0, "x1": 1, "y0": value, "y1": value}
-    word = {"text": text, "textposition": "end", "yanchor": "top", "font": {"color": MUTED, "size": 10}}
+    word: Spec = {"text": text, "textposition": "end", "font": {"color": MUTED, "size": 10}}
+    word["yanchor"] = "bottom" if above else "top"
     return {"type": "line", "line": {"color": INK, "width": 1, "dash": "dash"}, "label": word} | ends
 
 

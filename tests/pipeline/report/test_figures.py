@@ -362,3 +362,41 @@ def test_the_scene_has_equal_scales_and_shows_the_worst_point(comparison: Compar
     np.testing.assert_allclose(place, deviation.actual[deviation.worst], rtol=0, atol=2**-23)
     (actual,) = [trace for trace in spec["data"] if trace["name"] == "actual"]
     assert numbers(actual["customdata"])[:, 1].max() == deviation.statistics["norm"].max * 1e3
+
+
+@pytest.mark.parametrize(("allowed", "side"), [(0.0001, "bottom"), (1.0, "top")])
+def test_a_tolerance_is_told_on_the_side_of_its_line_that_has_room(
+    comparison: Comparison, allowed: float, side: str
+) -> None:
+    reference, run = comparison.runs[0].run, comparison.runs[1].run
+    (deviation,) = compare_runs(reference, [run], CompareOptions({"angle": allowed})).runs
+    figure = pose_figure(deviation)
+    assert figure is not None
+    told = [shape["label"] for shape in figure.spec["layout"]["shapes"] if shape.get("label", {}).get("text")]
+    assert [(one["text"], one["yanchor"]) for one in told] == [
+        (f"{text.limit(allowed, 'rad')} deg", side),
+    ]
+
+
+def test_a_logarithmic_overview_reaches_the_tolerance(comparison: Comparison) -> None:
+    reference, off = comparison.runs[0].run, comparison.runs[1].run
+    assert reference.tcp is not None
+    near = replace(reference, name="near", tcp=replace(reference.tcp, position=reference.tcp.position + 1e-6))
+    logs = [near, off]
+    figure = overview_figure(compare_runs(reference, logs, CompareOptions({"norm": 2.0})))
+    assert figure is not None
+    axis = figure.spec["layout"]["yaxis"]
+    (line,) = figure.spec["layout"]["shapes"]
+    assert axis["type"] == "log"
+    assert line["y0"] == 2000.0
+    assert axis["range"][1] > np.log10(line["y0"])
+
+
+def test_what_stands_at_the_head_of_a_line_is_not_under_the_legend(comparison: Comparison) -> None:
+    run = comparison.runs[0].run
+    played = play_back(run)
+    assert played is not None
+    figure = point_figure(run, played)
+    assert figure is not None
+    above = (figure.spec["layout"]["legend"]["y"] - 1.0) * (figure.height - 64)  # px
+    assert above >= 14  # a line of text of 11 px

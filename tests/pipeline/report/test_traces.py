@@ -63,3 +63,17 @@ def test_a_line_without_any_value_is_drawn_as_nothing() -> None:
     drawn = line(np.arange(3.0), np.full(3, np.nan), "a", "#000000", "m")
     assert np.isnan(numbers(drawn["y"])).all()
     assert drawn["hovertemplate"] == "%{y:.4f} m"
+
+
+def test_a_single_sample_is_drawn_as_a_point() -> None:
+    one = line(np.zeros(1), np.ones(1), "one", "#000000", "m")
+    two = line(np.arange(2.0), np.ones(2), "two", "#000000", "m")
+    assert (one["mode"], two["mode"]) == ("lines+markers", "lines")
+
+
+def test_samples_crowded_in_time_take_no_points_from_the_others() -> None:
+    t = np.concatenate([np.linspace(0.0, 1.0, 100_000, endpoint=False), np.linspace(1.0, 10.0, 2000)])
+    drawn = line(t, np.sin(20.0 * t), "crowded", "#000000", "rad", points=4000)
+    late = numbers(drawn["x"])
+    late = late[late >= 1.0]
+    assert np.max(np.diff(late)) < 10.0 / 400  # a sample in each of 1000 buckets, two of them at its ends
