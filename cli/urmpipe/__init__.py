@@ -15,12 +15,12 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from urmpipe.api import Report as Report
-    from urmpipe.api import compare as compare
     from urmpipe.api import export as export
     from urmpipe.api import ingest as ingest
     from urmpipe.api import report as report
     from urmpipe.api import view as view
     from urmpipe.api import write_map as write_map
+    from urmpipe.comparing import compare as compare
     from urmpipe_models.catalogue import load_robot as load_robot
     from urmpipe_models.catalogue import robot_names as robot_names
     from urmpipe_models.chain import Chain as Chain
@@ -43,7 +43,7 @@ _HOME = {
     "Report": "urmpipe.api",
     "Run": "urmpipe_pipeline.results",
     "UrmpipeError": "urmpipe_models.errors",
-    "compare": "urmpipe.api",
+    "compare": "urmpipe.comparing",
     "export": "urmpipe.api",
     "ingest": "urmpipe.api",
     "load_robot": "urmpipe_models.catalogue",

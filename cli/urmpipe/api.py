@@ -9,7 +9,6 @@ from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe.comparing import compare
 from urmpipe.guards import (
     PathLike,
     Robot,
@@ -23,7 +22,6 @@ from urmpipe_models.catalogue import robot_names
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.audit_file import write_audit
-from urmpipe_pipeline.compare import Tcp
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import ingest_log
@@ -37,12 +35,13 @@ from urmpipe_pipeline.sources import ReadOptions, map_of, read_map
 if TYPE_CHECKING:
     import pandas as pd
 
+    from urmpipe_pipeline.compare import Tcp
     from urmpipe_pipeline.export import Exported, Format, Rows
     from urmpipe_pipeline.report import FigureFile
     from urmpipe_pipeline.report.headless import FigureFormat
 
 __all__ = [
-    "PathLike", "Report", "Robot", "compare", "export", "ingest", "place_robot", "read_options", "report",
+    "PathLike", "Report", "Robot", "export", "ingest", "place_robot", "read_options", "report",
     "write_map",
 ]  # fmt: skip
 

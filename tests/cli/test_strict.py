@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from urmpipe import api
+import urmpipe
 from urmpipe_models.errors import LogError
 
 FloatArray = NDArray[np.float64]
@@ -74,7 +74,7 @@ def test_what_an_offset_leaves_out_is_no_doubt(tmp_path: Path) -> None:
         table = np.column_stack([t[:300], q[rows]])
         np.savetxt(tmp_path / f"{name}.csv", table, fmt="%.9f", delimiter=",", header=header, comments="")
     wanted, late = tmp_path / "wanted.csv", tmp_path / "late.csv"
-    result = api.compare(wanted, [late], robot="ur5e", sync="auto", strict=True)
+    result = urmpipe.compare(wanted, [late], robot="ur5e", sync="auto", strict=True)
     assert result.runs[0].sync.offset == pytest.approx(0.5, abs=1e-7)  # of values to 1e-9 rad
     assert [(one.kind, one.message) for one in result.warnings] == [
         (
@@ -84,5 +84,5 @@ def test_what_an_offset_leaves_out_is_no_doubt(tmp_path: Path) -> None:
         )
     ]
     with pytest.raises(LogError) as error:
-        api.compare(wanted, [late], robot="ur5e", sync="auto", tsp=0.0051, strict=True)
+        urmpipe.compare(wanted, [late], robot="ur5e", sync="auto", tsp=0.0051, strict=True)
     assert "resampled" in str(error.value)

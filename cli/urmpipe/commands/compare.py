@@ -130,7 +130,7 @@ def compare(
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
     """
     tune_pyarrow()
-    from urmpipe import api
+    from urmpipe.comparing import compare as compare_logs
     from urmpipe.comparison_printing import print_comparison
     from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar
 
@@ -148,7 +148,7 @@ def compare(
     shared = {name: options.pop(name) for name in names}
     target = None if made else output or Path(default_name(reference, logs))
     with progress_bar(f"Writing {target}", quiet=quiet or made is not None) as progress:
-        result = api.compare(
+        result = compare_logs(
             made or reference,
             logs,
             robot=robot,

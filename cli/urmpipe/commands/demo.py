@@ -40,6 +40,7 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
     """
     tune_pyarrow()
     from urmpipe import api
+    from urmpipe.comparing import compare
     from urmpipe.comparison_printing import print_comparison
     from urmpipe.printing import print_json, print_recording, progress_bar
     from urmpipe_datasets import LOGS
@@ -53,7 +54,7 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
             runs.append(api.ingest(source, robot="urm6", output=output / f"{name}.rrd"))
             if progress:
                 progress(number / steps)
-        result = api.compare(LOGS / "path.csv", runs, output=output / "demo.rrd")
+        result = compare(LOGS / "path.csv", runs, output=output / "demo.rrd")
         if progress:
             progress((steps - 1) / steps)
         report = api.report([result], output / "report.html")
