@@ -63,6 +63,8 @@ def draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
     """Draw a line through the worst sample in every plot, as high as what is plotted there."""
     import rerun as rr
 
+    if len(one.run.t_ns) < 2:
+        return  # the line's nanosecond would be the whole axis
     # A line between two values at one time is drawn as a point: one of them is a nanosecond later.
     t_ns = one.t_ns[one.worst] + np.arange(2)
     style = rr.SeriesLines(

@@ -158,6 +158,15 @@ def test_a_mark_beside_missing_values_stands_between_the_nearest(make_run: MakeR
     np.testing.assert_allclose(values[1], wanted, rtol=1e-12)  # rounding of the interpolation
 
 
+def test_a_comparison_of_one_sample_has_no_line_through_the_worst(
+    make_comparison: MakeComparison, tmp_path: Path
+) -> None:
+    path = write_recording(make_comparison(("coppeliasim",), rows=1), tmp_path / "one.rrd")
+    assert not [entity for entity in Store(path).rows if entity.startswith("/marks/worst")]
+    path = write_recording(make_comparison(("coppeliasim",), rows=2), tmp_path / "two.rrd")
+    assert [entity for entity in Store(path).rows if entity.startswith("/marks/worst")]
+
+
 def test_the_one_sample_of_a_log_is_a_point(make_run: MakeRun, tmp_path: Path) -> None:
     """The viewer draws no line through it."""
     run = make_run(rows=1)
