@@ -12,6 +12,7 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.elementwise import Vector
 from urmpipe_models.kinematics import points_over_log
 from urmpipe_models.transform import Transform, translation
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
@@ -129,7 +130,8 @@ def _worst(result: Comparison) -> Mark:
     norm = one.statistics["norm"]
     x, y, z = one.actual[one.worst].tolist()
     whose = f", {printable(one.name)}" if len(result.runs) > 1 else ""
-    return Mark((x, y, z), f"worst {1e3 * norm.max:.3f} mm at {norm.t_max:.4f} s{whose}")
+    said = f"worst {text.quantity(norm.max, 'm')} at {text.seconds(norm.t_max)} s{whose}"
+    return Mark((x, y, z), said)
 
 
 def _run_ways(run: Run, place: Place) -> Iterator[Way]:

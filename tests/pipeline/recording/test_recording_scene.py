@@ -229,7 +229,7 @@ def test_of_several_runs_the_largest_deviation_that_needs_it_is_enlarged(
     assert scene.enlarged is not None
     assert scene.enlarged.label == "deviation of two x50"
     assert scene.worst is not None
-    assert scene.worst.text == f"worst 9000.000 mm at {norm.t_max:.4f} s, far"
+    assert scene.worst.text == f"worst 9000.0000 mm at {norm.t_max:.3f} s, far"
 
 
 @pytest.mark.parametrize(
@@ -262,7 +262,7 @@ def test_the_worst_place_has_its_size_and_its_time(make_comparison: MakeComparis
     (one,) = comparison.runs
     norm = one.statistics["norm"]
     x, y, z = one.actual[one.worst].tolist()
-    text = f"worst {1e3 * norm.max:.3f} mm at {norm.t_max:.4f} s"
+    text = f"worst {1e3 * norm.max:.4f} mm at {norm.t_max:.3f} s"
     assert scene_of(comparison).worst == Mark((x, y, z), text)
     path = write_recording(comparison, tmp_path / "one.rrd")
     assert column(path, "/point/worst/label", "Points3D:labels").tolist() == [[text]]
@@ -286,4 +286,4 @@ def test_a_log_against_itself_has_nothing_to_enlarge(
     scene = scene_of(compare_runs(run, [run], CompareOptions({"axis": 0.0035})))
     assert scene.enlarged is None
     assert scene.worst is not None
-    assert scene.worst.text == "worst 0.000 mm at 0.0000 s"
+    assert scene.worst.text == "worst 0.0000 mm at 0.000 s"
