@@ -16,6 +16,9 @@ NOTHING = "–"
 DIGITS = 4
 """Digits after the point of a length in [mm] or an angle in [deg]: 0.1 micrometres, 2 microradians."""
 
+FINEST = 1e-3
+"""The least standard error of a time that is said, in [ms]: a fit may claim less, but no clock keeps it."""
+
 SHOWN = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / math.pi)}
 """The units that people read, and how many of them one of the SI unit is."""
 
@@ -105,6 +108,11 @@ def seconds(value: float) -> str:
 def offset(value: float) -> str:
     """Return a shift in time in [s] with its sign."""
     return f"{'+' if value > 0 else ''}{seconds(value)} s"
+
+
+def standard_error(value: float) -> str:
+    """Return the standard error of a time in [s] as [ms]: two digits, none finer than a microsecond."""
+    return f"{float(f'{max(1e3 * value, FINEST):.2g}'):.6g} ms"
 
 
 def percent(share: float) -> str:
