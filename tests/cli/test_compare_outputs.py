@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import asdict
 from pathlib import Path
@@ -335,3 +338,29 @@ def test_the_option_of_a_file_is_a_path() -> None:
     assert command is not None
     kinds = {param.name: type(param.type) for param in command.params}
     assert {kinds[name] for name in ("junit", "statistics", "baseline")} == {click.Path}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
+def test_a_log_whose_name_is_no_text_is_compared_recorded_and_reported(capsys: Captured) -> None:
+    Path("good.csv").rename("gut\udcfc.csv")
+    assert compare("gut\udcfc.csv", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["runs"][0]["name"] == "gut\udcfc"
+    assert recorded("gut\ufffd-against-wanted.rrd").runs[0].name == "gut\udcfc"
+    assert run(["report", "gut\ufffd-against-wanted.rrd", "-o", "gut.html"]) == 0
+    assert "gut?" in Path("gut.html").read_text(encoding="utf-8")
+    assert run(["ingest", "gut\udcfc.csv", "--robot", "ur5e", "-q"]) == 0
+    assert Path("gut\ufffd.rrd").is_file()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
+@pytest.mark.parametrize("encoding", ["utf-8:strict", "latin-1:strict", "ascii:strict"])
+def test_no_output_is_too_narrow_for_a_name_or_a_sign(encoding: str) -> None:
+    Path("good.csv").rename("gut\udcfc.csv")
+    call = [sys.executable, "-m", "urmpipe", "compare", "wanted.csv", "gut\udcfc.csv", "--robot", "ur5e"]
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    told, found = (
+        subprocess.run([*call, *more], env=environment, capture_output=True, check=True, timeout=120)
+        for more in ((), ("--json",))
+    )
+    assert told.stdout.startswith(rb"PASS  gut\udcfc within tolerance against wanted")
+    assert json.loads(found.stdout)["runs"][0]["name"] == "gut\udcfc"
