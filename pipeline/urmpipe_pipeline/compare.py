@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 from urmpipe_models.continuity import continuous_quaternions
-from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.errors import LogError, OptionError, for_each
 from urmpipe_models.kinematics import poses_over_log
 from urmpipe_models.orientation import quaternions
 from urmpipe_pipeline.alignment import align, check_align
@@ -87,10 +87,11 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     if not runs:
         raise OptionError("compare: no log to hold against the reference; at least one is needed")
     wanted = trajectory(reference, chosen.tcp if reference.log.joints else "recorded")
-    deviations = [
-        _deviation(name, run, wanted, trajectory(run, chosen.tcp), chosen)
-        for name, run in zip(_unique([run.name for run in runs]), runs, strict=True)
-    ]
+    names = _unique([run.name for run in runs])
+    deviations = for_each(
+        lambda named: _deviation(*named, wanted, trajectory(named[1], chosen.tcp), chosen),
+        zip(names, runs, strict=True),
+    )
     told = [*_told_of(reference), *_differing_robots([reference, *runs], chosen.tcp)]
     return _comparison(wanted, deviations, chosen, told)
 
