@@ -160,6 +160,17 @@ def tolerance(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",
     return ", ".join(parts)
 
 
+def unique(names: Sequence[str]) -> list[str]:
+    """Return the names, those that repeat with a number: "log", "log-2"."""
+    result: list[str] = []
+    for name in names:
+        candidate, number = name, 2
+        while candidate in result:
+            candidate, number = f"{name}-{number}", number + 1
+        result.append(candidate)
+    return result
+
+
 def size(count: int) -> str:
     """Return a file's length in bytes, with thin spaces between thousands."""
     return f"{count:,}".replace(",", "\u202f")
