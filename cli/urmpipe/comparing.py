@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from urmpipe.guards import PathLike, Robot, place_robot, refuse_foreign, refuse_shared, refuse_warnings
-from urmpipe_models.errors import Finding, OptionError, RecordingError
+from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.compare import CompareOptions, Tcp, compare_recorded, compare_runs
@@ -134,7 +134,7 @@ def _compared(
     """Return the comparison of some logs with a reference, or of one log with what it recorded itself."""
     if isinstance(reference, Comparison):
         raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
-    first, others = run_of(reference), [run_of(log) for log in logs]
+    first, *others = for_each(run_of, (reference, *logs))
     return compare_runs(first, others, options) if others else compare_recorded(first, options)
 
 
@@ -168,9 +168,11 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
 
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
-    runs = [one.run for one in result.runs]
+    of_logs = [
+        replace(w, message=f"{one.name}: {w.message}") for one in result.runs for w in one.run.warnings
+    ]
     doubts = [w for w in result.warnings if w.kind not in (LACKING_TOOL, BEYOND)]  # those explain a result
-    refuse_warnings(strict, (*(w for run in runs for w in run.warnings), *doubts))
+    refuse_warnings(strict, (*of_logs, *doubts))
 
 
 def _files(operands: Sequence[PathLike | Run | Comparison | None]) -> list[Path]:

@@ -6,6 +6,7 @@ Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
 from __future__ import annotations
 
 import gc
+import io
 import os
 import sys
 from collections.abc import Sequence
@@ -107,6 +108,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: errors become lines on standard error and the exit code 2."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     tune_python()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # names of files and signs that it cannot take
     code = run(given)
     gc.freeze()  # else Python looks for cycles among all modules before it exits
     sys.exit(code)
@@ -156,10 +160,10 @@ def _print_findings(findings: Sequence[Finding], as_json: bool) -> None:
     if len(findings) > SHOWN_FINDINGS:
         click.echo(f"error: and {len(findings) - SHOWN_FINDINGS} more", err=True)
     if as_json:
-        import json
+        from urmpipe.printing import echo_json
 
         errors = [
             {name: getattr(one, name) for name in ("file", "line", "row", "column", "message")}
             for one in findings
         ]
-        click.echo(json.dumps({"schema": 1, "errors": errors}, ensure_ascii=False))
+        echo_json({"schema": 1, "errors": errors})

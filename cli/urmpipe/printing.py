@@ -30,7 +30,17 @@ def print_json(value: Any) -> None:
     """Print one JSON object, NaN as null."""
     from urmpipe_pipeline.results import json_ready
 
-    click.echo(json.dumps(json_ready(value), ensure_ascii=False, indent=2))
+    echo_json(json_ready(value), indent=2)
+
+
+def echo_json(value: Any, indent: int | None = None) -> None:
+    """Print a JSON value in the letters that it holds, or in ASCII where the output cannot take them all."""
+    written = json.dumps(value, ensure_ascii=False, indent=indent)
+    try:
+        written.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:  # such as the bytes of a file name that are no text
+        written = json.dumps(value, indent=indent)
+    click.echo(written)
 
 
 def print_recording(recording: Path | None) -> None:

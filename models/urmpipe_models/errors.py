@@ -7,7 +7,12 @@ allowed. The command line prints these lines and exits with 2.
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
+from typing import TypeVar
+
+Given = TypeVar("Given")
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,3 +78,22 @@ class OptionError(UrmpipeError):
 
 class ViewerError(UrmpipeError):
     """A recording cannot be shown here: there is no display, or the viewer does not start."""
+
+
+def for_each(make: Callable[[Given], Made], items: Iterable[Given]) -> list[Made]:
+    """Return what a function makes of each item.
+
+    Raises:
+        UrmpipeError: With all that is wrong with any of them, of the class of the first error.
+    """
+    made: list[Made] = []
+    errors: list[UrmpipeError] = []
+    for item in items:
+        try:
+            made.append(make(item))
+        except UrmpipeError as error:
+            errors.append(error)
+    if errors:
+        found = dict.fromkeys(finding for error in errors for finding in error.findings)
+        raise type(errors[0])(*found) from errors[0]
+    return made

@@ -7,9 +7,10 @@ from dataclasses import dataclass, field, replace
 from typing import Literal, get_args
 
 from urmpipe_models.continuity import continuous_quaternions
-from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.errors import LogError, OptionError, for_each
 from urmpipe_models.kinematics import poses_over_log
 from urmpipe_models.orientation import quaternions
+from urmpipe_pipeline import text
 from urmpipe_pipeline.alignment import align, check_align
 from urmpipe_pipeline.audit import audit_log
 from urmpipe_pipeline.comparison import Comparison, Deviation
@@ -87,10 +88,11 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     if not runs:
         raise OptionError("compare: no log to hold against the reference; at least one is needed")
     wanted = trajectory(reference, chosen.tcp if reference.log.joints else "recorded")
-    deviations = [
-        _deviation(name, run, wanted, trajectory(run, chosen.tcp), chosen)
-        for name, run in zip(_unique([run.name for run in runs]), runs, strict=True)
-    ]
+    names = text.unique([run.name for run in runs])
+    deviations = for_each(
+        lambda named: _deviation(*named, wanted, trajectory(named[1], chosen.tcp), chosen),
+        zip(names, runs, strict=True),
+    )
     told = [*_told_of(reference), *_differing_robots([reference, *runs], chosen.tcp)]
     return _comparison(wanted, deviations, chosen, told)
 
@@ -217,14 +219,3 @@ def _matched(run: Run, reference: Trajectory, actual: Trajectory, sync: Sync) ->
             lacking(run, f"no sample in common with {reference.name} (time offset {sync.offset} s)")
         )
     return matched
-
-
-def _unique(names: Sequence[str]) -> list[str]:
-    """Return the names, those that repeat with a number."""
-    result: list[str] = []
-    for name in names:
-        candidate, number = name, 2
-        while candidate in result:
-            candidate, number = f"{name}-{number}", number + 1
-        result.append(candidate)
-    return result

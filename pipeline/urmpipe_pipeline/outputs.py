@@ -5,6 +5,7 @@ An output replaces only a recording, a report or an export that urmpipe wrote, a
 
 from __future__ import annotations
 
+import os
 import re
 import uuid
 from collections.abc import Iterator, Sequence
@@ -86,6 +87,9 @@ def is_report(path: Path) -> bool:
 
 def _refuse(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
     """Raise an `OutputError` if the output may not be written there."""
+    if kind == "recording" and not _is_text(path):
+        said = "found a name that is no UTF-8 text, which Rerun cannot open, allowed: one that is"
+        raise OutputError(Finding(said, str(path)))
     try:
         trouble = _trouble(path, inputs, kind)
     except OSError as error:
@@ -109,6 +113,15 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
         such = f"such {'an' if kind in ('audit', 'export') else 'a'} {noun}"
         return f"found a file that is no {noun} of urmpipe's, allowed: a new name, or {such} to replace"
     return None
+
+
+def _is_text(path: Path) -> bool:
+    """Tell whether a path can be written as UTF-8: on Linux a name may hold any bytes."""
+    try:
+        os.fspath(path.absolute()).encode()
+    except UnicodeEncodeError:
+        return False
+    return True
 
 
 def _is_ours(path: Path, kind: OutputKind) -> bool:

@@ -8,6 +8,7 @@ from typing import Literal, TypeAlias
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning
 from urmpipe_pipeline.sync_coarse import FLOOR, mean_rates, peaks
 from urmpipe_pipeline.sync_fine import Estimate, refine
@@ -167,7 +168,7 @@ def sync_doubts(name: str, sync: Sync, period: float) -> list[LogWarning]:
     said = f"{name}: the offset of {sync.offset:.6g} s, estimated by the {sync.by},"
     doubts = []
     if sync.precision is not None and sync.precision > CERTAIN * period:
-        error = f"is known to +-{1e3 * sync.precision:.2g} ms (standard error)"
+        error = f"is known to +-{text.standard_error(sync.precision)} (standard error)"
         doubts.append(LogWarning("sync-uncertain", f"{said} {error}; the period is {1e3 * period:.6g} ms"))
     if sync.similarity is not None and sync.similarity < ALIKE:
         like = f"leaves the two motions alike by {sync.similarity:.2f} only, of 1: are they one motion?"

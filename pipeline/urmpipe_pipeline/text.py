@@ -16,6 +16,9 @@ NOTHING = "–"
 DIGITS = 4
 """Digits after the point of a length in [mm] or an angle in [deg]: 0.1 micrometres, 2 microradians."""
 
+FINEST = 1e-3
+"""The least standard error of a time that is said, in [ms]: a fit may claim less, but no clock keeps it."""
+
 SHOWN = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / math.pi)}
 """The units that people read, and how many of them one of the SI unit is."""
 
@@ -115,6 +118,11 @@ def offset(value: float) -> str:
     return f"{'+' if round(value, 6) > 0 else ''}{seconds(value)} s"
 
 
+def standard_error(value: float) -> str:
+    """Return the standard error of a time in [s] as [ms]: two digits, none finer than a microsecond."""
+    return f"{float(f'{max(1e3 * value, FINEST):.2g}'):.6g} ms"
+
+
 def percent(share: float) -> str:
     """Return a share 0..1 in [%], never rounded to 0 or to 100 when it is not."""
     scaled = share * 100.0
@@ -158,6 +166,17 @@ def tolerance(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",
         else:
             parts.append(words[name].format(limit(value, "rad" if name == "angle" else "m")))
     return ", ".join(parts)
+
+
+def unique(names: Sequence[str]) -> list[str]:
+    """Return the names, those that repeat with a number: "log", "log-2"."""
+    result: list[str] = []
+    for name in names:
+        candidate, number = name, 2
+        while candidate in result:
+            candidate, number = f"{name}-{number}", number + 1
+        result.append(candidate)
+    return result
 
 
 def size(count: int) -> str:

@@ -33,7 +33,7 @@ def sync_words(sync: Sync) -> str:
     how = "as given" if sync.mode == "given" else f"estimated from {sync.by}"
     said = f"clocks: t_reference = t_log {'-' if sync.offset < 0.0 else '+'} {abs(sync.offset):.6g} s, {how}"
     if sync.precision is not None:
-        said += f", ± {1e3 * sync.precision:.2g} ms"
+        said += f", ± {text.standard_error(sync.precision)}"
     return said + ("" if sync.similarity is None else f", similarity {sync.similarity:.4f}")
 
 

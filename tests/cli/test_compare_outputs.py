@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import csv
 import json
+import os
+import subprocess
+import sys
 import xml.etree.ElementTree as ET
 from dataclasses import asdict
 from pathlib import Path
@@ -335,3 +338,55 @@ def test_the_option_of_a_file_is_a_path() -> None:
     assert command is not None
     kinds = {param.name: type(param.type) for param in command.params}
     assert {kinds[name] for name in ("junit", "statistics", "baseline")} == {click.Path}
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
+def test_a_log_whose_name_is_no_text_is_compared_recorded_and_reported(capsys: Captured) -> None:
+    Path("good.csv").rename("gut\udcfc.csv")
+    assert compare("gut\udcfc.csv", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["runs"][0]["name"] == "gut\udcfc"
+    assert recorded("gut\ufffd-against-wanted.rrd").runs[0].name == "gut\udcfc"
+    assert run(["report", "gut\ufffd-against-wanted.rrd", "-o", "gut.html"]) == 0
+    assert "gut?" in Path("gut.html").read_text(encoding="utf-8")
+    assert run(["ingest", "gut\udcfc.csv", "--robot", "ur5e", "-q"]) == 0
+    assert Path("gut\ufffd.rrd").is_file()
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
+@pytest.mark.parametrize("encoding", ["utf-8:strict", "latin-1:strict", "ascii:strict"])
+def test_no_output_is_too_narrow_for_a_name_or_a_sign(encoding: str) -> None:
+    Path("good.csv").rename("gut\udcfc.csv")
+    call = [sys.executable, "-m", "urmpipe", "compare", "wanted.csv", "gut\udcfc.csv", "--robot", "ur5e"]
+    environment = {**os.environ, "PYTHONIOENCODING": encoding}
+    told, found = (
+        subprocess.run([*call, *more], env=environment, capture_output=True, check=True, timeout=120)
+        for more in ((), ("--json",))
+    )
+    assert told.stdout.startswith(rb"PASS  gut\udcfc within tolerance against wanted")
+    assert json.loads(found.stdout)["runs"][0]["name"] == "gut\udcfc"
+
+
+def test_all_that_is_wrong_with_any_log_is_told_at_once(capsys: Captured) -> None:
+    assert compare("no.csv", "good.csv", "none.csv", "none.csv") == 2
+    assert capsys.readouterr().err.splitlines() == [
+        "error: no.csv: found no such file",
+        "error: none.csv: found no such file",
+    ]
+    t = 0.005 * np.arange(200)
+    for name in ("still", "rest"):
+        write_log(f"{name}.csv", t, np.full((200, 6), 0.5))
+    assert compare("still.csv", "good.csv", "rest.csv", "--sync", "auto") == 2
+    errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]
+    assert [line.split(":")[1] for line in errors] == [" still.csv", " rest.csv"]
+    assert all("--sync auto: found no motion of the joints in this log" in line for line in errors)
+
+
+def test_strict_names_the_log_of_each_warning(capsys: Captured) -> None:
+    for name in ("good", "slack"):
+        lines = Path(f"{name}.csv").read_text().splitlines()
+        Path(f"{name}.csv").write_text("\n".join([lines[0].replace(" [rad]", ""), *lines[1:]]))
+    assert compare("good.csv", "slack.csv", "--strict") == 2
+    said = "no unit is given for q1, q2, q3, q4, q5, q6: the joints are taken as rad; --unit says otherwise"
+    assert capsys.readouterr().err.splitlines() == [
+        f"error: assumed-unit: {name}: {said} (--strict)" for name in ("good", "slack")
+    ]

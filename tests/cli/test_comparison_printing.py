@@ -184,6 +184,9 @@ def test_how_the_clocks_were_put_together_is_said(capsys: Captured) -> None:
     assert fact(replace(run, sync=found), "clocks", capsys) == [
         "clocks: t_reference = t_log + 3.4 s, estimated from joints, ± 0.21 ms, similarity 0.9988"
     ]
+    assert fact(replace(run, sync=replace(found, precision=6.1e-8)), "clocks", capsys) == [
+        "clocks: t_reference = t_log + 3.4 s, estimated from joints, ± 0.001 ms, similarity 0.9988"
+    ]
     assert fact(replace(run, sync=Sync("given", -0.5)), "clocks", capsys) == [
         "clocks: t_reference = t_log - 0.5 s, as given"
     ]

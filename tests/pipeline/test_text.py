@@ -60,6 +60,21 @@ def test_a_quantity_has_the_unit_that_people_read() -> None:
 
 
 @pytest.mark.parametrize(
+    ("error", "written"),
+    [
+        (0.0, "0.001 ms"),
+        (6.1e-8, "0.001 ms"),
+        (1.26e-6, "0.0013 ms"),
+        (2.1e-4, "0.21 ms"),
+        (0.1234, "120 ms"),
+        (12.6, "13000 ms"),
+    ],
+)
+def test_a_standard_error_is_said_no_finer_than_a_microsecond(error: float, written: str) -> None:
+    assert text.standard_error(error) == written
+
+
+@pytest.mark.parametrize(
     ("seconds", "written"),
     [(0.0, "0.000"), (36.91, "36.910"), (2.0625, "2.0625"), (1 / 3, "0.333333"), (math.nan, "–")],
 )

@@ -197,9 +197,9 @@ def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:
 
 
 def default_name(reference: Path, logs: tuple[Path, ...]) -> str:
-    """Return LOG-against-REFERENCE.rrd; of several logs the first names it."""
+    """Return LOG-against-REFERENCE.rrd; of several logs the first names it. Bytes of no text are replaced."""
     against = reference.resolve().stem
     if not logs:
-        return f"{against}-against-itself.rrd"
+        return click.format_filename(f"{against}-against-itself.rrd")
     more = f"-and-{len(logs) - 1}-more" if len(logs) > 1 else ""
-    return f"{logs[0].resolve().stem}{more}-against-{against}.rrd"
+    return click.format_filename(f"{logs[0].resolve().stem}{more}-against-{against}.rrd")

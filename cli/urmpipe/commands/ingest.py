@@ -100,6 +100,9 @@ def ingest(
 
 
 def default_name(logs: tuple[Path, ...]) -> str:
-    """Return LOG.rrd; several files that are one log go by the name of their folder."""
+    """Return LOG.rrd; several files that are one log go by the name of their folder.
+
+    Bytes of no text are replaced: Rerun opens no file whose name holds such.
+    """
     first = logs[0].resolve()
-    return f"{first.parent.name if len(logs) > 1 else first.stem}.rrd"
+    return click.format_filename(f"{first.parent.name if len(logs) > 1 else first.stem}.rrd")

@@ -74,6 +74,8 @@ def draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
     for plot, values in _plots(one):
+        if not values.size:  # a path has no joints
+            continue
         ends = [ufunc.reduce(values, axis=None) for ufunc in (np.fmin, np.fmax)]  # of what is no NaN
         if np.isfinite(ends).all():
             entity = worst_entity(place, plot)

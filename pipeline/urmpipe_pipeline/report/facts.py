@@ -103,7 +103,7 @@ def sync_value(sync: Sync) -> str:
     """Return how two clocks were put together."""
     if sync.mode == "start":
         return "both start together"
-    within = "" if sync.precision is None else f" ± {sync.precision * 1e3:.2g} ms"
+    within = "" if sync.precision is None else f" ± {text.standard_error(sync.precision)}"
     return f"{text.offset(sync.offset)}{within}"
 
 

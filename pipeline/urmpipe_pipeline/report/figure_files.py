@@ -18,6 +18,7 @@ from urmpipe_models.errors import Finding, OptionError, OutputError
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.report.headless import FigureFormat, draw
 from urmpipe_pipeline.report.spec import Figure
+from urmpipe_pipeline.text import unique
 
 FORMATS: tuple[FigureFormat, ...] = get_args(FigureFormat)
 
@@ -96,7 +97,7 @@ def write_figures(
         OutputError: If they may not be written there, or there is nothing to draw them with.
     """
     _make_folder(options.folder)
-    stems = _unique([figure_stem(figure.title, part) for part, figure in figures])
+    stems = unique([figure_stem(figure.title, part) for part, figure in figures])
     wanted = [
         (figure, suffix, FigureFile(options.folder / f"{stem}.{suffix}", figure.title, part))
         for stem, (part, figure) in zip(stems, figures, strict=True)
@@ -129,17 +130,6 @@ def _plain_name(text: str) -> str:
     """Return a text in letters that every file system takes."""
     plain = unicodedata.normalize("NFKD", text).encode("ascii", "ignore").decode().lower()
     return re.sub(r"[^a-z0-9]+", "-", plain)[:LONGEST_NAME].strip("-")
-
-
-def _unique(stems: Sequence[str]) -> list[str]:
-    """Return the names, those that repeat with a number."""
-    result: list[str] = []
-    for stem in stems:
-        candidate, number = stem, 2
-        while candidate in result:
-            candidate, number = f"{stem}-{number}", number + 1
-        result.append(candidate)
-    return result
 
 
 def _marked_svg(drawn: bytes, figure: Figure) -> bytes:

@@ -69,7 +69,7 @@ def write_report(
     """
     page = _lay_out(results)
     with guarded_output(path, inputs, kind="report") as part:
-        part.write_bytes(_render(page).encode("utf-8"))
+        part.write_bytes(_render(page).encode("utf-8", "replace"))  # a file name may hold bytes of no text
         if progress and figures is None:
             progress(1.0)
         files = () if figures is None else write_figures(page.figures, figures, inputs, progress)

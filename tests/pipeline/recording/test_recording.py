@@ -134,6 +134,15 @@ def test_a_log_of_times_alone_comes_back_as_it_was(make_run: MakeRun, tmp_path: 
     assert_same(round_trip(run, tmp_path), run)
 
 
+def test_a_path_held_against_a_path_is_recorded(make_run: MakeRun, tmp_path: Path) -> None:
+    run = path_run(make_run(rows=20))
+    comparison = compare_runs(run, [run, make_run(rows=20)])
+    back = read_recording(write_recording(comparison, tmp_path / "paths.rrd"))
+    assert isinstance(back, Comparison)
+    assert [one.run.log.joints for one in back.runs] == [(), make_run(rows=20).log.joints]
+    np.testing.assert_array_equal(back.runs[0].actual, comparison.runs[0].actual)
+
+
 def test_a_grid_without_any_value_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:
     run = make_run(rows=30)
     assert run.tcp is not None

@@ -26,6 +26,12 @@ TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
             "as asked for; t of the reference = t of the log + this",
         ),
         (
+            Sync("auto", 3.4, "position", 6.1e-8, 1.0),
+            "+3.400 s ± 0.001 ms",
+            "found by the motion of the position; t of the reference = t of the log + this;"
+            " likeness of the motions there: 1.0000 of 1",
+        ),
+        (
             Sync("auto", 3.4, "joints", 1.25e-5, 0.99991),
             "+3.400 s ± 0.013 ms",
             "found by the motion of the joints; t of the reference = t of the log + this;"
