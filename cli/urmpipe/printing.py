@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -44,8 +45,12 @@ def echo_json(value: Any, indent: int | None = None) -> None:
 
 
 def print_recording(recording: Path | None) -> None:
-    """Print where a recording is and how to open it."""
-    click.echo(f"Recording: {recording}  (open it: urmpipe view {recording})")
+    """Print where a recording is and how to open it, with the urmpipe that is running."""
+    command = "urmpipe"
+    if shutil.which(command) is None:  # not on the path, as in an environment that was not activated
+        installed, here = Path(sys.executable).parent / command, Path.cwd()
+        command = str(installed.relative_to(here) if installed.is_relative_to(here) else installed)
+    click.echo(f"Recording: {recording}  (open it: {command} view {recording})")
 
 
 def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
