@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-import csv
 from pathlib import Path
 from typing import Any
 
-from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.csv_rows import write_rows
 from urmpipe_pipeline.outputs import AUDIT_COLUMNS
 from urmpipe_pipeline.results import Run
 
@@ -23,11 +22,7 @@ def write_audit(run: Run, part: Path, path: Path) -> None:
         OutputError: If it did not read back as it was written.
     """
     rows = [list(AUDIT_COLUMNS), *([str(cell) for cell in _cells(one.to_dict())] for one in run.audit)]
-    with part.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file:
-        csv.writer(file).writerows(rows)
-    with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:
-        if list(csv.reader(file)) != rows:
-            raise OutputError(Finding("reads back otherwise than written", str(path)))
+    write_rows(rows, part, path)
 
 
 def _cells(entry: dict[str, Any]) -> list[Any]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import csv
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
-from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.comparison import Comparison, Statistics
+from urmpipe_pipeline.csv_rows import write_rows
 
 COLUMNS = ("run", "sync_offset", *(field.name for field in fields(Statistics)))
 """The header; lengths are in m, angles in rad, times in s."""
@@ -28,11 +27,7 @@ def write_statistics(result: Comparison, part: Path, path: Path) -> None:
         OutputError: If it did not read back as it was written.
     """
     rows = [list(COLUMNS), *([_cell(row[name]) for name in COLUMNS] for row in result.rows())]
-    with part.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file:
-        csv.writer(file, lineterminator="\n").writerows(rows)
-    with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:
-        if list(csv.reader(file)) != rows:
-            raise OutputError(Finding("reads back otherwise than written", str(path)))
+    write_rows(rows, part, path)
 
 
 def _cell(value: Any) -> str:

@@ -41,6 +41,15 @@ def test_without_a_display_it_says_what_to_do(urmpipe: RunCommand, monkeypatch: 
     assert (ran.code, ran.out, ran.err) == (2, "", f"error: {NO_DISPLAY}\n")
 
 
+def refused(environment: dict[str, str], platform: str) -> bool:
+    """Tell whether there is no display to show a recording on."""
+    try:
+        refuse_without_display([Path("run.rrd")], environment, platform)
+    except ViewerError:
+        return True
+    return False
+
+
 @pytest.mark.parametrize(
     ("environment", "platform"),
     [
@@ -51,7 +60,8 @@ def test_without_a_display_it_says_what_to_do(urmpipe: RunCommand, monkeypatch: 
     ],
 )
 def test_where_there_is_a_display_it_is_used(environment: dict[str, str], platform: str) -> None:
-    refuse_without_display([Path("run.rrd")], environment, platform)
+    assert not refused(environment, platform)
+    assert refused({}, "linux")
 
 
 def test_an_empty_variable_is_no_display() -> None:

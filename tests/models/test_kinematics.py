@@ -230,14 +230,14 @@ def test_motion_and_jacobian_of_every_point_are_pinocchios(
         velocity = pin.getFrameVelocity(model, peers, frame, aligned).vector
         acceleration = pin.getFrameClassicalAcceleration(model, peers, frame, aligned).vector
         J = pin.getFrameJacobian(model, peers, frame, aligned).reshape(6, -1)
-        close(motion.pose.translation, peers.oMf[frame].translation)
-        close(motion.pose.rotation, peers.oMf[frame].rotation)
-        close([*motion.velocity, *motion.omega], velocity)
-        close([*motion.acceleration, *motion.alpha], acceleration)
-        close(np.array(jacobian(chain, q, k), dtype=float).T, J)
+        assert_close(motion.pose.translation, peers.oMf[frame].translation)
+        assert_close(motion.pose.rotation, peers.oMf[frame].rotation)
+        assert_close([*motion.velocity, *motion.omega], velocity)
+        assert_close([*motion.acceleration, *motion.alpha], acceleration)
+        assert_close(np.array(jacobian(chain, q, k), dtype=float).T, J)
 
 
-def close(got: Any, expected: Any) -> None:
+def assert_close(got: Any, expected: Any) -> None:
     """Hold values of some tens: levers of up to 10 m, times speeds of up to 7 and their squares."""
     np.testing.assert_allclose(np.array(got, dtype=float), expected, rtol=AGREES, atol=30 * AGREES)
 
@@ -289,7 +289,7 @@ def test_jacobian_velocity_and_acceleration_are_the_differences_of_the_poses(
             np.array(motion.acceleration, dtype=float), (after - 2 * here + before)[k] / h**2, atol=1e-4
         )
         # the Jacobian maps the rates to the very velocity that the recursion finds
-        close([*motion.velocity, *motion.omega], J @ qd)
+        assert_close([*motion.velocity, *motion.omega], J @ qd)
 
 
 @settings(deadline=None, max_examples=40)

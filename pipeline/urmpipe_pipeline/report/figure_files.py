@@ -107,6 +107,7 @@ def write_figures(
         places = [stack.enter_context(guarded_output(file.path, inputs, "figure")) for _, _, file in wanted]
 
         def write(number: int, drawn: bytes) -> None:
+            """Put our mark into a drawn figure and write it to its place."""
             figure, suffix, _ = wanted[number]
             marked = _marked_svg(drawn, figure) if suffix == "svg" else _marked_png(drawn, figure)
             places[number].write_bytes(marked)
