@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from urmpipe_datasets import LOGS
@@ -79,6 +79,14 @@ def refused(reference: Trajectory, log: Trajectory, align: AlignMode = "none") -
     return str(error.value)
 
 
+def shared(q: Motion, wanted: FloatArray, done: FloatArray) -> float:
+    """Share of a motion, as the energy of its rates, that both sides have; of the side with more of it."""
+    first, last = max(wanted[0], done[0]), min(wanted[-1], done[-1])
+    energies = [(np.diff(q(t), axis=0) ** 2).sum(axis=1) for t in (wanted, done)]
+    both = [(t[:-1] >= first) & (t[1:] <= last) for t in (wanted, done)]
+    return max(float(side[here].sum() / side.sum()) for side, here in zip(energies, both, strict=True))
+
+
 STARTS = st.floats(0.0, 6.0)
 LENGTHS = st.floats(14.0, 20.0)
 RATES = st.sampled_from([(0.005, 0.005), (0.005, 0.008), (0.008, 0.005), (0.004, 0.01)])
@@ -87,14 +95,23 @@ SEEDS = st.integers(0, 2**32 - 1)
 
 @settings(max_examples=25, deadline=None)
 @given(SEEDS, STARTS, STARTS, LENGTHS, LENGTHS, RATES, st.sampled_from([smooth, moves]))
-def test_any_offset_between_two_logs_of_the_joints_is_found(
+@example(19933, 0.0, 6.0, 14.0, 15.0, (0.005, 0.005), smooth)  # 8 s in both, 0.49 of the motion
+@example(3262002750, 0.0, 6.0, 14.0, 14.0, (0.004, 0.01), moves)
+def test_any_offset_between_two_logs_of_the_joints_is_found_or_too_little_is_in_both(
     seed: int, first: float, second: float, long: float, other: float, rate: tuple[float, float],
     make: Callable[[int, int], Motion],
 ) -> None:  # fmt: skip
     q = make(seed, 6)
     wanted, done = times(first, long, rate[0]), times(second, other, rate[1])
     turns = 2.0 * np.pi * np.arange(6)  # two logs may count the turns of their start differently
-    sync = synchronise(joints(q(wanted), wanted, "wanted"), joints(q(done) + turns, done), "auto")
+    reference, log = joints(q(wanted), wanted, "wanted"), joints(q(done) + turns, done)
+    try:
+        sync = synchronise(reference, log, "auto")
+    except LogError as error:
+        assert str(error).endswith(f"; {ALLOWED}")
+        # A period of up to 0.1 s at either end, of 8 s in both, is cut off: 0.02 of the motion.
+        assert shared(q, wanted, done) < 0.52
+        return
     assert abs(sync.offset - (second - first)) < CLEAN
     assert (sync.mode, sync.by) == ("auto", "joints")
     assert sync.similarity is not None
