@@ -7,7 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.columns import Column, print_columns
-from urmpipe.printing import LISTED, judged
+from urmpipe.printing import LISTED, judged_line
 from urmpipe_pipeline import text
 from urmpipe_pipeline.baseline import Absent, BaselineComparison, Change, Worse
 from urmpipe_pipeline.results import json_ready
@@ -27,10 +27,8 @@ def print_baseline(console: Console, found: BaselineComparison) -> None:
     worse = f"{number} {'quantity' if number == 1 else 'quantities'} worse"
     gone = f", {len(found.gone)} gone" if found.gone else ""
     said = "nothing worse" if found.verdict == "pass" else worse + gone
-    line = judged(found.verdict)
-    line.append(f"  against the baseline {found.name}: {said}", style="not bold default")
     console.print()
-    console.print(line, soft_wrap=True)
+    console.print(judged_line(found.verdict, f"against the baseline {found.name}: {said}"), soft_wrap=True)
     changed = [change for change in found.changes if change.changed]
     if changed:
         title = f"Changed since {found.name} by more than the noise"

@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe.columns import Column, print_columns
 from urmpipe.comparison_facts import facts
-from urmpipe.printing import count, judged, new_console
+from urmpipe.printing import count, judged, judged_line, new_console
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Statistics
 from urmpipe_pipeline.wording import correlation, of_allowed
@@ -52,7 +52,7 @@ def _print_verdict(console: Console, result: Comparison) -> None:
     number = f"{len(failed)} of {total} logs" if failed else f"all {total} logs"
     who = result.runs[0].name if total == 1 else number
     said = f"{who} {'out of' if failed else 'within'} tolerance against {result.reference.name}"
-    console.print(judged(result.verdict).append(f"  {said}", style="not bold default"), soft_wrap=True)
+    console.print(judged_line(result.verdict, said), soft_wrap=True)
     worst = result.ranking[-1]
     console.print(f"      {_decisive(worst, named=total > 1)}", soft_wrap=True)
 

@@ -229,7 +229,9 @@ def log_options(command: Command) -> Command:
 def _tell_defaults(ctx: click.Context, param: click.Parameter, quiet: bool) -> bool:
     """Tell what urmpipe.toml says for the command, before anything in it can be found to be wrong."""
     if ctx.obj and not quiet:
-        click.echo(ctx.obj, err=True)
+        from urmpipe.printing import say
+
+        say(ctx.obj, err=True)
     return quiet
 
 

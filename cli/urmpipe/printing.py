@@ -12,6 +12,8 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from urmpipe_models.errors import one_line
+
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
@@ -44,13 +46,18 @@ def echo_json(value: Any, indent: int | None = None) -> None:
     click.echo(written)
 
 
+def say(line: str, *, err: bool = False) -> None:
+    """Print one line, on standard output or standard error; what is not printable in names as escapes."""
+    click.echo(one_line(line), err=err)
+
+
 def print_recording(recording: Path | None) -> None:
     """Print where a recording is and how to open it, with the urmpipe that is running."""
     command = "urmpipe"
     if shutil.which(command) is None:  # not on the path, as in an environment that was not activated
         installed, here = Path(sys.executable).parent / command, Path.cwd()
         command = str(installed.relative_to(here) if installed.is_relative_to(here) else installed)
-    click.echo(f"Recording: {recording}  (open it: {command} view {recording})")
+    say(f"Recording: {recording}  (open it: {command} view {recording})")
 
 
 def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
@@ -58,9 +65,9 @@ def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
     named = f"{log}: " if log else ""
     for warning in warnings[:LISTED]:
         place = f"row {warning.row}: " if warning.row is not None else ""
-        click.echo(f"warning: {named}{place}{warning.message}", err=True)
+        say(f"warning: {named}{place}{warning.message}", err=True)
     if len(warnings) > LISTED:
-        click.echo(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
+        say(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
 
 
 def print_run(run: Run, *, alternatives: bool = False) -> None:
@@ -139,15 +146,25 @@ def judged(verdict: str | None) -> Text:
     return Text(NOTHING) if verdict is None else Text(verdict.upper(), style=style[verdict])
 
 
+def judged_line(verdict: str | None, said: str) -> Text:
+    """Return a verdict and what is said to it, in one line."""
+    return judged(verdict).append(f"  {one_line(said)}", style="not bold default")
+
+
 def new_console() -> Console:
     """Return a console that takes text as it is: names from files may hold brackets."""
     from rich.console import Console
 
     class PlainConsole(Console):
-        """Leaves a closed pipe to the error boundary: rich itself exits with 1, which is a verdict."""
+        """Shows text as it is, and lets nothing in it act on the terminal."""
 
         def on_broken_pipe(self) -> None:
+            """Leave a closed pipe to the error boundary: rich itself exits with 1, which is a verdict."""
             raise BrokenPipeError
+
+        def render_str(self, text: str, **options: Any) -> Text:
+            """Return a string or the text of a cell, line by line without what is not printable."""
+            return super().render_str("\n".join(one_line(line) for line in text.split("\n")), **options)
 
     width = None if sys.stdout.isatty() else PIPE_WIDTH
     return PlainConsole(width=width, markup=False, emoji=False, highlight=False)

@@ -39,7 +39,17 @@ class Finding:
             place += f":{self.line}"
         if self.column is not None:
             place += f"{', ' if place else ''}column {self.column}"
-        return f"{place}: {self.message}" if place else self.message
+        return one_line(f"{place}: {self.message}" if place else self.message)
+
+
+def one_line(text: str) -> str:
+    """Return a text with all that is not printable as the escapes of Python's strings.
+
+    Names come from files, and may hold what breaks a line or what a terminal acts on instead of showing it.
+    """
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
 
 
 class UrmpipeError(Exception):

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -29,3 +31,21 @@ def test_the_command_that_opens_a_recording_works_without_an_activated_environme
     print_recording(Path("run.rrd"))
     within = Path("bin") / "urmpipe"
     assert capsys.readouterr().out == f"Recording: run.rrd  (open it: {within} view run.rrd)\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="Windows allows no such names")
+def test_nothing_in_a_name_acts_on_the_terminal(urmpipe: Callable[..., Any], tmp_path: Path) -> None:
+    rows = "".join(f"{0.005 * k:.3f},{0.001 * k:.3f},0,0\n" for k in range(40))
+    (tmp_path / "wanted\x1b[31m.csv").write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
+    (tmp_path / "done\r\n.csv").write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
+    (tmp_path / "wrong\x1b.csv").write_text("t,q1\n0,x\n1,2\n", encoding="utf-8")
+    for words, code in (
+        (["ingest", "wanted\x1b[31m.csv"], 0),
+        (["ingest", "wanted\x1b[31m.csv", "--explain"], 0),
+        (["compare", "wanted\x1b[31m.csv", "done\r\n.csv"], 0),
+        (["ingest", "wrong\x1b.csv"], 2),
+    ):
+        ran = urmpipe(*words)
+        assert ran.code == code
+        assert all(line.isprintable() for line in (ran.out + ran.err).split("\n"))
+        assert r"\x1b" in ran.out + ran.err

@@ -132,11 +132,11 @@ def compare(
     tune_pyarrow()
     from urmpipe.comparing import compare as compare_logs
     from urmpipe.comparison_printing import print_comparison
-    from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar
+    from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar, say
 
     said = about_recordings(ctx, (reference, *logs))
     if said and not quiet:
-        click.echo(f"note: {said}", err=True)
+        say(f"note: {said}", err=True)
     made = None if logs or not options["baseline"] else _made_before(ctx, reference)
     if not options["baseline"] and ctx.get_parameter_source("noise") != ParameterSource.COMMANDLINE:
         options["noise"] = None  # what a lab says for the calls that have a baseline
@@ -167,7 +167,7 @@ def compare(
         print_comparison(result)
         for title, path in (("JUnit", shared["junit"]), ("Statistics", shared["statistics"])):
             if path:
-                click.echo(f"{title}: {path}")
+                say(f"{title}: {path}")
         print_recording(result.recording)
     return 0 if result.accepted else 1
 

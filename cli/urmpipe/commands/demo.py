@@ -42,7 +42,7 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
     from urmpipe import api
     from urmpipe.comparing import compare
     from urmpipe.comparison_printing import print_comparison
-    from urmpipe.printing import print_json, print_recording, progress_bar
+    from urmpipe.printing import print_json, print_recording, progress_bar, say
     from urmpipe_datasets import LOGS
 
     output.mkdir(parents=True, exist_ok=True)
@@ -64,7 +64,7 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
         print_json(result.to_dict() | {"as_expected": as_expected, "report": str(report.path)})
     elif not quiet:
         print_comparison(result)
-        click.echo(AS_EXPECTED if as_expected else f"These are not the verdicts expected: {EXPECTED}")
-        click.echo(f"Report:    {report.path}  (open it in any browser)")
+        say(AS_EXPECTED if as_expected else f"These are not the verdicts expected: {EXPECTED}")
+        say(f"Report:    {report.path}  (open it in any browser)")
         print_recording(result.recording)
     return 0 if as_expected else 1

@@ -53,7 +53,7 @@ def export(recording: Path, output: Path | None, as_json: bool, quiet: bool, **o
     """
     tune_pyarrow()
     from urmpipe import api
-    from urmpipe.printing import print_json, print_warnings
+    from urmpipe.printing import print_json, print_warnings, say
 
     result = api.export(recording, output, **options)
     if not quiet:
@@ -63,5 +63,5 @@ def export(recording: Path, output: Path | None, as_json: bool, quiet: bool, **o
     elif not quiet:
         columns = len(result.columns)
         for one in result.files:
-            click.echo(f"Export: {one.path}  ({one.rows} rows, {columns} columns)")
+            say(f"Export: {one.path}  ({one.rows} rows, {columns} columns)")
     return 0

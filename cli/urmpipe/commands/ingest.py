@@ -62,7 +62,15 @@ def ingest(
     """
     tune_pyarrow()
     from urmpipe import api
-    from urmpipe.printing import count, print_json, print_recording, print_run, print_warnings, progress_bar
+    from urmpipe.printing import (
+        count,
+        print_json,
+        print_recording,
+        print_run,
+        print_warnings,
+        progress_bar,
+        say,
+    )
 
     if explain and output:
         raise click.UsageError(
@@ -93,9 +101,9 @@ def ingest(
         if run.recording:
             print_recording(run.recording)
         if audit:
-            click.echo(f"Audit: {audit}  ({count(len(run.audit), 'line')})")
+            say(f"Audit: {audit}  ({count(len(run.audit), 'line')})")
         if map_output:
-            click.echo(f"Map: {map_output}  (use it: urmpipe ingest LOG --map {map_output})")
+            say(f"Map: {map_output}  (use it: urmpipe ingest LOG --map {map_output})")
     return 0
 
 

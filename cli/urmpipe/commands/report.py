@@ -66,7 +66,7 @@ def report(
         raise click.UsageError("--format: found without --figures, allowed: with --figures DIR")
     tune_pyarrow()
     from urmpipe import api
-    from urmpipe.printing import print_json, progress_bar
+    from urmpipe.printing import print_json, progress_bar, say
 
     target = output or Path(f"{recordings[0].stem}.html")
     with progress_bar(f"Writing {target}", quiet=quiet) as progress:
@@ -76,7 +76,7 @@ def report(
     if as_json:
         print_json(result.to_dict())
     elif not quiet:
-        click.echo(f"Report: {result.path}  (open it in any browser)")
+        say(f"Report: {result.path}  (open it in any browser)")
         if figures:
-            click.echo(f"Figures: {len(result.figures)} files in {figures}")
+            say(f"Figures: {len(result.figures)} files in {figures}")
     return 0

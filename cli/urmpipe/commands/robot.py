@@ -136,7 +136,7 @@ def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options
       urmpipe robot export ur5e --tool 0,0,0.15 -o ur5e-gripper.urdf
       urmpipe robot export urm8 -o urm8.toml
     """
-    from urmpipe.printing import print_json
+    from urmpipe.printing import print_json, say
     from urmpipe_models.errors import OptionError
     from urmpipe_models.export import write_export
     from urmpipe_models.robot_file import robot_toml
@@ -151,7 +151,7 @@ def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options
     if as_json:
         print_json({"schema": 1, "robot": chain.name, "file": target})
     elif not quiet:
-        click.echo(f"Robot: {target}")
+        say(f"Robot: {target}")
     return 0
 
 

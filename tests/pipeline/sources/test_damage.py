@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import Phase, given, settings
+from hypothesis import Phase, example, given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.chain import Chain, Joint
@@ -81,6 +81,7 @@ def damaged(draw: st.DrawFn) -> bytes:
 @pytest.mark.filterwarnings("error")
 @settings(max_examples=300, deadline=None)
 @given(damaged(), st.sampled_from(OPTIONS), st.sampled_from(ROBOTS))
+@example(SPECIMENS[10].replace(b"q values", b"q\r values", 1), ReadOptions(), None)
 def test_a_sound_log_or_an_error_of_ours(content: bytes, options: ReadOptions, robot: Chain | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.csv"
