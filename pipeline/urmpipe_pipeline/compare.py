@@ -18,6 +18,7 @@ from urmpipe_pipeline.joint_log import FloatArray, LogWarning
 from urmpipe_pipeline.left_out import left_out_warnings
 from urmpipe_pipeline.matching import Matched, as_recorded, by_kinematics, lacking, match
 from urmpipe_pipeline.measure import measure, unheld
+from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.recorded_tcp import lacking_tool
 from urmpipe_pipeline.results import Run
@@ -167,6 +168,7 @@ def _comparison(
         warnings += left_out_warnings(one, reference)
         if _lacks_joints(reference, one):
             warnings.append(_joints_not_compared(reference, one))
+    warnings += _shapes_gone(deviations)
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
     given = {
         "tolerance": dict(options.tolerance),
@@ -187,6 +189,14 @@ def _comparison(
         warnings=tuple(warnings),
         provenance=provenance("compare", given, inputs),
     )
+
+
+def _shapes_gone(deviations: Sequence[Deviation]) -> list[LogWarning]:
+    """Return what cannot be drawn of the arms any more: a recording keeps the names of mesh files only."""
+    arms = [one.run for one in deviations if one.run.robot]
+    told = {warning.message for run in arms for warning in run.warnings}
+    gone = dict.fromkeys(warning for run in arms if run.robot for warning in missing_visuals(run.robot))
+    return [warning for warning in gone if warning.message not in told]
 
 
 def _lacks_joints(reference: Trajectory, one: Deviation) -> bool:

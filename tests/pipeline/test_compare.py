@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -12,10 +13,12 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics import point_over_log, positions_over_log
 from urmpipe_models.transform import translation
 from urmpipe_models.urm import urm_chain
+from urmpipe_models.visual import Mesh, Visual
 from urmpipe_pipeline.audit import audit_log
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.derivatives import derivatives
 from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.results import Run
 
@@ -268,3 +271,18 @@ def test_kinematics_of_different_robots_are_told(q: FloatArray) -> None:
     assert compare_runs(arm_run(q), [arm_run(q, robot=other)]).warnings  # logs of one name are two logs
     path = path_run(positions_over_log(URM6, q))
     assert not compare_runs(path, [arm_run(q)]).warnings
+
+
+def test_meshes_that_went_away_since_the_log_was_read_are_told_once(q: FloatArray, tmp_path: Path) -> None:
+    mesh = tmp_path / "link.stl"
+    mesh.write_bytes(b"solid")
+    shown = replace(URM6, visuals=(Visual("phi1", Mesh(str(mesh))),))
+    logs = [arm_run(q, name=name, robot=shown) for name in ("one", "other")]
+    path = path_run(positions_over_log(URM6, q))
+    assert compare_runs(path, logs).warnings == ()
+    mesh.unlink()
+    gone = missing_visuals(shown)
+    assert compare_runs(path, logs).warnings == tuple(gone)
+    assert [warning.kind for warning in gone] == ["visual-missing"]
+    told = [replace(log, warnings=tuple(gone)) for log in logs]  # read when they were gone already
+    assert compare_runs(path, told).warnings == ()
