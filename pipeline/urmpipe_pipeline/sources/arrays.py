@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from itertools import pairwise
@@ -11,7 +10,7 @@ from itertools import pairwise
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells import is_missing, is_number
-from urmpipe_pipeline.sources.form import CLOSING, Form, RowError, Value, spread_names, words_around
+from urmpipe_pipeline.sources.form import CLOSING, Form, Value, spread_names, usual_length, words_around
 from urmpipe_pipeline.sources.sniff import COMMENTS, Layout, sniff
 from urmpipe_pipeline.sources.text import HeadLine, Segment, head_lines
 
@@ -54,8 +53,9 @@ def sniff_arrays(segment: Segment, delimiter: str | None = None, decimal: str | 
         segment, delimiter, decimal, [replace(row, text=_with_plain(form, row.text)) for row in rows]
     )
     form = replace(form, delimiter=outer.delimiter, decimal=outer.decimal, names=outer.names)
-    values = _values(form, [row for row in rows if row.number >= outer.first_line])
-    lengths = tuple(_length([row[j] for row in values]) for j in range(len(outer.names)))
+    body = [row.text for row in rows if row.number >= outer.first_line]
+    values = form.readable(text for text in body if not text.lstrip().startswith(COMMENTS))
+    lengths = tuple(usual_length(row[j] for row in values) for j in range(len(outer.names)))
     if not any(lengths):
         return None
     _refuse_commas(segment, form, rows)
@@ -93,27 +93,6 @@ def _joined(form: Form, lines: Sequence[HeadLine], *, whole: bool) -> list[HeadL
 def _with_plain(form: Form, text: str) -> str:
     """Return a row with a plain number for each array."""
     return form.replaced(text, lambda array: _PLAIN if _is_numeric(array) or "'" in array else array)
-
-
-def _values(form: Form, rows: Sequence[HeadLine]) -> list[list[Value]]:
-    """Return the values of the rows that have all of them."""
-    result = []
-    for row in rows:
-        if row.text.lstrip().startswith(COMMENTS):
-            continue
-        try:
-            values = form.values(row.text)
-        except RowError:
-            continue
-        if len(values) == len(form.names):
-            result.append(values)
-    return result
-
-
-def _length(values: Sequence[Value]) -> int:
-    """Return how many numbers most values of a column hold: 0 if most are plain cells."""
-    lengths = Counter(0 if isinstance(value, str) else len(value) for value in values)
-    return lengths.most_common(1)[0][0] if lengths else 0
 
 
 def _is_numeric(value: Value) -> bool:

@@ -10,6 +10,7 @@ raises `UnfitError` where a row is not like the others.
 from __future__ import annotations
 
 import re
+from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -120,6 +121,18 @@ class Form:
         cells = split_line(self.replaced(text, lambda _: _MARK), self.delimiter)
         whole = (re.sub(_MARK, lambda _: next(arrays, _MARK), cell) for cell in cells)
         return [self._value(cell) for cell in whole]
+
+    def readable(self, texts: Iterable[str]) -> list[list[Value]]:
+        """Return the values of the rows that have all of them."""
+        rows = []
+        for text in texts:
+            try:
+                values = self.values(text)
+            except RowError:
+                continue
+            if len(values) == len(self.names):
+                rows.append(values)
+        return rows
 
     def arrays(self, text: str) -> list[str]:
         """Return the arrays of a row, with their brackets and quotes."""
@@ -260,6 +273,12 @@ class Form:
         separates[between] = False
         result: bytes = flat[~separates].tobytes()
         return result
+
+
+def usual_length(values: Iterable[Value]) -> int:
+    """Return how many numbers most values of a column hold, 0 for plain cells; of two alike, the more."""
+    counts = Counter(0 if isinstance(value, str) else len(value) for value in values)
+    return max(counts, key=lambda length: (counts[length], length), default=0)
 
 
 def words_around(texts: Iterable[str]) -> tuple[str, ...]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells import is_number
-from urmpipe_pipeline.sources.form import Form, spread_names, words_around
+from urmpipe_pipeline.sources.form import Form, spread_names, usual_length, words_around
 from urmpipe_pipeline.sources.sniff import SAMPLED_LINES, Layout
 from urmpipe_pipeline.sources.text import HeadLine, Segment, head_lines
 
@@ -80,15 +80,14 @@ def _layout(segment: Segment, rows: Sequence[HeadLine], labels: tuple[str, ...],
     names = tuple(_BARE.sub(" ", label).strip() for label in labels)
     form = Form(names, (0,) * len(names), ";", opening=opening, labels=labels, tail=tail)
     form = replace(form, words=words_around(row.text for row in rows))
-    values = [form.values(row.text) for row in rows]
-    lengths = tuple(
-        Counter(0 if isinstance(row[j], str) else len(row[j]) for row in values).most_common(1)[0][0]
-        for j in range(len(names))
-    )
+    values = form.readable(row.text for row in rows)
+    if not values:
+        return None
+    lengths = tuple(usual_length(row[j] for row in values) for j in range(len(names)))
     plain = [value for row in values for value in row if isinstance(value, str)]
     decimal = "," if any(is_number(v, ",") and not is_number(v, ".") for v in plain) else "."
     form = replace(form, lengths=lengths, decimal=decimal, opening=opening if any(lengths) else "")
-    sample = form.sampled(values)
+    sample = form.sampled(form.readable(row.text for row in rows))
     if not sample or not any(is_number(cell, decimal) for cell in sample[0]):
         return None
     shown = " ".join(label.strip(",;{ ") for label in labels)

@@ -82,6 +82,9 @@ def damaged(draw: st.DrawFn) -> bytes:
 @settings(max_examples=300, deadline=None)
 @given(damaged(), st.sampled_from(OPTIONS), st.sampled_from(ROBOTS))
 @example(SPECIMENS[10].replace(b"q values", b"q\r values", 1), ReadOptions(), None)
+@example(b'connected\nTime:"]" values: [1, 3] Type: 0\n', ReadOptions(), None)
+@example(SPECIMENS[10].replace(b"1, 2", b""), ReadOptions(), None)
+@example(SPECIMENS[10].replace(b"1, 2", b"").replace(b"1, 3", b""), ReadOptions(), None)
 def test_a_sound_log_or_an_error_of_ours(content: bytes, options: ReadOptions, robot: Chain | None) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.csv"
