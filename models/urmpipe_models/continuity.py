@@ -88,13 +88,15 @@ def _nearest_turns(angles: FloatArray) -> FloatArray:
 
 
 def _vectors(v: FloatArray) -> FloatArray:
-    angle = np.linalg.norm(v, axis=1)
-    turning = np.flatnonzero(angle > 0.0)
+    largest = np.abs(v).max(axis=1)
+    turning = np.flatnonzero(largest > 0.0)
     if not len(turning):
         return v
-    last = np.maximum.accumulate(np.where(angle > 0.0, np.arange(len(v)), -1))
+    last = np.maximum.accumulate(np.where(largest > 0.0, np.arange(len(v)), -1))
     known = np.where(last < 0, turning[0], last)
-    axis = v[known] / angle[known, np.newaxis]
+    along = v[known] / largest[known, np.newaxis]  # squares of tiny components are no numbers any more
+    lengths = np.linalg.norm(along, axis=1)
+    axis, angle = along / lengths[:, np.newaxis], largest * lengths
     signs = _signs(axis)
     turns = _nearest_turns(signs * angle)
     more = axis * (signs * turns * FULL_TURN)[:, np.newaxis]

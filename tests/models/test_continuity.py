@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from urmpipe_models.continuity import (
@@ -51,6 +51,8 @@ def test_a_turn_about_a_drifting_axis_goes_on_past_pi(turns: list[float], drift:
 
 
 @given(st.lists(st.tuples(*[st.floats(-6.0, 6.0)] * 3), min_size=1, max_size=40))
+@example([(0.0, 0.0, 4.0), (0.0, 0.0, 1.6e-160)])
+@example([(0.0, 0.0, 4.0), (0.0, 5e-324, 0.0)])
 def test_continuous_vectors_are_the_same_rotations(vectors: list[tuple[float, ...]]) -> None:
     v = np.array(vectors)
     found = continuous_vectors(v)
