@@ -224,8 +224,11 @@ def test_the_demo_goes_the_whole_way(urmpipe: RunCommand, tmp_path: Path) -> Non
     assert (folder / "report.html").stat().st_size < 15e6
     again = urmpipe("demo")
     assert again.code == 0
-    assert "Report:" in again.out
-    assert "Recording:" in again.out
+    *_, as_expected, more, report, recording = again.out.splitlines()
+    assert as_expected.startswith("The verdicts are as they should be: ")
+    assert more == "the counter-rotating module does not."
+    assert report == f"Report:    {Path('urmpipe-demo', 'report.html')}  (open it in any browser)"
+    assert recording.startswith(f"Recording: {Path('urmpipe-demo', 'demo.rrd')}  (open it: ")
 
 
 def test_a_tolerance_may_have_its_unit_and_decides(urmpipe: RunCommand) -> None:

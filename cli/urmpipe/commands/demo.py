@@ -64,7 +64,7 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
         print_json(result.to_dict() | {"as_expected": as_expected, "report": str(report.path)})
     elif not quiet:
         print_comparison(result)
-        say(AS_EXPECTED if as_expected else f"These are not the verdicts expected: {EXPECTED}")
+        click.echo(AS_EXPECTED if as_expected else f"These are not the verdicts expected: {EXPECTED}")
         say(f"Report:    {report.path}  (open it in any browser)")
         print_recording(result.recording)
     return 0 if as_expected else 1
