@@ -168,9 +168,7 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
 
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
-    of_logs = [
-        replace(w, message=f"{one.name}: {w.message}") for one in result.runs for w in one.run.warnings
-    ]
+    of_logs = [w.of(one.name) for one in result.runs for w in one.run.warnings]
     doubts = [w for w in result.warnings if w.kind not in (LACKING_TOOL, BEYOND)]  # those explain a result
     refuse_warnings(strict, (*of_logs, *doubts))
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
-from urmpipe.printing import count
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.wording import alignment_words, correlation, sync_words, tool_option
@@ -13,16 +12,16 @@ from urmpipe_pipeline.wording import alignment_words, correlation, sync_words, t
 def facts(run: Deviation) -> Iterator[str]:
     """Yield what is to be known of how a log was compared, a line each."""
     arm = f", robot {run.run.robot.name}" if run.run.robot else ""
-    yield f"{count(len(run.sample), 'sample')} compared over {text.seconds(run.duration)} s{arm}"
+    yield f"{text.counted(len(run.sample), 'sample')} compared over {text.seconds(run.duration)} s{arm}"
     if run.left_out or run.reference_left_out:
         yield (
-            f"left out: {count(run.left_out, 'sample')} of the log,"
-            f" {count(run.reference_left_out, 'sample')} of the reference outside its time"
+            f"left out: {text.counted(run.left_out, 'sample')} of the log,"
+            f" {text.counted(run.reference_left_out, 'sample')} of the reference outside its time"
         )
     if longest := run.longest_out:
         yield (
             f"{text.percent(run.share_out)} out of tolerance; the longest stretch:"
-            f" {text.seconds(longest.duration)} s ({count(longest.samples, 'sample')})"
+            f" {text.seconds(longest.duration)} s ({text.counted(longest.samples, 'sample')})"
             f" from t = {text.seconds(longest.t)} s"
         )
     yield sync_words(run.sync) or "clocks: both from their first samples"

@@ -5,11 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 from urmpipe.columns import Column, print_columns
 from urmpipe.comparison_facts import facts
-from urmpipe.printing import count, judged, judged_line, new_console
+from urmpipe.printing import judged, judged_line, new_console
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Statistics
 from urmpipe_pipeline.wording import correlation, of_allowed
@@ -40,7 +38,7 @@ def print_comparison(result: Comparison) -> None:
         for line in facts(run):
             console.print(f"  {line}", soft_wrap=True)
     if left := len(ranked) - len(detailed[-SHOWN:]):
-        console.print(f"Statistics of {count(left, 'more log')}: --csv FILE, --json or the report.")
+        console.print(f"Statistics of {text.counted(left, 'more log')}: --csv FILE, --json or the report.")
     if result.baseline:
         print_baseline(console, result.baseline)
 
@@ -60,7 +58,7 @@ def _print_verdict(console: Console, result: Comparison) -> None:
 def _decisive(run: Deviation, *, named: bool) -> str:
     """Say which quantity uses up most of its tolerance: how much of how much, when and where."""
     one = run.decisive
-    place = text.point(run.actual[int(np.searchsorted(run.sample, one.sample_max))])
+    place = text.point(run.place(one))
     of = f" of {run.name}" if named else ""
     return (
         f"{_largest(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"

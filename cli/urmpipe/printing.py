@@ -101,12 +101,14 @@ def _why_robot(run: Run) -> str:
 
 def _print_audit(console: Console, run: Run) -> None:
     """Print what the repolarizer did, and what it could not decide."""
+    from urmpipe_pipeline.text import counted
+
     if not run.audit:
         console.print("No repolarization.")
         return
     wraps = len(run.repolarizations)
-    others = f", {count(len(run.audit) - wraps, 'other finding')}" if len(run.audit) > wraps else ""
-    title = f"{count(wraps, 'repolarization')}{others}"
+    others = f", {counted(len(run.audit) - wraps, 'other finding')}" if len(run.audit) > wraps else ""
+    title = f"{counted(wraps, 'repolarization')}{others}"
     audit = new_table("What", "Joint", "Row", "t_r [s]", "Step [rad]", "Turns", title=title)
     for one in run.audit[:LISTED]:
         instant = f"{one.t:.6g} ± {one.half_period:.4g}"
@@ -115,11 +117,6 @@ def _print_audit(console: Console, run: Run) -> None:
     console.print(audit)
     if len(run.audit) > LISTED:
         console.print(f"... and {len(run.audit) - LISTED} more; --audit FILE.csv lists all")
-
-
-def count(number: int, noun: str) -> str:
-    """Return a number of things, in the singular if it is one."""
-    return f"{number} {noun}{'' if number == 1 else 's'}"
 
 
 @contextmanager

@@ -167,6 +167,25 @@ def product(first: FloatArray, second: FloatArray) -> FloatArray:
     )
 
 
+def best_rotation(crossed: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the rotation R with the largest sum of products a . R b, which brings points b nearest to a.
+
+    With U S V^T of H: R = U diag(1, 1, det(U V^T)) V^T. It is the only one if the last two of the sizes that
+    are returned beside it add up to more than 0.
+
+    Args:
+        crossed: H = sum(a b^T), in the units of both, shape (3, 3).
+
+    Returns:
+        R [-], shape (3, 3), and s1, s2, det(U V^T) s3, whose sum is that of the products, shape (3,).
+
+    Source: Kabsch 1976; Umeyama 1991, eq. 39-43, without scale.
+    """
+    u, sizes, vt = np.linalg.svd(crossed)
+    signs = np.array([1.0, 1.0, np.sign(np.linalg.det(u) * np.linalg.det(vt))])
+    return np.asarray(u * signs @ vt), np.asarray(sizes * signs)
+
+
 def _of_matrix(r: FloatArray) -> FloatArray:
     trace = np.trace(r, axis1=1, axis2=2)
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = r.transpose(1, 2, 0)

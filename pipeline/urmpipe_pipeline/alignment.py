@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.orientation import conjugate, matrices, product, quaternions
+from urmpipe_models.orientation import best_rotation, conjugate, matrices, product, quaternions
 from urmpipe_models.transform import rpy_of, translation
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.matching import Matched, lacking
@@ -82,20 +82,15 @@ def _start(matched: Matched) -> Alignment:
 
 
 def _rigid(matched: Matched, run: Run) -> Alignment:
-    """Return the rigid motion with the least squared distances.
-
-    With U S V^T of the covariance of reference and log: R = U diag(1, 1, det(U V^T)) V^T. It is the only best
-    one if s2 + det(U V^T) s3 > 0.
+    """Return the rigid motion with the least squared distances, if the positions tell it.
 
     Source: Umeyama 1991, eq. 38-42, without scale.
     """
     wanted, done = matched.wanted - matched.wanted.mean(axis=0), matched.done - matched.done.mean(axis=0)
-    u, common, vt = np.linalg.svd(wanted.T @ done / len(done))
-    hand = float(np.sign(np.linalg.det(u) * np.linalg.det(vt)))
+    rotation, common = best_rotation(wanted.T @ done / len(done))
     size, breadth = zip(*map(_extent, (wanted, done)), strict=True)
-    if min(breadth) < RESOLVED or common[1] + hand * common[2] <= IN_COMMON * breadth[0] * breadth[1]:
+    if min(breadth) < RESOLVED or common[1] + common[2] <= IN_COMMON * breadth[0] * breadth[1]:
         raise LogError(lacking(run, _open_rotation(min(size), min(breadth))))
-    rotation = u @ np.diag([1.0, 1.0, hand]) @ vt
     shift = matched.wanted.mean(axis=0) - rotation @ matched.done.mean(axis=0)
     return _alignment("rigid", rotation, shift)
 

@@ -9,7 +9,7 @@ from typing import Any, Literal, TypeAlias
 
 import numpy as np
 
-from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Statistics, Verdict
+from urmpipe_pipeline.comparison import Comparison, Deviation, Statistics, Verdict
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.tolerance import allowed_for, check_tolerance, parse_tolerance
 
@@ -269,10 +269,7 @@ def _changes(now: Deviation, before: Deviation, noise: Mapping[str, float]) -> I
 
 def _values(run: Deviation) -> dict[Key, FloatArray]:
     """Return the values of every quantity, each of shape (m,)."""
-    columns = [*(run.delta[:, i] for i in range(len(AXES))), run.path]
-    columns += [] if run.angle is None else [run.angle]
-    columns += [] if run.joint_delta is None else list(run.joint_delta.T)
-    return dict(zip(_keyed(run.all_statistics), columns, strict=True))
+    return dict(zip(_keyed(run.all_statistics), run.values, strict=True))
 
 
 def _share_noise(

@@ -100,7 +100,7 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
 
 def _told_of(reference: Run) -> list[LogWarning]:
     """Return the warnings of a reference, which a comparison holds as a trajectory alone."""
-    return [replace(one, message=f"{reference.name}: {one.message}") for one in reference.warnings]
+    return [one.of(reference.name) for one in reference.warnings]
 
 
 def _differing_robots(runs: Sequence[Run], tcp: Tcp) -> list[LogWarning]:

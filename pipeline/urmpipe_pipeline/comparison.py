@@ -192,6 +192,17 @@ class Deviation:
         return (*self.statistics.values(), *self.joint_statistics.values())
 
     @property
+    def values(self) -> tuple[FloatArray, ...]:
+        """Every quantity at the compared samples in [m] or [rad], shape (m,) each; as `all_statistics`."""
+        angle = () if self.angle is None else (self.angle,)
+        joints = () if self.joint_delta is None else tuple(self.joint_delta.T)
+        return (*self.delta.T, self.path, *angle, *joints)
+
+    def place(self, one: Statistics) -> FloatArray:
+        """Return where the log was when one of its quantities was largest, in [m], shape (3,)."""
+        return np.asarray(self.actual[np.searchsorted(self.sample, one.sample_max)])
+
+    @property
     def decisive(self) -> Statistics:
         """The quantity that uses up most of its tolerance; the norm where nothing has one."""
         held = [one for one in self.all_statistics if one.used is not None]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal, TypeAlias, get_args
 
 import numpy as np
@@ -63,6 +63,10 @@ class LogWarning:
     kind: str
     message: str
     row: int | None = None
+
+    def of(self, name: str) -> LogWarning:
+        """Return it behind the name of what it is about, to stand among others."""
+        return replace(self, message=f"{name}: {self.message}")
 
 
 Role = Literal["time", "joint", "rate", "acceleration", "position", "rotation"]

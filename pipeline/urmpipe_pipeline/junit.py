@@ -27,6 +27,7 @@ from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.baseline import Absent, Change
 from urmpipe_pipeline.comparison import Comparison, Deviation, Statistics
 from urmpipe_pipeline.outputs import JUNIT_HEADER
+from urmpipe_pipeline.text import exact
 
 OUT_OF_TOLERANCE = "out-of-tolerance"
 WORSE = "worse-than-baseline"
@@ -72,7 +73,7 @@ def _suite(result: Comparison, run: Deviation) -> ET.Element:
     suite = ET.Element("testsuite", name=_plain(run.name))
     properties = ET.SubElement(suite, "properties")
     for name, value in _properties(result, run):
-        ET.SubElement(properties, "property", name=_plain(name), value=_value(value))
+        ET.SubElement(properties, "property", name=_plain(name), value=_plain(exact(value)))
     suite.extend(_judged(run, one) for one in run.all_statistics if one.tolerance is not None)
     if result.baseline:
         suite.extend(_changed(one) for one in result.baseline.changes if one.run == run.name)
@@ -165,13 +166,6 @@ def _fail(case: ET.Element, kind: str, message: str) -> None:
 def _named(one: Statistics) -> str:
     """Return the name of a quantity, unique in its log: a joint may be called x."""
     return f"joint {one.quantity}" if one.kind == "joint" else one.quantity
-
-
-def _value(value: Any) -> str:
-    """Return a value as text; repr of a float is the shortest that reads back as the same number."""
-    if value is None:
-        return ""
-    return _plain(value) if isinstance(value, str) else repr(value)
 
 
 def _duration(run: Deviation) -> int:

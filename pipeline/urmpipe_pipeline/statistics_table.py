@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
 
 from urmpipe_pipeline.comparison import Comparison, Statistics
 from urmpipe_pipeline.csv_rows import write_rows
+from urmpipe_pipeline.text import exact
 
 COLUMNS = ("run", "sync_offset", *(field.name for field in fields(Statistics)))
 """The header; lengths are in m, angles in rad, times in s."""
@@ -26,12 +26,5 @@ def write_statistics(result: Comparison, part: Path, path: Path) -> None:
     Raises:
         OutputError: If it did not read back as it was written.
     """
-    rows = [list(COLUMNS), *([_cell(row[name]) for name in COLUMNS] for row in result.rows())]
+    rows = [list(COLUMNS), *([exact(row[name]) for name in COLUMNS] for row in result.rows())]
     write_rows(rows, part, path)
-
-
-def _cell(value: Any) -> str:
-    """Return a value as text; repr of a float is the shortest that reads back as the same number."""
-    if value is None:
-        return ""
-    return value if isinstance(value, str) else repr(value)

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from urmpipe_models.orientation import best_rotation
 from urmpipe_pipeline.grid import interpolate
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.sync_coarse import Peak, Rates, rates, similarity
@@ -113,19 +114,10 @@ def _line(view: View, found: Rates, offset_ns: int) -> _Line:
     energy = float((parts[2][both] ** 2).sum())
     reference, log, rate, *nuisance = (part[both] - part[both].mean(axis=0) for part in parts)
     if view.turned:
-        log = log @ _turn(log, reference).T
+        log = log @ best_rotation(reference.T @ log)[0].T
         nuisance = [np.cross(axis, log) for axis in np.eye(3)]
     residual, rate = (_without(part, nuisance) for part in (reference - log, rate))
     return _Line(residual, rate, energy)
-
-
-def _turn(points: FloatArray, onto: FloatArray) -> FloatArray:
-    """Return the rotation matrix that brings points, about their mean, nearest to others.
-
-    Source: Kabsch, W.: A solution for the best rotation to relate two sets of vectors, 1976.
-    """
-    u, _, vt = np.linalg.svd(onto.T @ points)
-    return np.asarray(u * (1.0, 1.0, np.sign(np.linalg.det(u @ vt))) @ vt)
 
 
 def _without(values: FloatArray, nuisance: Sequence[FloatArray]) -> FloatArray:

@@ -6,9 +6,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
-import numpy as np
-
-from urmpipe_models.orientation import product
+from urmpipe_models.orientation import matrices
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.matching import joint_order
 from urmpipe_pipeline.trajectory import AlignMode, Trajectory
@@ -53,13 +51,6 @@ def views(reference: Trajectory, log: Trajectory, align: AlignMode) -> Iterator[
     if order is not None and reference.q is not None and log.q is not None:
         yield View("joints", False, reference.t_ns, reference.q[:, order], log.t_ns, log.q)
     if align in ("none", "tool"):
-        axes = None if align == "none" or log.quat_xyzw is None else _axes(log.quat_xyzw)
+        axes = None if align == "none" or log.quat_xyzw is None else matrices(log.quat_xyzw)
         yield View("position", False, reference.t_ns, reference.position, log.t_ns, log.position, axes)
     yield View("position", True, reference.t_ns, reference.position, log.t_ns, log.position)
-
-
-def _axes(quat_xyzw: FloatArray) -> FloatArray:
-    """Return rotation matrices of unit quaternions, shape (m, 3, 3): q e q* for the unit vectors e."""
-    back = quat_xyzw * np.array([-1.0, -1.0, -1.0, 1.0])
-    units = np.eye(4)[:3, np.newaxis] + np.zeros((1, len(back), 1))
-    return np.stack([product(product(quat_xyzw, unit), back)[:, :3] for unit in units], axis=2)

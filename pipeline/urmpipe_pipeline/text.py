@@ -184,6 +184,13 @@ def size(count: int) -> str:
     return f"{count:,}".replace(",", "\u202f")
 
 
+def exact(value: Any) -> str:
+    """Return a value for programs, nothing for None: a float in the fewest digits that read back as it."""
+    if value is None:
+        return ""
+    return value if isinstance(value, str) else repr(value)
+
+
 def plain(value: Any) -> str:
     """Return an option's value as one line: text as it is, the rest as JSON."""
     return value if isinstance(value, str) else json.dumps(json_ready(value), ensure_ascii=False)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from urmpipe_models.chain import Chain
 from urmpipe_pipeline import text
 from urmpipe_pipeline.alignment import tool_with
-from urmpipe_pipeline.comparison import Statistics
+from urmpipe_pipeline.comparison import Comparison, Statistics
 from urmpipe_pipeline.trajectory import Alignment, Sync
 
 
@@ -19,6 +19,12 @@ def of_allowed(one: Statistics) -> str:
     if one.tolerance is None:
         return ""
     return f" of {text.limit(one.tolerance, one.unit)} {text.SHOWN[one.unit][0]} allowed"
+
+
+def tolerance_words(comparison: Comparison) -> str:
+    """Return what a comparison allows, that of joints in the units of those that were compared."""
+    units = {one.unit for run in comparison.runs for one in run.joint_statistics.values()}
+    return text.tolerance(comparison.tolerance, units or {"rad"})
 
 
 def correlation(r: float | None) -> str:

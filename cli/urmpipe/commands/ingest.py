@@ -63,7 +63,6 @@ def ingest(
     tune_pyarrow()
     from urmpipe import api
     from urmpipe.printing import (
-        count,
         print_json,
         print_recording,
         print_run,
@@ -101,7 +100,9 @@ def ingest(
         if run.recording:
             print_recording(run.recording)
         if audit:
-            say(f"Audit: {audit}  ({count(len(run.audit), 'line')})")
+            from urmpipe_pipeline.text import counted
+
+            say(f"Audit: {audit}  ({counted(len(run.audit), 'line')})")
         if map_output:
             say(f"Map: {map_output}  (use it: urmpipe ingest LOG --map {map_output})")
     return 0

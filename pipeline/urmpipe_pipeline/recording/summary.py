@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import replace
 
 import numpy as np
 
@@ -14,7 +13,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import run_colour_word
 from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.wording import alignment_words, excess, sync_words
+from urmpipe_pipeline.wording import alignment_words, excess, sync_words, tolerance_words
 
 LISTED = 4
 """Warnings that are listed; the others are counted."""
@@ -53,15 +52,11 @@ def _of_comparison(result: Comparison) -> Iterator[str]:
     worst = result.ranking[-1]
     yield _worst(worst, several)
     yield ""
-    yield f"Reference: {_text(result.reference.name)} (grey, dashed). Tolerance: {_allowed(result)}."
+    yield f"Reference: {_text(result.reference.name)} (grey, dashed). Tolerance: {tolerance_words(result)}."
     yield ""
     yield from _table(result)
     yield from _set_up(result, several)
-    told = [
-        replace(warning, message=f"{one.name}: {warning.message}")
-        for one in result.runs
-        for warning in one.run.warnings
-    ]
+    told = [warning.of(one.name) for one in result.runs for warning in one.run.warnings]
     yield from _warnings([*result.warnings, *told])
     yield ""
     yield "All figures, statistics and provenance: `urmpipe report` with this file."
@@ -80,12 +75,6 @@ def _worst(one: Deviation, several: bool) -> str:
             said += f", longest for {text.seconds(longest.duration)} s from {text.seconds(longest.t)} s"
         said += "."
     return said
-
-
-def _allowed(result: Comparison) -> str:
-    """Return what is allowed of each kind; what holds for joints in [rad] and in [m] is said of both."""
-    joints = {unit for one in result.runs for unit in one.run.joint_units}
-    return text.tolerance(result.tolerance, joints or {"rad"})
 
 
 def _table(result: Comparison) -> Iterator[str]:

@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe_models.errors import Finding, RecordingError, ViewerError
+from urmpipe_models.errors import ViewerError, for_each
 from urmpipe_pipeline.recording.store import Store
 
 if TYPE_CHECKING:
@@ -61,16 +61,7 @@ def opening_times(paths: Sequence[Path]) -> dict[Path, int]:
     Raises:
         RecordingError: With every file that is no recording of urmpipe's.
     """
-    times: dict[Path, int] = {}
-    faults: list[Finding] = []
-    for path in paths:
-        try:
-            times[path] = Store(path).opens_at_ns
-        except RecordingError as error:
-            faults += error.findings
-    if faults:
-        raise RecordingError(*faults)
-    return times
+    return dict(zip(paths, for_each(lambda path: Store(path).opens_at_ns, paths), strict=True))
 
 
 def refuse_without_display(

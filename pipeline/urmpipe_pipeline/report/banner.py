@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.report.facts import Fact, allowed, place
+from urmpipe_pipeline.report.facts import Fact
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.wording import of_allowed, tolerance_words
 
 NAMED = 3
 """Logs named in the headline; more are only counted."""
@@ -76,21 +77,19 @@ def _named(runs: Sequence[Deviation], total: int) -> str:
 def _decisive(run: Deviation, href: str) -> tuple[Fact, ...]:
     """Return which quantity uses up the largest share of its tolerance, how much, when and where."""
     one = run.decisive
-    amount = f"{text.size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}"
-    if one.tolerance is not None:
-        amount += f" of {text.limit(one.tolerance, one.unit)} {text.SHOWN[one.unit][0]} allowed"
+    amount = f"{text.size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
     return (
         Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", run.name, href=href),
         Fact("How much", amount),
         Fact("When", f"t = {text.seconds(one.t_max)} s"),
-        Fact("Where (x, y, z)", f"{text.point(place(run, one))} m"),
+        Fact("Where (x, y, z)", f"{text.point(run.place(one))} m"),
     )
 
 
 def _against(comparisons: Sequence[Comparison]) -> tuple[Fact, ...]:
     """Return what was the reference and what is allowed, where it is the same for all."""
     references = sorted({comparison.reference.name for comparison in comparisons})
-    tolerances = sorted({allowed(comparison) for comparison in comparisons})
+    tolerances = sorted({tolerance_words(comparison) for comparison in comparisons})
     return (
         Fact("Reference" if len(references) == 1 else "References", ", ".join(references)),
         Fact("Tolerance", tolerances[0] if len(tolerances) == 1 else "as each comparison says"),

@@ -9,7 +9,6 @@ from urmpipe_pipeline.comparison import Deviation, Statistics
 from urmpipe_pipeline.report.facts import (
     Fact,
     alignment_value,
-    place,
     speed_correlation,
     stretch,
     sync_value,
@@ -67,7 +66,7 @@ def _facts(deviation: Deviation) -> list[Fact]:
     angle = found.get("angle")
     return [
         Fact("When", f"t = {text.seconds(decisive.t_max)} s"),
-        Fact("Where (x, y, z)", f"{text.point(place(deviation, decisive))} m"),
+        Fact("Where (x, y, z)", f"{text.point(deviation.place(decisive))} m"),
         Fact("Largest ‖Δ‖", _largest(found["norm"])),
         Fact("Off the path", _largest(found["path"])),
         Fact("Largest angle", _largest(angle) if angle else ""),

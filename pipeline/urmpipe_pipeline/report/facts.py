@@ -7,11 +7,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import Comparison, Deviation, Statistics, Stretch
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.comparison import Comparison, Deviation, Stretch
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.trajectory import Sync
-from urmpipe_pipeline.wording import correlation, tool_option
+from urmpipe_pipeline.wording import correlation, tolerance_words, tool_option
 
 
 @dataclass(frozen=True, slots=True)
@@ -48,7 +47,7 @@ def comparison_facts(comparison: Comparison) -> tuple[Fact, ...]:
     return _told(
         Fact("Reference", comparison.reference.name),
         Fact("Reference samples", str(len(comparison.reference.t_ns))),
-        Fact("Tolerance", allowed(comparison)),
+        Fact("Tolerance", tolerance_words(comparison)),
         Fact("Recording", str(comparison.recording) if comparison.recording else ""),
     )
 
@@ -77,17 +76,6 @@ def speed_correlation(deviation: Deviation) -> str:
     """Return how the norm goes with the speed; nothing where that is not known."""
     found = deviation.speed_correlation
     return "" if found is None else correlation(found)
-
-
-def allowed(comparison: Comparison) -> str:
-    """Return the tolerance of a comparison, that of joints in the units of its joints."""
-    units = {one.unit for run in comparison.runs for one in run.joint_statistics.values()}
-    return text.tolerance(comparison.tolerance, units or {"rad"})
-
-
-def place(deviation: Deviation, statistics: Statistics) -> FloatArray:
-    """Return where the log was when a quantity was largest, in [m], shape (3,)."""
-    return np.asarray(deviation.actual[np.searchsorted(deviation.sample, statistics.sample_max)])
 
 
 def stretch(found: Stretch | None) -> str:

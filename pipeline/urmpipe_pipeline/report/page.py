@@ -11,10 +11,11 @@ from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.report import gallery, log_tables, verdict_tables
 from urmpipe_pipeline.report.banner import Banner, banner
 from urmpipe_pipeline.report.cards import Card, card
-from urmpipe_pipeline.report.facts import Fact, allowed, comparison_facts, deviation_facts, run_facts
+from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_facts, run_facts
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.wording import tolerance_words
 
 Block: TypeAlias = Table | Figure
 
@@ -117,7 +118,7 @@ def _summary(comparison: Comparison, links: Sequence[str]) -> Summary:
         f"{', best to worst' if several else ''}",
         tuple(card(run, link) for run, link in zip(comparison.ranking, links, strict=True)),
         verdict_tables.ranking_tables(comparison, links) if several else (),
-        f"Tolerance: {allowed(comparison)}. The bars show how much of it is used up.",
+        f"Tolerance: {tolerance_words(comparison)}. The bars show how much of it is used up.",
     )
 
 

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Statistics
 from urmpipe_pipeline.report.facts import alignment_value, speed_correlation
@@ -38,7 +36,7 @@ def ranking_tables(comparison: Comparison, links: Sequence[str]) -> tuple[Table,
 
 def statistics_tables(deviation: Deviation) -> tuple[Table, ...]:
     """Return the statistics of every quantity: a table of those in [mm] and one of those in [deg]."""
-    starts = _at_start(deviation)
+    starts = [float(values[0]) for values in deviation.values]
     tables = []
     for unit, (shown, _) in text.SHOWN.items():
         pairs = zip(deviation.all_statistics, starts, strict=True)
@@ -140,16 +138,6 @@ def _statistics_note(deviation: Deviation) -> str:
         "max, rms and p95 are of absolute values, mean and std signed. At start: the agreement of the start"
         f" poses (mutual calibration) at t = {text.seconds(float(deviation.t[0]))} s."
     )
-
-
-def _at_start(deviation: Deviation) -> list[float]:
-    """Return every quantity at the first compared sample in [m] or [rad], in the order of the statistics."""
-    found = [*deviation.start, float(deviation.path[0])]
-    if deviation.angle is not None:
-        found.append(float(deviation.angle[0]))
-    if deviation.joint_delta is not None:
-        found += [float(value) for value in np.asarray(deviation.joint_delta[0])]
-    return found
 
 
 def _furthest(joints: Sequence[Statistics]) -> Statistics | None:

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.errors import Finding, LogError, for_each
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
 from urmpipe_pipeline.sources.blockwise import read_blockwise
 from urmpipe_pipeline.sources.checks import (
@@ -24,7 +24,6 @@ from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.roles import Roles
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.table import Numbers, read_fast
-from urmpipe_pipeline.sources.tables import for_all
 from urmpipe_pipeline.sources.text_times import timed
 
 
@@ -80,7 +79,7 @@ def read_content(plan: Plan, *, skip_bad: bool = False) -> Content:
             of one log differ in their times.
     """
     columns = {t: tuple(c for c in plan.roles.columns if c.table == t) for t in plan.used}
-    read = for_all(plan.used, lambda table: _numbers(plan, table, columns[table], skip_bad))
+    read = for_each(lambda table: _numbers(plan, table, columns[table], skip_bad), plan.used)
     numbers = dict(zip(plan.used, read, strict=True))
     roles, said = _joined(plan, numbers)
     if plan.time_file is not None:

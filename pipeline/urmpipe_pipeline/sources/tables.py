@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TypeVar
 
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import OptionError, for_each
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources import coppeliasim
 from urmpipe_pipeline.sources.arrays import sniff_arrays
@@ -17,9 +16,6 @@ from urmpipe_pipeline.sources.ros2 import with_names
 from urmpipe_pipeline.sources.sniff import Layout, across, sniff
 from urmpipe_pipeline.sources.text import Segment, open_text
 from urmpipe_pipeline.sources.vocabulary import KnownSource, vocabulary
-
-T = TypeVar("T")
-U = TypeVar("U")
 
 COPPELIASIM, PATH, TABLE = "coppeliasim", "path", "table"
 
@@ -69,13 +65,13 @@ def open_tables(files: Sequence[Path], options: ReadOptions) -> Tables:
         raise OptionError("found no log file, allowed: one, or several if a source writes one a plot")
     if options.source is not None and options.source not in source_names():
         raise OptionError(f"--source: found {options.source!r}, allowed: {', '.join(source_names())}")
-    segments = for_all(files, lambda path: open_text(path, any_suffix=options.source is not None))
+    segments = for_each(lambda path: open_text(path, any_suffix=options.source is not None), files)
     titled = [(file.stem, segment) for file, segment in zip(files, segments, strict=True)]
     forced = options.source == COPPELIASIM
     if len(files) == 1 and (forced or (options.source is None and coppeliasim.is_export(segments[0]))):
         titled = coppeliasim.graphs(segments[0]) or titled
         forced = True
-    layouts = for_all(titled, lambda item: _layout(item[1], options))
+    layouts = for_each(lambda item: _layout(item[1], options), titled)
     if len(files) > 1:
         layouts = [across(layout) for layout in layouts]
     known, said = _known(layouts, options) if not forced else (None, _coppeliasim(titled, options))
@@ -97,24 +93,6 @@ def _layout(segment: Segment, options: ReadOptions) -> Layout:
     given = options.delimiter, options.decimal
     found = None if options.delimiter else sniff_labels(segment)
     return found or sniff_arrays(segment, *given) or with_names(sniff(segment, *given))
-
-
-def for_all(items: Sequence[T], function: Callable[[T], U]) -> list[U]:
-    """Return the function of every item; raise what is wrong with all of them at once.
-
-    Raises:
-        LogError: With the findings of every item that raised one.
-    """
-    results: list[U] = []
-    findings: list[Finding] = []
-    for item in items:
-        try:
-            results.append(function(item))
-        except LogError as error:
-            findings += error.findings
-    if findings:
-        raise LogError(*findings)
-    return results
 
 
 def _known(layouts: Sequence[Layout], options: ReadOptions) -> tuple[KnownSource | None, Inference]:
