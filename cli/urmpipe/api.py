@@ -19,7 +19,7 @@ from urmpipe.guards import (
     refuse_warnings,
 )
 from urmpipe_models.catalogue import robot_names
-from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.errors import Finding, LogError, for_each
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.audit_file import write_audit
 from urmpipe_pipeline.comparison import Comparison
@@ -175,10 +175,15 @@ def report(
     files = [Path(one) for one in results if isinstance(one, (str, Path))]
     refuse_foreign(files)
     reading, writing = _halves(progress)
-    shown = []
-    for number, one in enumerate(results, start=1):
-        shown.append(read_recording(Path(one)) if isinstance(one, (str, Path)) else one)
+
+    def read(numbered: tuple[int, PathLike | Run | Comparison]) -> Run | Comparison:
+        """Return a result, read if it is a recording, and tell how far it is."""
+        number, one = numbered
+        found = read_recording(Path(one)) if isinstance(one, (str, Path)) else one
         reading(number / len(results))
+        return found
+
+    shown = for_each(read, enumerate(results, start=1))
     written = write_report(shown, Path(output), files, wanted, writing)
     return Report(written.path, tuple(shown), written.figures)
 

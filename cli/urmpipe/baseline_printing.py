@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Iterator, Sequence
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from urmpipe.columns import Column, print_columns
 from urmpipe.printing import LISTED, judged_line
 from urmpipe_pipeline import text
 from urmpipe_pipeline.baseline import Absent, BaselineComparison, Change, Worse
-from urmpipe_pipeline.results import json_ready
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -87,7 +85,7 @@ def _lines(found: BaselineComparison) -> Iterator[str]:
         if absent:
             yield f"{word}: {_listed(absent)}"
     for one in found.differences:
-        yield f"made otherwise: {one.what}: {_plain(one.before)}{ARROW}{_plain(one.now)}"
+        yield f"made otherwise: {one.what}: {text.plain(one.before)}{ARROW}{text.plain(one.now)}"
 
 
 def _unit(kind: str) -> str:
@@ -97,8 +95,3 @@ def _unit(kind: str) -> str:
 def _listed(absent: Sequence[Absent]) -> str:
     more = f" and {len(absent) - LISTED} more" if len(absent) > LISTED else ""
     return ", ".join(map(str, absent[:LISTED])) + more
-
-
-def _plain(value: Any) -> str:
-    """Return a value as one line."""
-    return value if isinstance(value, str) else json.dumps(json_ready(value), ensure_ascii=False)

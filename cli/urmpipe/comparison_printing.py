@@ -60,30 +60,11 @@ def _decisive(run: Deviation, *, named: bool) -> str:
     one = run.decisive
     place = text.point(run.place(one))
     of = f" of {run.name}" if named else ""
+    used = f" ({text.used(one)})" if one.tolerance is not None else ""
     return (
-        f"{_largest(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
-        f"{_used(one)}, at t = {text.seconds(one.t_max)} s, at ({place}) m"
+        f"max {text.size_of(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
+        f"{used}, at t = {text.seconds(one.t_max)} s, at ({place}) m"
     )
-
-
-def _largest(one: Statistics) -> str:
-    """Return what people call the largest value of a quantity."""
-    return f"max |{text.symbol(one)}|" if one.kind == "axis" else f"max {text.symbol(one)}"
-
-
-def _used(one: Statistics) -> str:
-    """Say how much of its tolerance a quantity uses up."""
-    if one.used is None:
-        return ""
-    if one.used <= 1.0:
-        return f" ({text.percent(one.used)})"
-    return f" ({(one.used - 1.0) * 100:.2g} % over)" if one.used < 2.0 else f" ({one.used:.3g} times)"
-
-
-def _largest_joint(run: Deviation, unit: str) -> Statistics | None:
-    """Return the joint of that unit that is furthest off."""
-    joints = [one for one in run.joint_statistics.values() if one.unit == unit]
-    return max(joints, key=lambda one: one.max, default=None)
 
 
 def _ranking(runs: Sequence[Deviation]) -> Iterator[Column]:
@@ -98,8 +79,8 @@ def _ranking(runs: Sequence[Deviation]) -> Iterator[Column]:
         f"max {text.SYMBOLS['norm']}": lambda run: run.statistics["norm"],
         "max path": lambda run: run.statistics["path"],
         "max angle": lambda run: run.statistics.get("angle"),
-        "max joint": lambda run: _largest_joint(run, "rad"),
-        "max slide": lambda run: _largest_joint(run, "m"),
+        "max joint": lambda run: run.furthest_joint("rad"),
+        "max slide": lambda run: run.furthest_joint("m"),
     }
     for head, find in quantities.items():
         found = [find(run) for run in runs]

@@ -126,10 +126,12 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
         yield None
         return
     from rich.console import Console
-    from rich.progress import Progress
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 
-    with Progress(console=Console(stderr=True), transient=True) as bar:
-        task = bar.add_task(title, total=1.0)
+    name = TextColumn("{task.description}", markup=False)  # a title holds names of files
+    columns = (name, BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(one_line(title), total=1.0)
         yield lambda share: bar.update(task, completed=share)
 
 

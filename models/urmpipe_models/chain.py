@@ -109,6 +109,8 @@ class Chain:
                     f"joint {joint.name} mimics {joint.mimic.joint}, no moving joint of the chain;"
                     f" allowed: {', '.join(self.coordinates)}"
                 )
+        for visual in self.visuals:
+            yield from visual.faults()
         carriers = {visual.joint for visual in self.visuals if visual.joint is not None}
         for carrier in sorted(carriers - set(names)):
             yield f"a visual hangs on {carrier}, no joint of the chain; allowed: {', '.join(names)}"

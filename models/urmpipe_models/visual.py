@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TypeAlias
 from urllib.parse import unquote
+
+import numpy as np
 
 from urmpipe_models.transform import Transform
 
@@ -72,6 +75,15 @@ class Visual:
     shape: Shape
     origin: Transform = field(default_factory=Transform)
     colour: Colour | None = None
+
+    def faults(self) -> Iterator[str]:
+        """Yield what no shape can have: a negative size, or a share of a colour beyond 0..1."""
+        mesh = isinstance(self.shape, Mesh)  # a negative scale mirrors
+        sizes: list[float] = [] if mesh else np.ravel([*asdict(self.shape).values()]).tolist()
+        if any(size < 0.0 for size in sizes):
+            yield f"a {type(self.shape).__name__.lower()} of negative size {min(sizes):g}; allowed: 0 or more"
+        if self.colour is not None and not all(0.0 <= share <= 1.0 for share in self.colour):
+            yield f"colour {', '.join(f'{share:g}' for share in self.colour)}; allowed: shares from 0 to 1"
 
     def located(self, folder: Path) -> Visual:
         """Return the same shape with its mesh file looked up from the folder of the description."""

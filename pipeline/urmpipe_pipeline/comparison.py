@@ -198,6 +198,11 @@ class Deviation:
         joints = () if self.joint_delta is None else tuple(self.joint_delta.T)
         return (*self.delta.T, self.path, *angle, *joints)
 
+    def furthest_joint(self, unit: str) -> Statistics | None:
+        """Return the joint in rad or m that is furthest off; None without one."""
+        joints = [one for one in self.joint_statistics.values() if one.unit == unit]
+        return max(joints, key=lambda one: one.max, default=None)
+
     def place(self, one: Statistics) -> FloatArray:
         """Return where the log was when one of its quantities was largest, in [m], shape (3,)."""
         return np.asarray(self.actual[np.searchsorted(self.sample, one.sample_max)])

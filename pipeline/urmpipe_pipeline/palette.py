@@ -36,6 +36,9 @@ RUN_COLOURS = {
 }
 """One a run of a comparison, by the word for it; none like the reference."""
 
+NEUTRAL_COLOUR = "#c8d0d4"
+"""Links, shapes without a colour and lines through all plots: joints and paths stand out in theirs."""
+
 DEVIATION_COLOUR = "#fe046c"
 """The deviation made visible in the 3D view: the enlarged path and the worst place; crimson."""
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from urmpipe.printing import print_recording
+from urmpipe.printing import print_recording, progress_bar
 
 
 def test_the_command_that_opens_a_recording_works_without_an_activated_environment(
@@ -49,3 +49,14 @@ def test_nothing_in_a_name_acts_on_the_terminal(urmpipe: Callable[..., Any], tmp
         assert ran.code == code
         assert all(line.isprintable() for line in (ran.out + ran.err).split("\n"))
         assert r"\x1b" in ran.out + ran.err
+
+
+def test_a_bar_shows_the_name_of_a_file_as_it_is(
+    capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys.stderr, "isatty", lambda: True)
+    monkeypatch.setenv("TERM", "xterm")
+    with progress_bar("reading [/b]a\x07.csv") as tell:
+        assert tell is not None
+        tell(0.5)
+    assert r"reading [/b]a\x07.csv" in capsys.readouterr().err

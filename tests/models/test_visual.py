@@ -260,3 +260,20 @@ def test_a_mesh_of_a_robot_file_is_looked_up_from_it(tmp_path: Path) -> None:
         read_robot_file(path)
     said = "key visuals[0].box: found box and sphere, allowed: one of box, cylinder, capsule, sphere, mesh"
     assert str(caught.value) == f"{path}: {said}"
+
+
+@pytest.mark.parametrize(
+    ("visual", "said"),
+    [
+        (Visual(None, Sphere(-1.0)), "a sphere of negative size -1; allowed: 0 or more"),
+        (Visual(None, Box((1.0, -2.0, 3.0))), "a box of negative size -2; allowed: 0 or more"),
+        (
+            Visual(None, Sphere(1.0), colour=(255.0, 0.0, 0.0, 1.0)),
+            "colour 255, 0, 0, 1; allowed: shares from 0 to 1",
+        ),
+    ],
+)
+def test_what_no_shape_can_have_is_refused(visual: Visual, said: str) -> None:
+    with pytest.raises(RobotError) as error:
+        Chain("arm", (Joint("j"),), visuals=(visual,))
+    assert str(error.value) == f"robot arm: {said}"

@@ -106,32 +106,41 @@ def test_a_log_is_as_far_from_a_path_as_each_of_its_points(far: float) -> None:
     assert_near(found[::1000], np.array(expected))
 
 
-def test_a_log_in_the_middle_of_a_circle_is_not_held_against_every_piece(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
-    angle = np.linspace(0, 6, 100_000)
-    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(100_000)])
-    points = np.random.default_rng(6).normal(0, 1e-7, (10_000, 3))
-    looked: list[int] = []
+@pytest.fixture
+def looked(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many pairs the search looks at, call by call."""
+    pairs: list[int] = []
     distance = nearest_path._distance
 
     def counted(points: FloatArray, start: FloatArray, step: FloatArray) -> FloatArray:
-        looked.append(len(points))
+        pairs.append(len(points))
         return distance(points, start, step)
 
     monkeypatch.setattr(nearest_path, "_distance", counted)
+    return pairs
+
+
+def test_a_log_in_the_middle_of_a_circle_is_not_held_against_every_piece(looked: list[int]) -> None:
+    angle = np.linspace(0, 6, 100_000)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(100_000)])
+    points = np.random.default_rng(6).normal(0, 1e-7, (10_000, 3))
     found = distance_from_path(points, circle, np.ones(99_999, bool))
     np.testing.assert_allclose(found, 1.0, rtol=0, atol=1.001e-6 + 5e-7)  # that, and how far the points are
     assert sum(looked) < 100 * len(points)  # not 1e9
 
 
-def test_where_a_path_stands_and_trembles_the_search_ends_early(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_where_a_path_stands_and_trembles_the_search_ends_early(
+    monkeypatch: pytest.MonkeyPatch, looked: list[int]
+) -> None:
     rng = np.random.default_rng(4)
     path = np.vstack([rng.normal(0, 1e-6, (3000, 3)), np.linspace((0, 0, 0), (0, 0, 10), 1000)])
     points, joined = rng.normal(0, 1e-6, (100, 3)), np.ones(3999, bool)
     exact = distance_from_path(points, path, joined)
+    whole = sum(looked)
+    looked.clear()
     monkeypatch.setattr(nearest_path, "ENOUGH", 8)
     near = distance_from_path(points, path, joined)
+    assert sum(looked) < whole / 4
     assert (near >= exact - 1.1e-9).all()  # that of the other
     assert (near <= exact + 1e-5).all()  # the size of the cloud
 

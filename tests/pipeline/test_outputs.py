@@ -112,12 +112,12 @@ def test_an_output_that_is_no_export_of_ours_is_not_replaced(tmp_path: Path) -> 
     assert path.read_text() == "new"
 
 
+@pytest.mark.skipif(sys.platform != "linux", reason="other systems have no such names")
 def test_a_recording_has_a_name_that_rerun_can_open(tmp_path: Path) -> None:
     wanted = "found a name that is no UTF-8 text, which Rerun cannot open, allowed: one that is"
     for path in (tmp_path / "bad\udcff.rrd", tmp_path / "bad\udcff" / "run.rrd"):
-        if sys.platform == "linux":
-            path.parent.mkdir(exist_ok=True)
-            assert refusal(path, kind="recording") == wanted
+        path.parent.mkdir(exist_ok=True)
+        assert refusal(path, kind="recording") == wanted
 
 
 def test_a_folder_is_not_replaced(tmp_path: Path) -> None:

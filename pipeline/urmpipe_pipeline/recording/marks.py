@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
-from urmpipe_pipeline.palette import joint_colour, rgb
+from urmpipe_pipeline.palette import NEUTRAL_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.recording.columns import scalar_column, time_columns
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.recording.overview import COMPARED
@@ -27,8 +27,8 @@ SHAPES: dict[Mark, Literal["up", "down", "cross"]] = {"up": "up", "down": "down"
 MARK_SIZE = 5.0
 """Size of a mark in points of the screen."""
 
-WORST_COLOUR, WORST_WIDTH = "#c8d0d4", 2.5
-"""The line through the worst sample: neutral, for it stands in every plot."""
+WORST_WIDTH = 2.5
+"""Width of the line through the worst sample in points of the screen."""
 
 
 def mark_entity(place: Place, mark: Mark | Literal["**"]) -> str:
@@ -68,7 +68,7 @@ def draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
     # A line between two values at one time is drawn as a point: one of them is a nanosecond later.
     t_ns = one.t_ns[one.worst] + np.arange(2)
     style = rr.SeriesLines(
-        colors=[rgb(WORST_COLOUR)],
+        colors=[rgb(NEUTRAL_COLOUR)],
         names=["worst"],
         widths=[WORST_WIDTH],
         aggregation_policy=rr.components.AggregationPolicy.MinMax,

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_pipeline.palette import DEVIATION_COLOUR, rgb
+from urmpipe_pipeline.palette import DEVIATION_COLOUR, NEUTRAL_COLOUR, rgb
 from urmpipe_pipeline.recording.columns import time_columns
 from urmpipe_pipeline.recording.scene import Arm, Mark, Scene
 from urmpipe_pipeline.recording.shape_drawing import draw_body
@@ -28,9 +28,6 @@ STRIPS = 256
 
 LABEL_COLOUR = "#ffffff"
 """Labels: they stand on lines of any colour."""
-
-LINK_COLOUR = "#c8d0d4"
-"""The links of the arm: neutral, so that the joints stand out in their own colours."""
 
 
 def draw_scene(stream: RecordingStream, scene: Scene) -> None:
@@ -71,7 +68,7 @@ def _draw_links(stream: RecordingStream, arm: Arm, skeleton: Skeleton, size: flo
     """Draw a line through the points of the arm."""
     import rerun as rr
 
-    links = rr.LineStrips3D.from_fields(colors=[rgb(LINK_COLOUR)], radii=[LINK_RADIUS * size])
+    links = rr.LineStrips3D.from_fields(colors=[rgb(NEUTRAL_COLOUR)], radii=[LINK_RADIUS * size])
     stream.log("/robot/links", links, static=True)
     for start in range(0, len(skeleton), STRIPS):
         rows = slice(start, start + STRIPS)

@@ -11,15 +11,12 @@ from urmpipe_models.orientation import quaternions
 from urmpipe_models.visual import Box, Capsule, Colour, Cylinder, Mesh, Visual
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.meshes import MEDIA_TYPES
-from urmpipe_pipeline.palette import rgb
+from urmpipe_pipeline.palette import NEUTRAL_COLOUR, rgb
 from urmpipe_pipeline.recording.bodies import Body
 from urmpipe_pipeline.recording.entities import entity_path, printable
 
 if TYPE_CHECKING:
     from rerun import AsComponents, RecordingStream, TimeColumn
-
-SHAPE_COLOUR = "#c8d0d4"
-"""A shape without a colour of its own: neutral, so that the joints stand out in theirs."""
 
 
 def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> None:
@@ -93,6 +90,6 @@ def _mesh(path: Path, colour: Colour | None) -> AsComponents | None:
 def _rgba(colour: Colour | None) -> tuple[int, int, int, int]:
     """Return a colour as four numbers 0..255."""
     if colour is None:
-        return (*rgb(SHAPE_COLOUR), 255)
+        return (*rgb(NEUTRAL_COLOUR), 255)
     red, green, blue, opacity = (round(255 * share) for share in colour)
     return red, green, blue, opacity

@@ -86,8 +86,5 @@ def _largest(statistics: Statistics) -> str:
 
 def _largest_joint(deviation: Deviation) -> str:
     """Return the joint that is furthest off, of each unit, with its deviation."""
-    furthest: dict[str, Statistics] = {}
-    for one in deviation.joint_statistics.values():
-        if one.unit not in furthest or one.max > furthest[one.unit].max:
-            furthest[one.unit] = one
-    return ", ".join(f"{_largest(one)} ({one.quantity})" for one in furthest.values())
+    furthest = map(deviation.furthest_joint, text.SHOWN)
+    return ", ".join(f"{_largest(one)} ({one.quantity})" for one in furthest if one)

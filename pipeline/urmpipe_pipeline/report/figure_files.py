@@ -85,7 +85,7 @@ def write_figures(
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[FigureFile, ...]:
-    """Write every figure in every format, all or none; only figures that urmpipe wrote are replaced.
+    """Write every figure in every format, all files or none; only figures that urmpipe wrote are replaced.
 
     Args:
         figures: Each behind the heading of its part.

@@ -62,9 +62,8 @@ def _how_far(comparison: Comparison, links: Sequence[str]) -> Table:
 
 
 def _how_far_row(run: Deviation, link: str) -> tuple[Cell, ...]:
-    joints = list(run.joint_statistics.values())
     found = [*(run.statistics[axis] for axis in AXES), run.statistics["path"], run.statistics.get("angle")]
-    found += [_furthest([one for one in joints if one.unit == unit]) for unit in ("rad", "m")]
+    found += map(run.furthest_joint, ("rad", "m"))
     return (
         Cell(run.name, href=link),
         judged(run.verdict),
@@ -138,10 +137,6 @@ def _statistics_note(deviation: Deviation) -> str:
         "max, rms and p95 are of absolute values, mean and std signed. At start: the agreement of the start"
         f" poses (mutual calibration) at t = {text.seconds(float(deviation.t[0]))} s."
     )
-
-
-def _furthest(joints: Sequence[Statistics]) -> Statistics | None:
-    return max(joints, key=lambda one: one.max, default=None)
 
 
 def _largest(statistics: Statistics | None) -> Cell:
