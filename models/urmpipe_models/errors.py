@@ -86,6 +86,18 @@ class OptionError(UrmpipeError):
     """An option's value, or two options together, make no sense."""
 
 
+class UnitError(UrmpipeError):
+    """A unit is not described right, or refuses a value: unknown variable, not finite, out of range."""
+
+
+class FmuError(UrmpipeError):
+    """An FMU cannot be built, read, loaded or run, or reports an error of its own."""
+
+
+class CosimulationError(UrmpipeError):
+    """A system of blocks cannot be put together: its file, its connections, an algebraic loop."""
+
+
 class ViewerError(UrmpipeError):
     """A recording cannot be shown here: there is no display, or the viewer does not start."""
 

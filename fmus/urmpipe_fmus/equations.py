@@ -1,0 +1,87 @@
+"""A unit's functions on flat lists of scalars: the form in which they are run, traced and looked into."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
+from typing import Any
+
+from urmpipe_fmus.table import Rows
+from urmpipe_fmus.unit import Function, Unit
+from urmpipe_fmus.values import Values
+from urmpipe_fmus.variable import Variable
+from urmpipe_models.elementwise import Element
+from urmpipe_models.errors import UnitError
+
+
+class Equations:
+    """What a unit computes, from one element a scalar to one element a scalar.
+
+    Each method takes the elements of `unit.given` in their order: parameters, inputs, states, memories.
+
+    Attributes:
+        unit: The unit.
+    """
+
+    def __init__(self, unit: Unit) -> None:
+        self.unit = unit
+
+    def outputs(self, time: Element, given: Sequence[Element], rows: Rows | None = None) -> list[Element]:
+        """Return the elements of `unit.computed`."""
+        return self._called("outputs", self.unit.outputs, self.unit.computed, time, given, rows)
+
+    def derivatives(self, time: Element, given: Sequence[Element], rows: Rows | None = None) -> list[Element]:
+        """Return the derivatives of `unit.states` in [unit/s]."""
+        return self._called("derivatives", self.unit.derivatives, self.unit.states, time, given, rows)
+
+    def update(self, time: Element, given: Sequence[Element], rows: Rows | None = None) -> list[Element]:
+        """Return the next values of `unit.memories`."""
+        return self._called("update", self.unit.update, self.unit.memories, time, given, rows)
+
+    def _called(
+        self,
+        what: str,
+        function: Function | None,
+        variables: Sequence[Variable],
+        time: Element,
+        given: Sequence[Element],
+        rows: Rows | None,
+    ) -> list[Element]:
+        """Return what a function of the unit gives for some variables, flat."""
+        if function is None:
+            return []
+        values = Values(time, named(self.unit.given, given), rows)
+        return flat(f"unit {self.unit.name}: {what}", function(values), variables)
+
+
+def named(variables: Sequence[Variable], elements: Sequence[Element]) -> dict[str, Any]:
+    """Return the elements of variables by name: one, or a tuple of them for a variable with a size."""
+    rest = iter(elements)
+    return {one.name: next(rest) if one.size is None else tuple(islice(rest, one.size)) for one in variables}
+
+
+def flat(where: str, result: Mapping[str, Any], variables: Sequence[Variable]) -> list[Element]:
+    """Return what a function gave by name as one element a scalar, in the order of the variables.
+
+    Raises:
+        UnitError: If a name is missing or unknown, or has another size than its variable.
+    """
+    faults = list(_faults(result, variables))
+    if faults:
+        raise UnitError(*(f"{where}: {fault}" for fault in faults))
+    return [
+        element
+        for one in variables
+        for element in ((result[one.name],) if one.size is None else result[one.name])
+    ]
+
+
+def _faults(result: Mapping[str, Any], variables: Sequence[Variable]) -> Iterator[str]:
+    expected = {one.name: one for one in variables}
+    for name in sorted(set(result) - set(expected)):
+        yield f"{name}: found in what it returns, allowed: {', '.join(expected)}"
+    for name, one in expected.items():
+        if name not in result:
+            yield f"{name}: not found in what it returns, allowed: all of {', '.join(expected)}"
+        elif one.size is not None and len(result[name]) != one.size:
+            yield f"{name}: found {len(result[name])} elements, allowed: {one.size}"

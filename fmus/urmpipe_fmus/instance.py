@@ -1,0 +1,200 @@
+"""An instance of a unit in Python: the rules of a step, which the native runtime follows line by line."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from urmpipe_fmus.equations import Equations
+from urmpipe_fmus.table import Rows
+from urmpipe_fmus.unit import INTERNAL_STEP, Unit
+from urmpipe_fmus.variable import Memory, Output, Parameter, State, Variable
+from urmpipe_models.elementwise import Element
+from urmpipe_models.errors import UnitError
+
+STEP_SLACK = 1e-9
+"""A step of n internal steps but for this share of one takes n of them: k h - (k-1) h is not quite h."""
+
+
+class Instance:
+    """A unit that is stepped through time.
+
+    Values are floats; elements of shape (runs,) as well, which step many runs side by side.
+
+    Attributes:
+        unit: The unit.
+        time: Where it stands in [s].
+        running: Whether fixed parameters are fixed: from the first step on.
+    """
+
+    def __init__(self, unit: Unit, time: float = 0.0) -> None:
+        self.unit = unit
+        self.time: Element = time
+        self.running = False
+        self._equations = Equations(unit)
+        self._owner = [variable for _, variable in unit.scalars]
+        self._index = {name: index for index, (name, _) in enumerate(unit.scalars)}
+        self._values: list[Element] = [start for one in unit.variables for start in one.starts]
+        self._given = self._places(unit.given)
+        self._states = self._places(unit.states)
+        self._memories = self._places(unit.memories)
+        self._computed = self._places(unit.computed)
+        self._stale = True
+
+    def reference(self, name: str) -> int:
+        """Return the value reference of a scalar.
+
+        Raises:
+            UnitError: If the unit has no such scalar.
+        """
+        if name not in self._index:
+            allowed = ", ".join(self._index)
+            raise UnitError(f"unit {self.unit.name}: no variable {name}; allowed: {allowed}")
+        return self._index[name]
+
+    def set(self, references: Sequence[int], values: Sequence[Element]) -> None:
+        """Set scalars: all of them, or none if one is refused.
+
+        Raises:
+            UnitError: With all that is refused: no such reference, an output, a value not finite or out of
+                range, a fixed parameter or a state of a running instance.
+        """
+        faults = [
+            fault
+            for reference, value in zip(references, values, strict=True)
+            for fault in self._refusals(reference, value)
+        ]
+        if faults:
+            raise UnitError(*(f"unit {self.unit.name}: {fault}" for fault in faults))
+        for reference, value in zip(references, values, strict=True):
+            self._values[reference] = value
+        self._stale = True
+
+    def get(self, references: Sequence[int]) -> list[Element]:
+        """Return scalars; outputs are those of the inputs as they stand now.
+
+        Raises:
+            UnitError: If there is no such reference, or an output is not finite.
+        """
+        for reference in references:
+            if not 0 <= reference < len(self._owner):
+                raise UnitError(f"unit {self.unit.name}: {self._no_reference(reference)}")
+            if self._stale and isinstance(self._owner[reference], Output):
+                self._refresh()
+        return [self._values[reference] for reference in references]
+
+    def do_step(self, time: float, step: float) -> None:
+        """Take the sample at a communication point, and go to the next.
+
+        Args:
+            time: The communication point in [s].
+            step: To the next one in [s], above 0.
+
+        Raises:
+            UnitError: If the step is not above 0, or a state is not finite after it; then nothing changed.
+        """
+        if not (math.isfinite(time) and math.isfinite(step) and step > 0.0):
+            raise UnitError(
+                f"unit {self.unit.name}: found a step of {step:g} s at {time:g} s, allowed: finite, above 0"
+            )
+        before = (self.time, list(self._values), self._stale)
+        self.running = True
+        try:
+            self._sample(time)
+            self._integrate(time, step)
+        except UnitError:
+            self.time, self._values, self._stale = before
+            raise
+        self.time, self._stale = time + step, True
+
+    def save(self) -> Any:
+        """Return all that the instance remembers, to be given to `restore`."""
+        return self.time, self.running, list(self._values)
+
+    def restore(self, saved: Any) -> None:
+        """Go back to where `save` was called."""
+        self.time, self.running, values = saved
+        self._values, self._stale = list(values), True
+
+    def _places(self, variables: Sequence[Variable]) -> list[int]:
+        return [self._index[name] for one in variables for name in one.names]
+
+    def _no_reference(self, reference: int) -> str:
+        return f"value reference {reference}: found, allowed: 0 to {len(self._owner) - 1}"
+
+    def _refusals(self, reference: int, value: Element) -> list[str]:
+        """Return why a scalar cannot be set."""
+        if not 0 <= reference < len(self._owner):
+            return [self._no_reference(reference)]
+        one, name = self._owner[reference], self.unit.scalars[reference][0]
+        if isinstance(one, Output):
+            return [f"{name}: set, allowed: an output is computed, not set"]
+        if self.running and isinstance(one, (State, Memory)):
+            return [f"{name}: set while it runs, allowed: a state before the first step"]
+        if self.running and isinstance(one, Parameter) and not one.tunable:
+            return [f"{name}: set while it runs, allowed: a fixed parameter before the first step"]
+        return [f"{name}: {fault}" for each in np.ravel(value) for fault in one.refusals(float(each))][:1]
+
+    def _rows(self, time: Element) -> Rows | None:
+        return None if self.unit.table is None else self.unit.table.rows_at(time)
+
+    def _elements(self) -> list[Element]:
+        return [self._values[place] for place in self._given]
+
+    def _refresh(self) -> None:
+        """Compute the outputs."""
+        found = self._equations.outputs(self.time, self._elements(), self._rows(self.time))
+        self._put(self._computed, found, "output")
+        self._stale = False
+
+    def _sample(self, time: float) -> None:
+        """Take the sample: the memories' next values from the values at the communication point."""
+        found = self._equations.update(time, self._elements(), self._rows(time))
+        self._put(self._memories, found, "next value")
+
+    def _integrate(self, time: float, step: float) -> None:
+        """Integrate the states over a step with the classical Runge-Kutta method (RK4)."""
+        if not self._states:
+            return
+        largest = self._values[self._index[INTERNAL_STEP]]
+        count = max(1, math.ceil(step / largest - STEP_SLACK))
+        h = step / count
+        for k in range(count):
+            t = time + k * h
+            x = [self._values[place] for place in self._states]
+            k1 = self._rates(t, x)
+            k2 = self._rates(t + 0.5 * h, [a + 0.5 * h * b for a, b in zip(x, k1, strict=True)])
+            k3 = self._rates(t + 0.5 * h, [a + 0.5 * h * b for a, b in zip(x, k2, strict=True)])
+            k4 = self._rates(t + h, [a + h * b for a, b in zip(x, k3, strict=True)])
+            slopes = zip(x, k1, k2, k3, k4, strict=True)
+            self._put(
+                self._states,
+                [a + h / 6.0 * (b1 + 2.0 * b2 + 2.0 * b3 + b4) for a, b1, b2, b3, b4 in slopes],
+                "state",
+            )
+
+    def _rates(self, time: float, states: Sequence[Element]) -> list[Element]:
+        """Return the derivatives at a time and for some states, the rest as it stands."""
+        values = list(self._values)
+        for place, state in zip(self._states, states, strict=True):
+            values[place] = state
+        return self._equations.derivatives(time, [values[place] for place in self._given], self._rows(time))
+
+    def _put(self, places: Sequence[int], found: Sequence[Element], what: str) -> None:
+        """Take new values over.
+
+        Raises:
+            UnitError: If one is not finite.
+        """
+        faults = [
+            f"unit {self.unit.name}: {what} {self.unit.scalars[place][0]} is not finite at {self.time:g} s"
+            for place, value in zip(places, found, strict=True)
+            if not np.all(np.isfinite(value))
+        ]
+        if faults:
+            raise UnitError(*faults)
+        for place, value in zip(places, found, strict=True):
+            self._values[place] = value

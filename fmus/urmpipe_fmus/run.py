@@ -1,0 +1,107 @@
+"""A unit over a log: all samples at once where it remembers nothing, else sample by sample."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_fmus.equations import Equations, named
+from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.variable import Variable
+from urmpipe_models.elementwise import Element
+from urmpipe_models.errors import UnitError
+
+FloatArray = NDArray[np.float64]
+
+
+def run(
+    unit: Unit,
+    t: FloatArray,
+    inputs: Mapping[str, Any] | None = None,
+    start: Mapping[str, Any] | None = None,
+) -> dict[str, FloatArray]:
+    """Run a unit over the samples of a log: the outputs at each sample for the inputs of that sample.
+
+    Args:
+        unit: The unit.
+        t: Times of the samples in [s], strictly rising, shape (n,).
+        inputs: Values of the inputs by variable name, in their units: shape (n,), or (n, size); an input
+            that is not named stays at its start.
+        start: Parameters and start values of states by variable name; a sequence for one with a size.
+
+    Returns:
+        Every output, and every state or memory that is one, by variable name: shape (n,), or (n, size).
+
+    Raises:
+        UnitError: If a name is unknown, a shape does not fit, or a value is refused.
+    """
+    t = np.asarray(t, dtype=np.float64)
+    instance = Instance(unit, float(t[0]) if len(t) else 0.0)
+    for name, value in (start or {}).items():
+        owner = _variable(unit, name)
+        values = [float(one) for one in np.broadcast_to(np.asarray(value, dtype=np.float64), (owner.width,))]
+        instance.set([instance.reference(scalar) for scalar in owner.names], values)
+    columns = _columns(unit, inputs or {}, len(t))
+    shown = [one for one in unit.variables if one.causality == "output"]
+    if unit.states or unit.memories:
+        found = _stepped(instance, t, columns, [name for one in shown for name in one.names])
+    else:
+        found = _at_once(instance, t, columns)
+    return {
+        name: np.column_stack(value) if isinstance(value, tuple) else np.asarray(value)
+        for name, value in named(shown, found).items()
+    }
+
+
+def _variable(unit: Unit, name: str) -> Variable:
+    """Return a variable of a unit by name."""
+    allowed = [one.name for one in unit.variables]
+    if name not in allowed:
+        raise UnitError(f"unit {unit.name}: no variable {name}; allowed: {', '.join(allowed)}")
+    return unit.variables[allowed.index(name)]
+
+
+def _columns(unit: Unit, inputs: Mapping[str, Any], count: int) -> dict[str, FloatArray]:
+    """Return the column of every scalar that is given over the log."""
+    columns: dict[str, FloatArray] = {}
+    for name, value in inputs.items():
+        owner, found = _variable(unit, name), np.asarray(value, dtype=np.float64)
+        shape = (count,) if owner.size is None else (count, owner.size)
+        if owner not in unit.inputs or found.shape != shape:
+            raise UnitError(
+                f"unit {unit.name}: {name}: found {owner.causality} with values of shape {found.shape},"
+                f" allowed: an input, shape {shape}"
+            )
+        columns |= zip(owner.names, found.reshape(count, -1).T, strict=True)
+    return columns
+
+
+def _at_once(instance: Instance, t: FloatArray, columns: Mapping[str, FloatArray]) -> list[Element]:
+    """Return the outputs of a unit that remembers nothing, each shape (n,)."""
+    unit = instance.unit
+    instance.set([instance.reference(name) for name in columns], list(columns.values()))
+    names = [name for one in unit.given for name in one.names]
+    given = instance.get([instance.reference(name) for name in names])
+    rows = None if unit.table is None else unit.table.rows_at(t)
+    found = Equations(unit).outputs(t, given, rows)
+    return [np.broadcast_to(np.asarray(one, dtype=np.float64), t.shape).copy() for one in found]
+
+
+def _stepped(
+    instance: Instance, t: FloatArray, columns: Mapping[str, FloatArray], shown: Sequence[str]
+) -> list[Element]:
+    """Return what a unit shows at every sample, each shape (n,)."""
+    inputs = [instance.reference(name) for name in columns]
+    outputs = [instance.reference(name) for name in shown]
+    given = np.column_stack(list(columns.values())).tolist() if columns else [[]] * len(t)
+    found = np.empty((len(outputs), len(t)))
+    for k, time in enumerate(t.tolist()):
+        instance.set(inputs, given[k])
+        found[:, k] = instance.get(outputs)
+        if k + 1 < len(t):
+            instance.do_step(time, float(t[k + 1]) - time)
+    return list(found)

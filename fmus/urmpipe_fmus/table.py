@@ -1,0 +1,85 @@
+"""A table over time inside a unit: the rows about an instant, found the same way in Python and in C."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_fmus.variable import LARGEST_INTEGER
+from urmpipe_models.elementwise import Element
+from urmpipe_models.errors import UnitError
+
+FloatArray = NDArray[np.float64]
+
+
+class Rows(NamedTuple):
+    """The rows of a table about an instant.
+
+    Attributes:
+        before: Values of the last row at or before it, one element a column; before the first, the first.
+        after: Values of the row after that; beyond the last, the last.
+        fraction: How far the instant is from one to the other, 0 at a row and outside the table, below 1.
+    """
+
+    before: tuple[Element, ...]
+    after: tuple[Element, ...]
+    fraction: Element
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Table:
+    """Values over time.
+
+    Times are integer nanoseconds, so that t = k h meets the row that is meant and not its neighbour.
+
+    Attributes:
+        t_ns: Times in [ns], strictly rising, shape (n,), n >= 1.
+        values: Finite, in SI, shape (n, columns).
+    """
+
+    t_ns: NDArray[np.int64]
+    values: FloatArray
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "t_ns", np.asarray(self.t_ns, dtype=np.int64))
+        object.__setattr__(self, "values", np.ascontiguousarray(self.values, dtype=np.float64))
+        faults = []
+        if self.values.ndim != 2 or len(self.t_ns) != len(self.values) or not self.values.size:
+            faults.append(
+                f"table: found {self.t_ns.shape} times and {self.values.shape} values, allowed: (n,) and"
+                " (n, columns), at least one of each"
+            )
+        elif len(self.t_ns) > LARGEST_INTEGER:
+            faults.append(f"table: found {len(self.t_ns)} rows, allowed: {LARGEST_INTEGER}")
+        if (np.diff(self.t_ns) <= 0).any():
+            row = int(np.argmax(np.diff(self.t_ns) <= 0)) + 2
+            faults.append(f"table: the time of row {row} is not after the one before; allowed: rising times")
+        if not np.isfinite(self.values).all():
+            row, column = (int(i) + 1 for i in np.argwhere(~np.isfinite(self.values))[0])
+            faults.append(f"table: row {row}, column {column} is not finite; allowed: finite values")
+        if faults:
+            raise UnitError(*faults)
+
+    @property
+    def columns(self) -> int:
+        """How many values a row has."""
+        return int(self.values.shape[1])
+
+    def rows_at(self, time: Element) -> Rows:
+        """Return the rows about a time in [s], a float or an array of shape (n,).
+
+        The time is rounded to whole nanoseconds, halves away from zero as C's `round` does.
+        """
+        scaled = np.asarray(time, dtype=np.float64) * 1e9
+        instant = np.trunc(scaled + np.copysign(0.5, scaled))
+        times = self.t_ns.astype(np.float64)
+        last = len(times) - 1
+        before = np.clip(np.searchsorted(times, instant, side="right") - 1, 0, last)
+        after = np.minimum(before + 1, last)
+        span = np.where(after > before, times[after] - times[before], 1.0)
+        fraction = np.where(instant <= times[before], 0.0, (instant - times[before]) / span)
+        fraction = np.where(after > before, fraction, 0.0)
+        return Rows(tuple(self.values[before].T), tuple(self.values[after].T), fraction)

@@ -1,0 +1,148 @@
+"""The unit: a model with FMI variables, written once in elementwise NumPy.
+
+From a unit come a vectorised run over a log (`run`), a Python FMU, a native FMU and its documentation.
+Its functions take the values of the variables (`v.phi`, `v.time`) and return new ones by name. Each value
+is an element: a float, an array, or a symbol of a trace; so the functions use `+ - * /` and NumPy's
+elementwise functions, `np.where` instead of `if`, and no `np.isnan`, `&` or `np.linalg`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+from typing import Any
+
+from urmpipe_fmus.table import Table
+from urmpipe_fmus.values import Values
+from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State, Variable
+from urmpipe_models.elementwise import Element
+from urmpipe_models.errors import UnitError
+
+Function = Callable[[Values], Mapping[str, Element | Sequence[Element]]]
+
+INTERNAL_STEP = "internal_step"
+"""The parameter that every unit with continuous states gets: the largest step of its integrator in [s]."""
+
+
+@dataclass(frozen=True, slots=True)
+class Recipe:
+    """How to make a unit again, where its FMU is run by Python.
+
+    Attributes:
+        module: Import name of the module that makes it; of a user's file the name of the file.
+        function: The module's function that returns the unit; empty if the module holds it as a variable.
+        arguments: What the function is called with: strings, numbers, lists and mappings of them. A table
+            is not among them: a unit that has one takes it as the argument `table`.
+        source: The text of a user's file; empty for a module of an installed package.
+    """
+
+    module: str = ""
+    function: str = ""
+    arguments: Mapping[str, Any] = field(default_factory=dict)
+    source: str = ""
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Unit:
+    """A model with FMI variables.
+
+    At a communication point t_k the inputs are set and the outputs are those of these inputs at once:
+    `outputs` is a function of time, parameters, inputs and states. A step from t_k to t_k+1 first takes the
+    sample, `update` giving the next values of the memories from those of t_k, then integrates the states
+    with RK4 in steps of at most `internal_step`, the inputs held.
+
+    Attributes:
+        name: An identifier: the name of the block, of the FMU's file and of its binaries.
+        description: One line for people.
+        variables: In the order in which importers show them.
+        outputs: The values of all `Output`s; None if there are none.
+        derivatives: The derivatives of all `State`s, in [unit/s]; None if there are none.
+        update: The next values of all `Memory`s; None if there are none.
+        internal_step: Largest step of the integrator in [s], the start value of a parameter of that name.
+        table: Rows over time, to be read as `v.table`; None for most units.
+        equations: The model as people write it, a line an equation or remark.
+        source: Where the equations come from.
+        recipe: How to make the unit again.
+    """
+
+    name: str
+    description: str
+    variables: tuple[Variable, ...]
+    outputs: Function | None = None
+    derivatives: Function | None = None
+    update: Function | None = None
+    internal_step: float = 1e-3
+    table: Table | None = None
+    equations: tuple[str, ...] = ()
+    source: str = ""
+    recipe: Recipe = field(default_factory=Recipe)
+
+    def __post_init__(self) -> None:
+        if self.states and not any(one.name == INTERNAL_STEP for one in self.variables):
+            step = Parameter(
+                name=INTERNAL_STEP,
+                description="Largest step of the integrator (RK4)",
+                unit="s",
+                start=self.internal_step,
+                minimum=1e-9,
+                tunable=False,
+            )
+            object.__setattr__(self, "variables", (*self.variables, step))
+        faults = [f"unit {self.name}: {fault}" for fault in self._faults()]
+        if faults:
+            raise UnitError(*faults)
+
+    @cached_property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Its parameters, in order."""
+        return tuple(one for one in self.variables if isinstance(one, Parameter))
+
+    @cached_property
+    def inputs(self) -> tuple[Input, ...]:
+        """Its inputs, in order."""
+        return tuple(one for one in self.variables if isinstance(one, Input))
+
+    @cached_property
+    def states(self) -> tuple[State, ...]:
+        """Its continuous states, in order."""
+        return tuple(one for one in self.variables if isinstance(one, State))
+
+    @cached_property
+    def memories(self) -> tuple[Memory, ...]:
+        """Its discrete states, in order."""
+        return tuple(one for one in self.variables if isinstance(one, Memory))
+
+    @cached_property
+    def computed(self) -> tuple[Output, ...]:
+        """The outputs that `outputs` computes, in order."""
+        return tuple(one for one in self.variables if isinstance(one, Output))
+
+    @cached_property
+    def given(self) -> tuple[Variable, ...]:
+        """All that the functions are given, by kind: parameters, inputs, states, memories."""
+        return (*self.parameters, *self.inputs, *self.states, *self.memories)
+
+    @cached_property
+    def scalars(self) -> tuple[tuple[str, Variable], ...]:
+        """Name and variable of every scalar, in order: the index is FMI's value reference."""
+        return tuple((name, one) for one in self.variables for name in one.names)
+
+    def _faults(self) -> Iterator[str]:
+        if not self.name.isidentifier():
+            yield f"found {self.name!r} as its name, allowed: a letter, then letters, digits and _"
+        names = [one.name for one in self.variables]
+        for name in sorted({name for name in names if names.count(name) > 1}):
+            yield f"{name}: found twice, allowed: each name once"
+        for name in {"time", "table"} & set(names):
+            yield f"{name}: found as a variable, allowed: another name (v.{name} is given to all units)"
+        for one in self.variables:
+            yield from one.faults()
+        for variables, function, said in (
+            (self.computed, self.outputs, "outputs"),
+            (self.states, self.derivatives, "derivatives"),
+            (self.memories, self.update, "update"),
+        ):
+            if bool(variables) != (function is not None):
+                found = "without variables for it" if function else f"missing, of {variables[0].name}"
+                yield f"{said}: found {found}, allowed: a function where there are variables, else none"
