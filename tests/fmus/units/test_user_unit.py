@@ -42,7 +42,7 @@ def said(path: Path) -> list[str]:
 
 def test_the_backlash_of_the_documentation_holds_a_joint_until_the_slack_is_taken_up() -> None:
     unit = load_unit_file(DOCS / "examples" / "backlash.py")
-    t = np.arange(401) * 0.005
+    t = np.linspace(0.0, 2.0, 401, dtype=np.float64)
     motor = np.sin(np.pi * t)[:, np.newaxis] * np.ones(6)
     play = 0.2
     joint = run(unit, t, {"motor": motor}, {"play": play})["joint"]
@@ -56,7 +56,7 @@ def test_the_backlash_of_the_documentation_holds_a_joint_until_the_slack_is_take
 
 def test_the_low_pass_of_the_documentation_follows_as_its_solution_does() -> None:
     unit = load_unit_file(DOCS / "examples" / "low_pass.py")
-    t = np.arange(41) * 5e-3
+    t = np.linspace(0.0, 0.2, 41, dtype=np.float64)
     y = run(unit, t, {"u": np.ones_like(t)}, {"T": 0.05})["y"]
     # RK4 with h = 1 ms: the error is about t h^4 / (120 T^5) = 5e-9 at 0.2 s
     np.testing.assert_allclose(y, 1.0 - np.exp(-t / 0.05), rtol=0.0, atol=1e-8)
