@@ -105,10 +105,20 @@ class Instance:
         try:
             self._sample(time)
             self._integrate(time, step)
-        except UnitError:
+        except BaseException:
             self.time, self._values, self._stale = before
             raise
         self.time, self._stale = time + step, True
+
+    def begin(self, time: float) -> None:
+        """Put the instance at its start time in [s], before the first step.
+
+        Raises:
+            UnitError: If the time is not finite.
+        """
+        if not math.isfinite(time):
+            raise UnitError(f"unit {self.unit.name}: startTime: found {time:g}, allowed: a finite number")
+        self.time, self._stale = time, True
 
     def save(self) -> Any:
         """Return all that the instance remembers, to be given to `restore`."""
