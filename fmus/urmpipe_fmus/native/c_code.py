@@ -105,7 +105,7 @@ _OUR_OWN = (
     *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
     *("exp", "expm1", "log", "log1p", "atan2", "hypot"),
 )
-"""Functions of elementary.h, named as the C library's with _of: they are the same to the last bit everywhere."""
+"""Functions of elementary.h, named as the C library's with _of: the same to the last bit everywhere."""
 
 _OF_THE_LIBRARY = ("sqrt", "floor", "ceil", "fabs", "fmod", "copysign", "pow")
 """The C library's, which are exact; but pow, which may differ in the last bits."""
