@@ -28,11 +28,11 @@ def test_the_table_of_stability_is_what_the_script_computes(figures: Mapping[str
 
 
 def test_the_picture_is_what_the_script_draws(figures: Mapping[str, Any]) -> None:
-    kept = figures["PICTURE"].read_text(encoding="utf-8")
-    numbers = re.compile(r"\d+(?:\.\d+)?")
-    assert numbers.sub("", figures["picture"]()) == numbers.sub("", kept)
-    drawn = [[float(one) for one in numbers.findall(text)] for text in (figures["picture"](), kept)]
-    assert drawn[0] == pytest.approx(drawn[1], abs=0.15)  # a rounded tenth of a pixel
+    texts = figures["picture"](), figures["PICTURE"].read_text(encoding="utf-8")
+    number = re.compile(r"\d+(?:\.\d+)?")
+    assert number.sub("", texts[0]) == number.sub("", texts[1])
+    computed, kept = ([float(one) for one in number.findall(text)] for text in texts)
+    assert computed == pytest.approx(kept, abs=0.15)  # a tenth of a pixel, rounded
 
 
 def test_every_parameter_stands_with_its_unit_and_value() -> None:
