@@ -134,6 +134,7 @@ def test_on_a_held_end_a_small_load_is_limited_by_2_inertia_over_l() -> None:
     assert end_held(0.999 * limit, 0.002) < 1.0 < end_held(1.001 * limit, 0.002)
 
 
+@pytest.mark.slow
 def test_the_radius_of_the_step_map_tells_what_a_simulation_does(figures: Mapping[str, Any]) -> None:
     for load, step in ((0.2, 5e-3), (0.2, 2.5e-3), (1.0, 5e-3)):
         starts = {"set_point__target": 0.0, "load__theta": 1e-9, "controller__u_max": 1e9, "load__J": load}
