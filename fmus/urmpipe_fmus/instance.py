@@ -96,7 +96,7 @@ class Instance:
 
         Raises:
             UnitError: If the step is not above 0 or too long for its internal steps, or a state is not finite
-                after it; then nothing changed.
+                after it; then nothing changed, but that what is fixed from the first step on stays fixed.
         """
         if not (math.isfinite(time) and math.isfinite(step) and step > 0.0):
             raise UnitError(

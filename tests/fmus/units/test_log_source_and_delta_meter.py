@@ -58,10 +58,16 @@ def test_the_columns_are_outputs_by_the_callers_names_that_depend_on_time() -> N
             [["q", "rad", 3, "Angles", 5]],
             "option columns: found ['q', 'rad', 3, 'Angles', 5], allowed: name, unit, size and description",
         ),
+        (
+            [["q", 2]],
+            "option columns: found ['q', 2], allowed: name, unit, size and description",
+        ),
+        ([7], "option columns: found 7, allowed: name, unit, size and description"),
+        ("qd", "found no table and columns, allowed: a Table, a list of columns"),
         ([["q", "rad", 2], ["q", "m"]], "q: found twice, allowed: each name once"),
     ],
 )
-def test_columns_that_do_not_fit_are_refused(columns: list[list[Any]], said: str) -> None:
+def test_columns_that_do_not_fit_are_refused(columns: Any, said: str) -> None:
     with pytest.raises(UnitError) as error:
         log_source(LOG, columns)
     assert str(error.value) == f"unit log_source: {said}"
