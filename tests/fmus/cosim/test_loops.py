@@ -41,7 +41,7 @@ def test_a_nonlinear_ring_is_solved() -> None:
 def test_the_solution_is_followed_over_time() -> None:
     """y = k u + c(t) with u = y^3 by two blocks: y^3 - 2 y + c = 0, from its root at y = 0."""
     t_ns = np.arange(11) * 10**8
-    c = LogColumn(t_ns, 0.08 * np.arange(11))
+    c = LogColumn(t_ns, np.linspace(0.0, 0.8, 11))
     cube = gain("cube", formula="u * u * u")
     line = Foreign(
         name="line",
@@ -129,7 +129,7 @@ def test_going_back_undoes_what_a_block_integrated() -> None:
 def test_what_has_no_solution_is_told_with_the_loop_and_what_is_left() -> None:
     recorded = ran({"a": gain(), "b": gain()}, RING, {"a": {"c": 1.0}}, iterate=True)
     assert recorded.failed == (
-        "algebraic loop: a.y -> b.u -> b.y -> a.u: not solved after 50 iterations, found a residual of 1, allowed:"
-        " 1e-09 relative to its values, at t = 0 s"
+        "algebraic loop: a.y -> b.u -> b.y -> a.u: not solved after 50 iterations, found a residual of 1,"
+        " allowed: 1e-09 relative to its values, at t = 0 s"
     )
     assert len(recorded.t_ns) == 0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -33,7 +35,7 @@ SUM = Foreign(
 def test_a_row_of_blocks_with_feedthrough_has_no_delay(count: int) -> None:
     names = [f"b{i}" for i in range(count)]
     blocks = {name: gain("metres", unit="m") for name in reversed(names)} | {"ramp": RAMP}
-    connections = {f"{b}.u": f"{a}.y" for a, b in zip(names, names[1:], strict=False)} | {"b0.u": "ramp.y[2]"}
+    connections = {f"{b}.u": f"{a}.y" for a, b in pairwise(names)} | {"b0.u": "ramp.y[2]"}
     recorded = ran(blocks, connections, {name: {"c": 1.0} for name in names})
     t = 0.1 * np.arange(11)
     assert recorded.failed is None

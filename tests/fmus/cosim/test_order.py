@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 
 import numpy as np
 from hypothesis import given
@@ -82,7 +83,7 @@ def test_blocks_in_a_row_are_read_once_each_in_their_order_whatever_that_of_the_
     names = [f"b{i}" for i in range(2000)]  # more than Python's recursion limit
     outputs = [Port(name, "y") for name in reversed(names)]
     depends = {port: [Port(port.block, "u")] for port in outputs}
-    sources = {Port(b, "u"): Port(a, "y") for a, b in zip(names, names[1:], strict=False)}
+    sources = {Port(b, "u"): Port(a, "y") for a, b in pairwise(names)}
     steps = Order(outputs, depends, sources).steps()
     assert [step.block for step in steps if isinstance(step, Exchange)] == names
 

@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from foreign_fmus import COUNTER, INTEGRATOR, TROUBLE, Foreign, Scalar, fmu, gain, planned, system
+from foreign_fmus import COUNTER, INTEGRATOR, TROUBLE, Foreign, Scalar, fmu, fmu_of, gain, planned, system
 from urmpipe_fmus.cosim import LogColumn, LogInput, Port, prepare
 from urmpipe_fmus.cosim.interface import read_interface
 from urmpipe_models.errors import CosimulationError
@@ -33,7 +34,10 @@ ARM = Foreign(
 )
 
 
-def told(*arguments: object, **options: object) -> list[str]:
+ALLOWED = "allowed: each in [connections], in [inputs], or with a value in start"
+
+
+def told(*arguments: Any, **options: Any) -> list[str]:
     with pytest.raises(CosimulationError) as caught:
         planned(*arguments, **options)
     return [str(finding) for finding in caught.value.findings]
@@ -71,10 +75,8 @@ def test_every_wrong_connection_is_told() -> None:
         "connections.n.by: found i.y, Real, allowed: Integer (numbers only)",
         "connections.n.on: found n.n, Integer, allowed: Boolean (numbers only)",
         "connections.arm.phi[1]: found i.u, causality input, allowed: an output of i: y",
-        "blocks.arm: found inputs without a source: phi[1]; allowed: each in [connections], in [inputs], or with"
-        " a value in start",
-        "blocks.i: found inputs without a source: u; allowed: each in [connections], in [inputs], or with a value"
-        " in start",
+        f"blocks.arm: found inputs without a source: phi[1]; {ALLOWED}",
+        f"blocks.i: found inputs without a source: u; {ALLOWED}",
     ]
 
 
@@ -132,7 +134,8 @@ def test_start_values_that_are_refused_are_told() -> None:
         },
     ) == [
         "blocks.arm.start.phi: found 10 values, allowed: 11, or one for all",
-        "blocks.arm.start.lenght: found 'lenght', allowed: length, gain, name, count, strict, phi, p, rate, free",
+        "blocks.arm.start.lenght: found 'lenght', allowed: length, gain, name, count, strict, phi, p, rate,"
+        " free",
         "blocks.arm.start.length: found 3, allowed: 0.1 to 2",
         "blocks.arm.start.gain: found nan, allowed: a finite number",
         "blocks.arm.start.gain[1]: found true, allowed: a number",
@@ -151,8 +154,8 @@ def test_start_values_that_are_refused_are_told() -> None:
 def test_a_loop_is_told_by_its_members() -> None:
     blocks = {"a": gain(), "b": gain(), "c": INTEGRATOR}
     assert told(blocks, {"b.u": "a.y", "a.u": "b.y", "c.u": "b.y"}) == [
-        "algebraic loop: a.y -> b.u -> b.y -> a.u: each depends on the one before at the same instant; allowed:"
-        " none, or [loops] iterate = true"
+        "algebraic loop: a.y -> b.u -> b.y -> a.u: each depends on the one before at the same instant;"
+        " allowed: none, or [loops] iterate = true"
     ]
     assert planned(blocks, {"b.u": "a.y", "a.u": "c.y", "c.u": "b.y"}).loops == ()
 
@@ -176,11 +179,9 @@ def test_a_loop_of_integers_cannot_be_iterated() -> None:
 def test_the_duration_is_told_by_the_system_or_by_the_caller_or_by_the_longest_log() -> None:
     ask = LogInput(destination=Port("a", "u"), log="run.csv", column="u")
     column = LogColumn(np.array([0, 36_910_000_000]), np.zeros(2))
-    options = {"step": 0.005, "duration": None}
-    blocks = system({"a": gain()}, inputs=[ask], **options)
-    make = lambda block: block.fmu  # noqa: E731 - the shortest there is
-    assert prepare(blocks, make, column=lambda one: column).count == 7382
-    assert prepare(blocks, make, column=lambda one: column, duration=1.0).count == 200
+    blocks = system({"a": gain()}, inputs=[ask], step=0.005, duration=None)
+    assert prepare(blocks, fmu_of, column=lambda one: column).count == 7382
+    assert prepare(blocks, fmu_of, column=lambda one: column, duration=1.0).count == 200
     assert told({"a": TROUBLE}, duration=None) == [
         "system.duration: not found, and no log tells it; allowed: a number above 0, in s"
     ]
@@ -228,11 +229,6 @@ def test_what_is_no_fmu_for_cosimulation_is_told(tmp_path: Path) -> None:
     ("found", "replaced", "told_as"),
     [
         (
-            'fmiVersion="2.0"',
-            'fmiVersion="3.0"',
-            "found FMI 3.0 for coSimulation, allowed: FMI 2.0 for coSimulation",
-        ),
-        (
             "CoSimulation",
             "ModelExchange",
             "found FMI 2.0 for modelExchange, allowed: FMI 2.0 for coSimulation",
@@ -256,6 +252,23 @@ def test_an_fmu_of_another_kind_is_told(tmp_path: Path, found: str, replaced: st
     binary = f"binaries/{fmpy.platform}/loss{fmpy.sharedLibraryExtension}"
     assert str(caught.value).startswith(
         f"block a: {other}: {told_as.format(here=fmpy.platform, binary=binary)}"
+    )
+
+
+def test_an_fmu_of_fmi_3_is_told(tmp_path: Path) -> None:
+    other = tmp_path / "other.fmu"
+    with zipfile.ZipFile(other, "w") as made:
+        made.writestr(
+            "modelDescription.xml",
+            '<fmiModelDescription fmiVersion="3.0" modelName="three" instantiationToken="3"><CoSimulation'
+            ' modelIdentifier="three"/><ModelVariables><Float64 name="time" valueReference="0"'
+            ' causality="independent" variability="continuous"/></ModelVariables><ModelStructure/>'
+            "</fmiModelDescription>",
+        )
+    with pytest.raises(CosimulationError) as caught:
+        prepare(system({"a": gain()}), lambda block: other)
+    assert str(caught.value) == (
+        f"block a: {other}: found FMI 3.0 for coSimulation, allowed: FMI 2.0 for coSimulation"
     )
 
 
