@@ -39,15 +39,21 @@ def native_missing(platforms: Sequence[str] = ()) -> str | None:
     """Return why no native FMU can be built here for some platforms (default: this one), None if it can."""
     if find_spec("casadi") is None:
         return "casadi is not installed (pip install 'urmpipe[native]')"
-    unknown = [one for one in platforms if one not in TARGETS and one != this_platform()]
-    if unknown:
-        return f"platform {', '.join(unknown)}: allowed: {', '.join(sorted({*TARGETS, this_platform()}))}"
-    if find_spec("ziglang") or _compiles_itself(platforms or (this_platform(),)):
+    wanted = list(platforms) or [this_platform()]
+    local = wanted == [this_platform()]
+    if local and _system_compiler():
         return None
-    zig = "ziglang is not installed (pip install 'urmpipe[cross]')"
-    if _is_local(platforms or (this_platform(),)):
-        return f"no C compiler is found (cc, or what the variable CC names), and {zig}"
-    return zig
+    reasons = ["no C compiler is found (cc, or what the variable CC names)"] if local else []
+    unknown = [one for one in wanted if one not in TARGETS]
+    if unknown:
+        reasons.append(
+            f"platform {', '.join(unknown)}: zig is asked for {' and '.join(sorted(TARGETS))} only"
+        )
+    elif find_spec("ziglang") is None:
+        reasons.append("ziglang is not installed (pip install 'urmpipe[cross]')")
+    else:
+        return None
+    return ", and ".join(reasons)
 
 
 def native_binaries(
@@ -81,26 +87,17 @@ def native_binaries(
     }
 
 
-def _is_local(platforms: Sequence[str]) -> bool:
-    return list(platforms) == [this_platform()]
-
-
 def _system_compiler() -> list[str] | None:
     """Return the command of the system's compiler: what CC names, else cc."""
     command = shlex.split(os.environ.get("CC") or "cc", posix=os.name == "posix")
     return command if command and shutil.which(command[0]) else None
 
 
-def _compiles_itself(platforms: Sequence[str]) -> bool:
-    """Return whether the system's compiler makes all that is wanted."""
-    return _is_local(platforms) and _system_compiler() is not None
-
-
 def _command(platforms: Sequence[str], one: str) -> list[str]:
     """Return the compiler and flags for one of some platforms."""
     position = [] if one.startswith("win") else ["-fPIC"]
     local = _system_compiler()
-    if local and _is_local(platforms):
+    if local and list(platforms) == [this_platform()]:
         linked = ["-Wl,--build-id=none"] if one.startswith("linux") else []
         return [*local, *FLAGS, *position, *linked]
     return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[one], *FLAGS, *position]

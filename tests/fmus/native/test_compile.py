@@ -95,8 +95,14 @@ def only_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
-    allowed = ", ".join(sorted({*TARGETS, this_platform()}))
-    assert native_missing(["amiga"]) == f"platform amiga: allowed: {allowed}"
+    assert native_missing(["amiga", "linux64"]) == ("platform amiga: zig is asked for linux64 and win64 only")
+    monkeypatch.setattr("urmpipe_fmus.native.compile.this_platform", lambda: "amiga")
+    monkeypatch.setattr("urmpipe_fmus.native.compile._system_compiler", lambda: None)
+    assert native_missing() == (
+        "no C compiler is found (cc, or what the variable CC names),"
+        " and platform amiga: zig is asked for linux64 and win64 only"
+    )
+    monkeypatch.undo()
     only_casadi(monkeypatch)
     assert native_missing(["linux64", "win64"]) == "ziglang is not installed (pip install 'urmpipe[cross]')"
     monkeypatch.setattr("urmpipe_fmus.native.compile.find_spec", lambda _: None)
