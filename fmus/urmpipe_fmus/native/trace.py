@@ -1,4 +1,4 @@
-"""A unit's functions run on symbols, and what they gave written as C."""
+"""A unit's functions run on symbols: what they compute, as expressions of the scalars."""
 
 from __future__ import annotations
 
