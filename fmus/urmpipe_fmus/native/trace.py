@@ -1,4 +1,4 @@
-"""A unit's functions run on symbols, and what they gave written as C."""
+"""A unit's functions run on symbols: what they compute, as expressions of the scalars."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def _function(unit: Unit, name: str) -> Any:
     method: Callable[..., list[Any]] = getattr(Equations(unit), name)
     found = method(Symbol(time), given, rows)
     try:
-        result = casadi.vertcat(*map(expression, found))
+        result = casadi.densify(casadi.vertcat(*map(expression, found)))
     except UnitError as error:
         raise UnitError(*(f"unit {unit.name}: {name}: {one}" for one in error.findings)) from error
     arguments = [time, *(casadi.vertcat(*group) for group in (values, before, after)), fraction]
