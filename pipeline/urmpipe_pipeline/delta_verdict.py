@@ -50,8 +50,8 @@ class DeltaVerdict:
 
     @property
     def used(self) -> float | None:
-        """Share of its tolerance that the worst value uses up; None without one."""
-        return self.worst / self.allowed if self.allowed else None
+        """Share of its tolerance that the worst value uses up; None where a sample has no value."""
+        return self.worst / self.allowed if self.allowed and math.isfinite(self.worst) else None
 
     @property
     def share_out(self) -> float:

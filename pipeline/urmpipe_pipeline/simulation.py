@@ -1,4 +1,4 @@
-"""What a co-simulation recorded: plain arrays with names and units, a table (`to_frame`) and JSON (`to_dict`)."""
+"""What a co-simulation recorded: named arrays with units, a table (`to_frame`) and JSON (`to_dict`)."""
 
 from __future__ import annotations
 
@@ -186,10 +186,12 @@ class Simulation:
         count = len(self.t_ns)
         if (np.diff(self.t_ns) <= 0).any():
             yield "found times that do not rise, allowed: rising times"
+        shaped = [one for one in self.signals if one.values.ndim in (1, 2) and len(one.values) == count]
         for one in self.signals:
-            if one.values.ndim not in (1, 2) or len(one.values) != count:
-                yield f"{one.name}: found values of shape {one.values.shape}, allowed: ({count},) or ({count}, size)"
-        for name, times in Counter(one.name for one in self.signals).items():
+            if one not in shaped:
+                allowed = f"({count},) or ({count}, size)"
+                yield f"{one.name}: found values of shape {one.values.shape}, allowed: {allowed}"
+        for name, times in Counter(name for one in shaped for name in {one.name, *one.names}).items():
             if times > 1:
                 yield f"{name}: found {times} signals of this name, allowed: one"
         for arm in self.arms:
@@ -213,6 +215,11 @@ class Simulation:
         if self.failed is not None or any(one.verdict == "fail" for one in self.verdicts):
             return "fail"
         return "pass" if self.verdicts else None
+
+    @property
+    def judged_worst(self) -> DeltaVerdict | None:
+        """The verdict that uses up most of its tolerance, or lacks a value; None without any."""
+        return max(self.verdicts, key=lambda one: math.inf if one.used is None else one.used, default=None)
 
     def signal(self, name: str) -> Signal:
         """Return the signal `block.variable`.
@@ -279,5 +286,8 @@ def extremes(values: FloatArray, t: FloatArray) -> dict[str, float | None]:
     low, high = known[np.argmin(values[known])], known[np.argmax(values[known])]
     return {
         **{name: value if math.isfinite(value) else None for name, value in ends.items()},
-        "min": float(values[low]), "t_min": float(t[low]), "max": float(values[high]), "t_max": float(t[high]),
-    }  # fmt: skip
+        "min": float(values[low]),
+        "t_min": float(t[low]),
+        "max": float(values[high]),
+        "t_max": float(t[high]),
+    }
