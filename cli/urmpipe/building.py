@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 from urmpipe.guards import PathLike, Robot, place_robot
+from urmpipe.log_tables import LogTable, read_table
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_options
 from urmpipe_models.errors import OptionError
@@ -28,7 +29,7 @@ def build_fmu(
     unit: Unit | PathLike,
     *,
     robot: Robot | None = None,
-    log: PathLike | None = None,
+    log: PathLike | LogTable | None = None,
     options: Mapping[str, Any] | None = None,
     read: ReadOptions | None = None,
     backend: Backend | None = None,
@@ -40,7 +41,7 @@ def build_fmu(
     Args:
         unit: A name of `urmpipe_fmus.units`, a Python file with a unit in it, or a unit.
         robot: Name, file (TOML, URDF) or chain of the arm, for a unit that has one.
-        log: A log for a unit that plays one: CSV, or a folder of plots.
+        log: A log for a unit that plays one: CSV, a folder of plots, or what `read_table` made of them.
         options: Further options of the unit by name; see `urmpipe fmu list`.
         read: How to read the log where it cannot tell by itself.
         backend: native (C, runs anywhere) or python (needs Python on the target); default: native if this
@@ -59,8 +60,8 @@ def build_fmu(
     made = unit_of(unit, robot=robot, log=log, options=options, read=read)
     path = Path(output)
     target = path if path.suffix == ".fmu" else path / f"{made.name}.fmu"
-    named = [one for one in (unit, robot, log) if isinstance(one, (str, Path))]
-    with guarded_output(target, [file for one in named for file in _files(one)], "fmu") as part:
+    inputs = [file for one in (unit, robot, log) for file in _files(one)]
+    with guarded_output(target, inputs, "fmu") as part:
         return replace(build(made, part, backend=backend, platforms=tuple(platforms)), path=target)
 
 
@@ -68,7 +69,7 @@ def unit_of(
     unit: Unit | PathLike,
     *,
     robot: Robot | None = None,
-    log: PathLike | None = None,
+    log: PathLike | LogTable | None = None,
     options: Mapping[str, Any] | None = None,
     read: ReadOptions | None = None,
 ) -> Unit:
@@ -77,7 +78,7 @@ def unit_of(
     Args:
         unit: A name, a Python file, or a unit.
         robot: The arm, for a unit that has one; for one that plays a log it tells how to read it.
-        log: A log for a unit that plays one.
+        log: A log for a unit that plays one, or what `read_table` made of it.
         options: Further options of the unit. Of a log, `columns` names columns of any table; without it
             they are the joints, or the x, y, z of a path.
         read: How to read the log where it cannot tell by itself.
@@ -94,7 +95,11 @@ def unit_of(
     _refuse_missing(name, known, robot, log)
     arm = place_robot(robot)
     if log is not None:
-        given |= _from_log(log, arm, given.get("columns"), read)
+        names = given.pop("columns", None)
+        found = (
+            log if isinstance(log, LogTable) else read_table(log, column_names(names), robot=arm, read=read)
+        )
+        given |= {"table": found.table, "columns": found.columns}
     elif arm is not None:
         given["robot"] = arm
     return make_unit(name, **given)
@@ -107,18 +112,16 @@ def _from_file(path: Path) -> Unit:
     return load_unit_file(path)
 
 
-def _from_log(log: PathLike, robot: Any, columns: Any, read: ReadOptions | None) -> dict[str, Any]:
-    """Return the options that a log stands for."""
-    from urmpipe.log_tables import read_columns, read_table
-
-    if columns is None:
-        found = read_table(log, robot=robot, read=read)
-    else:
-        found = read_columns(log, [columns] if isinstance(columns, str) else list(columns), read=read)
-    return dict(zip(FROM_LOG, (found.table, found.columns), strict=True))
+def column_names(columns: Any) -> list[str] | None:
+    """Return names of columns as they stand in an option: one, or a list of them."""
+    return (
+        None
+        if columns is None
+        else [str(one) for one in (columns if isinstance(columns, list) else [columns])]
+    )
 
 
-def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, log: PathLike | None) -> None:
+def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, log: Any) -> None:
     """Raise an `OptionError` if a unit lacks its robot or its log, or is given what it does not have."""
     takes = {"robot": "robot" in known, "log": FROM_LOG[0] in known}
     faults = []
@@ -139,7 +142,10 @@ def _refuse_options(unit: Unit | PathLike, given: Mapping[str, Any]) -> None:
         raise OptionError(f"unit {who}: found {', '.join(found)}, allowed: no options, it is complete")
 
 
-def _files(operand: PathLike) -> list[Path]:
+def _files(operand: Any) -> Sequence[Path]:
     """Return the files that an operand stands for, if it stands for any."""
-    path = Path(operand)
-    return log_files(path) if path.is_dir() else [path]
+    if isinstance(operand, LogTable):
+        return operand.files
+    if not isinstance(operand, (str, Path)):
+        return ()
+    return log_files(Path(operand)) if Path(operand).is_dir() else [Path(operand)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import NamedTuple
 
@@ -12,7 +12,7 @@ from urmpipe.guards import PathLike
 from urmpipe_fmus.table import Table
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.joint_log import FloatArray, JointLog
+from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.sources import ReadOptions, read_log
 from urmpipe_pipeline.text import counted
@@ -38,54 +38,60 @@ class LogTable(NamedTuple):
     Attributes:
         table: Its rows.
         columns: What the columns of the table are, from the left.
+        files: Its files.
+        warnings: What a person should know of it.
     """
 
     table: Table
     columns: tuple[Quantity, ...]
+    files: tuple[Path, ...]
+    warnings: tuple[LogWarning, ...]
 
 
 def read_table(
-    operand: PathLike, *, robot: Chain | None = None, read: ReadOptions | None = None
+    log: PathLike,
+    names: Sequence[str] | None = None,
+    *,
+    robot: Chain | None = None,
+    read: ReadOptions | None = None,
 ) -> LogTable:
-    """Return a log as a table.
+    """Return a log as a table: its motion, or some columns by name.
 
-    Its variables are q, the angles of the joints that turn, and s, the ways of those that slide; qd, qdd, sd
-    and sdd, what was recorded of their rates; and p, a path or the recorded tool centre point.
+    The variables of its motion are q, the angles of the joints that turn, and s, the ways of those that
+    slide; qd, qdd, sd and sdd, what was recorded of their rates; and p, a path or the recorded tool centre
+    point. A column by name, such as a voltage, is a variable of its own.
 
     Args:
-        operand: A log or path (CSV), or a folder whose CSV files make one log.
+        log: A log or path (CSV), or a folder whose CSV files make one log.
+        names: Columns by name or number, of any table; default: the motion.
         robot: The arm: it tells how many joints there are, their names, and which of them slide.
         read: How to read the file where it cannot tell by itself.
 
     Raises:
         LogError: With everything that is wrong with the files, or if a row lacks a value.
     """
-    files = log_files(Path(operand))
+    return _motion(Path(log), robot, read) if names is None else _columns(Path(log), names, read)
+
+
+def _motion(path: Path, robot: Chain | None, read: ReadOptions | None) -> LogTable:
+    """Return the motion that a log holds."""
+    files = log_files(path)
     log = read_log(files, read, robot)
     parts = list(_parts(log))
     _refuse_missing(str(files[0]), parts)
     columns = tuple(Quantity(name, unit, values.shape[1]) for name, unit, values in parts)
-    return LogTable(Table(log.t_ns, np.column_stack([values for _, _, values in parts])), columns)
+    table = Table(log.t_ns, np.column_stack([values for _, _, values in parts]))
+    return LogTable(table, columns, tuple(files), tuple(one.of(log.name) for one in log.warnings))
 
 
-def read_columns(file: PathLike, names: Sequence[str], *, read: ReadOptions | None = None) -> LogTable:
-    """Return columns of any table by name, such as a voltage, each a variable of its own.
-
-    Args:
-        file: A CSV file.
-        names: The columns.
-        read: How to read the file where it cannot tell by itself.
-
-    Raises:
-        LogError: If a column is not there, or with everything that is wrong with the rows.
-    """
+def _columns(path: Path, names: Sequence[str], read: ReadOptions | None) -> LogTable:
+    """Return columns of a table by name."""
     from urmpipe_pipeline.sources.series import read_series
 
-    series = read_series(Path(file), names, read)
-    columns = tuple(
-        Quantity(name, unit or "") for name, unit in zip(series.names, series.units, strict=True)
-    )
-    return LogTable(Table(series.t_ns, series.values), columns)
+    found = read_series(path, names, read)
+    columns = tuple(Quantity(name, unit or "") for name, unit in zip(found.names, found.units, strict=True))
+    warnings = tuple(one.of(path.stem) for one in found.warnings)
+    return LogTable(Table(found.t_ns, found.values), columns, (path,), warnings)
 
 
 def _parts(log: JointLog) -> Iterator[tuple[str, str, FloatArray]]:

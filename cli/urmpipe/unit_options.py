@@ -24,6 +24,21 @@ class UnitType(click.ParamType[str]):
         return [*names, CompletionItem(incomplete, type="file")]
 
 
+class SystemType(click.ParamType[str]):
+    """A shipped system's name, or a system file; names complete in the shell."""
+
+    name = "SYSTEM"
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Offer the names of the systems and then files."""
+        from urmpipe_fmus.cosim import system_names
+
+        names = [CompletionItem(name) for name in system_names() if name.startswith(incomplete)]
+        return [*names, CompletionItem(incomplete, type="file")]
+
+
 def option_value(text: str) -> Any:
     """Return the value of NAME=VALUE: as TOML has it, else some words parted by commas, or a word."""
     try:

@@ -110,13 +110,19 @@ def build(
       urmpipe fmu build log_source --log log.csv -o fmus
       urmpipe fmu build my_unit.py
     """
-    from urmpipe.building import build_fmu
+    from urmpipe.building import build_fmu, column_names
     from urmpipe.fmu_printing import built_dict, print_built
-    from urmpipe.printing import print_json
+    from urmpipe.guards import place_robot
+    from urmpipe.log_tables import read_table
+    from urmpipe.printing import print_json, print_warnings
 
     options = {name: option_value(text) for name, text in given.items()}
+    arm = place_robot(robot)
+    table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm)
+    if table and not quiet:
+        print_warnings(table.warnings)
     made = build_fmu(
-        unit, robot=robot, log=log, options=options, backend=backend, platforms=platforms, output=output
+        unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
     )
     if as_json:
         print_json(built_dict(made))

@@ -1,0 +1,119 @@
+"""The blocks of a system as FMUs: their robots, logs and units, and the FMU of each from the cache."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from urmpipe.building import Backend, column_names, unit_of
+from urmpipe.guards import place_robot
+from urmpipe.log_tables import LogTable, read_table
+from urmpipe_datasets import LOGS
+from urmpipe_models.errors import OptionError
+
+if TYPE_CHECKING:
+    from urmpipe_fmus.cosim.plan import LogColumn
+    from urmpipe_fmus.cosim.system import Block, LogInput
+    from urmpipe_fmus.unit import Unit
+    from urmpipe_models.chain import Chain
+    from urmpipe_pipeline.joint_log import LogWarning
+    from urmpipe_pipeline.sources import ReadOptions
+
+CHAIN, METER = "kinematic_chain", "delta_meter"
+"""The units that are shown as an arm, and judged."""
+
+
+class Blocks:
+    """What the blocks of a system are made of.
+
+    Args:
+        shipped: Whether the system came with urmpipe: its logs are the bundled ones then, by name.
+        backend: What the FMUs of units are built with.
+        read: How to read a log where it cannot tell by itself.
+        told: Told what takes its time: an FMU that is built.
+
+    Attributes:
+        units: The unit of each block that is one.
+        chains: The arm of each block that has one.
+        files: The files that were read.
+        warnings: What a person should know of the logs.
+        end: Where the longest log ends in [s]; 0 without one.
+    """
+
+    def __init__(
+        self,
+        *,
+        shipped: bool,
+        backend: Backend | None = None,
+        read: ReadOptions | None = None,
+        told: Callable[[str], None] | None = None,
+    ) -> None:
+        self._shipped, self._backend, self._read = shipped, backend, read
+        self._told = told or (lambda line: None)
+        self.units: dict[str, Unit] = {}
+        self.chains: dict[str, Chain] = {}
+        self.files: list[Path] = []
+        self.warnings: list[LogWarning] = []
+        self.end = 0.0
+
+    def make(self, block: Block) -> Path:
+        """Return the FMU of a block, built if it is not in the cache.
+
+        Raises:
+            UrmpipeError: With what is wrong with its unit, its robot, its log or its file.
+        """
+        if block.fmu is not None:
+            self.files.append(block.fmu)
+            return block.fmu
+        unit = self.units[block.name] = self._unit(block)
+        return self._fmu(unit)
+
+    def column(self, asked: LogInput) -> LogColumn:
+        """Return the column of a log that an input follows.
+
+        Raises:
+            LogError: If it cannot be read.
+        """
+        from urmpipe_fmus.cosim.plan import LogColumn
+
+        found = self._table(asked.log, [asked.column], None)
+        return LogColumn(found.table.t_ns, found.table.values[:, 0], found.columns[0].unit)
+
+    def _unit(self, block: Block) -> Unit:
+        """Return the unit of a block."""
+        options = dict(block.options)
+        if block.file is not None:
+            self.files.append(block.file)
+            return unit_of(block.file, options=options)
+        robot, log = (self._text(block, options.pop(name, None), name) for name in ("robot", "log"))
+        arm = place_robot(robot)
+        if arm is not None:
+            self.chains[block.name] = arm
+        if robot is not None and Path(robot).is_file():
+            self.files.append(Path(robot))
+        table = None if log is None else self._table(log, column_names(options.pop("columns", None)), arm)
+        return unit_of(block.unit, robot=arm, log=table, options=options)
+
+    def _fmu(self, unit: Unit) -> Path:
+        """Return the FMU of a unit from the cache."""
+        from urmpipe_fmus.cache import cached_fmu
+
+        return cached_fmu(unit, self._backend)
+
+    def _text(self, block: Block, value: Any, name: str) -> str | None:
+        """Return an option that names a robot or a log."""
+        if value is not None and not isinstance(value, str):
+            raise OptionError(f"{name}: found {value!r}, allowed: a name or a file")
+        return value
+
+    def _table(self, name: str, columns: list[str] | None, robot: Chain | None) -> LogTable:
+        """Return a log by the name that the system gives it, and remember what there is to know of it."""
+        path = Path(name)
+        if self._shipped and not path.exists() and (LOGS / path.name).exists():
+            path = LOGS / path.name
+        found = read_table(path, columns, robot=robot, read=self._read)
+        self.files += found.files
+        self.warnings += [one for one in found.warnings if one not in self.warnings]
+        self.end = max(self.end, float(found.table.t_ns[-1]) / 1e9)
+        return found
