@@ -11,6 +11,7 @@ from urmpipe.guards import PathLike, Robot, place_robot
 from urmpipe.log_tables import LogTable, read_table
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_options
+from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.outputs import guarded_output
@@ -95,10 +96,8 @@ def unit_of(
     _refuse_missing(name, known, robot, log)
     arm = place_robot(robot)
     if log is not None:
-        names = given.pop("columns", None)
-        found = (
-            log if isinstance(log, LogTable) else read_table(log, column_names(names), robot=arm, read=read)
-        )
+        names = column_names(given.pop("columns", None))
+        found = log if isinstance(log, LogTable) else read_table(log, names, robot=arm, read=read)
         given |= {"table": found.table, "columns": found.columns}
     elif arm is not None:
         given["robot"] = arm
@@ -114,11 +113,9 @@ def _from_file(path: Path) -> Unit:
 
 def column_names(columns: Any) -> list[str] | None:
     """Return names of columns as they stand in an option: one, or a list of them."""
-    return (
-        None
-        if columns is None
-        else [str(one) for one in (columns if isinstance(columns, list) else [columns])]
-    )
+    if columns is None:
+        return None
+    return [str(one) for one in (columns if isinstance(columns, list) else [columns])]
 
 
 def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, log: Any) -> None:
@@ -129,9 +126,17 @@ def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, lo
         if takes[option] and value is None:
             faults.append(f"unit {name}: found no {option}, allowed: --{option} {metavar}")
         elif not takes[option] and value is not None and not (option == "robot" and takes["log"]):
-            faults.append(f"unit {name}: found a {option} ({value}), allowed: none, it has no such option")
+            said = f"found a {option} ({_shown(value)}), allowed: none, it has no such option"
+            faults.append(f"unit {name}: {said}")
     if faults:
         raise OptionError(*faults)
+
+
+def _shown(value: Any) -> Any:
+    """Return what a robot or a log is called."""
+    if isinstance(value, LogTable):
+        return value.files[0]
+    return value.name if isinstance(value, Chain) else value
 
 
 def _refuse_options(unit: Unit | PathLike, given: Mapping[str, Any]) -> None:

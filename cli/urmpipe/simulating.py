@@ -14,7 +14,7 @@ import fmpy  # noqa: F401 - Rerun is imported beside: what both import must be t
 from urmpipe import __version__
 from urmpipe.building import Backend
 from urmpipe.guards import PathLike
-from urmpipe.simulation_result import simulation_of
+from urmpipe.simulation_result import check_meters, simulation_of
 from urmpipe.system_blocks import Blocks
 from urmpipe_fmus.cosim import load_system, prepare, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
@@ -24,7 +24,6 @@ from urmpipe_pipeline.recording import record
 from urmpipe_pipeline.simulation import Simulation
 
 if TYPE_CHECKING:
-    from urmpipe_fmus.cosim.plan import Plan
     from urmpipe_fmus.cosim.system import System
     from urmpipe_pipeline.sources import ReadOptions
 
@@ -63,7 +62,7 @@ def simulate(
     Raises:
         UrmpipeError: With everything that is wrong with the system, before the first step, or with an output.
     """
-    loaded = _changed(load_system(_named(system), arguments or {}), step, duration)
+    loaded = _changed(load_system(system, arguments), step, duration)
     shipped = str(system) in system_names()
     blocks = Blocks(shipped=shipped, backend=backend, read=read, told=told)
     kept = [loaded.path, *_files(loaded)]
@@ -72,17 +71,15 @@ def simulate(
         drawing = None if draw is None else stack.enter_context(guarded_output(Path(draw), kept, "drawing"))
 
         def make() -> Simulation:
-            plan = prepare(loaded, blocks.make, column=blocks.column, duration=None)
+            """Return the simulation; draw it before it is run."""
+            plan = prepare(loaded, blocks.make, column=blocks.column)
+            check_meters(plan)
             svg = system_svg(plan)
             if drawing is not None:
                 _write_drawing(drawing, svg)
             return simulation_of(plan, run_plan(plan, progress=running), blocks, svg)
 
         return make() if output is None else record(lambda early: make(), Path(output), kept, writing)
-
-
-def _named(system: PathLike) -> PathLike:
-    return system if isinstance(system, Path) else str(system)
 
 
 def _changed(system: System, step: float | None, duration: float | None) -> System:
@@ -117,6 +114,3 @@ def _write_drawing(path: Path, svg: str) -> None:
     """Write a drawing with the mark by which one of ours is known."""
     header = f"{DRAWING_HEADER}{__version__} -->\n"
     path.write_text(svg if svg.startswith(DRAWING_HEADER) else header + svg, encoding="utf-8", newline="\n")
-
-
-__all__ = ["Plan", "simulate"]

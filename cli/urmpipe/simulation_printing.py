@@ -1,4 +1,4 @@
-"""A co-simulation in the terminal: how it ended, the verdicts of its delta meters, the extremes of its outputs."""
+"""A co-simulation in the terminal: how it ended, the verdicts, the extremes of its signals."""
 
 from __future__ import annotations
 

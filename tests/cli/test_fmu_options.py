@@ -131,7 +131,7 @@ def test_a_chain_is_taken_as_a_robot() -> None:
         (("kinematic_chain", "--robot", "urm7"), "unknown robot 'urm7' (did you mean urm8?)"),
         (
             ("repolarizer", "-s", "joints=nan"),
-            "unit repolarizer: option joints: found nan, allowed: an integer",
+            "repolarizer: option joints: found nan, allowed: an integer",
         ),
         (("repolarizer", "-s", "joints"), "found 'joints', allowed: NAME=VALUE, each name once"),
         (("repolarizer", "-s", "joints=6", "-s", "joints=7"), "found 'joints=7', allowed: NAME=VALUE"),
