@@ -29,7 +29,7 @@ def signals_figure(simulation: Simulation, group: Group) -> Figure | None:
     spec = stacked([panel], end, shapes)
     spec["layout"]["xaxis"]["range"] = [start, end if end > start else start + 1.0]
     return Figure(
-        f"{group.block}: {group.variables}",
+        group.variables,
         " ".join(_described(one) for one in group.signals) + _shading(group),
         f"{group.variables} of {group.block} over time. {_ends(simulation, group)}",
         spec,

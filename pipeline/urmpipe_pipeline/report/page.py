@@ -60,7 +60,7 @@ class Part:
         facts: What it is about.
         explained: Facts that need a word each, in a list of their own.
         notice: What must not be overseen; empty for nothing.
-        link: What its figures share their time axis by; empty for its anchor.
+        link: What its figures, side by side, share their time axis by; empty for its anchor.
     """
 
     title: str
