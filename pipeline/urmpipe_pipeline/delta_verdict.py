@@ -51,7 +51,9 @@ class DeltaVerdict:
     @property
     def used(self) -> float | None:
         """Share of its tolerance that the worst value uses up; None where a sample has no value."""
-        return self.worst / self.allowed if self.allowed and math.isfinite(self.worst) else None
+        if self.allowed is None or not math.isfinite(self.worst):
+            return None
+        return float(_shares(np.array(self.worst), np.array(self.allowed)))
 
     @property
     def share_out(self) -> float:
@@ -90,13 +92,14 @@ def delta_verdict(
         variables: Its signals that hold what is judged.
 
     Raises:
-        OptionError: If a tolerance is none of those, or not positive.
+        OptionError: If a tolerance is none of those, or negative.
     """
     _check(block, tolerance)
     if not len(t_ns):
         return None
     sizes = np.column_stack((np.abs(delta), np.linalg.norm(delta, axis=1)))
-    allowed = np.array([_allowed(axis, tolerance) or math.inf for axis in AXES])
+    held = [_allowed(axis, tolerance) for axis in AXES]
+    allowed = np.array([math.inf if one is None else one for one in held])
     known = np.isfinite(sizes).all(axis=1)
     out = ~known | (sizes > allowed).any(axis=1)
     row, axis = _worst(np.where(known[:, np.newaxis], sizes, math.inf), allowed)
@@ -120,9 +123,15 @@ def _worst(sizes: FloatArray, allowed: FloatArray) -> tuple[int, int]:
     A sample without a value, whose sizes are infinite, is the worst of all.
     """
     judged = np.flatnonzero(np.isfinite(allowed))
-    shares = sizes[:, judged] / allowed[judged]
+    shares = _shares(sizes[:, judged], allowed[judged])
     row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
     return int(row), int(judged[column])
+
+
+def _shares(sizes: FloatArray, allowed: FloatArray) -> FloatArray:
+    """Return the shares of what is allowed that sizes use up: of nothing allowed, anything is infinite."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(sizes > 0.0, sizes / allowed, 0.0)
 
 
 def _allowed(quantity: str, tolerance: Mapping[str, float]) -> float | None:
@@ -132,9 +141,9 @@ def _allowed(quantity: str, tolerance: Mapping[str, float]) -> float | None:
 def _check(block: str, tolerance: Mapping[str, float]) -> None:
     allowed = ("axis", *AXES)
     faults = [
-        f"{block}: found a tolerance {kind}={value:g}, allowed: {', '.join(allowed)}; positive"
+        f"{block}: found a tolerance {kind}={value:g}, allowed: {', '.join(allowed)}; 0 or positive"
         for kind, value in tolerance.items()
-        if kind not in allowed or not 0.0 < value < math.inf
+        if kind not in allowed or not 0.0 <= value < math.inf
     ]
     if faults or not tolerance:
         raise OptionError(*(faults or [f"{block}: found no tolerance, allowed: {', '.join(allowed)}"]))
