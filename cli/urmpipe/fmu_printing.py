@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any
 from urmpipe.building import FROM_LOG
 from urmpipe.printing import new_console, new_table, say
 from urmpipe_fmus.units import unit_help, unit_names, unit_options
-from urmpipe_pipeline import text
 
 if TYPE_CHECKING:
     from urmpipe_fmus.build import BuiltFmu
@@ -68,7 +67,7 @@ def built_dict(made: BuiltFmu) -> dict[str, Any]:
 def print_built(made: BuiltFmu) -> None:
     """Print where an FMU is and what is inside."""
     inside = f"{made.backend}, {', '.join(made.platforms)}"
-    size = text.size(made.path.stat().st_size)
-    say(f"FMU: {made.path}  ({inside}, {size} bytes, guid {made.guid})")
+    size = f"{made.path.stat().st_size / 1e3:.0f} kB"
+    say(f"FMU: {made.path}  ({inside}, {size}, guid {made.guid})")
     if made.note:
         say(f"note: {made.note}", err=True)
