@@ -64,7 +64,6 @@ def simulate(
     """
     loaded = _changed(load_system(system, arguments), step, duration)
     shipped = str(system) in system_names()
-    blocks = Blocks(shipped=shipped, backend=backend, read=read, told=told)
     kept = [loaded.path, *_files(loaded)]
     running, writing = _halves(progress)
     with ExitStack() as stack:
@@ -72,7 +71,8 @@ def simulate(
 
         def make() -> Simulation:
             """Return the simulation; draw it before it is run."""
-            plan = prepare(loaded, blocks.make, column=blocks.column)
+            blocks = Blocks(loaded, shipped=shipped, backend=backend, read=read, told=told)
+            plan = prepare(loaded, blocks.make, column=blocks.column, duration=blocks.end)
             check_meters(plan)
             svg = system_svg(plan)
             if drawing is not None:

@@ -1,4 +1,4 @@
-"""The blocks of a system as FMUs: their robots, logs and units, and the FMU of each from the cache."""
+"""The parts of a system: its robots, logs and units, and the FMU of each block from the cache."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from urmpipe.building import Backend, column_names, unit_of
 from urmpipe.guards import place_robot
 from urmpipe.log_tables import LogTable, read_table
 from urmpipe_datasets import LOGS
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import OptionError, UrmpipeError
 
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.plan import LogColumn
-    from urmpipe_fmus.cosim.system import Block, LogInput
+    from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
     from urmpipe_fmus.unit import Unit
     from urmpipe_models.chain import Chain
     from urmpipe_pipeline.joint_log import LogWarning
@@ -25,10 +25,13 @@ CHAIN, METER = "kinematic_chain", "delta_meter"
 
 
 class Blocks:
-    """What the blocks of a system are made of.
+    """What the blocks and inputs of a system are made of, read at once.
+
+    What is wrong with one is raised when it is asked for, so that all of it is told together.
 
     Args:
-        shipped: Whether the system came with urmpipe: its logs are the bundled ones then, by name.
+        system: The system.
+        shipped: Whether it came with urmpipe: its logs are the bundled ones then, by name.
         backend: What the FMUs of units are built with.
         read: How to read a log where it cannot tell by itself.
         told: Told what takes its time: an FMU that is built.
@@ -38,11 +41,12 @@ class Blocks:
         chains: The arm of each block that has one.
         files: The files that were read.
         warnings: What a person should know of the logs.
-        end: Where the longest log ends in [s]; 0 without one.
+        end: Where the longest log ends in [s]; None without one.
     """
 
     def __init__(
         self,
+        system: System,
         *,
         shipped: bool,
         backend: Backend | None = None,
@@ -55,7 +59,13 @@ class Blocks:
         self.chains: dict[str, Chain] = {}
         self.files: list[Path] = []
         self.warnings: list[LogWarning] = []
-        self.end = 0.0
+        self.end: float | None = None
+        self._faults: dict[str, UrmpipeError] = {}
+        self._columns: dict[Port, LogTable] = {}
+        for block in system.blocks:
+            self._try(block.name, lambda block=block: self._take(block))  # type: ignore[misc]
+        for one in system.inputs:
+            self._try(str(one.destination), lambda one=one: self._follow(one))  # type: ignore[misc]
 
     def make(self, block: Block) -> Path:
         """Return the FMU of a block, built if it is not in the cache.
@@ -63,28 +73,46 @@ class Blocks:
         Raises:
             UrmpipeError: With what is wrong with its unit, its robot, its log or its file.
         """
-        if block.fmu is not None:
-            self.files.append(block.fmu)
-            return block.fmu
-        unit = self.units[block.name] = self._unit(block)
-        return self._fmu(unit)
+        if block.name in self._faults:
+            raise self._faults[block.name]
+        return block.fmu or self._fmu(self.units[block.name])
 
     def column(self, asked: LogInput) -> LogColumn:
         """Return the column of a log that an input follows.
 
         Raises:
-            LogError: If it cannot be read.
+            UrmpipeError: If it cannot be read.
         """
         from urmpipe_fmus.cosim.plan import LogColumn
 
-        found = self._table(asked.log, [asked.column], None)
+        if str(asked.destination) in self._faults:
+            raise self._faults[str(asked.destination)]
+        found = self._columns[asked.destination]
         return LogColumn(found.table.t_ns, found.table.values[:, 0], found.columns[0].unit)
+
+    def _try(self, name: str, take: Callable[[], None]) -> None:
+        """Take a part, or remember what is wrong with it."""
+        try:
+            take()
+        except UrmpipeError as error:
+            self._faults[name] = error
+
+    def _take(self, block: Block) -> None:
+        """Take a block: its file, or its unit."""
+        path = block.fmu or block.file
+        if path is not None:
+            self.files.append(path)
+        if block.fmu is None:
+            self.units[block.name] = self._unit(block)
+
+    def _follow(self, asked: LogInput) -> None:
+        """Take the log of an input."""
+        self._columns[asked.destination] = self._table(asked.log, [asked.column], None)
 
     def _unit(self, block: Block) -> Unit:
         """Return the unit of a block."""
         options = dict(block.options)
         if block.file is not None:
-            self.files.append(block.file)
             return unit_of(block.file, options=options)
         robot, log = (self._text(block, options.pop(name, None), name) for name in ("robot", "log"))
         arm = place_robot(robot)
@@ -115,5 +143,5 @@ class Blocks:
         found = read_table(path, columns, robot=robot, read=self._read)
         self.files += found.files
         self.warnings += [one for one in found.warnings if one not in self.warnings]
-        self.end = max(self.end, float(found.table.t_ns[-1]) / 1e9)
+        self.end = max(self.end or 0.0, float(found.table.t_ns[-1]) / 1e9)
         return found
