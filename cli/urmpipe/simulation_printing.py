@@ -23,7 +23,7 @@ def print_simulation(result: Simulation, wall: float) -> None:
 
     Args:
         result: The simulation.
-        wall: What it took in [s], from the first to the last sample.
+        wall: What it took in [s].
     """
     console = new_console()
     console.print(_head(result, wall), soft_wrap=True)
@@ -35,20 +35,32 @@ def print_simulation(result: Simulation, wall: float) -> None:
 def _head(result: Simulation, wall: float) -> str:
     """Return how long it is, in which steps, and how fast it was."""
     step = f"communication step {1e3 * result.step:.6g} ms"
-    faster = f" in {wall:.2g} s, {result.duration / wall:.3g} times faster than real time" if wall else ""
+    faster = f", {result.duration / wall:.3g} times faster than real time" if result.duration > wall else ""
     samples = text.counted(len(result.t_ns), "sample")
-    return f"{result.name}: {samples} over {text.seconds(result.duration)} s, {step}{faster}"
+    return f"{result.name}: {samples} over {text.seconds(result.duration)} s, {step}; in {wall:.2g} s{faster}"
 
 
 def _print_extremes(console: Console, result: Simulation) -> None:
     """Print the least and the largest value of each scalar signal, as many as are listed."""
-    rows = [row for signal in result.signals for row in _scalars(signal)]
+    rows = [row for signal in _last_first(result) for row in _scalars(signal)]
     if not rows or not len(result.t_ns):
         return
     shown = rows[:LISTED]
     print_columns(console, "Signals", list(_columns(shown, result.t)))
     if len(rows) > LISTED:
         console.print(f"... and {len(rows) - LISTED} more; --json has all")
+
+
+def _last_first(result: Simulation) -> list[Signal]:
+    """Return the signals, what comes out at the end of the system first.
+
+    That is what blocks compute whose outputs no other block takes, then what no block takes, then the rest.
+    """
+    taken = set(result.connections.values())
+    inner = {source.partition(".")[0] for source in taken}
+    return sorted(
+        result.signals, key=lambda one: (one.block in inner, not taken.isdisjoint((one.name, *one.names)))
+    )
 
 
 def _scalars(signal: Signal) -> Iterator[tuple[str, str, FloatArray]]:

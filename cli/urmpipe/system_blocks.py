@@ -11,6 +11,7 @@ from urmpipe.guards import place_robot
 from urmpipe.log_tables import LogTable, read_table
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import OptionError, UrmpipeError
+from urmpipe_pipeline.sources import ReadOptions, read_map
 
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.plan import LogColumn
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from urmpipe_fmus.unit import Unit
     from urmpipe_models.chain import Chain
     from urmpipe_pipeline.joint_log import LogWarning
-    from urmpipe_pipeline.sources import ReadOptions
 
 CHAIN, METER = "kinematic_chain", "delta_meter"
 """The units that are shown as an arm, and judged."""
@@ -107,20 +107,22 @@ class Blocks:
 
     def _follow(self, asked: LogInput) -> None:
         """Take the log of an input."""
-        self._columns[asked.destination] = self._table(asked.log, [asked.column], None)
+        self._columns[asked.destination] = self._table(asked.log, [asked.column])
 
     def _unit(self, block: Block) -> Unit:
         """Return the unit of a block."""
         options = dict(block.options)
         if block.file is not None:
             return unit_of(block.file, options=options)
-        robot, log = (self._text(block, options.pop(name, None), name) for name in ("robot", "log"))
+        robot, log, log_map = (_text(name, options.pop(name, None)) for name in ("robot", "log", "map"))
         arm = place_robot(robot)
         if arm is not None:
             self.chains[block.name] = arm
         if robot is not None and Path(robot).is_file():
             self.files.append(Path(robot))
-        table = None if log is None else self._table(log, column_names(options.pop("columns", None)), arm)
+        if log is None:
+            return unit_of(block.unit, robot=arm, options=options)
+        table = self._table(log, column_names(options.pop("columns", None)), arm, log_map)
         return unit_of(block.unit, robot=arm, log=table, options=options)
 
     def _fmu(self, unit: Unit) -> Path:
@@ -129,19 +131,23 @@ class Blocks:
 
         return cached_fmu(unit, self._backend)
 
-    def _text(self, block: Block, value: Any, name: str) -> str | None:
-        """Return an option that names a robot or a log."""
-        if value is not None and not isinstance(value, str):
-            raise OptionError(f"{name}: found {value!r}, allowed: a name or a file")
-        return value
-
-    def _table(self, name: str, columns: list[str] | None, robot: Chain | None) -> LogTable:
+    def _table(
+        self, name: str, columns: list[str] | None, robot: Chain | None = None, log_map: str | None = None
+    ) -> LogTable:
         """Return a log by the name that the system gives it, and remember what there is to know of it."""
         path = Path(name)
         if self._shipped and not path.exists() and (LOGS / path.name).exists():
             path = LOGS / path.name
-        found = read_table(path, columns, robot=robot, read=self._read)
+        read = self._read if log_map is None else read_map(Path(log_map)).read
+        found = read_table(path, columns, robot=robot, read=read)
         self.files += found.files
         self.warnings += [one for one in found.warnings if one not in self.warnings]
         self.end = max(self.end or 0.0, float(found.table.t_ns[-1]) / 1e9)
         return found
+
+
+def _text(name: str, value: Any) -> str | None:
+    """Return an option that names a robot or a file."""
+    if value is not None and not isinstance(value, str):
+        raise OptionError(f"{name}: found {value!r}, allowed: a name or a file")
+    return value
