@@ -102,8 +102,8 @@ class Wiring:
             if one.causality != causality:
                 allowed = ", ".join(shown.names(causality)) or "none"
                 self.faults.append(
-                    f"{where}: found {port.block}.{one.name}, causality {one.causality}, allowed: an {causality}"
-                    f" of {port.block}: {allowed}"
+                    f"{where}: found {port.block}.{one.name}, causality {one.causality}, allowed: an"
+                    f" {causality} of {port.block}: {allowed}"
                 )
                 return ()
         return found
@@ -186,8 +186,8 @@ class Wiring:
             ]
             if left:
                 self.faults.append(
-                    f"blocks.{name}: inputs without a source: {', '.join(left)}; allowed: each in [connections],"
-                    f" in [inputs], or with a value in start"
+                    f"blocks.{name}: found inputs without a source: {', '.join(left)}; allowed: each in"
+                    " [connections], in [inputs], or with a value in start"
                 )
 
 
@@ -204,15 +204,12 @@ def _start_fault(one: Variable, value: Any) -> str:
     """Return why a scalar cannot start with a value; empty if it can."""
     if not one.settable:
         return f"found {one.name}, {one.variability} {one.causality}, allowed: a parameter, input or state"
-    if one.type == "String" or isinstance(value, str):
-        right = one.type == "String" and isinstance(value, str)
-        return (
-            "" if right else f"found {value!r}, allowed: {'a text' if one.type == 'String' else 'a number'}"
-        )
-    if not isinstance(value, (bool, int, float)):
-        return f"found {value!r}, allowed: a number"
-    if isinstance(value, bool) != (one.type == "Boolean"):
-        return (
-            f"found {str(value).lower()}, allowed: {'true, false' if one.type == 'Boolean' else 'a number'}"
-        )
-    return one.refusal(float(value))
+    types: dict[str, tuple[type | tuple[type, ...], str]] = {
+        "String": (str, "a text"),
+        "Boolean": (bool, "true, false"),
+    }
+    right, allowed = types.get(one.type, ((int, float), "a number"))
+    if not isinstance(value, right) or (isinstance(value, bool) and one.type != "Boolean"):
+        found = str(value).lower() if isinstance(value, bool) else repr(value)
+        return f"found {found}, allowed: {allowed}"
+    return one.refusal(float(value)) if isinstance(value, (bool, int, float)) else ""

@@ -55,7 +55,7 @@ class Variable:
 
     @property
     def settable(self) -> bool:
-        """Whether it takes a start value (FMI 2.0.4, section 4.2.4: all but constants, if exact or approx)."""
+        """Whether it takes a start value: no constant, initial exact or approx (FMI 2.0.4, section 4.2.4)."""
         return self.variability != "constant" and self.initial in ("exact", "approx")
 
     def refusal(self, value: float) -> str:
@@ -213,7 +213,7 @@ def _variables(described: Any) -> Iterator[Variable]:
 
 
 def si_base(unit: str, told: Any = None) -> BaseUnit | None:
-    """Return a unit in the base units of SI, as FMPy read it or else by its spelling; None if it is unknown."""
+    """Return a unit in the base units of SI, as FMPy read it or else by its spelling; None if unknown."""
     if told is not None:
         exponents = {name: getattr(told, name) for name in BASE_NAMES}
         return BaseUnit(**exponents, factor=told.factor, offset=told.offset)

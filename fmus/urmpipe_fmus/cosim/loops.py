@@ -80,8 +80,8 @@ class LoopSolver:
         if self._solved(x, r):
             return 0
         raise NoConvergence(
-            f"algebraic loop: {self._loop.ring}: not solved after {ITERATIONS} iterations, found a residual of"
-            f" {np.max(np.abs(r)):.3g}, allowed: {self._tolerance:.3g} relative to its values"
+            f"algebraic loop: {self._loop.ring}: not solved after {ITERATIONS} iterations, found a residual"
+            f" of {np.max(np.abs(r)):.3g}, allowed: {self._tolerance:.3g} relative to its values"
         )
 
     def _residual(self, x: FloatArray) -> FloatArray:
@@ -106,7 +106,7 @@ class LoopSolver:
         return np.column_stack(columns)
 
     def _line(self, x: FloatArray, r: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the point along a step, within the range of the inputs, that leaves less, and what it leaves."""
+        """Return a point along a step, in the range of the inputs, that leaves less, and what it leaves."""
         for _ in range(SHRINKS):
             following = np.clip(x + step, self._loop.minimum, self._loop.maximum)
             left = self._residual(following)

@@ -182,11 +182,7 @@ def _recorded(
         if Port(block, one.name) in shown
     )
     result = _result(folder)
-    failed = (
-        _crash(plan, job, folder, state, exit_code)
-        if result is None
-        else _failure(job, folder, state, result)
-    )
+    failed = _crash(job, folder, state, exit_code) if result is None else _failure(job, folder, state, result)
     points = np.arange(state.rows) * job.record_every * job.step
     return Recorded(
         t_ns=np.round(points * 1e9).astype(np.int64),
@@ -214,7 +210,7 @@ def _failure(job: Job, folder: Path, state: Progress, result: dict[str, Any]) ->
     return _told(job, folder, state, result["code"], result["failed"])
 
 
-def _crash(plan: Plan, job: Job, folder: Path, state: Progress, exit_code: int) -> str:
+def _crash(job: Job, folder: Path, state: Progress, exit_code: int) -> str:
     """Return how a run failed that could not say so itself."""
     how = _ending(exit_code)
     if state.call == ELSEWHERE:

@@ -171,7 +171,7 @@ class Slave:
         return call_code(self.number, "fmi2SetFMUstate"), call
 
     def _function(self, kind: Any, name: str) -> Any:
-        """Return a function of the FMU by its address: ctypes converts less than FMPy's argument types ask."""
+        """Return a function of the FMU with argument types that ctypes is quick with."""
         return kind(ctypes.cast(getattr(self._fmu.dll, name), ctypes.c_void_p).value)
 
     def terminated(self) -> bool:

@@ -242,7 +242,7 @@ class _System:
 
 
 def _leaves(table: Mapping[str, Any], leaf: type, name: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield the rows of a table whose keys may be written with or without quotes: `drive.u` is nested then."""
+    """Yield the rows of a table; TOML nests its keys, `drive.u`, where they stand without quotes."""
     for key, value in table.items():
         path = f"{name}.{key}" if name else key
         nested = isinstance(value, dict) and (

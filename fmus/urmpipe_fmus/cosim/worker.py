@@ -67,7 +67,7 @@ class Log:
         self._size += os.write(self._file, line)
         if self._size > LOG_BYTES:
             os.close(self._file)
-            os.replace(self._path, self._path.with_suffix(".before"))
+            self._path.replace(self._path.with_suffix(".before"))
             self._open()
 
 

@@ -64,10 +64,9 @@ class Foreign:
             f"    Values *v = &m->v; (void)v; {self.step}\n    return fmi2OK;\n}}\n"
         )
         library = work / f"{self.name}{fmpy.sharedLibraryExtension}"
-        headers = Path(fmpy.__file__).parent / "c-code"
+        includes = (f"-I{work}", f"-I{Path(fmpy.__file__).parent / 'c-code'}")
         subprocess.run(
-            [compiler, "-shared", "-fPIC", "-O1", "-w", f"-I{work}", f"-I{headers}"]
-            + [str(HERE / "foreign.c"), "-o", str(library), "-lm"],
+            [compiler, "-shared", "-fPIC", "-O1", "-w", *includes, HERE / "foreign.c", "-o", library, "-lm"],
             check=True,
         )
         with zipfile.ZipFile(made, "w") as archive:
@@ -179,6 +178,7 @@ TROUBLE = Foreign(
     case 9: for (;;) pause();
     }
     """,
+    start="m->v.r[0] = 0.05;",
 )
 """Breaks from a time on, in the way of its parameter `kind`."""
 
