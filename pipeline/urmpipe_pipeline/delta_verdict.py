@@ -80,7 +80,7 @@ def delta_verdict(
     t_ns: IntArray,
     delta: FloatArray,
     tolerance: Mapping[str, float],
-    variables: tuple[str, ...] = ("delta",),
+    variables: tuple[str, ...] = ("delta", "norm"),
 ) -> DeltaVerdict | None:
     """Hold the deviation of a delta meter against a tolerance; None without a sample.
 
@@ -130,7 +130,7 @@ def _worst(sizes: FloatArray, allowed: FloatArray) -> tuple[int, int]:
 
 def _shares(sizes: FloatArray, allowed: FloatArray) -> FloatArray:
     """Return the shares of what is allowed that sizes use up: of nothing allowed, anything is infinite."""
-    with np.errstate(divide="ignore", invalid="ignore"):
+    with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return np.where(sizes > 0.0, sizes / allowed, 0.0)
 
 

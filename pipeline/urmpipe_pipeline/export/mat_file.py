@@ -112,8 +112,8 @@ def simulation_fields(simulation: Simulation, table: Table, about: Mapping[str, 
     values = [np.asarray(column.values) for column in signals]
     return {
         "name": printable(simulation.name),
-        "t": simulation.t,
-        "clock_ns": simulation.t_ns,
+        "t": simulation.t[:, np.newaxis],  # a vector without a row would be written as 0 x 0
+        "clock_ns": simulation.t_ns[:, np.newaxis],
         "values": np.column_stack(values) if values else np.empty((len(simulation.t_ns), 0)),
         "names": cells([column.name for column in signals]),
         "units": cells([column.unit for column in signals]),
