@@ -170,7 +170,7 @@ class Layout:
         return [self.start(wire), *(one.y + LANE / 2.0 for one in self.lanes[wire]), self.end(wire)]
 
     def _wanted_lane(self, lane: Lane) -> float:
-        """Return where a lane would stand: in line with the wire's others; below its ends if it feeds back."""
+        """Return where a lane would stand: in line with its wire; below the ends of one that feeds back."""
         wire = lane.wire
         if lane.back:
             ends = self.boxes[wire.source], self.boxes[wire.target]

@@ -19,7 +19,8 @@ STRAIGHT = 0.75
 
 
 Shape = Literal["out", "through", "in"]
-"""Of a turn: both ends to its left (a wire that leaves a box to feed back), one at each side, both to its right."""
+"""Of a turn: both ends to its left (where a wire that feeds back leaves a box), one at each side, or both to
+its right."""
 
 
 @dataclass(slots=True, eq=False)
@@ -27,7 +28,7 @@ class Turn:
     """A wire's way through a channel.
 
     Attributes:
-        left: The y of the end that is more to the left in [px]; of two at one side, where the wire comes from.
+        left: The y of the end to its left in [px]; of two at one side, where the wire comes from.
         right: The y of the other end.
         shape: At which sides its ends are.
         track: Number of its track, from the left.
