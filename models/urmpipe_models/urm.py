@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
+from typing import NamedTuple
 
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import RobotError
 from urmpipe_models.transform import Transform, rotation_y, translation
+
+ROUNDING = 1e-15
+"""Entries of frames of about 1 are the same if they differ by no more than rounding."""
 
 
 def urm_chain(
@@ -65,3 +70,41 @@ def urm_chain(
         description=description,
         source=source,
     )
+
+
+class UrmGeometry(NamedTuple):
+    """What `urm_chain` makes an arm from.
+
+    Attributes:
+        lengths: r_1..r_{n+1} in [m].
+        tilts: theta_2..theta_{n+1} in [rad].
+        directions: +1 or -1 a module.
+    """
+
+    lengths: tuple[float, ...]
+    tilts: tuple[float, ...]
+    directions: tuple[float, ...]
+
+
+def urm_geometry(chain: Chain) -> UrmGeometry | None:
+    """Return what a URM arm is made from, on whatever base and with whatever tool; None of any other arm."""
+    modules, links = chain.joints[:-1], chain.joints[1:]
+    found = UrmGeometry(
+        (*(link.origin.translation[2] for link in links), chain.tip.translation[2]),
+        tuple(math.atan2(link.origin.rotation[0][2], link.origin.rotation[0][0]) for link in links),
+        tuple(module.axis[2] for module in modules),
+    )
+    if not modules or any(direction not in (1.0, -1.0) for direction in found.directions):
+        return None
+    again = urm_chain(chain.name, found.lengths, found.tilts, directions=found.directions)
+    same = _near(chain.tip, again.tip) and all(
+        (joint.kind, joint.mimic) == (other.kind, other.mimic) and _near(joint.origin, other.origin)
+        for joint, other in zip(chain.joints, again.joints, strict=True)
+    )
+    return found if same else None
+
+
+def _near(one: Transform, other: Transform) -> bool:
+    """Return whether two constant frames are the same but for rounding."""
+    pairs = zip((*one.rotation, one.translation), (*other.rotation, other.translation), strict=True)
+    return all(abs(a - b) <= ROUNDING for rows in pairs for a, b in zip(*rows, strict=True))

@@ -1,0 +1,122 @@
+"""What of an arm's shape can be changed while it is simulated: parameters, and the chain that they make."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import NamedTuple
+
+from urmpipe_fmus.values import Values
+from urmpipe_fmus.variable import Parameter
+from urmpipe_models.chain import Chain
+from urmpipe_models.transform import Transform, from_rpy, rpy_of
+from urmpipe_models.urm import UrmGeometry, urm_chain, urm_geometry
+
+
+class Geometry(NamedTuple):
+    """The shape of an arm.
+
+    Attributes:
+        parameters: Tunable; they start at the shape that the robot's description tells.
+        chain_at: Returns the arm of some values of the parameters.
+    """
+
+    parameters: tuple[Parameter, ...]
+    chain_at: Callable[[Values], Chain]
+
+
+def geometry_of(robot: Chain) -> Geometry:
+    """Return the parameters of an arm: lengths and tilts of a URM arm, of any other the frames of its joints.
+
+    Where it stands (`base`) and its `tool` are parameters of both.
+    """
+    urm = urm_geometry(robot)
+    shape = _of_frames(robot) if urm is None else _of_urm(robot, urm)
+    ends = (
+        *_frame_parameters("base", "the base in the world", robot.base),
+        *_frame_parameters("tool", "the tool centre point at the end of the arm", robot.tool),
+    )
+
+    def chain_at(v: Values) -> Chain:
+        """Return the arm on its base and with its tool."""
+        return shape.chain_at(v).placed(_frame_at(v, "base"), _frame_at(v, "tool"))
+
+    return Geometry((*shape.parameters, *ends), chain_at)
+
+
+def _of_urm(robot: Chain, urm: UrmGeometry) -> Geometry:
+    """Return the shape of a URM arm."""
+
+    def chain_at(v: Values) -> Chain:
+        """Return the arm of some lengths and tilts."""
+        return urm_chain(robot.name, v.lengths, v.tilts, directions=urm.directions)
+
+    return Geometry(
+        (
+            Parameter(
+                name="lengths",
+                description="Segments r_1..r_(n+1), the last one the effector",
+                unit="m",
+                display_unit="mm",
+                start=urm.lengths,
+                size=len(urm.lengths),
+            ),
+            Parameter(
+                name="tilts",
+                description="Tilts theta_2..theta_(n+1) of each segment against the one before",
+                unit="rad",
+                display_unit="deg",
+                start=urm.tilts,
+                size=len(urm.tilts),
+            ),
+        ),
+        chain_at,
+    )
+
+
+def _of_frames(robot: Chain) -> Geometry:
+    """Return the shape of any arm: the frame that every joint sits in, and the end; the axes are constant."""
+    origins = [f"origin{k}" for k in range(1, len(robot.joints) + 1)]
+    parameters = [
+        parameter
+        for name, joint in zip(origins, robot.joints, strict=True)
+        for parameter in _frame_parameters(name, f"joint {joint.name} in the frame before it", joint.origin)
+    ]
+
+    def chain_at(v: Values) -> Chain:
+        """Return the arm of some frames."""
+        joints = [
+            replace(joint, origin=_frame_at(v, name))
+            for name, joint in zip(origins, robot.joints, strict=True)
+        ]
+        return replace(robot, joints=tuple(joints), tip=_frame_at(v, "tip"), visuals=())
+
+    tip = _frame_parameters("tip", "the end of the arm in the frame of the last joint", robot.tip)
+    return Geometry((*parameters, *tip), chain_at)
+
+
+def _frame_parameters(name: str, where: str, frame: Transform) -> tuple[Parameter, Parameter]:
+    """Return a frame as two parameters: x, y, z, and the angles about the fixed x, y, z."""
+    return (
+        Parameter(
+            name=name,
+            description=f"Place of {where}: x, y, z",
+            unit="m",
+            display_unit="mm",
+            start=tuple(map(float, frame.translation)),
+            size=3,
+        ),
+        Parameter(
+            name=f"{name}_rpy",
+            description=f"Turn of {where}: roll, pitch, yaw (about the fixed x, y, z)",
+            unit="rad",
+            display_unit="deg",
+            start=rpy_of(frame.rotation),
+            size=3,
+        ),
+    )
+
+
+def _frame_at(v: Values, name: str) -> Transform:
+    """Return the frame of the two parameters of a name."""
+    return Transform(from_rpy(*getattr(v, f"{name}_rpy")).rotation, getattr(v, name))

@@ -1,0 +1,205 @@
+"""The kinematics of an arm as a unit: where its points are, and how they move."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+from typing import Any
+
+from urmpipe_fmus.unit import Recipe, Unit
+from urmpipe_fmus.units.chain_geometry import geometry_of
+from urmpipe_fmus.units.options import some_of, yes_or_no
+from urmpipe_fmus.values import Values
+from urmpipe_fmus.variable import Input, Output, Variable
+from urmpipe_models.chain import Chain
+from urmpipe_models.elementwise import Element
+from urmpipe_models.errors import UnitError
+from urmpipe_models.kinematics import forward
+from urmpipe_models.motion import Motion, each_motion
+from urmpipe_models.robot_file import chain_from_dict, robot_toml
+from urmpipe_models.transform import Transform, euler_zyx
+
+OPTIONS: Mapping[str, str] = {
+    "robot": "a robot: a name of the catalogue, a .toml or a .urdf file",
+    "points": 'the points whose place is an output, such as ["p6", "p7"] (default: all)',
+    "sensors": "the points whose angles, and motion with rates, are outputs (default: the tool centre)",
+    "rates": "true: the joints' rates are inputs, the sensors' velocity and acceleration outputs",
+}
+
+
+def kinematic_chain(
+    robot: Chain,
+    *,
+    points: Sequence[str] | None = None,
+    sensors: Sequence[str] | None = None,
+    rates: bool = False,
+) -> Unit:
+    """Return the unit that computes points of an arm from its joints.
+
+    Inputs are the angles `phi` of the joints that turn and the ways `s` of those that slide, each from the
+    base outwards; with rates also `phid`, `phidd`, `sd`, `sdd`. They start at the calibration pose. They have
+    no limits: what lies beyond a joint's range has its place all the same, and a repolarized angle counts on.
+
+    Args:
+        robot: The arm.
+        points: Which of p1..pn are outputs, by name; all by default.
+        sensors: Points whose angles rz, ry, rx are outputs too; the tool centre point by default.
+        rates: Whether the joints' rates are inputs; then velocity v and acceleration a of the sensors are
+            outputs.
+
+    Raises:
+        UnitError: With what is wrong with the options.
+
+    Source: [UrmArm2021]_ eq. 1-14; v and a by the outward recursion (see `each_motion`).
+    """
+    if not isinstance(robot, Chain):
+        raise UnitError(f"unit kinematic_chain: option robot: found {robot!r}, allowed: a robot (Chain)")
+    names = robot.point_names
+    shown = some_of("kinematic_chain", "points", names if points is None else points, names)
+    sensed = some_of("kinematic_chain", "sensors", names[-1:] if sensors is None else sensors, names)
+    yes_or_no("kinematic_chain", "rates", rates)
+    geometry = geometry_of(robot)
+
+    def outputs(v: Values) -> Mapping[str, Any]:
+        """Return the points, and what the sensors see."""
+        arm = geometry.chain_at(v)
+        poses, motions = _moved(arm, v, rates)
+        places = dict(zip(names, poses, strict=True))
+        found = {name: places[name].translation for name in shown}
+        for name in sensed:
+            found |= _sensed(name[1:], places[name], motions[names.index(name)] if rates else None)
+        return found
+
+    described = replace(robot, visuals=())  # an arm's looks are no part of where it is, and name files
+    return Unit(
+        name="kinematic_chain",
+        description=f"Points of {robot.name or 'an arm'} from its joints",
+        variables=(
+            *geometry.parameters,
+            *_inputs(robot, rates),
+            *(_output(name, f"Place of point {name}: x, y, z", "m", 3) for name in shown),
+            *(variable for name in sensed for variable in _sensor_outputs(name, rates)),
+        ),
+        outputs=outputs,
+        equations=_equations(rates),
+        source="UrmArm2021, eq. 1-14, with atan2 in eq. 10 and 13",
+        recipe=Recipe(
+            __name__,
+            "from_robot_toml",
+            {"robot": robot_toml(described), "points": list(shown), "sensors": list(sensed), "rates": rates},
+        ),
+    )
+
+
+def from_robot_toml(robot: str, **options: Any) -> Unit:
+    """Return `kinematic_chain` of the arm that a text of `robot_toml` describes, bit by bit."""
+    return kinematic_chain(chain_from_dict(tomllib.loads(robot)), **options)
+
+
+def _moved(arm: Chain, v: Values, rates: bool) -> tuple[Sequence[Transform], Sequence[Motion]]:
+    """Return the poses of p1..pn, and their motions if the rates are known."""
+    q = _coordinates(arm, v, "phi", "s")
+    if not rates:
+        return forward(arm, q), ()
+    qd, qdd = _coordinates(arm, v, "phid", "sd"), _coordinates(arm, v, "phidd", "sdd")
+    motions = tuple(each_motion(arm, q, qd, qdd))
+    return [motion.pose for motion in motions], motions
+
+
+def _coordinates(arm: Chain, v: Values, turning: str, sliding: str) -> list[Element]:
+    """Return the joints' values in the arm's order from those that turn and those that slide."""
+    kinds = [joint.kind for joint in arm.moving]
+    angles = iter(getattr(v, turning) if "revolute" in kinds else ())
+    ways = iter(getattr(v, sliding) if "prismatic" in kinds else ())
+    return [next(ways if kind == "prismatic" else angles) for kind in kinds]
+
+
+def _sensed(number: str, pose: Transform, motion: Motion | None) -> dict[str, Any]:
+    """Return the outputs of a sensor: angles, where they are a convention, and motion."""
+    rz, ry, rx, singular = euler_zyx(pose.rotation)
+    found = {"rz": rz, "ry": ry, "rx": rx, "singular": singular}
+    if motion is not None:
+        found |= {"v": motion.velocity, "a": motion.acceleration}
+    return {f"{name}{number}": value for name, value in found.items()}
+
+
+def _inputs(robot: Chain, rates: bool) -> Iterator[Input]:
+    """Yield the joints' angles and ways, and their rates."""
+    for name, kind, unit, shown, quantity in (
+        ("phi", "revolute", "rad", "deg", "Angles"),
+        ("s", "prismatic", "m", "mm", "Ways"),
+    ):
+        at = [k for k, joint in enumerate(robot.moving) if joint.kind == kind]
+        if not at:
+            continue
+        of = f"of the joints {', '.join(robot.coordinates[k] for k in at)}"
+        start = tuple(float(robot.start[k]) for k in at)
+        yield Input(
+            name=name,
+            description=f"{quantity} {of}",
+            unit=unit,
+            display_unit=shown,
+            start=start,
+            size=len(at),
+        )
+        if rates:
+            yield Input(
+                name=f"{name}d",
+                description=f"Velocities {of}",
+                unit=f"{unit}/s",
+                display_unit=f"{shown}/s",
+                size=len(at),
+            )
+            yield Input(
+                name=f"{name}dd",
+                description=f"Accelerations {of}",
+                unit=f"{unit}/s2",
+                display_unit=f"{shown}/s2",
+                size=len(at),
+            )
+
+
+def _sensor_outputs(name: str, rates: bool) -> Iterator[Variable]:
+    """Yield the outputs of the sensor on a point."""
+    number = name[1:]
+    for angle, axis in (("rz", "z"), ("ry", "the turned y"), ("rx", "the turned x")):
+        yield _output(f"{angle}{number}", f"Angle of {name} about {axis}", "rad", None)
+    yield Output(
+        name=f"singular{number}",
+        description=f"Whether ry{number} is +-90 deg, where rx{number} is 0 by convention",
+        type="Boolean",
+    )
+    if rates:
+        yield _output(f"v{number}", f"Velocity of {name}", "m/s", 3)
+        yield _output(f"a{number}", f"Acceleration of {name}", "m/s2", 3)
+
+
+def _output(name: str, description: str, unit: str, size: int | None) -> Output:
+    return Output(
+        name=name,
+        description=description,
+        unit=unit,
+        display_unit="deg" if unit == "rad" else "",
+        size=size,
+    )
+
+
+def _equations(rates: bool) -> tuple[str, ...]:
+    return (
+        "p_k = the origin of the frame after joint k: the product of the joints' frames and motions;",
+        "of a URM arm p_(i+1) = Rz(phi_1) [r_1 + sum_k prod_j (Ry(theta_(j+1)) Rz(phi_(j+1))) r_(k+1)]"
+        " (eq. 1-8)",
+        "R = Rz(rz) Ry(ry) Rx(rx) (eq. 9, 14)",
+        "rz = atan2(a21, a11), ry = atan2(-a31, hypot(a11, a21)), rx = atan2(a32, a33) (eq. 10-13)",
+        "at ry = +-90 deg: rx = 0, rz = atan2(-a12, a22), and singular is true",
+        *(
+            (
+                "v = v_before + omega x d, a = a_before + alpha x d + omega x (omega x d), joint by joint",
+                "omega grows by z phid, alpha by z phidd + omega x z phid; a sliding joint adds z sd to v,",
+                "z sdd + 2 omega x z sd to a",
+            )
+            if rates
+            else ()
+        ),
+    )

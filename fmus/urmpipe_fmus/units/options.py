@@ -1,0 +1,47 @@
+"""Checks of the options that a unit is made with: they come from a file or a command line."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from urmpipe_models.errors import UnitError
+
+
+def whole_number(unit: str, option: str, value: Any) -> int:
+    """Return an option that counts something.
+
+    Raises:
+        UnitError: If it is no integer of 1 or more.
+    """
+    if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+        raise UnitError(f"unit {unit}: option {option}: found {value!r}, allowed: an integer, 1 or more")
+    return value
+
+
+def yes_or_no(unit: str, option: str, value: Any) -> bool:
+    """Return an option that is true or false.
+
+    Raises:
+        UnitError: If it is neither.
+    """
+    if not isinstance(value, bool):
+        raise UnitError(f"unit {unit}: option {option}: found {value!r}, allowed: true or false")
+    return value
+
+
+def some_of(unit: str, option: str, value: Any, allowed: tuple[str, ...]) -> tuple[str, ...]:
+    """Return an option that names some of what there is, in the order in which that stands.
+
+    Raises:
+        UnitError: If it is no list, or with every name that there is not.
+    """
+    if isinstance(value, str) or not isinstance(value, (list, tuple)):
+        raise UnitError(
+            f"unit {unit}: option {option}: found {value!r}, allowed: a list of {', '.join(allowed)}"
+        )
+    wrong = [one for one in value if one not in allowed]
+    if wrong:
+        raise UnitError(
+            *(f"unit {unit}: option {option}: found {one!r}, allowed: {', '.join(allowed)}" for one in wrong)
+        )
+    return tuple(one for one in allowed if one in value)
