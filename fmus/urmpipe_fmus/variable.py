@@ -7,6 +7,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Literal
 
+from urmpipe_fmus.si_units import display_conversion
+from urmpipe_models.errors import UnitError
+
 Causality = Literal["parameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
 ValueType = Literal["Real", "Integer", "Boolean"]
@@ -80,8 +83,20 @@ class Variable:
             yield f"{self.name}: found {len(self.starts)} start values, allowed: {self.width}"
         if not self.minimum <= self.maximum:
             yield f"{self.name}: min {self.minimum:g} above max {self.maximum:g}"
+        yield from (f"{self.name}: {fault}" for fault in self._unit_faults())
         for name, start in zip(self.names, self.starts, strict=False):
             yield from (f"{name}: start value {fault}" for fault in self.refusals(start))
+
+    def _unit_faults(self) -> Iterator[str]:
+        if self.type != "Real" and (self.unit or self.display_unit):
+            yield f"found {self.type} with a unit, allowed: a unit of a Real"
+        elif self.display_unit and not self.unit:
+            yield f"found display unit {self.display_unit!r} without a unit, allowed: both or none"
+        try:
+            if self.unit:
+                display_conversion(self.unit, self.display_unit or self.unit)
+        except UnitError as error:
+            yield str(error)
 
     def refusals(self, value: float) -> Iterator[str]:
         """Yield why one of its scalars cannot take a value: not finite, out of range, no integer."""

@@ -1,0 +1,182 @@
+"""Units as FMI spells them: what `N.m.s/rad` is in the base units of SI, and how one unit turns into another.
+
+A spelling is a product of powers, `kg.m2`, over one factor or a product in parentheses: `V.s/rad`,
+`J/(kg.K)`, `1/s` (the form of Modelica's language specification, chapter 19, which FMI 2.0 refers to).
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import dataclass
+from functools import cache
+
+from urmpipe_models.errors import UnitError
+
+SAME_FACTOR = 1e-9
+"""Relative: tools write pi/180 with ten digits or more, and no two units that people use are that close."""
+
+BASE_NAMES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+
+
+@dataclass(frozen=True, slots=True)
+class BaseUnit:
+    """A unit by the base units of SI: value in base units = factor * value in the unit + offset.
+
+    The attributes are those of FMI's element BaseUnit (FMI 2.0.4, section 2.2.2).
+
+    Attributes:
+        kg: Exponent of the kilogram; the other exponents likewise.
+        factor: From the unit to the base units.
+        offset: In base units, added after the factor: 273.15 for degC.
+    """
+
+    kg: int = 0
+    m: int = 0
+    s: int = 0
+    A: int = 0
+    K: int = 0
+    mol: int = 0
+    cd: int = 0
+    rad: int = 0
+    factor: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def exponents(self) -> tuple[int, ...]:
+        """The exponents, in the order of `BASE_NAMES`."""
+        return tuple(getattr(self, name) for name in BASE_NAMES)
+
+
+_SYMBOLS = {
+    "1": BaseUnit(),
+    "m": BaseUnit(m=1),
+    "g": BaseUnit(kg=1),
+    "s": BaseUnit(s=1),
+    "A": BaseUnit(A=1),
+    "K": BaseUnit(K=1),
+    "mol": BaseUnit(mol=1),
+    "cd": BaseUnit(cd=1),
+    "rad": BaseUnit(rad=1),
+    "Hz": BaseUnit(s=-1),
+    "N": BaseUnit(kg=1, m=1, s=-2),
+    "Pa": BaseUnit(kg=1, m=-1, s=-2),
+    "J": BaseUnit(kg=1, m=2, s=-2),
+    "W": BaseUnit(kg=1, m=2, s=-3),
+    "C": BaseUnit(s=1, A=1),
+    "V": BaseUnit(kg=1, m=2, s=-3, A=-1),
+    "F": BaseUnit(kg=-1, m=-2, s=4, A=2),
+    "Ohm": BaseUnit(kg=1, m=2, s=-3, A=-2),
+    "S": BaseUnit(kg=-1, m=-2, s=3, A=2),
+    "Wb": BaseUnit(kg=1, m=2, s=-2, A=-1),
+    "T": BaseUnit(kg=1, s=-2, A=-1),
+    "H": BaseUnit(kg=1, m=2, s=-2, A=-2),
+    "bar": BaseUnit(kg=1, m=-1, s=-2, factor=1e5),
+}
+"""Those that take a prefix (all but 1)."""
+
+_PLAIN = {
+    "kg": BaseUnit(kg=1),
+    "deg": BaseUnit(rad=1, factor=math.pi / 180.0),
+    "rev": BaseUnit(rad=1, factor=2.0 * math.pi),
+    "min": BaseUnit(s=1, factor=60.0),
+    "h": BaseUnit(s=1, factor=3600.0),
+    "d": BaseUnit(s=1, factor=86400.0),
+}
+"""Those that take none."""
+
+_ALONE = {"": BaseUnit(), "degC": BaseUnit(K=1, offset=273.15)}
+"""Those that stand in no product: a temperature with an offset has no multiple."""
+
+GRAM = -3
+"""The gram is the base unit times this power of ten."""
+
+_PREFIXES = {"": 0, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3, "u": -6, "n": -9, "p": -12}
+_POWER = re.compile(r"(1|[A-Za-z]+)([+-]?[1-9])?")
+_PARTS = re.compile(r"([^/()]+)(?:/(?:([^/.()]+)|\(([^/()]+)\)))?")
+
+
+@cache
+def base_unit(spelling: str) -> BaseUnit:
+    """Return what a unit is in the base units of SI; an empty spelling is a number without a unit.
+
+    Raises:
+        UnitError: If the spelling is none of a unit.
+    """
+    if spelling in _ALONE:
+        return _ALONE[spelling]
+    parts = _PARTS.fullmatch(spelling)
+    if parts is None:
+        raise _unknown(spelling)
+    above, one_below, more_below = parts.groups()
+    below = one_below or more_below
+    powers = _powers(above, spelling)
+    powers += [(symbol, -power) for symbol, power in _powers(below, spelling)] if below else []
+    return _product(powers, spelling)
+
+
+def same_unit(one: str | BaseUnit, other: str | BaseUnit) -> bool:
+    """Return whether values in one unit are values in the other: exponents, factor and offset are equal."""
+    a, b = _base(one), _base(other)
+    return (
+        a.exponents == b.exponents
+        and math.isclose(a.factor, b.factor, rel_tol=SAME_FACTOR)
+        and math.isclose(a.offset, b.offset, rel_tol=SAME_FACTOR)
+    )
+
+
+def display_conversion(unit: str, display_unit: str) -> tuple[float, float]:
+    """Return factor and offset of a unit to display: shown value = factor * value + offset.
+
+    Raises:
+        UnitError: If a spelling is unknown, or the two are units of different quantities.
+    """
+    held, shown = base_unit(unit), base_unit(display_unit)
+    if held.exponents != shown.exponents:
+        raise UnitError(
+            f"display unit {display_unit!r}: found for values in {unit!r}, allowed: one of the same quantity"
+        )
+    return held.factor / shown.factor, (held.offset - shown.offset) / shown.factor
+
+
+def _base(unit: str | BaseUnit) -> BaseUnit:
+    return base_unit(unit) if isinstance(unit, str) else unit
+
+
+def _powers(product: str, spelling: str) -> list[tuple[str, int]]:
+    """Return the symbols of a product, `kg.m2`, with their exponents."""
+    matches = [_POWER.fullmatch(one) for one in product.split(".")]
+    if None in matches:
+        raise _unknown(spelling)
+    return [(match[1], int(match[2] or 1)) for match in matches if match]
+
+
+def _product(powers: list[tuple[str, int]], spelling: str) -> BaseUnit:
+    """Return the product of powers of symbols; tens are counted, so that mm2 is 1e-6 and mm/ms is m/s."""
+    exponents, factor, tens = [0] * 8, 1.0, 0
+    for symbol, power in powers:
+        ten, one = _symbol(symbol, spelling)
+        exponents = [so_far + power * each for so_far, each in zip(exponents, one.exponents, strict=True)]
+        factor *= one.factor**power
+        tens += power * ten
+    scale = factor * float(f"1e{tens}")
+    return BaseUnit(**dict(zip(BASE_NAMES, exponents, strict=True)), factor=scale)
+
+
+def _symbol(symbol: str, spelling: str) -> tuple[int, BaseUnit]:
+    """Return a symbol's power of ten and its unit without it."""
+    if symbol in _PLAIN:
+        return 0, _PLAIN[symbol]
+    prefix, rest = ("", symbol) if symbol in _SYMBOLS else (symbol[:1], symbol[1:])
+    if prefix not in _PREFIXES or rest not in _SYMBOLS or (prefix and rest == "1"):
+        raise _unknown(spelling)
+    return _PREFIXES[prefix] + (GRAM if rest == "g" else 0), _SYMBOLS[rest]
+
+
+def _unknown(spelling: str) -> UnitError:
+    symbols = ", ".join(one for one in (*_SYMBOLS, *_PLAIN) if one != "1")
+    return UnitError(
+        f"unit {spelling!r}: found, allowed: powers of {symbols} (the SI ones also with a prefix such as k or"
+        " m) as a product over one factor or a product in parentheses, such as N.m, kg.m2, rad/s2,"
+        " N.m.s/rad, J/(kg.K), 1/s; degC alone; empty for a number without a unit"
+    )
