@@ -1,0 +1,132 @@
+"""Set points of one joint as closed forms of time: a step, a ramp, a trapezoid of velocity.
+
+Each starts at `begin` and goes from `initial` to `target`. Values at a corner are those after it.
+
+    step        at once; velocity and acceleration stay 0 (their impulses are left out)
+    ramp        with the largest velocity all the way; acceleration stays 0 (its impulses are left out)
+    trapezoid   with the largest acceleration to the largest velocity, on with it, and down again; a move
+                too short for that is a triangle, which turns back halfway
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from urmpipe_models.elementwise import Element
+
+STEP, RAMP, TRAPEZOID = 0, 1, 2
+"""The kinds, as numbers, for `set_point`."""
+
+
+class JointMotion(NamedTuple):
+    """Where a joint is or shall be.
+
+    Attributes:
+        position: Angle in [rad].
+        velocity: Its rate in [rad/s].
+        acceleration: Its second derivative in [rad/s2].
+    """
+
+    position: Element
+    velocity: Element
+    acceleration: Element
+
+
+def step(time: Element, begin: Element, initial: Element, target: Element) -> JointMotion:
+    """Return the step: `initial` before `begin`, `target` from then on.
+
+    Args:
+        time: In [s].
+        begin: When it steps, in [s].
+        initial: Where from, in [rad].
+        target: Where to, in [rad].
+    """
+    return JointMotion(np.where(time >= begin, target, initial), 0.0 * time, 0.0 * time)
+
+
+def ramp(time: Element, begin: Element, initial: Element, target: Element, speed: Element) -> JointMotion:
+    """Return the ramp, which takes |target - initial| / speed.
+
+    Args:
+        time: In [s].
+        begin: When it starts, in [s].
+        initial: Where from, in [rad].
+        target: Where to, in [rad].
+        speed: Largest velocity in [rad/s], above 0.
+    """
+    way, direction = np.abs(target - initial), np.sign(target - initial)
+    end = begin + way / speed
+    gone = np.minimum(np.maximum(time - begin, 0.0), way / speed) * speed
+    moving = np.logical_and(time >= begin, time < end)
+    position = np.where(time >= end, target, initial + direction * gone)
+    return JointMotion(position, np.where(moving, direction * speed, 0.0), 0.0 * time)
+
+
+def trapezoid(
+    time: Element,
+    begin: Element,
+    initial: Element,
+    target: Element,
+    speed: Element,
+    acceleration: Element,
+) -> JointMotion:
+    """Return the move with a trapezoid of velocity.
+
+    It speeds up for t_a = min(v / a, sqrt(way / a)), keeps its velocity for way / v - v / a, but not below
+    0, and slows down for t_a. Both t_a and the time between are finite for a way of 0.
+
+    Args:
+        time: In [s].
+        begin: When it starts, in [s].
+        initial: Where from, in [rad].
+        target: Where to, in [rad].
+        speed: v, the largest velocity in [rad/s], above 0.
+        acceleration: a, the largest acceleration in [rad/s2], above 0.
+    """
+    way, direction = np.abs(target - initial), np.sign(target - initial)
+    rise = np.minimum(speed / acceleration, np.sqrt(way / acceleration))
+    cruise = np.maximum(way / speed - speed / acceleration, 0.0)
+    total = 2.0 * rise + cruise
+    since = time - begin
+    up = _within(since, rise)
+    level = _within(since - rise, cruise)
+    down = _within(since - rise - cruise, rise)
+    peak = acceleration * rise
+    gone = 0.5 * acceleration * up * up + peak * level + (peak - 0.5 * acceleration * down) * down
+    speeding = np.logical_and(since >= 0.0, since < rise)
+    slowing = np.logical_and(since >= rise + cruise, since < total)
+    return JointMotion(
+        np.where(since >= total, target, initial + direction * gone),
+        direction * acceleration * (up - down),
+        direction * acceleration * (np.where(speeding, 1.0, 0.0) - np.where(slowing, 1.0, 0.0)),
+    )
+
+
+def set_point(
+    kind: Element,
+    time: Element,
+    begin: Element,
+    initial: Element,
+    target: Element,
+    speed: Element,
+    acceleration: Element,
+) -> JointMotion:
+    """Return the set point of a kind: 0 the step, 1 the ramp, 2 the trapezoid; the rest as they take it."""
+    forms = (
+        step(time, begin, initial, target),
+        ramp(time, begin, initial, target, speed),
+        trapezoid(time, begin, initial, target, speed, acceleration),
+    )
+    return JointMotion(
+        *(
+            np.where(kind == STEP, stepped, np.where(kind == RAMP, ramped, rounded))
+            for stepped, ramped, rounded in zip(*forms, strict=True)
+        )
+    )
+
+
+def _within(time: Element, duration: Element) -> Element:
+    """Return how much of a stretch that starts at 0 is over."""
+    return np.minimum(np.maximum(time, 0.0), duration)
