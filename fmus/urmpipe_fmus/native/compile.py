@@ -1,0 +1,128 @@
+"""Compiling the C sources of an FMU: by the system's compiler for this platform, by zig for several."""
+
+from __future__ import annotations
+
+import os
+import platform
+import shlex
+import shutil
+import subprocess
+import sys
+import tempfile
+from collections.abc import Mapping, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+
+from urmpipe_fmus.native.sources import GUID_HEADER, guid_header
+from urmpipe_fmus.unit import Unit
+from urmpipe_models.errors import FmuError
+
+TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu"}
+"""zig's name of the platforms, by FMI's."""
+
+SUFFIXES = {"win64": ".dll", "win32": ".dll", "darwin64": ".dylib"}
+"""How a binary's name ends, where it is not .so."""
+
+FLAGS = ("-shared", "-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-Wall", "-Wextra", "-s")
+"""No fused multiply-add: a product is rounded before it is added, as NumPy does. No symbols but FMI's."""
+
+LINES_OF_AN_ERROR = 12
+
+
+def this_platform() -> str:
+    """Return FMI's name of the platform that this runs on, such as linux64."""
+    system = {"Windows": "win", "Darwin": "darwin"}.get(platform.system(), "linux")
+    return f"{system}{'64' if sys.maxsize > 2**32 else '32'}"
+
+
+def native_missing(platforms: Sequence[str] = ()) -> str | None:
+    """Return why no native FMU can be built here for some platforms (default: this one), None if it can."""
+    if find_spec("casadi") is None:
+        return "casadi is not installed (pip install 'urmpipe[native]')"
+    unknown = [one for one in platforms if one not in TARGETS and one != this_platform()]
+    if unknown:
+        return f"platform {', '.join(unknown)}: allowed: {', '.join(sorted({*TARGETS, this_platform()}))}"
+    if _is_local(platforms or (this_platform(),)):
+        return None if _system_compiler() else "no C compiler is found (cc, or what the variable CC names)"
+    return None if find_spec("ziglang") else "ziglang is not installed (pip install 'urmpipe[cross]')"
+
+
+def native_binaries(
+    unit: Unit, sources: Mapping[str, bytes], guid: str, platforms: Sequence[str]
+) -> dict[str, bytes]:
+    """Compile the sources of a unit's FMU.
+
+    The same sources and GUID give the same bytes, whatever the folder.
+
+    Args:
+        unit: The unit, of which the binaries take the name.
+        sources: What `native_sources` gave.
+        guid: GUID of the FMU.
+        platforms: FMI's names of the platforms; this platform alone is compiled by the system's compiler.
+
+    Returns:
+        The binaries by their path in the FMU.
+
+    Raises:
+        FmuError: If a compiler is missing or fails, with its last lines.
+    """
+    missing = native_missing(platforms)
+    if missing:
+        raise FmuError(f"unit {unit.name}: no native FMU can be built: {missing}")
+    files = {**sources, GUID_HEADER: guid_header(guid)}
+    return {
+        f"binaries/{one}/{unit.name}{SUFFIXES.get(one, '.so')}": _compiled(
+            unit, files, one, _command(platforms, one)
+        )
+        for one in platforms
+    }
+
+
+def _is_local(platforms: Sequence[str]) -> bool:
+    return list(platforms) == [this_platform()]
+
+
+def _system_compiler() -> list[str] | None:
+    """Return the command of the system's compiler: what CC names, else cc."""
+    command = shlex.split(os.environ.get("CC") or "cc", posix=os.name == "posix")
+    return command if command and shutil.which(command[0]) else None
+
+
+def _command(platforms: Sequence[str], one: str) -> list[str]:
+    """Return the compiler and flags for one of some platforms."""
+    position = [] if one.startswith("win") else ["-fPIC"]
+    local = _system_compiler() if _is_local(platforms) else None
+    if local:
+        linked = ["-Wl,--build-id=none"] if one.startswith("linux") else []
+        return [*local, *FLAGS, *position, *linked]
+    return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[one], *FLAGS, *position]
+
+
+def _compiled(unit: Unit, files: Mapping[str, bytes], target: str, command: Sequence[str]) -> bytes:
+    """Return the binary of some sources for one platform, made in a folder that is removed again."""
+    with tempfile.TemporaryDirectory(prefix="urmpipe-fmu-") as folder:
+        for name, content in files.items():
+            path = Path(folder, name)
+            path.parent.mkdir(exist_ok=True)
+            path.write_bytes(content)
+        c_files = sorted(name for name in files if name.endswith(".c"))
+        binary = f"binary{SUFFIXES.get(target, '.so')}"
+        libraries = [] if target.startswith("win") else ["-lm"]
+        _run(unit, target, [*command, "-o", binary, *c_files, *libraries], folder)
+        return Path(folder, binary).read_bytes()
+
+
+def _run(unit: Unit, target: str, command: Sequence[str], folder: str) -> None:
+    """Run a compiler in a folder."""
+    try:
+        done = subprocess.run(
+            command, cwd=folder, capture_output=True, text=True, errors="replace", check=False
+        )
+    except OSError as error:
+        raise FmuError(f"unit {unit.name}: {command[0]} cannot be run: {error}") from error
+    if done.returncode:
+        said = (done.stderr or done.stdout).splitlines()[-LINES_OF_AN_ERROR:]
+        raise FmuError(
+            f"unit {unit.name}: the C compiler failed for {target} (exit code {done.returncode})",
+            *(line for line in said if line.strip()),
+        )
