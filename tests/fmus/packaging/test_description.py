@@ -1,0 +1,147 @@
+"""modelDescription.xml: valid, complete, and what FMPy reads from it is what the unit says."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from pathlib import Path
+from xml.etree import ElementTree as ET
+
+import pytest
+from fmpy import read_model_description
+from fmpy.model_description import ModelDescription
+from fmpy.validation import validate_fmu
+from hypothesis import given
+from hypothesis import strategies as st
+
+from urmpipe_fmus.description import model_description
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.variable import Input, Output, Parameter
+
+NOT_XML = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
+"""XML 1.0, production 2."""
+GUID = "{00000000-0000-0000-0000-000000000000}"
+
+
+def problems_of(text: str, folder: Path) -> list[str]:
+    (folder / "modelDescription.xml").write_text(text, encoding="utf-8")
+    found: list[str] = validate_fmu(str(folder))
+    return found
+
+
+def read_back(text: str, folder: Path) -> ModelDescription:
+    (folder / "modelDescription.xml").write_text(text, encoding="utf-8")
+    return read_model_description(str(folder), validate=False)
+
+
+def test_fmpy_finds_nothing_wrong(unit: Unit, tmp_path: Path) -> None:
+    assert problems_of(model_description(unit, GUID, "native", ["model.c"]), tmp_path) == []
+    assert problems_of(model_description(unit, GUID, "python"), tmp_path) == []
+
+
+def test_every_scalar_is_described_as_the_unit_says(unit: Unit, tmp_path: Path) -> None:
+    found = read_back(model_description(unit, GUID, "native"), tmp_path).modelVariables
+    assert [one.name for one in found] == [name for name, _ in unit.scalars]
+    for reference, (seen, (name, meant)) in enumerate(zip(found, unit.scalars, strict=True)):
+        start = meant.starts[meant.names.index(name)]
+        assert seen.valueReference == reference
+        assert (seen.type, seen.causality, seen.variability) == (
+            meant.type,
+            meant.causality,
+            meant.variability,
+        )
+        assert (seen.unit or "", seen.displayUnit or "") == (meant.unit, meant.display_unit)
+        assert seen.description == meant.description
+        if isinstance(meant, Output):
+            assert (seen.initial, seen.start) == ("calculated", None)
+        elif meant.type == "Boolean":
+            assert seen.start == ("true" if start else "false")
+        else:
+            assert float(seen.start) == start
+
+
+def test_units_are_told_in_base_units_with_their_display_units(
+    make: Callable[..., Unit], tmp_path: Path
+) -> None:
+    found = read_back(model_description(make("spring"), GUID, "native"), tmp_path).unitDefinitions
+    bases = {one.name: one.baseUnit for one in found}
+    assert sorted(bases) == ["J", "N", "N.s/m", "N/m", "kg", "m", "m/s", "m/s2", "s"]
+    assert (bases["J"].kg, bases["J"].m, bases["J"].s, bases["J"].factor) == (1, 2, -2, 1.0)
+    (metre,) = (one for one in found if one.name == "m")
+    assert [(one.name, one.factor) for one in metre.displayUnits] == [("mm", 1000.0)]
+
+
+def dependencies(text: str, folder: Path, title: str) -> dict[str, set[str]]:
+    read = getattr(read_back(text, folder), title)
+    return {one.variable.name: {known.name for known in one.dependencies} for one in read}
+
+
+def test_outputs_depend_on_inputs_and_initial_unknowns_on_all_that_is_known(
+    make: Callable[..., Unit], tmp_path: Path
+) -> None:
+    text = model_description(make("spring"), GUID, "native")
+    assert dependencies(text, tmp_path, "outputs") == {"x": set(), "a": {"F"}, "E": set()}
+    assert dependencies(text, tmp_path, "initialUnknowns") == {
+        "a": {"m", "c", "d", "F", "x", "v"},
+        "E": {"m", "c", "x", "v"},
+    }
+    text = model_description(make("arm"), GUID, "native")
+    angles = {"phi[1]", "phi[2]", "phi[3]"}
+    assert dependencies(text, tmp_path, "outputs") == {
+        "p[1]": angles,
+        "p[2]": angles,
+        "reach": angles,
+        "first": {"phi[1]"},
+    }
+
+
+def test_an_fmu_with_a_table_plays_it_by_default(make: Callable[..., Unit], tmp_path: Path) -> None:
+    found = read_back(model_description(make("playback"), GUID, "native"), tmp_path).defaultExperiment
+    assert (found.startTime, found.stopTime, found.stepSize) == ("0.0", "0.3", "0.1")
+
+
+@pytest.mark.parametrize(
+    ("backend", "needs_python", "sources"), [("native", False, ["model.c"]), ("python", True, [])]
+)
+def test_capabilities_are_those_of_the_backend(
+    make: Callable[..., Unit], tmp_path: Path, backend: str, needs_python: bool, sources: list[str]
+) -> None:
+    text = model_description(make("spring"), GUID, backend, sources)  # type: ignore[arg-type]
+    assert [one.get("name") for one in ET.fromstring(text.encode()).findall(".//File")] == sources
+    found = read_back(text, tmp_path).coSimulation
+    assert found.modelIdentifier == "spring"
+    assert bool(found.needsExecutionTool) is needs_python
+    assert found.canGetAndSetFMUstate and found.canSerializeFMUstate
+    assert found.canHandleVariableCommunicationStepSize
+    assert not found.canBeInstantiatedOnlyOncePerProcess
+    assert not found.providesDirectionalDerivative
+
+
+def test_bounds_are_told_where_they_are_some(tmp_path: Path) -> None:
+    unit = Unit(
+        name="bounded",
+        description="",
+        variables=(
+            Parameter(name="r", description="", minimum=-0.5),
+            Parameter(name="n", description="", type="Integer", minimum=-1.5, maximum=1e12),
+            Input(name="b", description="", type="Boolean", minimum=0, maximum=1),
+        ),
+    )
+    text = model_description(unit, GUID, "native")
+    assert problems_of(text, tmp_path) == []
+    found = read_back(text, tmp_path).modelVariables
+    assert [(one.min, one.max) for one in found] == [("-0.5", None), ("-1", None), (None, None)]
+
+
+@given(text=st.text(st.characters(exclude_categories=[])))
+def test_any_description_is_valid_and_what_xml_can_hold_of_it_comes_back(text: str) -> None:
+    unit = Unit(
+        name="named",
+        description=text,
+        variables=(Input(name="u", description=text), Output(name="y", description="")),
+        outputs=lambda v: {"y": v.u},
+    )
+    root = ET.fromstring(model_description(unit, GUID, "native").encode())
+    escaped = NOT_XML.sub(lambda found: ascii(found[0])[1:-1], text)
+    assert root.get("description") == escaped
+    assert root.find(".//ScalarVariable").get("description", "") == escaped  # type: ignore[union-attr]

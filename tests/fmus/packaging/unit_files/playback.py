@@ -1,0 +1,23 @@
+"""A table over time, read held and interpolated."""
+
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.variable import Output, Parameter
+
+
+def make(table, gain=1.0):
+    """Make a unit that plays the table's two columns, scaled."""
+    return Unit(
+        name="playback",
+        description="Plays a table",
+        variables=(
+            Parameter(name="gain", description="Scale", start=gain),
+            Output(name="held", description="The last row's first value"),
+            Output(name="between", description="The second column, interpolated", unit="m"),
+        ),
+        outputs=lambda v: {
+            "held": v.gain * v.table.before[0],
+            "between": v.gain
+            * (v.table.before[1] + v.table.fraction * (v.table.after[1] - v.table.before[1])),
+        },
+        table=table,
+    )
