@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+import traceback
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import islice
 from typing import Any
+
+import numpy as np
 
 from urmpipe_fmus.table import Rows
 from urmpipe_fmus.unit import Function, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Variable
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError
+from urmpipe_models.errors import Finding, UnitError, UrmpipeError
 
 
 class Equations:
@@ -50,8 +53,28 @@ class Equations:
         """Return what a function of the unit gives for some variables, flat."""
         if function is None:
             return []
+        where = f"unit {self.unit.name}: {what}"
         values = Values(time, named(self.unit.given, given), rows)
-        return flat(f"unit {self.unit.name}: {what}", function(values), variables)
+        try:
+            with np.errstate(all="ignore"):  # 1/0 is inf, as in C; who uses it asks whether it is finite
+                result = function(values)
+        except Exception as error:
+            raise UnitError(*_told(where, function, error)) from error
+        return flat(where, result, variables)
+
+
+def _told(where: str, function: Function, error: Exception) -> Iterator[Finding]:
+    """Yield what went wrong in a unit's function, and in which line of its file."""
+    code = getattr(function, "__code__", None)
+    frames = traceback.extract_tb(error.__traceback__)
+    lines = [frame.lineno for frame in frames if code and frame.filename == code.co_filename]
+    place = {"file": code.co_filename, "line": lines[-1]} if code and lines else {}
+    said = (
+        [one.message for one in error.findings]
+        if isinstance(error, UrmpipeError)
+        else [f"{type(error).__name__}: {error}"]
+    )
+    return (Finding(f"{where}: {one}", **place) for one in said)
 
 
 def named(variables: Sequence[Variable], elements: Sequence[Element]) -> dict[str, Any]:
@@ -60,12 +83,16 @@ def named(variables: Sequence[Variable], elements: Sequence[Element]) -> dict[st
     return {one.name: next(rest) if one.size is None else tuple(islice(rest, one.size)) for one in variables}
 
 
-def flat(where: str, result: Mapping[str, Any], variables: Sequence[Variable]) -> list[Element]:
+def flat(where: str, result: Any, variables: Sequence[Variable]) -> list[Element]:
     """Return what a function gave by name as one element a scalar, in the order of the variables.
 
     Raises:
-        UnitError: If a name is missing or unknown, or has another size than its variable.
+        UnitError: If it is no mapping, a name is missing or unknown, or one has not its variable's size.
     """
+    if not isinstance(result, Mapping):
+        raise UnitError(
+            f"{where}: returns {_kind(result)}, allowed: a dict of {', '.join(one.name for one in variables)}"
+        )
     faults = list(_faults(result, variables))
     if faults:
         raise UnitError(*(f"{where}: {fault}" for fault in faults))
@@ -83,5 +110,15 @@ def _faults(result: Mapping[str, Any], variables: Sequence[Variable]) -> Iterato
     for name, one in expected.items():
         if name not in result:
             yield f"{name}: not found in what it returns, allowed: all of {', '.join(expected)}"
-        elif one.size is not None and len(result[name]) != one.size:
-            yield f"{name}: found {len(result[name])} elements, allowed: {one.size}"
+            continue
+        found, many = result[name], isinstance(result[name], (tuple, list))
+        if one.size is None and (many or found is None or isinstance(found, str)):
+            yield f"{name}: found {_kind(found)}, allowed: one element"
+        elif one.size is not None and not many:
+            yield f"{name}: found {_kind(found)}, allowed: a tuple of {one.size} elements"
+        elif one.size is not None and len(found) != one.size:
+            yield f"{name}: found {len(found)} elements, allowed: {one.size}"
+
+
+def _kind(value: Any) -> str:
+    return "nothing (None)" if value is None else f"{type(value).__name__}"

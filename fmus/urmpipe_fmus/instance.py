@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_fmus.equations import Equations
 from urmpipe_fmus.table import Rows
 from urmpipe_fmus.unit import INTERNAL_STEP, Unit
-from urmpipe_fmus.variable import Memory, Output, Parameter, State, Variable
+from urmpipe_fmus.variable import LARGEST_INTEGER, Memory, Output, Parameter, State, Variable
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError
 
@@ -22,7 +22,8 @@ STEP_SLACK = 1e-9
 class Instance:
     """A unit that is stepped through time.
 
-    Values are floats; elements of shape (runs,) as well, which step many runs side by side.
+    Values are NumPy's doubles, which compute as C's do: 1/0 is inf, and raises nothing. They may be elements
+    of shape (runs,) as well, which step many runs side by side.
 
     Attributes:
         unit: The unit.
@@ -30,14 +31,14 @@ class Instance:
         running: Whether fixed parameters are fixed: from the first step on.
     """
 
-    def __init__(self, unit: Unit, time: float = 0.0) -> None:
+    def __init__(self, unit: Unit, time: Element = 0.0) -> None:
         self.unit = unit
-        self.time: Element = time
+        self.time: Element = np.float64(time)
         self.running = False
         self._equations = Equations(unit)
         self._owner = [variable for _, variable in unit.scalars]
         self._index = {name: index for index, (name, _) in enumerate(unit.scalars)}
-        self._values: list[Element] = [start for one in unit.variables for start in one.starts]
+        self._values: list[Element] = [np.float64(start) for one in unit.variables for start in one.starts]
         self._given = self._places(unit.given)
         self._states = self._places(unit.states)
         self._memories = self._places(unit.memories)
@@ -70,7 +71,7 @@ class Instance:
         if faults:
             raise UnitError(*(f"unit {self.unit.name}: {fault}" for fault in faults))
         for reference, value in zip(references, values, strict=True):
-            self._values[reference] = value
+            self._values[reference] = np.float64(value)
         self._stale = True
 
     def get(self, references: Sequence[int]) -> list[Element]:
@@ -94,7 +95,8 @@ class Instance:
             step: To the next one in [s], above 0.
 
         Raises:
-            UnitError: If the step is not above 0, or a state is not finite after it; then nothing changed.
+            UnitError: If the step is not above 0 or too long for its internal steps, or a state is not finite
+                after it; then nothing changed.
         """
         if not (math.isfinite(time) and math.isfinite(step) and step > 0.0):
             raise UnitError(
@@ -103,12 +105,13 @@ class Instance:
         before = (self.time, list(self._values), self._stale)
         self.running = True
         try:
-            self._sample(time)
-            self._integrate(time, step)
+            with np.errstate(all="ignore"):  # what is not finite is told
+                self._sample(np.float64(time))
+                self._integrate(np.float64(time), np.float64(step))
         except UnitError:
             self.time, self._values, self._stale = before
             raise
-        self.time, self._stale = time + step, True
+        self.time, self._stale = np.float64(time) + step, True
 
     def save(self) -> Any:
         """Return all that the instance remembers, to be given to `restore`."""
@@ -136,7 +139,7 @@ class Instance:
             return [f"{name}: set while it runs, allowed: a state before the first step"]
         if self.running and isinstance(one, Parameter) and not one.tunable:
             return [f"{name}: set while it runs, allowed: a fixed parameter before the first step"]
-        return [f"{name}: {fault}" for each in np.ravel(value) for fault in one.refusals(float(each))][:1]
+        return [f"{name}: {fault}" for each in _extremes(one, value) for fault in one.refusals(each)][:1]
 
     def _rows(self, time: Element) -> Rows | None:
         return None if self.unit.table is None else self.unit.table.rows_at(time)
@@ -160,6 +163,11 @@ class Instance:
         if not self._states:
             return
         largest = self._values[self._index[INTERNAL_STEP]]
+        if step / largest > LARGEST_INTEGER:
+            raise UnitError(
+                f"unit {self.unit.name}: found a step of {step:g} s in internal steps of {largest:g} s,"
+                f" allowed: {LARGEST_INTEGER} internal steps"
+            )
         count = max(1, math.ceil(step / largest - STEP_SLACK))
         h = step / count
         for k in range(count):
@@ -190,11 +198,33 @@ class Instance:
             UnitError: If one is not finite.
         """
         faults = [
-            f"unit {self.unit.name}: {what} {self.unit.scalars[place][0]} is not finite at {self.time:g} s"
+            f"unit {self.unit.name}: {what} {self.unit.scalars[place][0]} is not finite at"
+            f" {self._first_not_finite(value):g} s"
             for place, value in zip(places, found, strict=True)
-            if not np.all(np.isfinite(value))
+            if not _all_finite(value)
         ]
         if faults:
             raise UnitError(*faults)
         for place, value in zip(places, found, strict=True):
-            self._values[place] = value
+            self._values[place] = np.float64(value)
+
+    def _first_not_finite(self, value: Element) -> float:
+        """Return the time of the first of some values that is not finite."""
+        times, values = np.broadcast_arrays(self.time, value)
+        return float(times[~np.isfinite(values)][0])
+
+
+def _all_finite(value: Element) -> bool:
+    return math.isfinite(value) if isinstance(value, float) else bool(np.isfinite(value).all())
+
+
+def _extremes(variable: Variable, value: Element) -> list[float]:
+    """Return values of which one is refused if any of an element is: of a column its bounds."""
+    if np.ndim(value) == 0:
+        return [float(value)]
+    values = np.ravel(np.float64(value))
+    if variable.type != "Real":
+        values = np.unique(values)
+    elif values.size:
+        values = np.array([values.min(), values.max()])
+    return [float(one) for one in values]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_fmus.equations import Equations, named
+from urmpipe_fmus.equations import named
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Variable
@@ -28,7 +28,7 @@ def run(
 
     Args:
         unit: The unit.
-        t: Times of the samples in [s], strictly rising, shape (n,).
+        t: Times of the samples in [s], finite, strictly rising, shape (n,).
         inputs: Values of the inputs by variable name, in their units: shape (n,), or (n, size); an input
             that is not named stays at its start.
         start: Parameters and start values of states by variable name; a sequence for one with a size.
@@ -37,20 +37,23 @@ def run(
         Every output, and every state or memory that is one, by variable name: shape (n,), or (n, size).
 
     Raises:
-        UnitError: If a name is unknown, a shape does not fit, or a value is refused.
+        UnitError: If times do not rise, a name is unknown, a shape does not fit, a value is refused, or an
+            output is not finite.
     """
     t = np.asarray(t, dtype=np.float64)
-    instance = Instance(unit, float(t[0]) if len(t) else 0.0)
+    if t.ndim != 1 or not np.isfinite(t).all() or (np.diff(t) <= 0.0).any():
+        raise UnitError(
+            f"unit {unit.name}: found times of shape {t.shape}, allowed: rising times, shape (n,)"
+        )
+    instance = Instance(unit, t[0] if len(t) else 0.0)
     for name, value in (start or {}).items():
         owner = _variable(unit, name)
         values = [float(one) for one in np.broadcast_to(np.asarray(value, dtype=np.float64), (owner.width,))]
         instance.set([instance.reference(scalar) for scalar in owner.names], values)
     columns = _columns(unit, inputs or {}, len(t))
     shown = [one for one in unit.variables if one.causality == "output"]
-    if unit.states or unit.memories:
-        found = _stepped(instance, t, columns, [name for one in shown for name in one.names])
-    else:
-        found = _at_once(instance, t, columns)
+    over = _stepped if unit.states or unit.memories else _at_once
+    found = over(instance, t, columns, [name for one in shown for name in one.names])
     return {
         name: np.column_stack(value) if isinstance(value, tuple) else np.asarray(value)
         for name, value in named(shown, found).items()
@@ -80,15 +83,14 @@ def _columns(unit: Unit, inputs: Mapping[str, Any], count: int) -> dict[str, Flo
     return columns
 
 
-def _at_once(instance: Instance, t: FloatArray, columns: Mapping[str, FloatArray]) -> list[Element]:
+def _at_once(
+    instance: Instance, t: FloatArray, columns: Mapping[str, FloatArray], shown: Sequence[str]
+) -> list[Element]:
     """Return the outputs of a unit that remembers nothing, each shape (n,)."""
-    unit = instance.unit
+    instance.time = t
     instance.set([instance.reference(name) for name in columns], list(columns.values()))
-    names = [name for one in unit.given for name in one.names]
-    given = instance.get([instance.reference(name) for name in names])
-    rows = None if unit.table is None else unit.table.rows_at(t)
-    found = Equations(unit).outputs(t, given, rows)
-    return [np.broadcast_to(np.asarray(one, dtype=np.float64), t.shape).copy() for one in found]
+    found = instance.get([instance.reference(name) for name in shown])
+    return [np.broadcast_to(one, t.shape).copy() for one in found]
 
 
 def _stepped(

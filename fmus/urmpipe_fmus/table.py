@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -42,26 +43,38 @@ class Table:
 
     t_ns: NDArray[np.int64]
     values: FloatArray
+    _times: FloatArray = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "t_ns", np.asarray(self.t_ns, dtype=np.int64))
-        object.__setattr__(self, "values", np.ascontiguousarray(self.values, dtype=np.float64))
-        faults = []
-        if self.values.ndim != 2 or len(self.t_ns) != len(self.values) or not self.values.size:
-            faults.append(
+        given = np.asarray(self.t_ns)
+        if given.dtype.kind not in "iu":
+            raise UnitError(f"table: found times of type {given.dtype}, allowed: integers, in ns")
+        for name, value in (
+            ("t_ns", np.array(given, dtype=np.int64)),
+            ("values", np.array(self.values, dtype=np.float64, order="C")),
+            ("_times", np.array(given, dtype=np.float64)),
+        ):
+            value.flags.writeable = False  # a copy of its own: nobody changes what a unit holds
+            object.__setattr__(self, name, value)
+        faults = list(self._faults())
+        if faults:
+            raise UnitError(*faults)
+
+    def _faults(self) -> Iterator[str]:
+        if self.values.ndim != 2 or self.t_ns.shape != self.values.shape[:1] or not self.values.size:
+            yield (
                 f"table: found {self.t_ns.shape} times and {self.values.shape} values, allowed: (n,) and"
                 " (n, columns), at least one of each"
             )
-        elif len(self.t_ns) > LARGEST_INTEGER:
-            faults.append(f"table: found {len(self.t_ns)} rows, allowed: {LARGEST_INTEGER}")
+            return
+        if len(self.t_ns) > LARGEST_INTEGER:
+            yield f"table: found {len(self.t_ns)} rows, allowed: {LARGEST_INTEGER}"
         if (np.diff(self.t_ns) <= 0).any():
             row = int(np.argmax(np.diff(self.t_ns) <= 0)) + 2
-            faults.append(f"table: the time of row {row} is not after the one before; allowed: rising times")
+            yield f"table: the time of row {row} is not after the one before; allowed: rising times"
         if not np.isfinite(self.values).all():
             row, column = (int(i) + 1 for i in np.argwhere(~np.isfinite(self.values))[0])
-            faults.append(f"table: row {row}, column {column} is not finite; allowed: finite values")
-        if faults:
-            raise UnitError(*faults)
+            yield f"table: row {row}, column {column} is not finite; allowed: finite values"
 
     @property
     def columns(self) -> int:
@@ -74,8 +87,9 @@ class Table:
         The time is rounded to whole nanoseconds, halves away from zero as C's `round` does.
         """
         scaled = np.asarray(time, dtype=np.float64) * 1e9
-        instant = np.trunc(scaled + np.copysign(0.5, scaled))
-        times = self.t_ns.astype(np.float64)
+        whole = np.trunc(scaled)  # adding 0.5 first would round once more where half a ns is an ulp
+        instant = whole + np.where(np.abs(scaled - whole) >= 0.5, np.copysign(1.0, scaled), 0.0)
+        times = self._times
         last = len(times) - 1
         before = np.clip(np.searchsorted(times, instant, side="right") - 1, 0, last)
         after = np.minimum(before + 1, last)

@@ -129,7 +129,7 @@ class Unit:
         return tuple((name, one) for one in self.variables for name in one.names)
 
     def _faults(self) -> Iterator[str]:
-        if not self.name.isidentifier():
+        if not self.name.isidentifier() or not self.name.isascii():
             yield f"found {self.name!r} as its name, allowed: a letter, then letters, digits and _"
         names = [one.name for one in self.variables]
         for name in sorted({name for name in names if names.count(name) > 1}):
@@ -138,6 +138,8 @@ class Unit:
             yield f"{name}: found as a variable, allowed: another name (v.{name} is given to all units)"
         for one in self.variables:
             yield from one.faults()
+            if one.name == INTERNAL_STEP and not (isinstance(one, Parameter) and one.minimum > 0.0):
+                yield f"{one.name}: found as a variable, allowed: a parameter with a min above 0"
         for variables, function, said in (
             (self.computed, self.outputs, "outputs"),
             (self.states, self.derivatives, "derivatives"),

@@ -10,6 +10,10 @@ from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError
 
 
+class NoSuchValueError(UnitError, AttributeError):
+    """A unit's function reads a variable that the unit has not; also what `hasattr` and `copy` expect."""
+
+
 class Values:
     """The values at an instant: `v.u` is an element, `v.phi` of a variable with a size a tuple of elements.
 
@@ -28,4 +32,4 @@ class Values:
 
     def __getattr__(self, name: str) -> Any:
         allowed = ", ".join(sorted(self.__dict__))
-        raise UnitError(f"v.{name}: found in a unit's function, allowed: {allowed}")
+        raise NoSuchValueError(f"v.{name}: found in a unit's function, allowed: {allowed}")

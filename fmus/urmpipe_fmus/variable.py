@@ -75,7 +75,7 @@ class Variable:
 
     def faults(self) -> Iterator[str]:
         """Yield what is wrong with the variable."""
-        if not self.name.isidentifier() or self.name.startswith("_"):
+        if not (self.name.isidentifier() and self.name.isascii()) or self.name.startswith("_"):
             yield f"{self.name!r}: found as a name, allowed: a letter, then letters, digits and _"
         if self.size is not None and self.size < 1:
             yield f"{self.name}: size {self.size}, allowed: 1 or more"

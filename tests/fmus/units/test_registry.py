@@ -18,7 +18,7 @@ TABLE = Table(np.array([0, 5_000_000]), np.array([[0.5, 1.0], [0.25, 2.0]]))
 
 
 def test_the_options_told_are_the_arguments_taken_and_a_unit_has_its_own_name() -> None:
-    given = {
+    given: dict[str, dict[str, object]] = {
         "kinematic_chain": {"robot": load_robot("urm4")},
         "repolarizer": {"joints": 4},
         "log_source": {"table": TABLE, "columns": [["q", "rad", 2]]},
