@@ -19,6 +19,10 @@ _UNITS: dict[str, str] = {
     "repolarizer": "joint angles without the jumps of limited joints",
     "delta_meter": "deviation of a point from where it should be, and whether it is tolerated",
     "log_source": "columns of a log over time, held or interpolated",
+    "dc_drive": "DC motor with gear and a flexible damped shaft",
+    "inertia": "load of a drive: an inertia in a bearing with friction",
+    "drive_controller": "sampled control of a drive's voltage",
+    "set_point": "set position, velocity and acceleration over time: step, ramp, trapezoid",
 }
 """What each unit does, in a line."""
 

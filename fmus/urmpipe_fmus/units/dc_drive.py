@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Parameter, State
 from urmpipe_models.drive import Drive, current_rate, shaft_acceleration, shaft_torque
 from urmpipe_models.elementwise import Element
+
+OPTIONS: Mapping[str, str] = {}
 
 SMALLEST = 1e-9
 """Stands for above 0: FMI's min is a value that is allowed."""
@@ -102,12 +106,12 @@ def _torque(v: Values) -> Element:
     return shaft_torque(drive_of(v), v.theta1, v.omega1, v.theta2, v.omega2)
 
 
-def _computed(v: Values) -> dict[str, Element]:
+def _computed(v: Values) -> Mapping[str, Element]:
     torque = _torque(v)
     return {"Mk": torque, "alpha1": shaft_acceleration(drive_of(v), v.i_a, torque)}
 
 
-def _derivatives(v: Values) -> dict[str, Element]:
+def _derivatives(v: Values) -> Mapping[str, Element]:
     return {
         "theta1": v.omega1,
         "omega1": shaft_acceleration(drive_of(v), v.i_a, _torque(v)),

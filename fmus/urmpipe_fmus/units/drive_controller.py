@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from urmpipe_fmus.unit import Recipe, Unit
@@ -10,6 +12,8 @@ from urmpipe_fmus.variable import Input, Memory, Output, Parameter
 from urmpipe_models.drive_controller import Gains, next_voltage, sample_number
 from urmpipe_models.elementwise import Element
 from urmpipe_models.set_point import JointMotion
+
+OPTIONS: Mapping[str, str] = {}
 
 
 def drive_controller() -> Unit:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Output, Parameter
 from urmpipe_models.elementwise import Element
 from urmpipe_models.set_point import TRAPEZOID
 from urmpipe_models.set_point import set_point as set_point_at
+
+OPTIONS: Mapping[str, str] = {}
 
 
 def set_point() -> Unit:
@@ -63,7 +67,7 @@ def _outputs() -> tuple[Output, ...]:
     )
 
 
-def _outputs_at(v: Values) -> dict[str, Element]:
+def _outputs_at(v: Values) -> Mapping[str, Element]:
     motion = set_point_at(v.kind, v.time, v.begin, v.initial, v.target, v.speed, v.acceleration)
     return {
         "theta": motion.position,
