@@ -1,4 +1,4 @@
-/* The table of a model: where its file is, what is in it, and its rows about an instant.
+/* The table of a model: what is in its file, and its rows about an instant.
 
    The file, all of it little-endian:
        8 bytes   "URMTABLE"
@@ -14,64 +14,11 @@
 #include <stdio.h>
 #include <string.h>
 
-#if defined _WIN32
-#include <windows.h>
-#endif
+#include "resources.h"
 
 #define MAGIC "URMTABLE"
 #define HEADER 32
-#define LONGEST_PATH 4096
 #define MOST_ROWS 2147483647u
-
-/* ---- the file's path ---- */
-
-static int hex_digit(char c) {
-    if (c >= '0' && c <= '9') return c - '0';
-    if (c >= 'a' && c <= 'f') return c - 'a' + 10;
-    if (c >= 'A' && c <= 'F') return c - 'A' + 10;
-    return -1;
-}
-
-/* The part of a file URI that is the path; a text without "file:" is a path already. */
-static const char *path_of(const char *uri, int *is_uri) {
-    *is_uri = strncmp(uri, "file:", 5) == 0;
-    if (!*is_uri) return uri;
-    uri += 5;
-    if (strncmp(uri, "//", 2) != 0) return uri; /* file:/path */
-    if (strncmp(uri, "//localhost/", 12) == 0) return uri + 11;
-    if (uri[2] == '/') return uri + 2; /* file:///path */
-    return uri;                        /* file://server/path: with both slashes it is a network path of Windows */
-}
-
-/* Write the path of table.bin in the folder `resources`; 0 if it is longer than a path may be. */
-static int table_path(const char *resources, char path[LONGEST_PATH]) {
-    int is_uri;
-    const char *from = path_of(resources, &is_uri);
-    size_t length = 0;
-    if (is_uri && from[0] == '/' && from[1] && (from[2] == ':' || strncmp(from + 2, "%3", 2) == 0))
-        from++; /* /C:/folder */
-    for (; *from; from++) {
-        if (length + sizeof "/table.bin" >= LONGEST_PATH) return 0;
-        int high = is_uri && *from == '%' ? hex_digit(from[1]) : -1;
-        int low = high >= 0 ? hex_digit(from[2]) : -1;
-        path[length++] = low >= 0 ? (char)(16 * high + low) : *from;
-        if (low >= 0) from += 2;
-    }
-    while (length && path[length - 1] == '/') length--;
-    strcpy(path + length, "/table.bin");
-    return 1;
-}
-
-/* Open a file whose path is in UTF-8. */
-static FILE *opened(const char *path) {
-#if defined _WIN32
-    wchar_t wide[LONGEST_PATH];
-    if (!MultiByteToWideChar(CP_UTF8, MB_ERR_INVALID_CHARS, path, -1, wide, LONGEST_PATH)) return NULL;
-    return _wfopen(wide, L"rb");
-#else
-    return fopen(path, "rb");
-#endif
-}
 
 /* ---- the file's content ---- */
 
@@ -128,9 +75,7 @@ static const char *read_file(FILE *file, Table *table, size_t columns, void *(*a
 }
 
 const char *read_table(Table *table, const char *resources, size_t columns, void *(*allocate)(size_t, size_t)) {
-    char path[LONGEST_PATH];
-    if (!table_path(resources, path)) return "found too long a path, allowed: 4095 bytes";
-    FILE *file = opened(path);
+    FILE *file = open_resource(resources, "table.bin");
     if (!file) return "cannot be opened, allowed: the file that the FMU was built with";
     const char *fault = read_file(file, table, columns, allocate);
     fclose(file);
