@@ -11,7 +11,7 @@ import pytest
 from urmpipe_fmus.native import native_missing
 
 NEEDS = {
-    "ecospy": "needs ecospy and Debian's libtbb12",
+    "ecospy": "needs ecospy and Debian's libtbb12 and unzip",
     "fmu_manipulation_toolbox": "needs fmu-manipulation-toolbox",
     "libcosimpy": "needs libcosimpy",
 }

@@ -11,6 +11,7 @@ import os
 import shutil
 import subprocess
 import sys
+import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -27,13 +28,16 @@ SCENARIO = "http://github.com/Ecos-platform/libecos/resources/schema/ScenarioCon
 TAGS = {"Real": "real", "Integer": "integer", "Boolean": "boolean"}
 """What Ecos calls FMI's types in a scenario."""
 
+TAR = "@xcopy /E /I /Y /Q unpacked %4\r\n"
+"""Ecos unpacks by Windows' own tar, which wine has not: this one copies what Python has unpacked."""
+
 
 @pytest.fixture(scope="module")
 def wine(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
     """The environment of a wine of its own, with nothing of the user's in it and no windows opened."""
     if sys.platform == "win32" or not shutil.which("wine"):
         pytest.skip("needs wine (Debian: wine, wine64)")
-    kept = {name: value for name, value in os.environ.items() if name != "DISPLAY"}
+    kept = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "SHELL")}
     return kept | {"WINEPREFIX": str(tmp_path_factory.mktemp("wine") / "prefix"), "WINEDEBUG": "-all"}
 
 
@@ -51,7 +55,7 @@ def scenario(unit: Unit, inputs: Mapping[str, FloatArray]) -> str:
     """Return Ecos's description of inputs: each value from a little before its step on."""
     types = {name: TAGS[one.type] for name, one in unit.scalars}
     actions = [
-        f'<ecos:action t="{(k - 0.5) * STEP:.17g}"><ecos:variable id="instance::{name}">'
+        f'<ecos:action t="{max(k - 0.5, 0.0) * STEP:.17g}"><ecos:variable id="instance::{name}">'
         f'<ecos:{types[name]} value="{written(types[name], values[k])}"/></ecos:variable></ecos:action>'
         for name, values in inputs.items()
         for k in range(STEPS)
@@ -73,6 +77,9 @@ def simulated(
 ) -> dict[str, FloatArray]:
     """Return what Ecos writes of an FMU, a column a scalar: from the start, then after each step."""
     folder = fmu.parent
+    (folder / "tar.bat").write_text(TAR, encoding="ascii", newline="")
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder / "unpacked")
     (folder / "inputs.xml").write_text(scenario(unit, inputs), encoding="utf-8")
     command = ["simulate", "--path", fmu.name, "--stopTime", str(STEPS * STEP), "--stepSize", str(STEP)]
     if inputs:
