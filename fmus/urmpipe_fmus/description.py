@@ -85,8 +85,8 @@ def _co_simulation(root: ET.Element, unit: Unit, backend: Backend, source_files:
     element = ET.SubElement(
         root,
         "CoSimulation",
+        flags,
         modelIdentifier=unit.name,
-        **flags,
         canHandleVariableCommunicationStepSize="true",
         canGetAndSetFMUstate="true",
         canSerializeFMUstate="true",

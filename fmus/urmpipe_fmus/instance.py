@@ -108,10 +108,20 @@ class Instance:
             with np.errstate(all="ignore"):  # what is not finite is told
                 self._sample(np.float64(time))
                 self._integrate(np.float64(time), np.float64(step))
-        except UnitError:
+        except BaseException:
             self.time, self._values, self._stale = before
             raise
         self.time, self._stale = np.float64(time) + step, True
+
+    def begin(self, time: float) -> None:
+        """Put the instance at its start time in [s], before the first step.
+
+        Raises:
+            UnitError: If the time is not finite.
+        """
+        if not math.isfinite(time):
+            raise UnitError(f"unit {self.unit.name}: startTime: found {time:g}, allowed: a finite number")
+        self.time, self._stale = time, True
 
     def save(self) -> Any:
         """Return all that the instance remembers, to be given to `restore`."""

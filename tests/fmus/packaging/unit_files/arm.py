@@ -1,14 +1,17 @@
 """A plane arm of three joints: arrays of scalars, outputs at once from inputs."""
 
+from typing import Any
+
 import numpy as np
 
 from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Parameter
 
 
-def tip(v):
+def tip(v: Values) -> dict[str, Any]:
     """Add the links, each turned by the sum of the angles before it."""
-    angle, x, y = 0.0, 0.0, 0.0
+    angle = x = y = 0.0
     for phi, length in zip(v.phi, v.length, strict=True):
         angle = angle + phi
         x = x + length * np.cos(angle)

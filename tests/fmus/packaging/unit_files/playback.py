@@ -1,10 +1,11 @@
 """A table over time, read held and interpolated."""
 
+from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Output, Parameter
 
 
-def make(table, gain=1.0):
+def make(table: Table, gain: float = 1.0) -> Unit:
     """Make a unit that plays the table's two columns, scaled."""
     return Unit(
         name="playback",

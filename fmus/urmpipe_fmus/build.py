@@ -1,0 +1,112 @@
+"""From a unit to an FMU file."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from urmpipe_fmus.archive import content_guid, write_fmu
+from urmpipe_fmus.description import Backend, model_description
+from urmpipe_fmus.documentation import documentation
+from urmpipe_fmus.unit import Unit
+
+DESCRIPTION = "modelDescription.xml"
+DOCUMENTATION = "documentation/index.html"
+
+
+@dataclass(frozen=True, slots=True)
+class BuiltFmu:
+    """An FMU that was built.
+
+    Attributes:
+        path: The file.
+        unit: What is in it.
+        backend: Who runs the unit: its own machine code, or Python on the target.
+        platforms: FMI's names of the platforms it has binaries for.
+        guid: The GUID, of its content.
+        note: One line on why it is not native although nobody asked for Python; else empty.
+    """
+
+    path: Path
+    unit: Unit
+    backend: Backend
+    platforms: tuple[str, ...]
+    guid: str
+    note: str = ""
+
+
+def build_fmu(
+    unit: Unit, target: Path, *, backend: Backend | None = None, platforms: Sequence[str] = ()
+) -> BuiltFmu:
+    """Build the FMU of a unit; the same unit, versions and compiler give the same bytes.
+
+    Args:
+        unit: The unit.
+        target: The file, or a folder that exists: then UNIT.fmu in it.
+        backend: Native or Python; None for native if it can be built here, else Python.
+        platforms: FMI's names of platforms; by default native is for this one, Python for all it knows.
+
+    Raises:
+        FmuError: If a compiler is missing or fails, Python cannot make the unit again, or the file cannot
+            be written.
+        UnitError: If a function of the unit does what cannot be traced.
+    """
+    chosen, note = _backend(unit, backend, platforms)
+    built = _native if chosen == "native" else _python
+    files, guid, found = built(unit, platforms)
+    path = target / f"{unit.name}.fmu" if target.is_dir() else target
+    write_fmu(path, files)
+    return BuiltFmu(path, unit, chosen, found, guid, note)
+
+
+def _backend(unit: Unit, backend: Backend | None, platforms: Sequence[str]) -> tuple[Backend, str]:
+    """Return the backend, and why it is Python where nobody asked for it."""
+    from urmpipe_fmus.native import native_missing
+
+    if backend is not None:
+        return backend, ""
+    missing = native_missing(platforms)
+    if missing is None:
+        return "native", ""
+    return "python", f"{unit.name}.fmu runs on Python, as no native one can be built here: {missing}"
+
+
+def _native(unit: Unit, platforms: Sequence[str]) -> tuple[dict[str, bytes], str, tuple[str, ...]]:
+    """Return files, GUID and platforms of a native FMU: machine code, and the C that it is made from."""
+    from urmpipe_fmus.native import guid_header, native_binaries, native_sources, this_platform
+    from urmpipe_fmus.native.sources import GUID_HEADER
+
+    chosen = tuple(dict.fromkeys(platforms)) or (this_platform(),)
+    sources = native_sources(unit)
+    compiled = [name.removeprefix("sources/") for name in sorted(sources) if name.endswith(".c")]
+    files, guid = _described(unit, "native", {**sources, **_table(unit)}, compiled)
+    files |= native_binaries(unit, sources, guid, chosen)
+    return files | {GUID_HEADER: guid_header(guid)}, guid, chosen
+
+
+def _python(unit: Unit, platforms: Sequence[str]) -> tuple[dict[str, bytes], str, tuple[str, ...]]:
+    """Return files, GUID and platforms of a Python FMU: the unit's sources under pythonfmu's binaries."""
+    from urmpipe_fmus.python_fmu.package import PLATFORMS, python_files
+
+    chosen = tuple(dict.fromkeys(platforms)) or PLATFORMS
+    files, guid = _described(unit, "python", python_files(unit, chosen, _table(unit)), [])
+    return files, guid, chosen
+
+
+def _table(unit: Unit) -> dict[str, bytes]:
+    """Return the file of a unit's table, if it has one."""
+    from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
+
+    return {} if unit.table is None else {TABLE_FILE: table_bytes(unit.table)}
+
+
+def _described(
+    unit: Unit, backend: Backend, files: dict[str, bytes], source_files: Sequence[str]
+) -> tuple[dict[str, bytes], str]:
+    """Return files with their description and documentation, and the GUID of them all."""
+    files = files | {DOCUMENTATION: documentation(unit).encode()}
+    without = model_description(unit, "", backend, source_files).encode()
+    guid = content_guid({**files, DESCRIPTION: without})
+    described = model_description(unit, guid, backend, source_files).encode()
+    return {**files, DESCRIPTION: described}, guid

@@ -1,0 +1,1 @@
+"""The Python backend: a unit with its own sources under pythonfmu's binaries."""
