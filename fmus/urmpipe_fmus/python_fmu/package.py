@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from importlib.metadata import files as distribution_files
 from importlib.resources import files
-from pathlib import PurePath
+from pathlib import Path, PurePath
 
 from urmpipe_fmus.archive import content_guid
 from urmpipe_fmus.python_fmu.closure import check_imports, imports_of, renamed, sources_of
@@ -118,4 +118,4 @@ def _binaries(unit: Unit, platforms: Sequence[str]) -> dict[str, bytes]:
         for one in (folder / platform).iterdir()
     }
     licence = next(one for one in distribution_files("pythonfmu") or [] if one.name == "LICENSE")
-    return {**found, LICENCE: licence.locate().read_bytes()}
+    return {**found, LICENCE: Path(str(licence.locate())).read_bytes()}

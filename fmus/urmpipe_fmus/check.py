@@ -1,0 +1,297 @@
+"""Whether an FMU is right and runs: validation, a short run of its default experiment, its variables."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import signal
+import subprocess
+import sys
+import tempfile
+import zipfile
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from urmpipe_fmus.check_run import CALL
+from urmpipe_models.errors import Finding, FmuError
+
+STEPS = 20
+"""So many steps are tried, less if the default experiment is shorter."""
+
+STEP = 0.005
+"""The communication step in [s] of an FMU that tells none."""
+
+SECONDS = 60.0
+"""A run that takes longer has hung."""
+
+LINES = 5
+"""So many of the last lines of its log are shown where an FMU fails."""
+
+PLATFORM_SUFFIXES = (".so", ".dll", ".dylib")
+
+
+@dataclass(frozen=True, slots=True)
+class CheckedVariable:
+    """A variable of a checked FMU.
+
+    Attributes:
+        name: Its name.
+        causality: input, output, parameter, ...
+        variability: fixed, tunable, discrete, ...
+        type: Real, Integer, Boolean, String or Enumeration.
+        unit: As the FMU spells it; empty without one.
+        start: The start value as the FMU writes it; empty without one.
+        before: Its value after the initialization; None if it is not known or not finite.
+        after: Its value after the last step.
+        description: One line for people.
+    """
+
+    name: str
+    causality: str
+    variability: str
+    type: str
+    unit: str
+    start: str
+    before: float | int | bool | str | None
+    after: float | int | bool | str | None
+    description: str
+
+
+@dataclass(frozen=True, slots=True)
+class Checked:
+    """What was found in an FMU.
+
+    Attributes:
+        path: The file.
+        name: Name of the model.
+        guid: Its GUID.
+        generator: The tool that made it.
+        platforms: FMI's names of the platforms that it has binaries for.
+        problems: All that is wrong, one line each; empty if nothing is.
+        variables: Its variables.
+        step: Communication step of the run in [s].
+        steps: How many steps were asked for.
+        ran: Whether it ran to the end.
+    """
+
+    path: Path
+    name: str
+    guid: str
+    generator: str
+    platforms: tuple[str, ...]
+    problems: tuple[str, ...]
+    variables: tuple[CheckedVariable, ...]
+    step: float
+    steps: int
+    ran: bool
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all of it as what JSON can hold."""
+        return {**asdict(self), "path": str(self.path)}
+
+
+def check_fmu(path: Path) -> Checked:
+    """Check an FMU 2.0 for co-simulation, of whatever tool.
+
+    It is validated by FMPy and runs for some steps of its default experiment in a process of its own.
+
+    Raises:
+        FmuError: If the file is no such FMU.
+    """
+    described = _described(path)
+    problems = _validated(path)
+    platforms = _platforms(path)
+    start, step, steps = _experiment(described)
+    before: Sequence[Any] = ()
+    after: Sequence[Any] = ()
+    if _this_platform() in platforms:
+        run = _run(path, described, (start, step, steps))
+        problems += run["problems"]
+        before, after = run["before"], run["after"]
+    else:
+        found = ", ".join(platforms) or "none"
+        problems.append(
+            f"found binaries for {found}, allowed for a run here: {_this_platform()}; it was not run"
+        )
+    return Checked(
+        path=path,
+        name=described.modelName,
+        guid=described.guid,
+        generator=described.generationTool or "",
+        platforms=platforms,
+        problems=tuple(problems),
+        variables=tuple(_variables(described, before, after)),
+        step=step,
+        steps=steps,
+        ran=bool(after) and not problems,
+    )
+
+
+def _described(path: Path) -> Any:
+    """Return the model description of an FMU 2.0 for co-simulation."""
+    from fmpy import read_model_description
+
+    def refused(said: str) -> FmuError:
+        return FmuError(Finding(said, file=str(path)))
+
+    try:
+        with zipfile.ZipFile(path) as archive:
+            if "modelDescription.xml" not in archive.namelist():
+                raise refused("found no modelDescription.xml, allowed: an FMU")
+        found = read_model_description(str(path), validate=False)
+    except OSError as error:
+        raise refused(f"cannot be read: {error.strerror or error}") from error
+    except zipfile.BadZipFile as error:
+        raise refused("found a file that is no zip, allowed: an FMU") from error
+    except FmuError:
+        raise
+    except Exception as error:  # FMPy raises Exception itself; lxml its own
+        raise refused(f"modelDescription.xml cannot be read: {error}") from error
+    if found.fmiVersion != "2.0":
+        raise refused(f"found FMI {found.fmiVersion}, allowed: FMI 2.0 for co-simulation")
+    if found.coSimulation is None:
+        raise refused("found an FMU for model exchange only, allowed: FMI 2.0 for co-simulation")
+    return found
+
+
+def _validated(path: Path) -> list[str]:
+    """Return what FMPy's validation finds."""
+    from fmpy.validation import validate_fmu
+
+    return [" ".join(str(one).split()) for one in validate_fmu(str(path))]
+
+
+def _platforms(path: Path) -> tuple[str, ...]:
+    """Return FMI's names of the platforms that an FMU has binaries for."""
+    with zipfile.ZipFile(path) as archive:
+        parts = [Path(name).parts for name in archive.namelist() if name.endswith(PLATFORM_SUFFIXES)]
+    return tuple(sorted({one[1] for one in parts if len(one) == 3 and one[0] == "binaries"}))
+
+
+def _this_platform() -> str:
+    from fmpy import platform
+
+    name: str = platform
+    return name
+
+
+def _experiment(described: Any) -> tuple[float, float, int]:
+    """Return start time and communication step in [s] of the default experiment, and a number of steps."""
+    told = described.defaultExperiment
+    start = _number(told and told.startTime, 0.0)
+    step = _number(told and told.stepSize, STEP)
+    step = step if step > 0.0 else STEP
+    stop = _number(told and told.stopTime, math.inf)
+    wanted = (stop - start) / step
+    return start, step, STEPS if wanted >= STEPS or wanted <= 0.0 else max(1, round(wanted))
+
+
+def _number(text: Any, default: float) -> float:
+    """Return the finite number of an attribute, or a default."""
+    try:
+        value = float(text)
+    except (TypeError, ValueError):
+        return default
+    return value if math.isfinite(value) else default
+
+
+def _run(path: Path, described: Any, experiment: tuple[float, float, int]) -> dict[str, Any]:
+    """Run an FMU in a process of its own; return values before and after, and problems."""
+    from fmpy import extract
+
+    start, step, steps = experiment
+    with tempfile.TemporaryDirectory(prefix="urmpipe-check-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        try:
+            extract(str(path), unzipdir=str(folder / "fmu"))
+        except Exception as error:  # FMPy raises Exception itself, zlib its own
+            raise FmuError(Finding(f"cannot be extracted: {error}", file=str(path))) from error
+        job = {
+            "folder": str(folder / "fmu"),
+            "guid": described.guid,
+            "identifier": described.coSimulation.modelIdentifier,
+            "variables": [(_type(one), one.valueReference) for one in described.modelVariables],
+            "start": start,
+            "step": step,
+            "steps": steps,
+        }
+        (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
+        ended = _process(folder)
+        log = (folder / "log").read_text("utf-8", "replace").splitlines() if (folder / "log").exists() else []
+        result = {"failed": "", "before": [], "after": []}
+        if (folder / "result.json").exists():
+            result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    return {**result, "problems": _problems(result, ended, log)}
+
+
+def _process(folder: Path) -> str:
+    """Run the job of a folder; return how the process ended, empty if well."""
+    command = [sys.executable, "-m", "urmpipe_fmus.check_run", str(folder / "job.json")]
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
+    try:
+        done = subprocess.run(
+            command,
+            env=environment,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            timeout=SECONDS,
+            check=False,
+        )
+    except subprocess.TimeoutExpired:
+        return f"did not return within {SECONDS:g} s"
+    if done.returncode < 0:
+        return f"ended its process: {signal.strsignal(-done.returncode) or -done.returncode}"
+    if done.returncode > 0:
+        said = done.stderr.decode("utf-8", "replace").strip().splitlines()
+        return f"ended its process with exit code {done.returncode}: {said[-1] if said else ''}"
+    return ""
+
+
+def _problems(result: Mapping[str, Any], ended: str, log: Sequence[str]) -> list[str]:
+    """Return what went wrong in a run, with the last lines that the FMU logged."""
+    calls = [line.removeprefix(CALL) for line in log if line.startswith(CALL)]
+    refused = sum(one is None for one in result["before"])
+    said = [f"{refused} variables cannot be read after the initialization"] if refused else []
+    if ended:
+        said.append(f"{calls[-1] if calls else 'loading'} {ended}")
+    elif result["failed"]:
+        said.append(str(result["failed"]))
+    if not said:
+        return []
+    return said + [f"its log: {line}" for line in log if not line.startswith(CALL)][-LINES:]
+
+
+def _variables(described: Any, before: Sequence[Any], after: Sequence[Any]) -> list[CheckedVariable]:
+    """Return the variables of an FMU with their values, if it ran."""
+    count = len(described.modelVariables)
+    unknown = [None] * count
+    return [
+        CheckedVariable(
+            name=one.name,
+            causality=one.causality or "local",
+            variability=one.variability or "",
+            type=one.type,
+            unit=one.unit or (one.declaredType.unit if one.declaredType else None) or "",
+            start="" if one.start is None else str(one.start),
+            before=_finite(first),
+            after=_finite(last),
+            description=one.description or "",
+        )
+        for one, first, last in zip(
+            described.modelVariables, before or unknown, after or unknown, strict=True
+        )
+    ]
+
+
+def _type(one: Any) -> str:
+    """Return by which function a variable is read."""
+    return "Integer" if one.type == "Enumeration" else str(one.type)
+
+
+def _finite(value: Any) -> Any:
+    """Return a value; None for a number that is not finite."""
+    return None if isinstance(value, float) and not math.isfinite(value) else value
