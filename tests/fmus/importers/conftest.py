@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from peers import need_builds_for
-from shipped_units import shipped, shipped_unit
+from shipped_units import CROSS_BUILT, shipped_unit
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.native import this_platform
 
@@ -34,11 +34,11 @@ def fmu_of(tmp_path_factory: pytest.TempPathFactory) -> Fmu:
 
 @pytest.fixture(scope="session")
 def cross_built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """Every shipped unit built by zig for linux64 and win64: one set for all tests, as it takes a while."""
+    """Units built by zig for linux64 and win64, by name: one set for all tests."""
     platforms = ["linux64", "win64"]
     need_builds_for(*platforms)
     folder = tmp_path_factory.mktemp("cross_built")
     return {
         name: build_fmu(shipped_unit(name), folder / f"{name}.fmu", platforms=platforms).path
-        for name in shipped()
+        for name in CROSS_BUILT
     }

@@ -22,6 +22,10 @@ FARTHEST = 2.0
 """Inputs without bounds are drawn from -FARTHEST to FARTHEST: angles, rates and volts for a small drive."""
 
 
+CROSS_BUILT = ("kinematic_chain", "repolarizer", "delta_meter", "log_source", "dc_drive")
+"""Units that are built for Linux and Windows: with integers, truths, a table, states."""
+
+
 def swinging_joints(rows: int, joints: int = 6, period: float = STEP) -> Table:
     """Return a log of joints in [rad] that swing by less than half a turn."""
     t = sample_times(rows, period)

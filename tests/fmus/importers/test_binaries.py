@@ -13,7 +13,7 @@ from pathlib import Path
 import pytest
 
 from peers import need_builds_for, said_by
-from shipped_units import shipped
+from shipped_units import CROSS_BUILT, shipped
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.native import this_platform
 from urmpipe_fmus.user_unit import load_unit_file
@@ -60,7 +60,7 @@ def test_a_binary_needs_only_the_c_library_and_shows_only_the_functions_of_fmi(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("name", CROSS_BUILT)
 def test_a_cross_built_binary_loads_where_the_c_library_is_of_2012(
     name: str, cross_built: dict[str, Path], tmp_path: Path
 ) -> None:
