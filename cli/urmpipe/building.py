@@ -45,7 +45,7 @@ def build_fmu(
         log: A log for a unit that plays one: CSV, a folder of plots, or what `read_table` made of them.
         options: Further options of the unit by name; see `urmpipe fmu list`.
         read: How to read the log where it cannot tell by itself.
-        backend: native (C, runs anywhere) or python (needs Python on the target); default: native if this
+        backend: native (C) or python (needs Python with NumPy on the target); default: native if this
             machine can build it, else python, with a `note` why.
         platforms: linux64, win64; default: this one. Others than this one need the extra `cross`.
         output: The folder for UNIT.fmu, or a name that ends in .fmu; only an FMU of urmpipe's is replaced.
