@@ -115,7 +115,7 @@ def column_names(columns: Any) -> list[str] | None:
     """Return names of columns as they stand in an option: one, or a list of them."""
     if columns is None:
         return None
-    return [str(one) for one in (columns if isinstance(columns, list) else [columns])]
+    return [str(one) for one in (columns if isinstance(columns, (list, tuple)) else [columns])]
 
 
 def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, log: Any) -> None:
@@ -124,7 +124,8 @@ def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, lo
     faults = []
     for option, value, metavar in (("robot", robot, "NAME|FILE"), ("log", log, "LOG")):
         if takes[option] and value is None:
-            faults.append(f"unit {name}: found no {option}, allowed: --{option} {metavar}")
+            allowed = f"--{option} {metavar}, in a system file {option} = ..."
+            faults.append(f"unit {name}: found no {option}, allowed: {allowed}")
         elif not takes[option] and value is not None and not (option == "robot" and takes["log"]):
             said = f"found a {option} ({_shown(value)}), allowed: none, it has no such option"
             faults.append(f"unit {name}: {said}")

@@ -10,11 +10,13 @@ from urmpipe.building import Backend, column_names, unit_of
 from urmpipe.guards import place_robot
 from urmpipe.log_tables import LogTable, read_table
 from urmpipe_datasets import LOGS
+from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.cosim.plan import LogColumn
+from urmpipe_fmus.native import native_missing
 from urmpipe_models.errors import OptionError, UrmpipeError
 from urmpipe_pipeline.sources import ReadOptions, read_map
 
 if TYPE_CHECKING:
-    from urmpipe_fmus.cosim.plan import LogColumn
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
     from urmpipe_fmus.unit import Unit
     from urmpipe_models.chain import Chain
@@ -84,8 +86,6 @@ class Blocks:
         Raises:
             UrmpipeError: If it cannot be read.
         """
-        from urmpipe_fmus.cosim.plan import LogColumn
-
         if str(asked.destination) in self._faults:
             raise self._faults[str(asked.destination)]
         found = self._columns[asked.destination]
@@ -121,6 +121,8 @@ class Blocks:
             self.chains[block.name] = arm
         if robot is not None and Path(robot).is_file():
             self.files.append(Path(robot))
+        if log is None and log_map is not None:
+            raise OptionError(f"map: found {log_map} without a log, allowed: with log = ...")
         if log is None:
             return unit_of(block.unit, robot=arm, options=options)
         table = self._table(log, column_names(options.pop("columns", None)), arm, log_map)
@@ -128,9 +130,6 @@ class Blocks:
 
     def _fmu(self, unit: Unit) -> Path:
         """Return the FMU of a unit from the cache; tell if it is built, and if Python runs it and why."""
-        from urmpipe_fmus.cache import cached_fmu
-        from urmpipe_fmus.native import native_missing
-
         missing = native_missing(()) if self._backend is None else None
         if missing and not self._why:
             self._why = missing
