@@ -5,11 +5,13 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.building import FROM_LOG
-from urmpipe.printing import new_console, new_table, say
+from urmpipe.printing import LISTED, new_console, new_table, say
 from urmpipe_fmus.units import unit_help, unit_names, unit_options
+from urmpipe_pipeline.text import NOTHING
 
 if TYPE_CHECKING:
     from urmpipe_fmus.build import BuiltFmu
+    from urmpipe_fmus.check import Checked, CheckedVariable
 
 LOG_HELP = "what it plays: a log (CSV), or a folder of plots"
 COLUMNS_HELP = "columns of the log by name, such as u or u,i (default: its joints, or the x, y, z of a path)"
@@ -71,3 +73,41 @@ def print_built(made: BuiltFmu) -> None:
     say(f"FMU: {made.path}  ({inside}, {size}, guid {made.guid})")
     if made.note:
         say(f"note: {made.note}", err=True)
+
+
+def checked_dict(checked: Checked) -> dict[str, Any]:
+    """Return the object that `urmpipe fmu check --json` prints."""
+    found = checked.to_dict()
+    return {"schema": 1, "fmu": found.pop("path"), **found}
+
+
+def print_checked(checked: Checked) -> None:
+    """Print what was found in an FMU, and a table of its variables."""
+    console = new_console()
+    ran = f"{checked.steps} steps of {1e3 * checked.step:.6g} ms" if checked.ran else "it did not run"
+    platforms = ", ".join(checked.platforms) or "no platform"
+    say(f"{checked.path}: {checked.name} of {checked.generator or 'an unknown tool'}, {platforms}; {ran}")
+    for problem in checked.problems:
+        say(f"problem: {problem}")
+    if not checked.problems:
+        say("No problem found.")
+    heads = ("Variable", "Causality", "Type", "Unit", "Start", "Before", "After", "Description")
+    table = new_table(*heads, title=f"{len(checked.variables)} variables")
+    for one in checked.variables[:LISTED]:
+        table.add_row(*_cells(one))
+    console.print(table)
+    if len(checked.variables) > LISTED:
+        console.print(f"... and {len(checked.variables) - LISTED} more; --json has all")
+
+
+def _cells(one: CheckedVariable) -> tuple[str, ...]:
+    """Return the cells of a variable."""
+    values = (_shown(value) for value in (one.before, one.after))
+    return (one.name, one.causality, one.type, one.unit, one.start, *values, one.description)
+
+
+def _shown(value: Any) -> str:
+    """Return a value of a variable."""
+    if value is None:
+        return NOTHING
+    return f"{value:.6g}" if isinstance(value, float) else str(value)

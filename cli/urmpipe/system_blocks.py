@@ -55,6 +55,7 @@ class Blocks:
     ) -> None:
         self._shipped, self._backend, self._read = shipped, backend, read
         self._told = told or (lambda line: None)
+        self._why = ""
         self.units: dict[str, Unit] = {}
         self.chains: dict[str, Chain] = {}
         self.files: list[Path] = []
@@ -126,10 +127,15 @@ class Blocks:
         return unit_of(block.unit, robot=arm, log=table, options=options)
 
     def _fmu(self, unit: Unit) -> Path:
-        """Return the FMU of a unit from the cache."""
+        """Return the FMU of a unit from the cache; tell if it is built, and if Python runs it and why."""
         from urmpipe_fmus.cache import cached_fmu
+        from urmpipe_fmus.native import native_missing
 
-        return cached_fmu(unit, self._backend)
+        missing = native_missing(()) if self._backend is None else None
+        if missing and not self._why:
+            self._why = missing
+            self._told(f"the units run on Python: {missing}")
+        return cached_fmu(unit, self._backend, told=lambda name: self._told(f"building {name} ..."))
 
     def _table(
         self, name: str, columns: list[str] | None, robot: Chain | None = None, log_map: str | None = None

@@ -71,7 +71,7 @@ class Instance:
         if faults:
             raise UnitError(*(f"unit {self.unit.name}: {fault}" for fault in faults))
         for reference, value in zip(references, values, strict=True):
-            self._values[reference] = np.float64(value)
+            self._values[reference] = _doubles(value)
         self._stale = True
 
     def get(self, references: Sequence[int]) -> list[Element]:
@@ -216,12 +216,17 @@ class Instance:
         if faults:
             raise UnitError(*faults)
         for place, value in zip(places, found, strict=True):
-            self._values[place] = np.float64(value)
+            self._values[place] = _doubles(value)
 
     def _first_not_finite(self, value: Element) -> float:
         """Return the time of the first of some values that is not finite."""
         times, values = np.broadcast_arrays(self.time, value)
         return float(times[~np.isfinite(values)][0])
+
+
+def _doubles(value: Element) -> Element:
+    """Return a value as C has it; a column as one of our own, which nobody else changes."""
+    return np.array(value, dtype=np.float64) if isinstance(value, np.ndarray) else np.float64(value)
 
 
 def _all_finite(value: Element) -> bool:

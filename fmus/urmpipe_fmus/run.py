@@ -79,7 +79,7 @@ def _columns(unit: Unit, inputs: Mapping[str, Any], count: int) -> dict[str, Flo
                 f"unit {unit.name}: {name}: found {owner.causality} with values of shape {found.shape},"
                 f" allowed: an input, shape {shape}"
             )
-        columns |= zip(owner.names, found.reshape(count, -1).T, strict=True)
+        columns |= zip(owner.names, found.reshape(count, owner.width).T, strict=True)
     return columns
 
 

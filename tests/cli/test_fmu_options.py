@@ -136,8 +136,9 @@ def test_a_chain_is_taken_as_a_robot() -> None:
         (("repolarizer", "-s", "joints"), "found 'joints', allowed: NAME=VALUE, each name once"),
         (("repolarizer", "-s", "joints=6", "-s", "joints=7"), "found 'joints=7', allowed: NAME=VALUE"),
         (("delta_meter", "--platforms", "linux64,amiga"), "found amiga, allowed: linux64, win64"),
-        (("log_source", "--log", "missing.csv"), "missing.csv: No such file or directory"),
+        (("log_source", "--log", "missing.csv"), "missing.csv: found no such file"),
         (("missing.py",), "missing.py"),
+        (("delta_meter", "--map", "lab.toml"), "--map: found without a log, allowed: with --log LOG"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(

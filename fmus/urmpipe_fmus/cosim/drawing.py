@@ -23,7 +23,8 @@ NARROWEST = 420.0
 STYLE = """
 .paper{fill:#ffffff}.box{fill:#f5f7fa;stroke:#5b6b7d}.head{fill:#dfe7f0}.log .head{fill:#e8e0cf}
 .wire{fill:none;stroke:#3a6ea5;stroke-width:1.4;stroke-linejoin:round}.array{stroke-width:2.8}.back{stroke:#a55a3a}
-.tip{fill:#3a6ea5}.back-tip{fill:#a55a3a}text{fill:#1c2733;font:12px ui-monospace,"DejaVu Sans Mono",monospace}
+.tip{fill:#3a6ea5}.back-tip{fill:#a55a3a}
+text{fill:#1c2733;font:12px ui-monospace,"DejaVu Sans Mono",monospace}
 .name{font-weight:bold}.quiet{fill:#5a6875}.title{font-size:16px;font-weight:bold}.many{font-size:10px}
 @media (prefers-color-scheme:dark){.paper{fill:#14191f}.box{fill:#1e262f;stroke:#8496a8}.head{fill:#2b3947}
 .log .head{fill:#453d2b}.wire{stroke:#7fb2e5}.back{stroke:#e59b7f}.tip{fill:#7fb2e5}.back-tip{fill:#e59b7f}
@@ -91,7 +92,8 @@ def _box(name: str, box: Box, feeding: set[tuple[str, str]]) -> Iterator[str]:
     x, y, width, height = box.x, box.y, box.width, box.height
     yield f"<g{' class=' + chr(34) + 'log' + chr(34) if box.kind == 'log' else ''}>"
     yield f'<rect class="box" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="4"/>'
-    yield f'<rect class="head" x="{x + 1:.1f}" y="{y + 1:.1f}" width="{width - 2:.1f}" height="{HEAD - 6:.1f}" rx="3"/>'
+    head = f'x="{x + 1:.1f}" y="{y + 1:.1f}" width="{width - 2:.1f}" height="{HEAD - 6:.1f}"'
+    yield f'<rect class="head" {head} rx="3"/>'
     yield f'<text class="name" x="{x + PAD:.1f}" y="{y + 16:.1f}">{_text(cut(name))}</text>'
     yield f'<text class="quiet" x="{x + PAD:.1f}" y="{y + 31:.1f}">{_text(cut(box.kind))}</text>'
     for i, pin in enumerate(box.left):

@@ -114,7 +114,7 @@ class Layout:
                 ]
                 own = (i + 0.5) / len(layer)
                 keys[id(box)] = (sum(shares) / len(shares) if shares else own, i)
-            layer.sort(key=lambda one: keys[id(one)])  # noqa: B023 - used at once
+            layer.sort(key=lambda one: keys[id(one)])
 
     def _share(self, box: Box) -> float:
         """Return how far down its layer a box is, 0 to 1."""
@@ -123,7 +123,10 @@ class Layout:
 
     def _add_lanes(self) -> None:
         """Give each wire its lanes, and put them among the boxes."""
-        for wire in self.wires:
+        nested = sorted(
+            self.wires, key=lambda one: -self.end(one)
+        )  # of those that feed back, one about the other
+        for wire in nested:
             source, target = self.boxes[wire.source], self.boxes[wire.target]
             back = self.back(wire)
             span = (
@@ -136,9 +139,9 @@ class Layout:
                 lane = Lane(wire, layer, back, y - LANE / 2.0)
                 self.lanes[wire].append(lane)
                 self.layers[layer].append(lane)
-        for layer in self.layers:
-            layer_order = {id(one): i for i, one in enumerate(layer)}
-            layer.sort(key=lambda one: (one.y + one.height / 2.0, layer_order[id(one)]))  # noqa: B023 - used at once
+        for items in self.layers:
+            place = {id(one): i for i, one in enumerate(items)}
+            items.sort(key=lambda one: (one.y + one.height / 2.0, place[id(one)]))
 
     def _settle(self) -> None:
         """Move boxes and lanes towards what they are wired with, without overlap and in their order."""
@@ -149,27 +152,30 @@ class Layout:
                     item.y = y
 
     def _wanted(self, item: Item) -> float:
-        """Return where an item would stand if it stood alone."""
+        """Return where an item would stand if it stood alone: by what leads to it, else by where it leads."""
         if isinstance(item, Lane):
             return self._wanted_lane(item)
-        moves = []
-        for wire in self.wires:
-            if self.back(wire):
-                continue
-            way = [self.start(wire), *(lane.y + LANE / 2.0 for lane in self.lanes[wire]), self.end(wire)]
-            if self.boxes[wire.source] is item:
-                moves.append(way[1] - way[0])
+        into, out = [], []
+        for wire in (one for one in self.wires if not self.back(one)):
+            way = self._way(wire)
             if self.boxes[wire.target] is item:
-                moves.append(way[-2] - way[-1])
+                into.append(way[-2] - way[-1])
+            if self.boxes[wire.source] is item:
+                out.append(way[1] - way[0])
+        moves = into or out
         return item.y + (sum(moves) / len(moves) if moves else 0.0)
 
+    def _way(self, wire: Wire) -> list[float]:
+        """Return the y of a wire at its ends and in its lanes."""
+        return [self.start(wire), *(one.y + LANE / 2.0 for one in self.lanes[wire]), self.end(wire)]
+
     def _wanted_lane(self, lane: Lane) -> float:
-        """Return where a lane would stand: in line with the wire's others, or just below what it goes around."""
+        """Return where a lane would stand: in line with its wire; below the ends of one that feeds back."""
         wire = lane.wire
         if lane.back:
             ends = self.boxes[wire.source], self.boxes[wire.target]
             return max(*(one.y for one in self.lanes[wire]), *(box.y + box.height for box in ends))
-        way = [self.start(wire), *(one.y + LANE / 2.0 for one in self.lanes[wire]), self.end(wire)]
+        way = self._way(wire)
         place = self.lanes[wire].index(lane) + 1
         return (way[place - 1] + way[place + 1]) / 2.0 - LANE / 2.0
 

@@ -6,6 +6,7 @@ In a channel each wire that turns has a track, so that no two run along each oth
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Literal
 
 from urmpipe_fmus.cosim.diagram import Box, Wire
 from urmpipe_fmus.cosim.layout import LANE, Layout
@@ -17,36 +18,52 @@ STRAIGHT = 0.75
 """Ends that differ by less, in [px], are joined by a straight line."""
 
 
+Shape = Literal["out", "through", "in"]
+"""Of a turn: both ends to its left (where a wire that feeds back leaves a box), one at each side, or both to
+its right."""
+
+
 @dataclass(slots=True, eq=False)
 class Turn:
     """A wire's way through a channel.
 
     Attributes:
-        wire: The wire.
-        before: Its y where it comes from in [px].
-        after: Its y where it goes to.
+        left: The y of the end to its left in [px]; of two at one side, where the wire comes from.
+        right: The y of the other end.
+        shape: At which sides its ends are.
         track: Number of its track, from the left.
     """
 
-    wire: Wire
-    before: float
-    after: float
+    left: float
+    right: float
+    shape: Shape = "through"
     track: int = 0
 
     @property
     def low(self) -> float:
         """The upper end of its track in [px]."""
-        return min(self.before, self.after)
+        return min(self.left, self.right)
 
     @property
     def high(self) -> float:
         """The lower end of its track in [px]."""
-        return max(self.before, self.after)
+        return max(self.left, self.right)
 
     @property
     def straight(self) -> bool:
         """Whether it needs no track."""
-        return self.high - self.low < STRAIGHT
+        return self.shape == "through" and self.high - self.low < STRAIGHT
+
+    @property
+    def rank(self) -> tuple[int, float, float]:
+        """Where its track is among others, so that they cross little.
+
+        Wires that turn around go about each other, the wider about the narrower. Of those that go down the
+        upper one turns last, of those that go up first.
+        """
+        if self.shape != "through":
+            return (0, self.high - self.low, 0.0) if self.shape == "out" else (3, self.low - self.high, 0.0)
+        return (1, self.left, self.right) if self.right <= self.left else (2, -self.left, -self.right)
 
 
 @dataclass(frozen=True, slots=True)
@@ -85,24 +102,22 @@ def route(layout: Layout) -> Routes:
 def _turns(layout: Layout, wire: Wire) -> list[tuple[int, Turn]]:
     """Return the channels that a wire goes through: channel c is to the right of layer c."""
     ys = [layout.start(wire), *(lane.y + LANE / 2.0 for lane in layout.lanes[wire]), layout.end(wire)]
-    first = layout.boxes[wire.source].layer
-    way = -1 if layout.back(wire) else 1
-    return [(first + way * i, Turn(wire, ys[i], ys[i + 1])) for i in range(len(ys) - 1)]
+    first, last = layout.boxes[wire.source].layer, len(ys) - 2
+    if not layout.back(wire):
+        return [(first + i, Turn(ys[i], ys[i + 1])) for i in range(last + 1)]
+    between = [(first - i, Turn(ys[i + 1], ys[i])) for i in range(1, last)]
+    ends = Turn(ys[0], ys[1], "out"), Turn(ys[-2], ys[-1], "in")
+    return [(first, ends[0]), *between, (first - last, ends[1])]
 
 
 def _assign(turns: list[Turn]) -> int:
-    """Give each turn of a channel a track; return how many there are.
-
-    Of wires that go down, the upper one turns last, of those that go up first: so they do not cross.
-    """
-    down = sorted((t for t in turns if t.after > t.before), key=lambda t: (-t.before, -t.after))
-    up = sorted((t for t in turns if t.after <= t.before), key=lambda t: (t.before, t.after))
+    """Give each turn of a channel a track; return how many there are."""
     placed: list[Turn] = []
-    for turn in (one for one in (*up, *down) if not one.straight):
-        beside = [t.track for t in placed if t.low < turn.high + TRACK and turn.low < t.high + TRACK]
+    for turn in sorted((one for one in turns if not one.straight), key=lambda one: one.rank):
+        beside = [one.track for one in placed if one.low < turn.high + TRACK and turn.low < one.high + TRACK]
         turn.track = max(beside, default=-1) + 1
         placed.append(turn)
-    return max((t.track for t in placed), default=-1) + 1
+    return max((one.track for one in placed), default=-1) + 1
 
 
 def _points(
@@ -114,5 +129,10 @@ def _points(
     for channel, turn in way:
         if not turn.straight:
             x = edges[channel] + TRACK * turn.track
-            points += [(x, turn.before), (x, turn.after)]
+            ends = (
+                (turn.left, turn.right)
+                if turn.shape != "through" or not layout.back(wire)
+                else (turn.right, turn.left)
+            )
+            points += [(x, y) for y in ends]
     return [*points, (target.x, layout.end(wire))]

@@ -1,0 +1,217 @@
+"""Random units as the text of a user's file, and random values for them.
+
+Values stay finite and of a size about 1, and errors of rounding do not grow: what jumps (floor, sign, a
+comparison) is asked only of inputs, parameters and constants, which have the same bits wherever a unit runs.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from hypothesis import HealthCheck
+from hypothesis import strategies as st
+from hypothesis.strategies import DrawFn, SearchStrategy
+from numpy.typing import NDArray
+
+from urmpipe_fmus.unit import INTERNAL_STEP, Recipe, Unit
+from urmpipe_fmus.user_unit import unit_of_source
+from urmpipe_fmus.variable import Variable
+
+FILE = "random_unit.py"
+
+PATIENT = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow, HealthCheck.data_too_large]}
+"""Settings of tests on random units: on a busy machine a large one takes some tenths of a second to draw."""
+
+numbers = st.integers(-2000, 2000).map(lambda k: k / 1000)
+
+SMOOTH: tuple[str, ...] = (
+    *("np.sin({a})", "np.cos({a})", "np.tanh({a})", "np.arctan({a})", "np.exp(-np.abs({a}))"),
+    *("({a} + {b})", "({a} - {b})", "({a} * {b})", "-{a}", "({a} / (1.5 + np.abs({b})))", "{a} ** 2"),
+    *("np.sqrt(1.0 + np.abs({a}))", "np.hypot({a}, {b})", "np.arctan2({a}, 1.0 + np.abs({b}))"),
+    *("np.minimum({a}, {b})", "np.maximum({a}, {b})", "np.clip({a}, -1.0, 1.0)", "np.log1p(np.abs({a}))"),
+    *("np.where({c}, {a}, {b})", "np.arcsin(0.5 * np.tanh({a}))", "np.cosh(np.tanh({a}))"),
+    *("np.copysign({a}, {e})", "({a} + np.floor({e}))", "({a} * np.sign({e}))", "({a} + np.round({e}))"),
+    *("({a} + {e} % 0.75)", "({a} + {e} // 0.75)", "({a} + np.trunc({e}))", "({a} + np.heaviside({e}, 0.5))"),
+)
+"""Expressions of expressions {a} and {b}, exact ones {e} and conditions {c}."""
+
+EXACT = ("({e} + {f})", "({e} - {f})", "({e} * {f})", "np.abs({e})", "np.maximum({e}, {f})")
+CONDITIONS = (
+    *("{e} < {f}", "{e} >= {f}", "{e} == {f}", "np.logical_and({e} < {f}, {f} != 0.5)"),
+    *("np.logical_or({e} > {f}, {f} <= 0.0)", "np.logical_not({e} > 0.0)", "({e} > 0.0) & ({f} > 0.0)"),
+)
+
+
+class Grammar:
+    """Draws expressions of a unit's values.
+
+    Attributes:
+        leaves: Expressions of values.
+        exact: Those that have the same bits wherever the unit runs.
+    """
+
+    def __init__(self, draw: DrawFn, leaves: list[str], exact: list[str]) -> None:
+        self.draw, self.leaves, self.exact = draw, leaves, exact
+
+    def number(self) -> str:
+        return repr(self.draw(numbers))
+
+    def smooth(self, depth: int = 3) -> str:
+        """A value of a size about 1."""
+        if depth == 0 or self.draw(st.integers(0, 3)) == 0:
+            return self.draw(st.sampled_from(self.leaves)) if self.draw(st.integers(0, 4)) else self.number()
+        form = self.draw(st.sampled_from(SMOOTH))
+        made = {"a": lambda: self.smooth(depth - 1), "b": lambda: self.smooth(depth - 1)}
+        return self._filled(form, made | {"c": self.condition, "e": self.exactly})
+
+    def exactly(self, depth: int = 1) -> str:
+        """A value with the same bits wherever it is computed."""
+        if depth == 0 or self.draw(st.booleans()):
+            return self.draw(st.sampled_from(self.exact)) if self.draw(st.integers(0, 4)) else self.number()
+        one = lambda: self.exactly(depth - 1)  # noqa: E731
+        return self._filled(self.draw(st.sampled_from(EXACT)), {"e": one, "f": one})
+
+    def condition(self) -> str:
+        one = self.exactly
+        return self._filled(self.draw(st.sampled_from(CONDITIONS)), {"e": one, "f": one})
+
+    def of_type(self, kind: str) -> str:
+        """A value that a variable of a type may have."""
+        if kind == "Boolean":
+            return self.condition()
+        return f"np.floor({self.exactly()})" if kind == "Integer" else self.smooth()
+
+    def _filled(self, form: str, made: dict[str, Callable[[], str]]) -> str:
+        return form.format(**{name: make() for name, make in made.items() if f"{{{name}}}" in form})
+
+
+@st.composite
+def random_unit_sources(draw: DrawFn, remembers: bool = True) -> str:
+    """The text of a user's file with a random unit in it, one that remembers or one that never does."""
+    given = [
+        _variable(draw, kind, f"{kind[0].lower()}{k}")
+        for kind, least in (("Parameter", 0), ("Input", 1), ("State", 0), ("Memory", 0))
+        if remembers or kind in ("Parameter", "Input")
+        for k in range(draw(st.integers(least, 2)))
+    ]
+    outputs = [_variable(draw, "Output", f"o{k}") for k in range(draw(st.integers(1, 3)))]
+    exact = _leaves([one for one in given if one["kind"] in ("Parameter", "Input")])
+    leaves = [*_leaves(given), "np.sin(v.time)"]
+    table = draw(st.none() | _tables())
+    if table is not None:
+        leaves += ["v.table.before[0]", "v.table.after[1]", "v.table.fraction"]
+    grammar = Grammar(draw, leaves, exact)
+    functions = {
+        "outputs": _function(grammar, outputs, "{}"),
+        "derivatives": _function(grammar, [one for one in given if one["kind"] == "State"], "np.tanh({})"),
+        "update": _function(grammar, [one for one in given if one["kind"] == "Memory"], "0.1 * np.tanh({})"),
+    }
+    variables = draw(st.permutations([*given, *outputs]))
+    lines = [
+        "import numpy as np",
+        "from urmpipe_fmus.table import Table",
+        "from urmpipe_fmus.unit import Unit",
+        "from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State",
+        "unit = Unit(",
+        '    name="random_unit",',
+        f"    description={draw(st.text(st.characters(categories=['L', 'Zs', 'P', 'S']), max_size=10))!r},",
+        "    variables=(",
+        *(f"        {_written(one)}," for one in variables),
+        "    ),",
+        *(f"    {name}=lambda v: {text}," for name, text in functions.items() if text),
+        f"    internal_step={draw(st.sampled_from([1e-3, 3e-3, 0.1]))},",
+        *([] if table is None else [f"    table={table},"]),
+        ")",
+    ]
+    return "\n".join(lines) + "\n"
+
+
+def random_units(remembers: bool = True) -> SearchStrategy[Unit]:
+    """Random units, made from the text that their recipe holds."""
+    return random_unit_sources(remembers).map(
+        lambda source: replace(unit_of_source(source, FILE), recipe=Recipe(module=FILE, source=source))
+    )
+
+
+@st.composite
+def random_starts(draw: DrawFn, unit: Unit) -> dict[str, Any]:
+    """Start values of some parameters, inputs, states and memories, by variable name."""
+    return {
+        one.name: draw(_values(one, one.width)) if one.size else draw(_values(one, 1))[0]
+        for one in unit.given
+        if one.name != INTERNAL_STEP and draw(st.booleans())
+    }
+
+
+@st.composite
+def random_columns(draw: DrawFn, unit: Unit, count: int) -> dict[str, NDArray[np.float64]]:
+    """Values of the inputs over some samples, by variable name."""
+    columns = {}
+    for one in unit.inputs:
+        flat = np.array(draw(_values(one, count * one.width)))
+        columns[one.name] = flat if one.size is None else flat.reshape(count, one.size)
+    return columns
+
+
+def _values(variable: Variable, count: int) -> SearchStrategy[list[float]]:
+    """Values that a variable takes."""
+    whole = {"Integer": st.integers(-3, 3), "Boolean": st.integers(0, 1)}
+    kind = whole[variable.type].map(float) if variable.type in whole else numbers
+    return st.lists(kind, min_size=count, max_size=count)
+
+
+def _variable(draw: DrawFn, kind: str, name: str) -> dict[str, Any]:
+    """What is written of a variable."""
+    types = ["Real"] if kind == "State" else ["Real", "Real", "Integer", "Boolean"]
+    of_type, size = draw(st.sampled_from(types)), draw(st.none() | st.integers(1, 3))
+    made: dict[str, Any] = {"kind": kind, "name": name, "description": "random", "type": of_type}
+    if size is not None:
+        made["size"] = size
+    if of_type == "Real":
+        made |= draw(st.sampled_from([{}, {"unit": "rad", "display_unit": "deg"}, {"unit": "N.m"}]))
+    if kind != "Output":
+        made["start"] = draw(
+            {"Real": numbers, "Integer": st.integers(-3, 3), "Boolean": st.integers(0, 1)}[of_type]
+        )
+    if kind == "Parameter":
+        made["tunable"] = draw(st.booleans())
+    if kind in ("State", "Memory"):
+        made["output"] = draw(st.booleans())
+    if kind == "Input" and of_type == "Real" and draw(st.booleans()):
+        made |= {"minimum": -2.0, "maximum": 2.0}
+    return made
+
+
+def _written(variable: dict[str, Any]) -> str:
+    """A variable as Python."""
+    arguments = ", ".join(f"{name}={value!r}" for name, value in variable.items() if name != "kind")
+    return f"{variable['kind']}({arguments})"
+
+
+def _leaves(variables: list[dict[str, Any]]) -> list[str]:
+    return [
+        f"v.{one['name']}" if "size" not in one else f"v.{one['name']}[{k}]"
+        for one in variables
+        for k in range(one.get("size", 1))
+    ]
+
+
+def _function(grammar: Grammar, variables: list[dict[str, Any]], bounded: str) -> str:
+    """The dict that a function of the unit returns, as Python."""
+    items = []
+    for one in variables:
+        form = bounded if one["type"] == "Real" else "{}"
+        found = [form.format(grammar.of_type(one["type"])) for _ in range(one.get("size", 1))]
+        items.append(f"{one['name']!r}: {found[0] if 'size' not in one else '(' + ', '.join(found) + ',)'}")
+    return f"{{{', '.join(items)}}}" if items else ""
+
+
+@st.composite
+def _tables(draw: DrawFn) -> str:
+    """A table of two columns about the first half second, as Python."""
+    times = draw(st.lists(st.integers(0, 500), min_size=1, max_size=5, unique=True).map(sorted))
+    rows = [[draw(numbers), draw(numbers)] for _ in times]
+    return f"Table(np.array({[1_000_000 * one for one in times]}), np.array({rows}))"
