@@ -197,6 +197,7 @@ def _in_space(position: FloatArray) -> Spec:
 
 def _frame(spec: Spec, low: FloatArray, high: FloatArray) -> None:
     """Give a scene axes of one length around what lies between two corners: a slim path stays in view."""
+    spec["layout"]["scene"]["aspectmode"] = "cube"
     half = max(float((high - low).max()) / 2.0 * (1.0 + AROUND), CLOSEST)
     for name, middle in zip("xyz", ((low + high) / 2.0).tolist(), strict=True):
         spec["layout"]["scene"][f"{name}axis"]["range"] = [middle - half, middle + half]
