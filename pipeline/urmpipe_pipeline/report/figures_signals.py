@@ -28,6 +28,8 @@ def signals_figure(simulation: Simulation, group: Group) -> Figure | None:
     shapes = [] if simulation.failed is None else [instant(end, "failed", end)]
     spec = stacked([panel], end, shapes)
     spec["layout"]["xaxis"]["range"] = [start, end if end > start else start + 1.0]
+    if all(one.type == "Boolean" for one in group.signals):
+        spec["layout"]["yaxis"] |= {"range": [-0.1, 1.1], "tickvals": [0, 1]}
     return Figure(
         group.variables,
         " ".join(dict.fromkeys(map(_described, group.signals))) + _shading(group),
