@@ -12,6 +12,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -240,8 +241,8 @@ def cross_part(count: int, folder: Path) -> Part:
         target = folder / f"cross{number}.fmu"
         return build_fmu(chain_unit(), target, platforms=["linux64", "win64"]).path
 
-    first = seconds(lambda: build(-1))
-    taken = {"linux64 and win64 by zig": [seconds(lambda n=number: build(n)) for number in range(count)]}
+    first = seconds(partial(build, -1))
+    taken = {"linux64 and win64 by zig": [seconds(partial(build, number)) for number in range(count)]}
     size = (folder / "cross0.fmu").stat().st_size / 1e3
     lines = [
         "## The same chain built by zig for Linux and Windows",

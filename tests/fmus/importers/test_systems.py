@@ -29,9 +29,7 @@ sent to the inputs, Ecos reads them after.
 """
 
 
-def elements(
-    source: tuple[str, str], target: tuple[str, str], size: int
-) -> list[tuple[tuple[str, str], ...]]:
+def elements(source: Port, target: Port, size: int) -> list[tuple[Port, Port]]:
     """Return the connections of all elements of two arrays."""
     return [((source[0], f"{source[1]}[{i}]"), (target[0], f"{target[1]}[{i}]")) for i in range(1, size + 1)]
 
