@@ -78,7 +78,7 @@ class Blocks:
         """
         if block.name in self._faults:
             raise self._faults[block.name]
-        return block.fmu or self._fmu(self.units[block.name])
+        return block.fmu or self._fmu(block.name)
 
     def column(self, asked: LogInput) -> LogColumn:
         """Return the column of a log that an input follows.
@@ -128,13 +128,18 @@ class Blocks:
         table = self._table(log, column_names(options.pop("columns", None)), arm, log_map)
         return unit_of(block.unit, robot=arm, log=table, options=options)
 
-    def _fmu(self, unit: Unit) -> Path:
-        """Return the FMU of a unit from the cache; tell if it is built, and if Python runs it and why."""
+    def _fmu(self, block: str) -> Path:
+        """Return the FMU of a block from the cache; tell if it is built, and if Python runs it and why."""
+
+        def built(name: str) -> None:
+            """Tell that the FMU of a unit is built."""
+            self._told(f"building {name} for block {block} ...")
+
         missing = native_missing(()) if self._backend is None else None
         if missing and not self._why:
             self._why = missing
             self._told(f"the units run on Python: {missing}")
-        return cached_fmu(unit, self._backend, told=lambda name: self._told(f"building {name} ..."))
+        return cached_fmu(self.units[block], self._backend, told=built)
 
     def _table(
         self, name: str, columns: list[str] | None, robot: Chain | None = None, log_map: str | None = None

@@ -315,9 +315,9 @@ def test_a_cold_build_is_told(following: Path, tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("URMPIPE_CACHE", str(tmp_path / "cache"))
     lines: list[str] = []
     simulate(following, told=lines.append)
-    assert lines == ["building follower ..."]
+    assert lines == ["building follower for block lag ..."]
     simulate(following, told=lines.append)
-    assert lines == ["building follower ..."]
+    assert lines == ["building follower for block lag ..."]
 
 
 def test_progress_rises_to_1(following: Path, tmp_path: Path) -> None:
