@@ -94,7 +94,7 @@ def _changed(system: System, step: float | None, duration: float | None) -> Syst
     wrong = {name: value for name, value in given.items() if value is not None and not 0.0 < value < math.inf}
     if wrong:
         raise OptionError(*(f"{name}: found {value:g} s, allowed: above 0" for name, value in wrong.items()))
-    return replace(system, **{name: value for name, value in given.items() if value is not None})
+    return replace(system, step=step or system.step, duration=duration or system.duration)
 
 
 def _files(system: System) -> list[Path]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -66,9 +67,9 @@ class Blocks:
         self._faults: dict[str, UrmpipeError] = {}
         self._columns: dict[Port, LogTable] = {}
         for block in system.blocks:
-            self._try(block.name, lambda block=block: self._take(block))  # type: ignore[misc]
+            self._try(block.name, partial(self._take, block))
         for one in system.inputs:
-            self._try(str(one.destination), lambda one=one: self._follow(one))  # type: ignore[misc]
+            self._try(str(one.destination), partial(self._follow, one))
 
     def make(self, block: Block) -> Path:
         """Return the FMU of a block, built if it is not in the cache.
