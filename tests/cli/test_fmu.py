@@ -160,7 +160,8 @@ def test_check_of_what_is_no_fmu_is_2(urmpipe: RunCommand, tmp_path: Path, conte
     (tmp_path / "file.fmu").write_bytes(content)
     ran = urmpipe("fmu", "check", "file.fmu")
     assert (ran.code, ran.out) == (2, "")
-    assert ran.err == "error: file.fmu: found a file that is no zip, allowed: an FMU\n"
+    assert ran.err.startswith("error: file.fmu: found no zip")
+    assert ran.err.endswith("allowed: an FMU\n")
 
 
 def test_check_of_a_missing_file_is_2(urmpipe: RunCommand) -> None:
