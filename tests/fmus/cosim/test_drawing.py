@@ -147,7 +147,8 @@ def test_texts_fit_into_their_boxes_in_a_browser(tmp_path: Path) -> None:
                 const box = group.querySelector('rect.box').getBBox();
                 return [...group.querySelectorAll('text')].filter(text => {
                     const b = text.getBBox();
-                    return b.x < box.x || b.x + b.width > box.x + box.width || b.y + b.height > box.y + box.height;
+                    const right = box.x + box.width, low = box.y + box.height;
+                    return b.x < box.x || b.x + b.width > right || b.y + b.height > low;
                 }).map(text => text.textContent);
             })"""
         )
