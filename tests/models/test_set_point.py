@@ -103,6 +103,16 @@ def test_velocity_is_the_rate_of_the_position_and_acceleration_that_of_the_veloc
     )
 
 
+@pytest.mark.parametrize("parts", [1, 3, 7, 16, 50])
+def test_communication_points_meet_a_corner_though_their_times_are_rounded(parts: int) -> None:
+    step_of = 5e-3 / parts
+    points = np.arange(100 * parts)
+    for t in (points * step_of + step_of, np.cumsum(np.full(100 * parts, step_of))):
+        for found in (step(t, 0.1, 0.0, 1.0).position, ramp(t, 0.1, 0.0, 1.0, 1.0).velocity):
+            assert np.argmax(found > 0.5) == 20 * parts - 1
+        assert np.argmax(trapezoid(t, 0.1, 0.0, 1.0, 1.0, 10.0).acceleration > 0.0) == 20 * parts - 1
+
+
 @pytest.mark.parametrize("kind", [STEP, RAMP, TRAPEZOID])
 def test_the_kind_chooses_the_form_for_columns_and_numbers_alike(kind: int) -> None:
     t = np.linspace(0.0, 2.0, 41)
