@@ -138,7 +138,9 @@ class Exchange:
         If they follow neither way the inputs may not matter at this instant: it is seen again at the next.
         """
         member = self._member
-        if self._follow(self._sets):
+        if member is not None and member.stale:
+            self.followed = True  # another of its exchanges saw it
+        elif self._follow(self._sets):
             self.followed = True
             if member is not None:
                 member.stale = bool(member.stale)

@@ -43,6 +43,10 @@ LAST_LINES = 5
 """So many of a block's last log lines are told with an error."""
 
 
+TAIL = 65_536
+"""So many of the last bytes that a process printed are looked at."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Recorded:
     """What a co-simulation recorded, until its end or until it failed.
@@ -253,8 +257,10 @@ def _log(folder: Path) -> list[tuple[str, str, str]]:
 
 
 def _said(folder: Path) -> list[str]:
-    """Return what the process printed."""
-    text = (folder / SAID).read_text(encoding="utf-8", errors="replace")
+    """Return what the process printed last."""
+    with (folder / SAID).open("rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - TAIL))
+        text = file.read().decode("utf-8", errors="replace")
     return [line.strip() for line in text.splitlines() if line.strip()]
 
 

@@ -33,8 +33,8 @@ def diagrams(draw: st.DrawFn) -> Diagram:
     sources = [(name, pin.name) for name, box in boxes.items() for pin in box.right]
     targets = [(name, pin.name) for name, box in boxes.items() for pin in box.left]
     wires = []
-    for target in targets:
-        if sources and draw(st.booleans()):
+    for target in targets if sources else ():
+        if draw(st.booleans()):
             source = draw(st.sampled_from(sources))
             wires.append(Wire(*source, *target))
     return Diagram(boxes, tuple(wires))
