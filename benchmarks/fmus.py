@@ -6,20 +6,28 @@ python benchmarks/fmus.py [--rounds N] [--only step|system|build|cross ...]
 from __future__ import annotations
 
 import argparse
+import os
 import statistics
 import sys
 import tempfile
 import time
 from collections.abc import Callable, Mapping, Sequence
+from functools import partial
 from pathlib import Path
 
 import numpy as np
-from bare_fmu import BareFmu, FloatArray
-from pairs import Bound, machine, median, rounds, write_results
+from bare_fmu import FloatArray, opened, run_bare
+from pairs import Bound, machine, measure, median, rounds, write_results
 from pairs import table as process_table
 
+from urmpipe.system_blocks import Blocks
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.cosim import Plan, load_system, prepare
+from urmpipe_fmus.cosim.assembly import Assembly
+from urmpipe_fmus.cosim.job import ELSEWHERE, Progress
+from urmpipe_fmus.cosim.master import Master
+from urmpipe_fmus.cosim.worker import Log, callbacks_with
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_models.catalogue import load_robot
@@ -29,6 +37,7 @@ STEP = 0.005
 """Communication step in [s]: the period of the sample log."""
 
 LOG = LOGS / "matlab.csv"
+SYSTEM = "log-to-delta"
 
 Part = tuple[list[str], list[Bound]]
 
@@ -77,17 +86,18 @@ def rows_of(taken: Mapping[str, Sequence[float]], base: str, scale: float, unit:
 
 def tool_over(fmu: Path, q: FloatArray) -> Callable[[], FloatArray]:
     """Return a job that steps a chain's FMU over joints: six values set, three got, a step."""
-    it = BareFmu(fmu)
+    it, references = opened(fmu)
     phi, p7, found = np.zeros(6), np.zeros(3), np.empty((len(q), 3))
-    set_phi = it.reals("Set", [f"phi[{i}]" for i in range(1, 7)], phi)
-    get_p7 = it.reals("Get", [f"p7[{i}]" for i in range(1, 4)], p7)
+    set_phi = it.exchange("fmi2SetReal", [references[f"phi[{i}]"] for i in range(1, 7)], phi)
+    get_p7 = it.exchange("fmi2GetReal", [references[f"p7[{i}]"] for i in range(1, 4)], p7)
 
     def job() -> FloatArray:
         for k, row in enumerate(q):
             phi[:] = row
-            if set_phi() + get_p7() + it.do_step(k * STEP, STEP):
-                raise RuntimeError(f"{fmu}: a call failed at sample {k}")
+            set_phi()
+            get_p7()
             found[k] = p7
+            it.do_step(k * STEP, STEP, 1)
         return found
 
     return job
@@ -112,8 +122,10 @@ def by_simulate_fmu(fmu: Path, q: FloatArray) -> Callable[[], object]:
 def step_part(count: int, folder: Path) -> Part:
     """Measure a step of the native and of the Python FMU."""
     q = sample_joints()
-    native = build_fmu(chain_unit(), folder / "native" / "kinematic_chain.fmu", backend="native").path
-    python = build_fmu(chain_unit(), folder / "python" / "kinematic_chain.fmu", backend="python").path
+    native, python = (
+        build_fmu(chain_unit(), folder / f"{backend}.fmu", backend=backend).path
+        for backend in ("native", "python")
+    )
     jobs: dict[str, Callable[[], object]] = {
         "native FMU": tool_over(native, q),
         "Python FMU": tool_over(python, q),
@@ -133,6 +145,70 @@ def step_part(count: int, folder: Path) -> Part:
     ]
     found = ratio(taken["Python FMU"], taken["native FMU"])
     return lines, [Bound("step of the Python FMU / of the native FMU", found, least=4.0)]
+
+
+def system_part(count: int, folder: Path) -> Part:
+    """Measure `urmpipe simulate log-to-delta`, with FMUs to build and from the cache, and the loop in it."""
+    output = folder / "run.rrd"
+    command = [sys.executable, "-m", "urmpipe", "simulate", SYSTEM, "-q", "-o", str(output)]
+    kept = os.environ.get("XDG_CACHE_HOME")
+    os.environ["XDG_CACHE_HOME"] = str(folder / "cache")
+    try:
+        cold = measure(command)
+        taken = rounds({"FMUs from the cache": command}, count, outputs=[output])
+    finally:
+        os.environ.pop("XDG_CACHE_HOME") if kept is None else os.environ.update(XDG_CACHE_HOME=kept)
+    plan = planned()
+    length = plan.count * plan.system.step
+    loops = in_turn(loops_of(plan, folder), count)
+    wall = median(taken["FMUs from the cache"], "wall")
+    lines = [
+        f"## `urmpipe simulate {SYSTEM}`: {plan.count + 1} samples, {length:.1f} s of motion",
+        "",
+        f"The first run, which builds the FMUs: {cold.wall:.2f} s.",
+        "",
+        *process_table(taken, "FMUs from the cache"),
+        "",
+        "Its loop, from the first instance to the last free, and the same C calls without any care:",
+        "",
+        *rows_of(loops, "bare ctypes loop", 1e3, "ms"),
+        "",
+    ]
+    return lines, [
+        Bound(f"real time / `urmpipe simulate {SYSTEM}`, whole process", length / wall, least=15.0),
+        Bound(
+            "its loop / the bare ctypes loop", ratio(loops["urmpipe"], loops["bare ctypes loop"]), under=2.0
+        ),
+    ]
+
+
+def planned() -> Plan:
+    """Return the shipped system, ready to run."""
+    system = load_system(SYSTEM)
+    blocks = Blocks(system, shipped=True)
+    return prepare(system, blocks.make, column=blocks.column, duration=blocks.end)
+
+
+def loops_of(plan: Plan, folder: Path) -> dict[str, Callable[[], object]]:
+    """Return a job that runs a plan in urmpipe's loop, and one that makes the same calls bare."""
+    from fmpy import extract
+
+    folders = {
+        name: Path(extract(str(one.path), unzipdir=str(folder / f"fmu_{name}")))
+        for name, one in plan.interfaces.items()
+    }
+    job = Assembly(plan).job(folders)
+    progress = Progress(rows=0, k=0, call=ELSEWHERE)
+    callbacks = callbacks_with(Log(folder / "log.txt", job, progress))
+    ours, theirs = np.zeros((job.rows, job.columns)), np.zeros((job.rows, job.columns))
+    Master(job, progress, ours, callbacks).run()
+    run_bare(job, theirs)
+    if not np.array_equal(ours, theirs):
+        raise RuntimeError("the two loops differ")
+    return {
+        "bare ctypes loop": lambda: run_bare(job, theirs),
+        "urmpipe": lambda: Master(job, progress, ours, callbacks).run(),
+    }
 
 
 def build_part(count: int, folder: Path) -> Part:
@@ -162,12 +238,12 @@ def cross_part(count: int, folder: Path) -> Part:
     """Measure the build by zig for two platforms, zig's own cache being warm, and its size."""
 
     def build(number: int) -> Path:
-        target = folder / f"cross{number}" / "kinematic_chain.fmu"
+        target = folder / f"cross{number}.fmu"
         return build_fmu(chain_unit(), target, platforms=["linux64", "win64"]).path
 
-    first = seconds(lambda: build(-1))
-    taken = {"linux64 and win64 by zig": [seconds(lambda n=number: build(n)) for number in range(count)]}
-    size = (folder / "cross0" / "kinematic_chain.fmu").stat().st_size / 1e3
+    first = seconds(partial(build, -1))
+    taken = {"linux64 and win64 by zig": [seconds(partial(build, number)) for number in range(count)]}
+    size = (folder / "cross0.fmu").stat().st_size / 1e3
     lines = [
         "## The same chain built by zig for Linux and Windows",
         "",
@@ -181,6 +257,7 @@ def cross_part(count: int, folder: Path) -> Part:
 
 PARTS: dict[str, Callable[[int, Path], Part]] = {
     "step": step_part,
+    "system": system_part,
     "build": build_part,
     "cross": cross_part,
 }

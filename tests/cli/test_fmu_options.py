@@ -98,8 +98,12 @@ def test_a_row_without_a_value_is_an_error(tmp_path: Path) -> None:
 
 
 def test_a_unit_says_what_it_lacks() -> None:
-    assert refusal("kinematic_chain") == ["unit kinematic_chain: found no robot, allowed: --robot NAME|FILE"]
-    assert refusal("log_source") == ["unit log_source: found no log, allowed: --log LOG"]
+    assert refusal("kinematic_chain") == [
+        "unit kinematic_chain: found no robot, allowed: --robot NAME|FILE, in a system file robot = ..."
+    ]
+    assert refusal("log_source") == [
+        "unit log_source: found no log, allowed: --log LOG, in a system file log = ..."
+    ]
     assert refusal("repolarizer") == [
         "unit repolarizer: option joints: not found, it needs the number of joints, such as 6"
     ]

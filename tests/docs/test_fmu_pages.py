@@ -9,6 +9,7 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -65,7 +66,7 @@ def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     # the same products of cosines; C and NumPy may differ in their last bits
     np.testing.assert_allclose(tips, np.tile(points_over_log(arm, posed)[0, -1], (5, 1)), atol=1e-15)
     monkeypatch.chdir(tmp_path)
-    shown: dict[str, object] = {}
+    shown: dict[str, Any] = {}
     for code in snippets("import/fmpy.md", "python"):
         exec(compile(code, "fmpy.md", "exec"), shown)
     q = np.zeros((200, 6))

@@ -74,7 +74,7 @@ def list_(as_json: bool, quiet: bool) -> int:
 @click.option(
     "--backend",
     type=click.Choice(["native", "python"]),
-    help="native: C inside, needs nothing on the target. python: needs Python and urmpipe there"
+    help="native: C inside, needs nothing on the target. python: needs Python with NumPy there"
     " [default: native if it can be built here].",
 )
 @click.option(
@@ -112,7 +112,7 @@ def build(
     \b
     Examples:
       urmpipe fmu build kinematic_chain --robot urm6
-      urmpipe fmu build kinematic_chain --robot arm.urdf -s rates=true -s sensors=p7
+      urmpipe fmu build kinematic_chain --robot arm.urdf -s rates=true -s points=p6,p7
       urmpipe fmu build repolarizer -s joints=6 --platforms linux64,win64
       urmpipe fmu build log_source --log log.csv -o fmus
       urmpipe fmu build my_unit.py

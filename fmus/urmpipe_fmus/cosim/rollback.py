@@ -68,7 +68,6 @@ class Member:
         self._call(self._slave.restorer(self._state))
         sets()
         self._call(self._again)
-        sets()
 
     def keep(self) -> None:
         """Set the state aside as it is."""

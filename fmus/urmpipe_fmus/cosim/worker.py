@@ -93,7 +93,8 @@ def work(folder: Path) -> None:
         job: Job = pickle.load(file)
     with (folder / PROGRESS).open("r+b") as file:
         progress = Progress.from_buffer(mmap.mmap(file.fileno(), ctypes.sizeof(Progress)))
-    recorded = np.memmap(folder / RECORDED, np.float64, "r+", shape=(job.rows, max(job.columns, 1)))
+    with (folder / RECORDED).open("r+b") as file:
+        recorded = np.frombuffer(mmap.mmap(file.fileno(), 0), np.float64).reshape(job.rows, -1)
     log = Log(folder / LOG, job, progress)
     callbacks = callbacks_with(log)
     master = Master(job, progress, recorded, callbacks)

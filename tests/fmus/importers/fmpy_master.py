@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import NDArray
 
-from systems import System, Trace
+from shipped_units import sample_times
+from systems import FloatArray, System, Trace
 
 
 def run_fmpy(system: System, step: float, steps: int) -> Trace:
-    """Run a system of one FMU with FMPy; inputs change at the samples and are held in between."""
+    """Run a system of one FMU with FMPy; inputs change at the samples."""
     from fmpy import simulate_fmu
 
     ((name, block),) = system.blocks.items()
-    t = step * np.arange(steps + 1)
+    t = sample_times(steps + 1, step)
     shown = [one.name for one in system.outputs()]
     found = simulate_fmu(
         str(block.fmu),
@@ -27,7 +29,7 @@ def run_fmpy(system: System, step: float, steps: int) -> Trace:
     return {name: {one: np.asarray(found[one], dtype=np.float64) for one in shown}}
 
 
-def _inputs(system: System, t: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray:  # type: ignore[type-arg]
+def _inputs(system: System, t: FloatArray) -> NDArray[np.void]:
     """Return the inputs as FMPy takes them: a structured array with a row a sample."""
     kinds = {"Real": np.float64, "Integer": np.int32, "Boolean": np.bool_}
     names = [one for one, _ in system.inputs(0)]

@@ -95,8 +95,9 @@ class System:
     def starts(self) -> Iterator[tuple[Scalar, float | int | bool]]:
         """Yield what is set before the start."""
         for name, block in self.blocks.items():
-            for scalar in map(lambda one, name=name: self.scalar(name, one), block.start):
-                yield scalar, scalar.python(block.start[scalar.name])
+            for one, value in block.start.items():
+                scalar = self.scalar(name, one)
+                yield scalar, scalar.python(value)
 
     def inputs(self, step: int) -> Iterator[tuple[Scalar, float | int | bool]]:
         """Yield what is set before a step."""

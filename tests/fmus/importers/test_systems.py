@@ -23,15 +23,12 @@ from urmpipe_models.kinematics import positions_over_log
 
 STEPS = 300
 Port = tuple[str, str]
-LATE = {"libcosimpy": (run_libcosim, 2), "ecospy": (run_ecos, 1)}
-"""How many samples a chain of two connections is late: libcosim reads outputs before it passes on what was
-sent to the inputs, Ecos reads them after.
-"""
+MASTERS = {"libcosimpy": run_libcosim, "ecospy": run_ecos}
+READS_FRESH = {"libcosimpy": False, "ecospy": True}
+"""After a step libcosim reads the outputs before it passes them on to connected inputs, Ecos after."""
 
 
-def elements(
-    source: tuple[str, str], target: tuple[str, str], size: int
-) -> list[tuple[tuple[str, str], ...]]:
+def elements(source: Port, target: Port, size: int) -> list[tuple[Port, Port]]:
     """Return the connections of all elements of two arrays."""
     return [((source[0], f"{source[1]}[{i}]"), (target[0], f"{target[1]}[{i}]")) for i in range(1, size + 1)]
 
@@ -47,7 +44,7 @@ def wrapped_joints() -> tuple[Table, FloatArray]:
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("master", LATE)
+@pytest.mark.parametrize("master", MASTERS)
 def test_log_repolarizer_and_chain_give_the_tool_of_the_log(
     master: str, fmu_of: Callable[..., Path], tmp_path: Path
 ) -> None:
@@ -61,8 +58,8 @@ def test_log_repolarizer_and_chain_give_the_tool_of_the_log(
     blocks |= {name: Block(fmu_of(name), shipped_unit(name)) for name in names}
     connections = elements(("log", "q"), ("repolarizer", "raw"), 6)
     connections += elements(("repolarizer", "q"), ("kinematic_chain", "phi"), 6)
-    run_master, late = LATE[master]
-    trace = run_master(System(blocks, connections), STEP, STEPS)
+    trace = MASTERS[master](System(blocks, connections), STEP, STEPS)
+    late = 1 if READS_FRESH[master] else 2  # two connections, each a step; the last is read fresh
     p7 = positions_over_log(load_robot("urm6"), q)
     found = np.column_stack([trace["kinematic_chain"][f"p7[{i}]"] for i in (1, 2, 3)])
     # The same lines of kinematics, compiled and in NumPy, on angles of whole turns more or less.
@@ -72,7 +69,7 @@ def test_log_repolarizer_and_chain_give_the_tool_of_the_log(
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("master", LATE)
+@pytest.mark.parametrize("master", MASTERS)
 def test_a_drive_and_its_load_give_what_their_instances_in_python_give(
     master: str, fmu_of: Callable[..., Path]
 ) -> None:
@@ -88,9 +85,8 @@ def test_a_drive_and_its_load_give_what_their_instances_in_python_give(
         (("inertia", "omega"), ("dc_drive", "omega2")),
     ]
     system, step = System(blocks, connections), 5e-4
-    run_master, late = LATE[master]
-    trace = run_master(system, step, STEPS)
-    expected = run_instances(system, step, STEPS, fresh=late == 1)
+    trace = MASTERS[master](system, step, STEPS)
+    expected = run_instances(system, step, STEPS, fresh=READS_FRESH[master])
     for one in system.outputs():
         values, wanted = trace[one.block][one.name][1:], expected[one.block][one.name][1:]
         # 300 steps of a stiff shaft: the masters' clocks differ from k h in the last digits.

@@ -1,10 +1,11 @@
-/* Runs an FMU's binary by a script from standard input, and prints numbers to the last bit:
+/* Runs an FMU's binary by a script from standard input, and prints the bits of numbers:
 
        host LIBRARY GUID RESOURCES < SCRIPT
 
-       set REFERENCE NUMBER ...    get REFERENCE ...    step TIME STEP    (a line each; NUMBER as %a or decimal)
+       set REFERENCE NUMBER ...    get REFERENCE ...    step TIME STEP    (a line each)
 
    It is compiled for Linux and for Windows, and with a sanitizer. */
+#include <inttypes.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -50,7 +51,11 @@ static void get(fmi2Component me, char *rest) {
     for (char *word = strtok(rest, " \n"); word; word = strtok(NULL, " \n"))
         references[count++] = (unsigned)strtoul(word, NULL, 10);
     printf("get %d", (int)((fmi2GetRealTYPE *)symbol("fmi2GetReal"))(me, references, count, values));
-    for (size_t k = 0; k < count; k++) printf(" %a", values[k]);
+    for (size_t k = 0; k < count; k++) {
+        uint64_t bits;
+        memcpy(&bits, values + k, sizeof bits);
+        printf(" %016" PRIx64, bits);
+    }
     printf("\n");
 }
 

@@ -73,7 +73,9 @@ def test_what_is_traced_is_what_a_unit_may_use() -> None:
 @pytest.mark.filterwarnings("ignore::RuntimeWarning")  # of what is not finite, which is meant here
 def test_each_function_gives_what_numpy_gives(native: Callable[..., Any], all_functions: Unit) -> None:
     fmu = native(all_functions)
-    some = [*EDGES, *(np.random.default_rng(5).normal(size=20) * 3).tolist()]
+    rng = np.random.default_rng(5)
+    sizes = 10.0 ** rng.uniform(-9.0, 3.5, 25)
+    some = [*EDGES, *(rng.normal(size=15) * 3).tolist(), *(rng.choice([-1.0, 1.0], 25) * sizes).tolist()]
     outputs = list(range(2, 2 + len(FUNCTIONS)))
     wrong = []
     for x in some:
