@@ -107,7 +107,10 @@ def comparison_fields(comparison: Comparison, about: Mapping[str, Any]) -> dict[
 
 
 def simulation_fields(simulation: Simulation, table: Table, about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a simulation in the units of its signals: a column a scalar, and their names."""
+    """Return the fields of a simulation in the units of its signals: a column a scalar, and their names.
+
+    The system file and why it failed stand in the metadata, in ASCII.
+    """
     signals = [column for column in table.columns if not isinstance(column.values, Times)]
     values = [np.asarray(column.values) for column in signals]
     return {
@@ -117,8 +120,6 @@ def simulation_fields(simulation: Simulation, table: Table, about: Mapping[str, 
         "values": np.column_stack(values) if values else np.empty((len(simulation.t_ns), 0)),
         "names": cells([column.name for column in signals]),
         "units": cells([column.unit for column in signals]),
-        "failed": printable(simulation.failed or ""),
-        "system": printable(simulation.system_text),
         "metadata": as_json(dict(about)),
     }
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from urmpipe_pipeline.report.spec import Figure, Panel, Spec, stacked
 from urmpipe_pipeline.report.traces import DASHES, band, instant, label, level, line, stroke
 from urmpipe_pipeline.signal_groups import MOST, Group
@@ -50,9 +52,11 @@ def _lines(simulation: Simulation, group: Group, number: int, factor: float) -> 
         if signal.type != "Real":
             look |= {"shape": "hv"}
         digits = DIGITS if factor == 1.0 else 4
+        with np.errstate(over="ignore"):
+            drawn = factor * values
         lines.append(
             line(
-                simulation.t, factor * values, name, colour, label(unit),
+                simulation.t, drawn, name, colour, label(unit),
                 digits=digits, line=look, showlegend=True,
             )
         )  # fmt: skip
@@ -62,11 +66,11 @@ def _lines(simulation: Simulation, group: Group, number: int, factor: float) -> 
 def _allowed(group: Group, factor: float) -> list[Spec]:
     """Return what the delta meter allows: the inside tinted, its ends as lines."""
     shapes: list[Spec] = []
-    for kind, limit in group.verdict.tolerance.items() if group.verdict is not None else ():
-        said = f"{limit * factor:.6g}"
-        shapes.append(level(limit * factor, said, above=True))
+    for kind, allowed in group.verdict.tolerance.items() if group.verdict is not None else ():
+        limit = allowed * factor
+        shapes.append(level(limit, f"{limit:.6g}", above=True))
         if kind != "norm":
-            shapes += [band(-limit * factor, limit * factor), level(-limit * factor, f"-{said}")]
+            shapes += [band(-limit, limit), level(-limit, f"{-limit:.6g}")]
     return shapes
 
 

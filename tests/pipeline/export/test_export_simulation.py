@@ -73,7 +73,16 @@ def test_mat_has_every_double_and_the_names_of_the_columns(
     np.testing.assert_array_equal(found["t"], simulation.t)
     assert found["names"].tolist() == NAMES
     assert found["units"][:2].tolist() == ["rad", "rad"]
-    assert (found["name"], found["system"]) == ("log-to-delta", simulation.system_text)
+    assert found["name"] == "log-to-delta"
+    about = json.loads(found["metadata"])
+    assert (about["system"], about["failed"]) == (simulation.system_text, None)
+
+
+def test_a_system_file_in_any_letters_leaves_too(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    simulation = replace(make_simulation(5), system_text="# \N{ROBOT FACE} \u0394\n", failed="\N{SKULL}")
+    export_result(simulation, tmp_path / "a.mat", ExportOptions("mat"))
+    about = json.loads(loadmat(tmp_path / "a.mat", simplify_cells=True)["simulation"]["metadata"])
+    assert (about["system"], about["failed"]) == (simulation.system_text, simulation.failed)
 
 
 @pytest.mark.parametrize("to", ["csv", "parquet", "mat"])
