@@ -97,18 +97,23 @@ _OPERATORS = {
     **{"SQ": "{0} * {0}", "TWICE": "2.0 * {}", "INV": "1.0 / {}", "IF_ELSE_ZERO": _IF},
     **{"LT": "{} < {}", "LE": "{} <= {}", "EQ": "{} == {}", "NE": "{} != {}"},
     **{"AND": "{} && {}", "OR": "{} || {}", "NOT": _NOT},
-    **{"CONSTPOW": "pow({}, {})", "SIGN": "sign_of({})", "FMIN": "lesser({}, {})", "FMAX": "greater({}, {})"},
+    **{
+        "CONSTPOW": "pow_of({}, {})",
+        "SIGN": "sign_of({})",
+        "FMIN": "lesser({}, {})",
+        "FMAX": "greater({}, {})",
+    },
 }
 """C of CasADi's operations, where it is not a function of the same name."""
 
 _OUR_OWN = (
     *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
-    *("exp", "expm1", "log", "log1p", "atan2", "hypot"),
+    *("exp", "expm1", "log", "log1p", "atan2", "hypot", "pow"),
 )
 """Functions of elementary.h, named as the C library's with _of: the same to the last bit everywhere."""
 
-_OF_THE_LIBRARY = ("sqrt", "floor", "ceil", "fabs", "fmod", "copysign", "pow")
-"""The C library's, which are exact; but pow, which may differ in the last bits."""
+_OF_THE_LIBRARY = ("sqrt", "floor", "ceil", "fabs", "fmod", "copysign")
+"""The C library's, which are exact."""
 
 _OF_TWO = ("atan2", "hypot", "fmod", "copysign", "pow")
 

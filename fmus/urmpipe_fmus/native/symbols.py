@@ -196,21 +196,9 @@ def _functions() -> dict[str, Formula]:
     return {"where": c.if_else, "round": _round, "around": _round, "clip": _clip}
 
 
-MOST_FACTORS = 16
-"""Up to this exponent a whole power is a product, whose bits are those of any platform; C's pow is not."""
-
-
 def _power(x: Any, y: Any) -> Any:
-    """Return x**y."""
-    exponent = float(y) if y.is_constant() else 0.5
-    if exponent != round(exponent) or not 1 <= abs(exponent) <= MOST_FACTORS:
-        return x**y
-    product = x
-    for digit in f"{int(abs(exponent)):b}"[1:]:
-        product = product * product
-        if digit == "1":
-            product = product * x
-    return product if exponent > 0.0 else 1.0 / product
+    """Return x**y; x**2 as x x, as NumPy does."""
+    return x * x if y.is_constant() and float(y) == 2.0 else x**y
 
 
 def _rounded(x: Any) -> Any:

@@ -173,7 +173,12 @@ def elementary() -> Unit:
         found |= {name: getattr(np, name)(small) for name in ("arcsin", "arccos")}
         found |= {"log": np.log(far), "log1p": np.log1p(small * 0.5), "arccosh": np.arccosh(far)}
         found |= {"hypot": np.hypot(v.x, v.y), "arctan2": np.arctan2(v.y, v.x)}
-        return found | {"arctanh": np.arctanh(small * 0.5), "cube": v.x**3, "root": np.sqrt(far)}
+        return found | {
+            "arctanh": np.arctanh(small * 0.5),
+            "cube": v.x**3,
+            "power": far**v.y,
+            "root": np.sqrt(far),
+        }
 
     names = outputs(type("Given", (), {"x": 0.5, "y": 0.5}))
     return Unit(

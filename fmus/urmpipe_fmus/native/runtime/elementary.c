@@ -69,6 +69,7 @@ static double near_cos(Rest x) {
 }
 
 double sin_of(double x) {
+    if (x == 0.0) return x; /* with its sign */
     if (!is_in_range(x)) return sin(x);
     Rest rest = rest_of(x);
     double found = rest.turns & 1 ? near_cos(rest) : near_sin(rest);
@@ -83,6 +84,7 @@ double cos_of(double x) {
 }
 
 double tan_of(double x) {
+    if (x == 0.0) return x; /* with its sign */
     if (!is_in_range(x)) return tan(x);
     Rest rest = rest_of(x);
     return rest.turns & 1 ? -near_cos(rest) / near_sin(rest) : near_sin(rest) / near_cos(rest);
@@ -127,54 +129,63 @@ double acos_of(double x) { return atan2_of(sqrt((1.0 - x) * (1.0 + x)), x); }
 
 /* ---- powers of e ---- */
 
-/* x = n ln 2 + rest, and what is found of the rest: e^rest - 1. */
-static double split_exp(double x, int *n) {
+/* x + more = n ln 2 + rest, where `more` is small; what is found is e^rest - 1. */
+static double split_exp(double x, double more, int *n) {
     static const double c[] = {1.0 / 2.0,       1.0 / 6.0,        1.0 / 24.0,        1.0 / 120.0,
                                1.0 / 720.0,     1.0 / 5040.0,     1.0 / 40320.0,     1.0 / 362880.0,
                                1.0 / 3628800.0, 1.0 / 39916800.0, 1.0 / 479001600.0, 1.0 / 6227020800.0};
     double whole = nearbyint(x * ONE_OVER_LN2);
-    double high = x - whole * LN2_1, low = whole * LN2_2;
+    double high = x - whole * LN2_1, low = whole * LN2_2 - more;
     double rest = high - low;
     double lost = (high - rest) - low;
     *n = (int)whole;
     return rest + (lost + rest * rest * SERIES(rest, c));
 }
 
-double exp_of(double x) {
+/* e^(x + more) */
+static double exp_of_sum(double x, double more) {
     int n;
     if (isnan(x)) return x;
     if (x > 710.0) return INFINITY;
     if (x < -746.0) return 0.0;
-    double less_one = split_exp(x, &n);
+    double less_one = split_exp(x, more, &n);
     return ldexp(1.0 + less_one, n);
 }
 
+double exp_of(double x) { return exp_of_sum(x, 0.0); }
+
 double expm1_of(double x) {
     int n;
+    if (x == 0.0) return x;
     if (isnan(x) || x > 40.0) return exp_of(x);
     if (x < -40.0) return -1.0;
-    double less_one = split_exp(x, &n);
+    double less_one = split_exp(x, 0.0, &n);
     return ldexp(less_one, n) + (ldexp(1.0, n) - 1.0);
 }
 
 /* ln(1 + f) about 0 by s = f/(2 + f): 2 s + 2 s^3/3 + 2 s^5/5 + ... = f - s (f - 2 s^2/3 - 2 s^4/5 - ...). */
+static const double LOG_SERIES[] = {2.0 / 3.0,  2.0 / 5.0,  2.0 / 7.0,  2.0 / 9.0,  2.0 / 11.0, 2.0 / 13.0,
+                                    2.0 / 15.0, 2.0 / 17.0, 2.0 / 19.0, 2.0 / 21.0, 2.0 / 23.0};
+
 static double near_log1p(double f) {
-    static const double c[] = {2.0 / 3.0,  2.0 / 5.0,  2.0 / 7.0,  2.0 / 9.0,  2.0 / 11.0, 2.0 / 13.0,
-                               2.0 / 15.0, 2.0 / 17.0, 2.0 / 19.0, 2.0 / 21.0, 2.0 / 23.0};
     double s = f / (2.0 + f), z = s * s;
-    return f - s * (f - z * SERIES(z, c));
+    return f - s * (f - z * SERIES(z, LOG_SERIES));
+}
+
+/* x = (1 + f) 2^n with 1 + f about 1. */
+static double split_log(double x, int *n) {
+    double part = frexp(x, n);
+    if (part >= 0.7071067811865476) return part - 1.0;
+    --*n;
+    return 2.0 * part - 1.0;
 }
 
 double log_of(double x) {
     int n;
     if (isnan(x) || x == INFINITY) return x;
     if (x <= 0.0) return x == 0.0 ? -INFINITY : NAN;
-    double part = frexp(x, &n); /* x = part 2^n */
-    if (part < 0.7071067811865476) {
-        part *= 2.0;
-        n--;
-    }
-    return n * LN2_1 + (near_log1p(part - 1.0) + n * LN2_2);
+    double f = split_log(x, &n);
+    return n * LN2_1 + (near_log1p(f) + n * LN2_2);
 }
 
 double log1p_of(double x) {
@@ -222,6 +233,50 @@ double acosh_of(double x) {
 double atanh_of(double x) {
     double size = fabs(x);
     return copysign(0.5 * log1p_of(2.0 * size / (1.0 - size)), x);
+}
+
+/* ---- any power ---- */
+
+/* A number in two parts, the second beyond the last place of the first. */
+typedef struct {
+    double high, low;
+} Pair;
+
+/* a b to the last bit (Dekker): products of halves of the digits are exact. */
+static Pair product(double a, double b) {
+    double a_high = a * 134217729.0, b_high = b * 134217729.0; /* 2^27 + 1 */
+    a_high -= a_high - a;
+    b_high -= b_high - b;
+    double a_low = a - a_high, b_low = b - b_high;
+    Pair found = {a * b, 0.0};
+    found.low = ((a_high * b_high - found.high) + a_high * b_low + a_low * b_high) + a_low * b_low;
+    return found;
+}
+
+/* ln(x) of a finite x > 0, to some more places than a double has: as log_of, with s in two parts. */
+static Pair log_pair(double x) {
+    int n;
+    double f = split_log(x, &n);
+    double below = 2.0 + f, below_low = (2.0 - below) + f;
+    double s = f / below;
+    Pair whole = product(s, below);
+    double s_low = ((f - whole.high) - whole.low - s * below_low) / below;
+    double first = n * LN2_1, second = 2.0 * s, sum = first + second;
+    double taken = sum - first; /* second, but for what the sum was rounded by */
+    double lost = (first - (sum - taken)) + (second - taken);
+    double z = s * s;
+    double low = lost + (2.0 * s_low + s * z * SERIES(z, LOG_SERIES) + n * LN2_2);
+    Pair found = {sum + low, 0.0};
+    found.low = (sum - found.high) + low;
+    return found;
+}
+
+double pow_of(double x, double y) {
+    int is_special = !(fabs(x) < INFINITY) || x == 0.0 || x == 1.0 || !(fabs(y) < 1e100) || y == 0.0;
+    if (is_special || (x < 0.0 && y != floor(y))) return pow(x, y); /* 0, 1, infinite or NaN: exact in any library */
+    Pair exponent = log_pair(fabs(x)), scaled = product(y, exponent.high);
+    double power = exp_of_sum(scaled.high, scaled.low + y * exponent.low);
+    return x < 0.0 && fmod(y, 2.0) != 0.0 ? -power : power;
 }
 
 /* ---- others ---- */

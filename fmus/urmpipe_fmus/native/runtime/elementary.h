@@ -4,7 +4,7 @@
    C libraries differ in the last bits of sin, exp and their like, and so would an FMU on Linux and on Windows. These
    use + - * / and sqrt only, which IEEE 754 defines to the last bit (compile without contracting a * b + c, and
    without -ffast-math), and what is exact in any library: floor, ldexp, fmod. They are within 3 units in the last
-   place. Not here is pow, and for angles above 1.6e6 rad sine and cosine: they are the library's own. */
+   place. For angles above 1.6e6 rad sine, cosine and tangent are the library's own. */
 #ifndef ELEMENTARY_H
 #define ELEMENTARY_H
 
@@ -26,6 +26,7 @@ double asinh_of(double x);
 double acosh_of(double x);
 double atanh_of(double x);
 double hypot_of(double x, double y);
+double pow_of(double x, double y);
 
 /* Functions of NumPy that C does not have: sign, minimum and maximum; a NaN goes through. */
 double sign_of(double x);
