@@ -95,9 +95,8 @@ class Wiring:
         shown = self.interfaces[port.block]
         found = shown.elements(port.variable)
         if not found:
-            self.faults.append(
-                f"{where}: {port.block} has {not_among(port.variable, shown.names(causality))}"
-            )
+            allowed = not_among(port.variable, shown.names(causality))
+            self.faults.append(f"{where}: {causality} of {port.block}: {allowed}")
         for one in found:
             if one.causality != causality:
                 allowed = ", ".join(shown.names(causality)) or "none"

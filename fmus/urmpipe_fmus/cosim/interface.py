@@ -136,6 +136,8 @@ class Interface:
 def read_interface(path: Path) -> Interface:
     """Read the description of an FMU.
 
+    It is not held to the standard's schema, as `check_fmu` does: many an FMU that is not quite valid runs.
+
     Raises:
         CosimulationError: If it cannot be read, is no FMU for co-simulation by FMI 2.0, or has no binaries
             for this platform.
@@ -143,23 +145,31 @@ def read_interface(path: Path) -> Interface:
     import fmpy
 
     try:
-        described = fmpy.read_model_description(str(path))
         with zipfile.ZipFile(path) as archive:
             names = set(archive.namelist())
-    except Exception as error:  # fmpy raises Exception itself, lxml and zipfile their own
+        described = fmpy.read_model_description(str(path), validate=False)
+        shown = _interface(path, described)
+    except Exception as error:  # fmpy raises Exception itself, and what a description can be wrong by is much
         said = " ".join(str(error).split())
         raise CosimulationError(f"{path}: cannot be read as an FMU: {said}") from error
-    if described.fmiVersion != "2.0" or described.coSimulation is None:
+    if shown is None:
         kinds = [kind for kind in ("coSimulation", "modelExchange") if getattr(described, kind)]
-        found = f"FMI {described.fmiVersion} for {' and '.join(kinds)}"
+        found = f"FMI {described.fmiVersion} for {' and '.join(kinds) or 'nothing'}"
         raise CosimulationError(f"{path}: found {found}, allowed: FMI 2.0 for coSimulation")
-    can = described.coSimulation
-    binary = f"binaries/{fmpy.platform}/{can.modelIdentifier}{fmpy.sharedLibraryExtension}"
+    binary = f"binaries/{fmpy.platform}/{shown.identifier}{fmpy.sharedLibraryExtension}"
     if binary not in names:
         platforms = sorted({name.split("/")[1] for name in names if re.match(r"binaries/[^/]+/.", name)})
         raise CosimulationError(
             f"{path}: found binaries for {', '.join(platforms) or 'no platform'}, allowed: {binary}"
         )
+    return shown
+
+
+def _interface(path: Path, described: Any) -> Interface | None:
+    """Return what FMPy's description shows; None if it is not for co-simulation by FMI 2.0."""
+    can = described.coSimulation
+    if described.fmiVersion != "2.0" or can is None:
+        return None
     return Interface(
         path=path,
         identifier=can.modelIdentifier,

@@ -21,7 +21,7 @@ GAP = 26.0
 LANE = 12.0
 """Height of a lane in [px]."""
 
-SWEEPS = 12
+SWEEPS = 24
 """How often boxes and lanes are moved towards what they are wired with."""
 
 

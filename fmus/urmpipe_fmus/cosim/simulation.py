@@ -182,7 +182,9 @@ def _recorded(
         if Port(block, one.name) in shown
     )
     result = _result(folder)
-    failed = _crash(job, folder, state, exit_code) if result is None else _failure(job, folder, state, result)
+    failed = _failure(job, folder, state, result) if result else None
+    if failed is None and exit_code:
+        failed = _crash(job, folder, state, exit_code)
     points = np.arange(state.rows) * job.record_every * job.step
     return Recorded(
         t_ns=np.round(points * 1e9).astype(np.int64),
@@ -214,7 +216,7 @@ def _crash(job: Job, folder: Path, state: Progress, exit_code: int) -> str:
     """Return how a run failed that could not say so itself."""
     how = _ending(exit_code)
     if state.call == ELSEWHERE:
-        return one_line(f"the process of the co-simulation {how}" + _quoted(_said(folder)))
+        return one_line(f"the process of the co-simulation {how}" + _quoted(_said(folder)[-LAST_LINES:]))
     return _told(job, folder, state, state.call, how)
 
 
@@ -258,7 +260,7 @@ def _said(folder: Path) -> list[str]:
 
 def _notes(job: Job, folder: Path, result: dict[str, Any]) -> list[str]:
     """Return what a run that could say how it ended leaves to be seen."""
-    notes = [result["note"]] if result["note"] else []
+    notes = list(result["notes"])
     for code, count in result["warnings"]:
         number, function = called(code)
         name = job.blocks[number].name

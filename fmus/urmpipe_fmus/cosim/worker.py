@@ -93,11 +93,12 @@ def work(folder: Path) -> None:
         job: Job = pickle.load(file)
     with (folder / PROGRESS).open("r+b") as file:
         progress = Progress.from_buffer(mmap.mmap(file.fileno(), ctypes.sizeof(Progress)))
-    recorded = np.memmap(folder / RECORDED, np.float64, "r+", shape=(job.rows, max(job.columns, 1)))
+    with (folder / RECORDED).open("r+b") as file:
+        recorded = np.frombuffer(mmap.mmap(file.fileno(), 0), np.float64).reshape(job.rows, -1)
     log = Log(folder / LOG, job, progress)
     callbacks = callbacks_with(log)
     master = Master(job, progress, recorded, callbacks)
-    result: dict[str, Any] = {"failed": None, "code": ELSEWHERE, "note": None}
+    result: dict[str, Any] = {"failed": None, "code": ELSEWHERE, "notes": []}
     try:
         master.run()
     except FmuFailed as error:
@@ -105,11 +106,13 @@ def work(folder: Path) -> None:
     except NoConvergence as error:
         result |= {"failed": str(error)}
     except Ended as ended:
-        result |= {"note": str(ended)}
+        result["notes"] += [str(ended)]
+    result["notes"] += master.notes
     result["warnings"] = sorted(master.warnings.items())
     partial = folder / f"{RESULT}.part"
     partial.write_text(json.dumps(result), encoding="utf-8")
     partial.replace(folder / RESULT)
+    master.end()  # last: what an FMU does there must not hide how the run ended
 
 
 def end_with_parent() -> None:

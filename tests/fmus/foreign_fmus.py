@@ -5,12 +5,26 @@ from __future__ import annotations
 import shutil
 import subprocess
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from urmpipe_fmus.cosim import (
+    Block,
+    Connection,
+    LogColumn,
+    LogInput,
+    Plan,
+    Port,
+    Recorded,
+    System,
+    prepare,
+    simulate,
+)
 
 HERE = Path(__file__).parent
 
@@ -39,6 +53,7 @@ class Foreign:
     compute: str = ""
     step: str = ""
     start: str = ""
+    free: str = ""
     fresh: bool = True
     can_save: bool = True
     once: bool = False
@@ -58,7 +73,8 @@ class Foreign:
         work = folder / self.name
         work.mkdir()
         (work / "model.h").write_text(
-            f'#define GUID "{self.guid}"\n#define FRESH {int(self.fresh)}\n#define START {self.start}\n'
+            f'#define GUID "{self.guid}"\n#define FRESH {int(self.fresh)}\n'
+            f"#define START {self.start}\n#define FREE {self.free}\n"
             f"static void compute(Model *m) {{ Values *v = &m->v; (void)v; {self.compute} }}\n"
             "static fmi2Status step(Model *m, double t, double h) {\n"
             f"    Values *v = &m->v; (void)v; {self.step}\n    return fmi2OK;\n}}\n"
@@ -66,7 +82,18 @@ class Foreign:
         library = work / f"{self.name}{fmpy.sharedLibraryExtension}"
         includes = (f"-I{work}", f"-I{Path(fmpy.__file__).parent / 'c-code'}")
         subprocess.run(
-            [compiler, "-shared", "-fPIC", "-O1", "-w", *includes, HERE / "foreign.c", "-o", library, "-lm"],
+            [
+                compiler,
+                "-shared",
+                "-fPIC",
+                "-O1",
+                "-w",
+                *includes,
+                HERE / "foreign_fmus.c",
+                "-o",
+                library,
+                "-lm",
+            ],
             check=True,
         )
         with zipfile.ZipFile(made, "w") as archive:
@@ -199,9 +226,41 @@ def fmu(foreign: Foreign) -> Path:
     return foreign.write(_folder())
 
 
-def fmus(**foreign: Foreign) -> dict[str, Path]:
-    """Return foreign FMUs by the name of their blocks."""
-    return {name: fmu(one) for name, one in foreign.items()}
+def system(
+    blocks: Mapping[str, Foreign],
+    connections: Mapping[str, str] | None = None,
+    start: Mapping[str, Mapping[str, Any]] | None = None,
+    inputs: Sequence[LogInput] = (),
+    **options: Any,
+) -> System:
+    """Return a system of foreign FMUs; connections are destination: source."""
+    made = {"step": 0.1, "duration": 1.0, **options}
+    return System(
+        name="test",
+        path=Path("test.toml"),
+        blocks=tuple(
+            Block(name=name, fmu=fmu(one), start=(start or {}).get(name, {})) for name, one in blocks.items()
+        ),
+        connections=tuple(
+            Connection(Port(*to.split(".", 1)), Port(*source.split(".", 1)))
+            for to, source in (connections or {}).items()
+        ),
+        inputs=tuple(inputs),
+        **made,
+    )
 
 
-__all__: Sequence[str] = ["COUNTER", "INTEGRATOR", "TROUBLE", "Foreign", "Scalar", "fmu", "fmus", "gain"]
+def fmu_of(block: Block) -> Path:
+    """Return the FMU of a block that names one."""
+    assert block.fmu is not None
+    return block.fmu
+
+
+def planned(*arguments: Any, column: Callable[[LogInput], LogColumn] | None = None, **options: Any) -> Plan:
+    """Return the plan of a system of foreign FMUs: the arguments are those of `system`."""
+    return prepare(system(*arguments, **options), fmu_of, column=column)
+
+
+def ran(*arguments: Any, **options: Any) -> Recorded:
+    """Return what a system of foreign FMUs recorded: the arguments are those of `planned`."""
+    return simulate(planned(*arguments, **options))

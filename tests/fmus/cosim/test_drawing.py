@@ -1,0 +1,158 @@
+"""A drawing of a system shows all of it, without boxes or texts on top of each other."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ET
+from itertools import combinations, pairwise
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from foreign_fmus import INTEGRATOR, Foreign, Scalar, gain, planned
+from urmpipe_fmus.cosim import LogColumn, LogInput, Plan, Port, system_svg
+from urmpipe_fmus.cosim.diagram import Box, Diagram, Pin, Wire, diagram
+from urmpipe_fmus.cosim.layout import Layout
+from urmpipe_fmus.cosim.routing import route
+
+SVG = "{http://www.w3.org/2000/svg}"
+
+
+@st.composite
+def diagrams(draw: st.DrawFn) -> Diagram:
+    """Boxes with ports, wired anyhow: rings, long wires, boxes apart."""
+    counts = draw(st.lists(st.tuples(st.integers(0, 4), st.integers(0, 4)), min_size=1, max_size=7))
+    boxes = {
+        f"b{i}": Box(
+            f"b{i}", "unit", [Pin(f"u{k}") for k in range(inputs)], [Pin(f"y{k}") for k in range(outputs)]
+        )
+        for i, (inputs, outputs) in enumerate(counts)
+    }
+    sources = [(name, pin.name) for name, box in boxes.items() for pin in box.right]
+    targets = [(name, pin.name) for name, box in boxes.items() for pin in box.left]
+    wires = [
+        Wire(*draw(st.sampled_from(sources)), *one) for one in targets if sources and draw(st.booleans())
+    ]
+    return Diagram(boxes, tuple(wires))
+
+
+@given(diagrams())
+def test_boxes_stand_apart(shown: Diagram) -> None:
+    route(Layout(shown))
+    for a, b in combinations(shown.boxes.values(), 2):
+        beside = a.x + a.width <= b.x or b.x + b.width <= a.x
+        assert beside or a.y + a.height <= b.y or b.y + b.height <= a.y
+
+
+@given(diagrams())
+def test_wires_go_upright_or_level_from_port_to_port_around_the_boxes(shown: Diagram) -> None:
+    layout = Layout(shown)
+    routes = route(layout)
+    assert set(routes.points) == set(shown.wires)
+    for wire, points in routes.points.items():
+        source, target = shown.boxes[wire.source], shown.boxes[wire.target]
+        assert points[0] == (source.x + source.width, layout.start(wire))
+        assert points[-1] == (target.x, layout.end(wire))
+        for (x0, y0), (x1, y1) in pairwise(points):
+            assert x0 == x1 or abs(y0 - y1) < 1.0  # px: what is drawn as straight may lean by less
+            for box in shown.boxes.values():
+                level = max(min(x0, x1), box.x) < min(max(x0, x1), box.x + box.width)
+                upright = max(min(y0, y1), box.y) < min(max(y0, y1), box.y + box.height)
+                through = box.x < x0 < box.x + box.width if x0 == x1 else box.y < y0 < box.y + box.height
+                assert not (through and (upright if x0 == x1 else level))
+
+
+@given(diagrams())
+def test_all_is_inside_the_drawing(shown: Diagram) -> None:
+    routes = route(Layout(shown))
+    corners = [one for points in routes.points.values() for one in points]
+    corners += [(box.x + box.width, box.y + box.height) for box in shown.boxes.values()]
+    corners += [(box.x, box.y) for box in shown.boxes.values()]
+    assert all(0.0 <= x <= routes.width + 1e-9 and 0.0 <= y <= routes.height + 1e-9 for x, y in corners)
+
+
+def test_wires_lead_to_the_right_but_for_those_that_close_a_ring() -> None:
+    names = ["set", "control", "drive", "load"]
+    boxes = {name: Box(name, "unit", [Pin("u"), Pin("v")], [Pin("y")]) for name in reversed(names)}
+    ahead = [Wire(a, "y", b, "u") for a, b in pairwise(names)]
+    layout = Layout(Diagram(boxes, (*ahead, Wire("load", "y", "control", "v"))))
+    assert [boxes[name].layer for name in names] == [0, 1, 2, 3]
+    assert [layout.back(wire) for wire in layout.wires] == [False, False, False, True]
+
+
+def arm_plan() -> Plan:
+    arm = Foreign(
+        name="arm",
+        scalars=(
+            *(Scalar(f"phi[{i}]", i, "input", unit="rad") for i in (1, 2)),
+            *(Scalar(f"p[{i}]", 20 + i, unit="m") for i in (1, 2, 3)),
+            *(Scalar(f"idle{i}", 30 + i) for i in range(14)),
+        ),
+    )
+    source = Foreign(name="source", scalars=tuple(Scalar(f"q[{i}]", i, unit="rad") for i in (1, 2)))
+    ask = LogInput(destination=Port("g", "u"), log="a<b>&.csv", column="u")
+    column = LogColumn(np.array([0, 10**9]), np.zeros(2))
+    return planned(
+        {"arm": arm, "source": source, "g": gain(), "i": INTEGRATOR},
+        {"arm.phi": "source.q", "i.u": "g.y"},
+        None,
+        [ask],
+        column=lambda one: column,
+        description="An arm & <more>",
+    )
+
+
+def test_arrays_are_one_port_and_one_wire_and_idle_outputs_are_counted() -> None:
+    shown = diagram(arm_plan())
+    assert shown.wires == (
+        Wire("source", "q", "arm", "phi", 2),
+        Wire("g", "y", "i", "u"),
+        Wire("a<b>&.csv", "u", "g", "u"),
+    )
+    arm = shown.boxes["arm"]
+    assert arm.left == [Pin("phi", 2, "rad")]
+    assert [pin.name for pin in arm.right] == ["p", *(f"idle{i}" for i in range(9))]
+    assert arm.hidden == 5
+
+
+def test_a_drawing_holds_names_units_and_connections_and_nothing_from_elsewhere() -> None:
+    plan = arm_plan()
+    svg = system_svg(plan)
+    assert svg == system_svg(plan)
+    texts = ["".join(one.itertext()) for one in ET.fromstring(svg).iter(f"{SVG}text")]
+    for text in ("test", "An arm & <more>", "arm.fmu", "phi ×2 rad", "p ×3 m", "a<b>&.csv", "5 more"):
+        assert text in texts
+    ways = [one.text for one in ET.fromstring(svg).iter(f"{SVG}title")]
+    assert ways == ["test", "source.q → arm.phi", "g.y → i.u", "a<b>&.csv.u → g.u"]
+    assert svg.count("http") == 1  # the name space
+
+
+@pytest.mark.slow
+def test_texts_fit_into_their_boxes_in_a_browser(tmp_path: Path) -> None:
+    chromium = Path("/usr/bin/chromium")
+    if not chromium.exists():
+        pytest.skip("needs a browser: chromium")
+    from playwright.sync_api import sync_playwright
+
+    page = tmp_path / "drawing.svg"
+    page.write_text(system_svg(arm_plan()), encoding="utf-8")
+    with sync_playwright() as play:
+        browser = play.chromium.launch(executable_path=str(chromium), args=["--no-sandbox"])
+        tab = browser.new_page()
+        tab.goto(page.as_uri())
+        outside = tab.evaluate(
+            """[...document.querySelectorAll('g > g')].flatMap(group => {
+                const box = group.querySelector('rect.box').getBBox();
+                return [...group.querySelectorAll('text')].filter(text => {
+                    const b = text.getBBox();
+                    const right = box.x + box.width, low = box.y + box.height;
+                    return b.x < box.x || b.x + b.width > right || b.y + b.height > low;
+                }).map(text => text.textContent);
+            })"""
+        )
+        count = tab.evaluate("document.querySelectorAll('g > g text').length")
+        browser.close()
+    assert outside == []
+    assert count > 20
