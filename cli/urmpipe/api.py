@@ -260,10 +260,10 @@ def export(
     rows: Rows | None = None,
     tcp: Tcp | None = None,
 ) -> Exported:
-    """Write a run or a comparison as tables (CSV, Parquet, MAT) or as trajectories (TUM).
+    """Write a run, a comparison or a simulation as tables (CSV, Parquet, MAT) or as trajectories (TUM).
 
     Args:
-        result: A recording (.rrd), or what `ingest` or `compare` returned.
+        result: A recording (.rrd), or what `ingest`, `compare` or `simulate` returned.
         output: The file to write; default: NAME-grid.csv and the like in the working folder.
         to: csv, parquet, mat or tum; default: by the output's suffix.
         rows: grid: t, q, rates and the tool centre point on the run's grid, in SI; file: the columns of

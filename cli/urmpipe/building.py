@@ -45,7 +45,7 @@ def build_fmu(
         log: A log for a unit that plays one: CSV, a folder of plots, or what `read_table` made of them.
         options: Further options of the unit by name; see `urmpipe fmu list`.
         read: How to read the log where it cannot tell by itself.
-        backend: native (C, runs anywhere) or python (needs Python on the target); default: native if this
+        backend: native (C) or python (needs Python with NumPy on the target); default: native if this
             machine can build it, else python, with a `note` why.
         platforms: linux64, win64; default: this one. Others than this one need the extra `cross`.
         output: The folder for UNIT.fmu, or a name that ends in .fmu; only an FMU of urmpipe's is replaced.
@@ -115,7 +115,7 @@ def column_names(columns: Any) -> list[str] | None:
     """Return names of columns as they stand in an option: one, or a list of them."""
     if columns is None:
         return None
-    return [str(one) for one in (columns if isinstance(columns, list) else [columns])]
+    return [str(one) for one in (columns if isinstance(columns, (list, tuple)) else [columns])]
 
 
 def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, log: Any) -> None:
@@ -124,7 +124,8 @@ def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, lo
     faults = []
     for option, value, metavar in (("robot", robot, "NAME|FILE"), ("log", log, "LOG")):
         if takes[option] and value is None:
-            faults.append(f"unit {name}: found no {option}, allowed: --{option} {metavar}")
+            allowed = f"--{option} {metavar}, in a system file {option} = ..."
+            faults.append(f"unit {name}: found no {option}, allowed: {allowed}")
         elif not takes[option] and value is not None and not (option == "robot" and takes["log"]):
             said = f"found a {option} ({_shown(value)}), allowed: none, it has no such option"
             faults.append(f"unit {name}: {said}")

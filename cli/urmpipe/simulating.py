@@ -13,13 +13,13 @@ import fmpy  # noqa: F401 - Rerun is imported beside: what both import must be t
 
 from urmpipe import __version__
 from urmpipe.building import Backend
-from urmpipe.guards import PathLike
+from urmpipe.guards import PathLike, refuse_shared
 from urmpipe.simulation_result import check_meters, simulation_of
 from urmpipe.system_blocks import Blocks
 from urmpipe_fmus.cosim import load_system, prepare, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.outputs import DRAWING_HEADER, guarded_output
+from urmpipe_pipeline.outputs import DRAWING_HEADER, OutputKind, guarded_output
 from urmpipe_pipeline.recording import record
 from urmpipe_pipeline.simulation import Simulation
 
@@ -65,6 +65,8 @@ def simulate(
     loaded = _changed(load_system(system, arguments), step, duration)
     shipped = str(system) in system_names()
     kept = [loaded.path, *_files(loaded)]
+    named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
+    refuse_shared({kind: Path(path) for kind, path in named.items() if path is not None})
     running, writing = _halves(progress)
     with ExitStack() as stack:
         drawing = None if draw is None else stack.enter_context(guarded_output(Path(draw), kept, "drawing"))
@@ -92,7 +94,7 @@ def _changed(system: System, step: float | None, duration: float | None) -> Syst
     wrong = {name: value for name, value in given.items() if value is not None and not 0.0 < value < math.inf}
     if wrong:
         raise OptionError(*(f"{name}: found {value:g} s, allowed: above 0" for name, value in wrong.items()))
-    return replace(system, **{name: value for name, value in given.items() if value is not None})
+    return replace(system, step=step or system.step, duration=duration or system.duration)
 
 
 def _files(system: System) -> list[Path]:

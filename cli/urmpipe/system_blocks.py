@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,11 +11,13 @@ from urmpipe.building import Backend, column_names, unit_of
 from urmpipe.guards import place_robot
 from urmpipe.log_tables import LogTable, read_table
 from urmpipe_datasets import LOGS
+from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.cosim.plan import LogColumn
+from urmpipe_fmus.native import native_missing
 from urmpipe_models.errors import OptionError, UrmpipeError
 from urmpipe_pipeline.sources import ReadOptions, read_map
 
 if TYPE_CHECKING:
-    from urmpipe_fmus.cosim.plan import LogColumn
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
     from urmpipe_fmus.unit import Unit
     from urmpipe_models.chain import Chain
@@ -64,9 +67,9 @@ class Blocks:
         self._faults: dict[str, UrmpipeError] = {}
         self._columns: dict[Port, LogTable] = {}
         for block in system.blocks:
-            self._try(block.name, lambda block=block: self._take(block))  # type: ignore[misc]
+            self._try(block.name, partial(self._take, block))
         for one in system.inputs:
-            self._try(str(one.destination), lambda one=one: self._follow(one))  # type: ignore[misc]
+            self._try(str(one.destination), partial(self._follow, one))
 
     def make(self, block: Block) -> Path:
         """Return the FMU of a block, built if it is not in the cache.
@@ -76,7 +79,7 @@ class Blocks:
         """
         if block.name in self._faults:
             raise self._faults[block.name]
-        return block.fmu or self._fmu(self.units[block.name])
+        return block.fmu or self._fmu(block.name)
 
     def column(self, asked: LogInput) -> LogColumn:
         """Return the column of a log that an input follows.
@@ -84,8 +87,6 @@ class Blocks:
         Raises:
             UrmpipeError: If it cannot be read.
         """
-        from urmpipe_fmus.cosim.plan import LogColumn
-
         if str(asked.destination) in self._faults:
             raise self._faults[str(asked.destination)]
         found = self._columns[asked.destination]
@@ -121,21 +122,25 @@ class Blocks:
             self.chains[block.name] = arm
         if robot is not None and Path(robot).is_file():
             self.files.append(Path(robot))
+        if log is None and log_map is not None:
+            raise OptionError(f"map: found {log_map} without a log, allowed: with log = ...")
         if log is None:
             return unit_of(block.unit, robot=arm, options=options)
         table = self._table(log, column_names(options.pop("columns", None)), arm, log_map)
         return unit_of(block.unit, robot=arm, log=table, options=options)
 
-    def _fmu(self, unit: Unit) -> Path:
-        """Return the FMU of a unit from the cache; tell if it is built, and if Python runs it and why."""
-        from urmpipe_fmus.cache import cached_fmu
-        from urmpipe_fmus.native import native_missing
+    def _fmu(self, block: str) -> Path:
+        """Return the FMU of a block from the cache; tell if it is built, and if Python runs it and why."""
+
+        def built(name: str) -> None:
+            """Tell that the FMU of a unit is built."""
+            self._told(f"building {name} for block {block} ...")
 
         missing = native_missing(()) if self._backend is None else None
         if missing and not self._why:
             self._why = missing
             self._told(f"the units run on Python: {missing}")
-        return cached_fmu(unit, self._backend, told=lambda name: self._told(f"building {name} ..."))
+        return cached_fmu(self.units[block], self._backend, told=built)
 
     def _table(
         self, name: str, columns: list[str] | None, robot: Chain | None = None, log_map: str | None = None

@@ -1,7 +1,7 @@
 """FMUs that were built before, found again by the hash of all that they are made from.
 
-The hash takes milliseconds: it reads the unit's recipe and table and urmpipe's own sources, and neither runs the
-unit nor imports what would trace it.
+The hash takes milliseconds: it reads the unit's recipe and table and urmpipe's own sources, and neither runs
+the unit nor imports what would trace it.
 """
 
 from __future__ import annotations
@@ -47,7 +47,8 @@ def cached_fmu(
 ) -> Path:
     """Return the FMU of a unit for this platform, built if it is not in the cache, or damaged there.
 
-    A unit without a recipe is built each time: nothing tells what its functions do.
+    A unit without a recipe is built each time, as nothing tells what its functions do; its place is named by
+    what was built.
 
     Args:
         unit: The unit.
@@ -61,20 +62,36 @@ def cached_fmu(
     from urmpipe_fmus.native import native_missing, this_platform
 
     chosen: Backend = backend or ("python" if native_missing(()) else "native")
-    key = _key(unit, chosen, this_platform()) if unit.recipe.module else uuid.uuid4().hex
-    folder = cache_folder() / "fmus" / key
-    path, digest = folder / f"{unit.name}.fmu", folder / f"{unit.name}.sha256"
-    if not _is_whole(path, digest):
-        if told:
-            told(unit.name)
-        try:
-            folder.mkdir(parents=True, exist_ok=True)
+    tell = told or (lambda name: None)
+    folder = cache_folder() / "fmus"
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if not unit.recipe.module:
+            tell(unit.name)
+            return _built_anew(unit, chosen, this_platform(), folder)
+        folder /= _key(unit, chosen, this_platform())
+        path, digest = folder / f"{unit.name}.fmu", folder / f"{unit.name}.sha256"
+        if not _is_whole(path, digest):
+            tell(unit.name)
+            folder.mkdir(exist_ok=True)
             build_fmu(unit, path, backend=chosen, platforms=(this_platform(),))
             _write(digest, _hash_of(path))
-        except OSError as error:
-            said = f"cannot be written: {error.strerror or error}; the variable URMPIPE_CACHE names another"
-            raise FmuError(Finding(said, file=str(folder))) from error
+    except OSError as error:
+        said = f"cannot be written: {error.strerror or error}; the variable URMPIPE_CACHE names another place"
+        raise FmuError(Finding(said, file=str(folder))) from error
     return path
+
+
+def _built_anew(unit: Unit, backend: Backend, target: str, folder: Path) -> Path:
+    """Build an FMU, and put it where its own hash says."""
+    part = folder / f"{uuid.uuid4().hex}.part"
+    try:
+        build_fmu(unit, part, backend=backend, platforms=(target,))
+        place = folder / _hash_of(part)[:32]
+        place.mkdir(exist_ok=True)
+        return part.replace(place / f"{unit.name}.fmu")
+    finally:
+        part.unlink(missing_ok=True)
 
 
 def _is_whole(path: Path, digest: Path) -> bool:

@@ -10,10 +10,12 @@ import subprocess
 import sys
 import tempfile
 import zipfile
+import zlib
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree as ET
 
 from urmpipe_fmus.check_run import CALL
 from urmpipe_models.errors import Finding, FmuError
@@ -74,7 +76,7 @@ class Checked:
         variables: Its variables.
         step: Communication step of the run in [s].
         steps: How many steps were asked for.
-        ran: Whether it ran to the end.
+        ran: Whether it ran to the end without an error.
     """
 
     path: Path
@@ -105,28 +107,23 @@ def check_fmu(path: Path) -> Checked:
     problems = _validated(path)
     platforms = _platforms(path)
     start, step, steps = _experiment(described)
-    before: Sequence[Any] = ()
-    after: Sequence[Any] = ()
     if _this_platform() in platforms:
         run = _run(path, described, (start, step, steps))
-        problems += run["problems"]
-        before, after = run["before"], run["after"]
     else:
-        found = ", ".join(platforms) or "none"
-        problems.append(
-            f"found binaries for {found}, allowed for a run here: {_this_platform()}; it was not run"
-        )
+        found = ", ".join(platforms) or "no platform"
+        said = f"found binaries for {found}, allowed for a run here: {_this_platform()}; it was not run"
+        run = {"before": [], "after": [], "problems": [said]}
     return Checked(
         path=path,
         name=described.modelName,
         guid=described.guid,
         generator=described.generationTool or "",
         platforms=platforms,
-        problems=tuple(problems),
-        variables=tuple(_variables(described, before, after)),
+        problems=(*problems, *run["problems"]),
+        variables=tuple(_variables(described, run["before"], run["after"])),
         step=step,
         steps=steps,
-        ran=bool(after) and not problems,
+        ran=not run["problems"],
     )
 
 
@@ -134,34 +131,50 @@ def _described(path: Path) -> Any:
     """Return the model description of an FMU 2.0 for co-simulation."""
     from fmpy import read_model_description
 
-    def refused(said: str) -> FmuError:
-        return FmuError(Finding(said, file=str(path)))
-
     try:
         with zipfile.ZipFile(path) as archive:
             if "modelDescription.xml" not in archive.namelist():
-                raise refused("found no modelDescription.xml, allowed: an FMU")
-        found = read_model_description(str(path), validate=False)
+                raise _refused(path, "found no modelDescription.xml, allowed: an FMU")
+            root = ET.fromstring(archive.read("modelDescription.xml"))
     except OSError as error:
-        raise refused(f"cannot be read: {error.strerror or error}") from error
-    except zipfile.BadZipFile as error:
-        raise refused("found a file that is no zip, allowed: an FMU") from error
-    except FmuError:
-        raise
-    except Exception as error:  # FMPy raises Exception itself; lxml its own
-        raise refused(f"modelDescription.xml cannot be read: {error}") from error
-    if found.fmiVersion != "2.0":
-        raise refused(f"found FMI {found.fmiVersion}, allowed: FMI 2.0 for co-simulation")
-    if found.coSimulation is None:
-        raise refused("found an FMU for model exchange only, allowed: FMI 2.0 for co-simulation")
-    return found
+        raise _refused(path, f"cannot be read: {error.strerror or error}") from error
+    except (zipfile.BadZipFile, zlib.error) as error:
+        raise _refused(path, f"found no zip, or a damaged one ({error}), allowed: an FMU") from error
+    except (ET.ParseError, LookupError, ValueError) as error:
+        raise _refused(path, f"modelDescription.xml cannot be read: {error}") from error
+    version = root.get("fmiVersion")
+    if version != "2.0":
+        raise _refused(path, f"found FMI {version}, allowed: FMI 2.0 for co-simulation")
+    if root.find("CoSimulation") is None:
+        raise _refused(path, "found no FMU for co-simulation, allowed: FMI 2.0 for co-simulation")
+    try:
+        return read_model_description(str(path), validate=False)
+    except Exception as error:  # what FMPy raises for a description it does not expect is of any kind
+        said = f"modelDescription.xml cannot be read: {type(error).__name__}: {error}"
+        raise _refused(path, said) from error
+
+
+def _refused(path: Path, said: str) -> FmuError:
+    return FmuError(Finding(said, file=str(path)))
 
 
 def _validated(path: Path) -> list[str]:
     """Return what FMPy's validation finds."""
-    from fmpy.validation import validate_fmu
+    from fmpy import read_model_description
+    from fmpy.model_description import ValidationError
 
-    return [" ".join(str(one).split()) for one in validate_fmu(str(path))]
+    with zipfile.ZipFile(path) as archive:
+        names = [one.orig_filename for one in archive.filelist]
+    problems = [f"{name}: found a backslash in a path, allowed: /" for name in names if "\\" in name]
+    try:
+        read_model_description(
+            str(path), validate=True, validate_variable_names=True, validate_model_structure=True
+        )
+    except ValidationError as error:
+        problems += error.problems
+    except Exception as error:  # what FMPy's validation stumbles over is wrong too
+        problems.append(f"the validation ended with {type(error).__name__}: {error}")
+    return [" ".join(str(one).split()) for one in problems]
 
 
 def _platforms(path: Path) -> tuple[str, ...]:
@@ -208,7 +221,7 @@ def _run(path: Path, described: Any, experiment: tuple[float, float, int]) -> di
         try:
             extract(str(path), unzipdir=str(folder / "fmu"))
         except Exception as error:  # FMPy raises Exception itself, zlib its own
-            raise FmuError(Finding(f"cannot be extracted: {error}", file=str(path))) from error
+            raise _refused(path, f"cannot be extracted: {error}") from error
         job = {
             "folder": str(folder / "fmu"),
             "guid": described.guid,
@@ -220,10 +233,13 @@ def _run(path: Path, described: Any, experiment: tuple[float, float, int]) -> di
         }
         (folder / "job.json").write_text(json.dumps(job), encoding="utf-8")
         ended = _process(folder)
+        whole = (folder / "result.json").exists()
         log = (folder / "log").read_text("utf-8", "replace").splitlines() if (folder / "log").exists() else []
         result = {"failed": "", "before": [], "after": []}
-        if (folder / "result.json").exists():
+        if whole:
             result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
+    if not whole:
+        ended = ended or "ended its process with exit code 0"
     return {**result, "problems": _problems(result, ended, log)}
 
 
@@ -247,7 +263,7 @@ def _process(folder: Path) -> str:
         return f"ended its process: {signal.strsignal(-done.returncode) or -done.returncode}"
     if done.returncode > 0:
         said = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        return f"ended its process with exit code {done.returncode}: {said[-1] if said else ''}"
+        return ": ".join((f"ended its process with exit code {done.returncode}", *said[-1:]))
     return ""
 
 

@@ -18,12 +18,16 @@ from typing import Any
 CALL = "call "
 """Begins the line of a call; other lines are what the FMU logged."""
 
-SIZES: dict[str, Any] = {
+HELD: dict[str, Any] = {
     "Real": ctypes.c_double,
     "Integer": ctypes.c_int,
     "Boolean": ctypes.c_int,
     "String": ctypes.c_char_p,
 }
+"""What a value of each type is held in."""
+
+FATAL = 4
+"""fmi2Fatal: nothing may be called any more."""
 
 
 class Stopped(Exception):  # noqa: N818 - the end of a run, told as its result
@@ -101,14 +105,16 @@ class Checked:
         return [self._value(fmu, kind, reference) for kind, reference in self._job["variables"]]
 
     def _value(self, fmu: Any, kind: str, reference: int) -> Any:
-        value = (SIZES[kind] * 1)()
+        value = (HELD[kind] * 1)()
         get = getattr(fmu, f"fmi2Get{kind}")
         try:
             self._called(
                 f"fmi2Get{kind} of value reference {reference}",
                 lambda: get(fmu.component, (ctypes.c_uint * 1)(reference), 1, value),
             )
-        except Stopped:
+        except Stopped as stopped:
+            if getattr(stopped.__cause__, "status", None) == FATAL:
+                raise
             return None
         found = value[0]
         if kind == "Boolean":

@@ -43,7 +43,7 @@ def model_description(unit: Unit, guid: str, backend: Backend, source_files: Seq
         fmiVersion="2.0",
         modelName=unit.name,
         guid=guid,
-        description=_text(unit.description),
+        description=markup_text(unit.description),
         generationTool=f"urmpipe {version('urmpipe')}",
         variableNamingConvention="structured",
     )
@@ -68,7 +68,7 @@ def default_experiment(unit: Unit) -> tuple[float, float]:
     return float(unit.table.t_ns[-1]) / 1e9, float(np.median(np.diff(unit.table.t_ns))) / 1e9
 
 
-def _text(text: str) -> str:
+def markup_text(text: str) -> str:
     """Return a text with what XML cannot hold (control characters, halves of pairs) as Python's escapes."""
     return "".join(
         one
@@ -130,7 +130,7 @@ def _scalar_variable(parent: ET.Element, reference: int, name: str, one: Variabl
     """Add a scalar: an input's `initial` is not allowed, a computed output has no start."""
     attributes = {"name": name, "valueReference": str(reference)}
     if one.description:
-        attributes["description"] = _text(one.description)
+        attributes["description"] = markup_text(one.description)
     attributes |= {"causality": one.causality, "variability": one.variability}
     if not isinstance(one, Input):
         attributes["initial"] = "calculated" if isinstance(one, Output) else "exact"

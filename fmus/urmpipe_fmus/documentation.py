@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from importlib.metadata import version
 
+from urmpipe_fmus.description import markup_text
 from urmpipe_fmus.si_units import display_conversion
 from urmpipe_fmus.unit import INTERNAL_STEP, Unit
 from urmpipe_fmus.variable import Output, Variable
@@ -33,7 +34,7 @@ def documentation(unit: Unit) -> str:
         rows=[list(zip(TITLES, _row(one), strict=True)) for one in unit.variables],
         steps=_steps(unit),
     )
-    return page.encode("utf-8", "backslashreplace").decode()
+    return markup_text(page)
 
 
 def _row(one: Variable) -> tuple[str, ...]:

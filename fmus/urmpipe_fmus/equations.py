@@ -105,19 +105,27 @@ def flat(where: str, result: Any, variables: Sequence[Variable]) -> list[Element
 
 def _faults(result: Mapping[str, Any], variables: Sequence[Variable]) -> Iterator[str]:
     expected = {one.name: one for one in variables}
-    for name in sorted(set(result) - set(expected)):
+    for name in sorted(set(result) - set(expected), key=str):
         yield f"{name}: found in what it returns, allowed: {', '.join(expected)}"
     for name, one in expected.items():
         if name not in result:
             yield f"{name}: not found in what it returns, allowed: all of {', '.join(expected)}"
             continue
-        found, many = result[name], isinstance(result[name], (tuple, list))
-        if one.size is None and (many or found is None or isinstance(found, str)):
-            yield f"{name}: found {_kind(found)}, allowed: one element"
-        elif one.size is not None and not many:
+        found = result[name]
+        if one.size is None:
+            yield from _element_faults(name, found)
+        elif not isinstance(found, (tuple, list)):
             yield f"{name}: found {_kind(found)}, allowed: a tuple of {one.size} elements"
-        elif one.size is not None and len(found) != one.size:
+        elif len(found) != one.size:
             yield f"{name}: found {len(found)} elements, allowed: {one.size}"
+        else:
+            for scalar, element in zip(one.names, found, strict=True):
+                yield from _element_faults(scalar, element)
+
+
+def _element_faults(name: str, found: Any) -> Iterator[str]:
+    if found is None or isinstance(found, (str, complex, tuple, list, dict)):
+        yield f"{name}: found {_kind(found)}, allowed: one element"
 
 
 def _kind(value: Any) -> str:

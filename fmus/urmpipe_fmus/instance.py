@@ -96,7 +96,7 @@ class Instance:
 
         Raises:
             UnitError: If the step is not above 0 or too long for its internal steps, or a state is not finite
-                after it; then nothing changed.
+                after it; then nothing changed, but that what is fixed from the first step on stays fixed.
         """
         if not (math.isfinite(time) and math.isfinite(step) and step > 0.0):
             raise UnitError(
@@ -207,16 +207,17 @@ class Instance:
         Raises:
             UnitError: If one is not finite.
         """
+        taken = [_doubles(value) for value in found]
         faults = [
             f"unit {self.unit.name}: {what} {self.unit.scalars[place][0]} is not finite at"
             f" {self._first_not_finite(value):g} s"
-            for place, value in zip(places, found, strict=True)
+            for place, value in zip(places, taken, strict=True)
             if not _all_finite(value)
         ]
         if faults:
             raise UnitError(*faults)
-        for place, value in zip(places, found, strict=True):
-            self._values[place] = _doubles(value)
+        for place, value in zip(places, taken, strict=True):
+            self._values[place] = value
 
     def _first_not_finite(self, value: Element) -> float:
         """Return the time of the first of some values that is not finite."""
@@ -226,7 +227,8 @@ class Instance:
 
 def _doubles(value: Element) -> Element:
     """Return a value as C has it; a column as one of our own, which nobody else changes."""
-    return np.array(value, dtype=np.float64) if isinstance(value, np.ndarray) else np.float64(value)
+    column = isinstance(value, np.ndarray) and value.ndim > 0
+    return np.array(value, dtype=np.float64) if column else np.float64(value)
 
 
 def _all_finite(value: Element) -> bool:
@@ -235,7 +237,7 @@ def _all_finite(value: Element) -> bool:
 
 def _extremes(variable: Variable, value: Element) -> list[float]:
     """Return values of which one is refused if any of an element is: of a column its bounds."""
-    if np.ndim(value) == 0:
+    if not isinstance(value, np.ndarray):
         return [float(value)]
     values = np.ravel(np.float64(value))
     if variable.type != "Real":

@@ -3,7 +3,7 @@
 From a unit come a vectorised run over a log (`run`), a Python FMU, a native FMU and its documentation.
 Its functions take the values of the variables (`v.phi`, `v.time`) and return new ones by name. Each value
 is an element: a float, an array, or a symbol of a trace; so the functions use `+ - * /` and NumPy's
-elementwise functions, `np.where` instead of `if`, and no `np.isnan`, `&` or `np.linalg`.
+elementwise functions (`dependencies.FUNCTIONS`), `np.where` instead of `if`, and no `np.linalg`.
 """
 
 from __future__ import annotations

@@ -21,7 +21,7 @@ STEP, RAMP, TRAPEZOID = 0, 1, 2
 
 
 CORNER_SLACK = 1e-9
-"""A corner counts as reached so early, in [s]: 319 x 0.3125 ms and one more are not quite 0.1 s."""
+"""A corner counts as reached so early, in [s]: times that are computed miss it by their rounding."""
 
 
 class JointMotion(NamedTuple):

@@ -18,27 +18,38 @@ NAMED = 3
 """Variables that the title of a plot names; of more, the first and the last."""
 
 
+FAMILY = 3
+"""So many blocks of one kind with the same variables are plotted together, variable by variable."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Group:
-    """Signals of one block in one unit, which share a plot.
+    """Signals in one unit which share a plot: those of a block, or one variable of several like blocks.
 
     Attributes:
-        block: Name of the block.
+        block: Name of the block, or "drive1 ... drive6" of several.
         unit: Their unit; empty for numbers without one.
         signals: At least one.
         verdict: The verdict on them, if they are what a delta meter is judged by.
+        family: Whether they are of several blocks.
     """
 
     block: str
     unit: str
     signals: tuple[Signal, ...]
     verdict: DeltaVerdict | None = None
+    family: bool = False
 
     @property
     def variables(self) -> str:
         """What is plotted: "theta1, theta2", or "Mk ... i" of many."""
-        names = [one.variable for one in self.signals]
+        names = list(dict.fromkeys(one.variable for one in self.signals))
         return ", ".join(names) if len(names) <= NAMED else f"{names[0]} ... {names[-1]}"
+
+    @property
+    def names(self) -> tuple[tuple[str, ...], ...]:
+        """What the legend calls each scalar, by signal: with its block where there are several."""
+        return tuple(one.names if self.family else one.variables for one in self.signals)
 
     @property
     def bracket(self) -> str:
@@ -66,8 +77,39 @@ class Group:
 
 def groups_of(simulation: Simulation) -> list[Group]:
     """Return the groups of all signals, by block in the order in which the blocks first stand."""
-    blocks = dict.fromkeys(one.block for one in simulation.signals)
-    return [group for block in blocks for group in _groups_of_block(simulation, block)]
+    families = _families(simulation)
+    found: list[Group] = []
+    for block in dict.fromkeys(one.block for one in simulation.signals):
+        family = next((one for one in families if block in one), None)
+        if family is None:
+            found += _groups_of_block(simulation, block)
+        elif block == family[0]:
+            found += _groups_of_family(simulation, family)
+    return found
+
+
+def _families(simulation: Simulation) -> list[list[str]]:
+    """Return the names of blocks of one kind that recorded the same variables; none that is judged."""
+    judged = {one.block for one in simulation.verdicts}
+    kinds: dict[object, list[str]] = {}
+    for block in simulation.blocks:
+        own = tuple(
+            (one.variable, one.unit, one.columns.shape[1])
+            for one in simulation.signals
+            if one.block == block.name
+        )
+        if own and block.name not in judged:
+            kinds.setdefault((block.kind, block.source, own), []).append(block.name)
+    return [names for names in kinds.values() if len(set(names)) >= FAMILY]
+
+
+def _groups_of_family(simulation: Simulation, family: list[str]) -> Iterator[Group]:
+    """Yield the signals of several blocks, variable by variable."""
+    label = f"{family[0]} ... {family[-1]}"
+    members = [one for one in simulation.signals if one.block in family]
+    for variable in dict.fromkeys(one.variable for one in members):
+        some = [one for one in members if one.variable == variable]
+        yield from (Group(label, some[0].unit, packed, None, True) for packed in _packed(some))
 
 
 def _groups_of_block(simulation: Simulation, block: str) -> Iterator[Group]:

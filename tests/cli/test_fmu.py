@@ -45,10 +45,8 @@ def test_build_writes_the_fmu_and_says_what_is_inside(urmpipe: RunCommand, tmp_p
     told = json.loads(ran.out)
     path = tmp_path / "kinematic_chain.fmu"
     assert (ran.code, ran.err) == (0, "")
-    assert (told["fmu"], told["unit"], told["backend"]) == (
-        "kinematic_chain.fmu",
-        "kinematic_chain", "native",
-    )  # fmt: skip
+    assert (told["fmu"], told["unit"]) == ("kinematic_chain.fmu", "kinematic_chain")
+    assert told["backend"] == "native"
     assert (told["size"], told["note"]) == (path.stat().st_size, None)
     assert told["size"] < 200_000
     checked = check_fmu(path)
@@ -58,7 +56,8 @@ def test_build_writes_the_fmu_and_says_what_is_inside(urmpipe: RunCommand, tmp_p
     arm = load_robot("urm6")
     tip = points_over_log(arm, np.array([arm.start]))[0, -1]
     # both evaluate the same products of cosines; C and NumPy may differ in the last bits of a cosine
-    np.testing.assert_allclose([values[f"p7[{i}]"] for i in (1, 2, 3)], tip, rtol=0.0, atol=1e-15)
+    found = np.array([values[f"p7[{i}]"] for i in (1, 2, 3)], dtype=np.float64)
+    np.testing.assert_allclose(found, tip, rtol=0.0, atol=1e-15)
 
 
 def test_the_same_unit_is_the_same_file(tmp_path: Path) -> None:

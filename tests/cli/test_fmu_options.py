@@ -98,8 +98,12 @@ def test_a_row_without_a_value_is_an_error(tmp_path: Path) -> None:
 
 
 def test_a_unit_says_what_it_lacks() -> None:
-    assert refusal("kinematic_chain") == ["unit kinematic_chain: found no robot, allowed: --robot NAME|FILE"]
-    assert refusal("log_source") == ["unit log_source: found no log, allowed: --log LOG"]
+    assert refusal("kinematic_chain") == [
+        "unit kinematic_chain: found no robot, allowed: --robot NAME|FILE, in a system file robot = ..."
+    ]
+    assert refusal("log_source") == [
+        "unit log_source: found no log, allowed: --log LOG, in a system file log = ..."
+    ]
     assert refusal("repolarizer") == [
         "unit repolarizer: option joints: not found, it needs the number of joints, such as 6"
     ]
@@ -136,8 +140,9 @@ def test_a_chain_is_taken_as_a_robot() -> None:
         (("repolarizer", "-s", "joints"), "found 'joints', allowed: NAME=VALUE, each name once"),
         (("repolarizer", "-s", "joints=6", "-s", "joints=7"), "found 'joints=7', allowed: NAME=VALUE"),
         (("delta_meter", "--platforms", "linux64,amiga"), "found amiga, allowed: linux64, win64"),
-        (("log_source", "--log", "missing.csv"), "missing.csv: No such file or directory"),
+        (("log_source", "--log", "missing.csv"), "missing.csv: found no such file"),
         (("missing.py",), "missing.py"),
+        (("delta_meter", "--map", "lab.toml"), "--map: found without a log, allowed: with --log LOG"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 import pytest
 
 import urmpipe
+from urmpipe.commands.simulate import simulate as command
 from urmpipe.simulating import simulate
+from urmpipe.unit_options import UnitType
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.simulation import Simulation
@@ -235,6 +241,69 @@ def test_no_input_is_ever_replaced(following: Path, tmp_path: Path, output: str)
     assert (tmp_path / output).read_bytes() == before
 
 
+def test_two_outputs_have_two_names(following: Path, tmp_path: Path) -> None:
+    both = tmp_path / "run.rrd"
+    assert refusal(following, output=both, draw=both) == [
+        f"found {both} as recording and as drawing; allowed: a name for each"
+    ]
+
+
+def test_an_fmu_that_fails_at_once_leaves_an_empty_recording(following: Path, tmp_path: Path) -> None:
+    unit = tmp_path / "follower.py"
+    unit.write_text(FOLLOWER.replace("v.u - v.x}", "(v.u - v.x) / (v.gain - v.gain)}"), encoding="utf-8")
+    result = simulate(following, output=tmp_path / "run.rrd")
+    assert result.failed is not None
+    assert result.failed.startswith("block lag: fmi2GetReal at t = 0 s: ")
+    assert (len(result.t_ns), result.verdict) == (0, "fail")
+    read = urmpipe.read_recording(tmp_path / "run.rrd")
+    assert isinstance(read, Simulation)
+    assert read.failed == result.failed
+
+
+def test_names_complete_in_the_shell() -> None:
+    context, argument = click.Context(command), command.params[0]
+    assert argument.type.shell_complete(context, argument, "six")[0].value == "six-drives"
+    units = UnitType().shell_complete(context, argument, "dc")
+    assert [(one.value, one.type) for one in units] == [("dc_drive", "plain"), ("dc", "file")]
+
+
+def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,q1,q2\n0,180,90\n0.01,170,80\n", encoding="utf-8")
+    run = urmpipe.ingest(tmp_path / "log.csv", read=urmpipe.ReadOptions(units={"": "deg"}))
+    urmpipe.write_map(run, tmp_path / "lab.toml")
+    system = tmp_path / "system.toml"
+    block = '[blocks.log]\nunit = "log_source"\nlog = "log.csv"\nmap = "lab.toml"\n'
+    system.write_text(block, encoding="utf-8")
+    q = simulate(system, step=0.01).signal("log.q").values
+    # one product of two doubles: a unit in the last place
+    np.testing.assert_allclose(q, np.radians([[180.0, 90.0], [170.0, 80.0]]), rtol=2.3e-16)
+    system.write_text('[blocks.meter]\nunit = "delta_meter"\nmap = "lab.toml"\n', encoding="utf-8")
+    assert any("without a log, allowed: with log = ..." in one for one in refusal(system))
+
+
+def test_no_import_meets_those_of_rerun(following: Path, tmp_path: Path) -> None:
+    """While a system is prepared and run Rerun is imported beside: see `load_rerun`."""
+    code = (
+        "import sys, urmpipe.simulating as s, urmpipe.process as p\n"
+        "p.tune_pyarrow()\n"
+        "before = set(sys.modules)\n"
+        f"s.simulate({str(following)!r})\n"
+        "own = set(sys.modules) - before\n"
+        "for name in own: del sys.modules[name]\n"
+        "import rerun.blueprint, rerun.chunk\n"
+        "print(*sorted(own & set(sys.modules)))"
+    )
+    paths = {"URMPIPE_CACHE": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, **paths},
+    )
+    assert done.stdout.strip() == ""
+
+
 def test_a_step_and_a_duration_are_positive(following: Path) -> None:
     assert refusal(following, step=float("nan"), duration=0.0) == [
         "step: found nan s, allowed: above 0",
@@ -246,9 +315,9 @@ def test_a_cold_build_is_told(following: Path, tmp_path: Path, monkeypatch: pyte
     monkeypatch.setenv("URMPIPE_CACHE", str(tmp_path / "cache"))
     lines: list[str] = []
     simulate(following, told=lines.append)
-    assert lines == ["building follower ..."]
+    assert lines == ["building follower for block lag ..."]
     simulate(following, told=lines.append)
-    assert lines == ["building follower ..."]
+    assert lines == ["building follower for block lag ..."]
 
 
 def test_progress_rises_to_1(following: Path, tmp_path: Path) -> None:

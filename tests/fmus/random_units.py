@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from hypothesis import HealthCheck
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 from numpy.typing import NDArray
@@ -20,6 +21,12 @@ from urmpipe_fmus.user_unit import unit_of_source
 from urmpipe_fmus.variable import Variable
 
 FILE = "random_unit.py"
+
+PATIENT: dict[str, Any] = {
+    "deadline": None,
+    "suppress_health_check": [HealthCheck.too_slow, HealthCheck.data_too_large],
+}
+"""Settings of tests on random units: on a busy machine a large one takes some tenths of a second to draw."""
 
 numbers = st.integers(-2000, 2000).map(lambda k: k / 1000)
 

@@ -11,7 +11,7 @@ import pytest
 from urmpipe_pipeline.display_unit import display_unit
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS
 from urmpipe_pipeline.signal_groups import groups_of
-from urmpipe_pipeline.simulation import Signal, Simulation
+from urmpipe_pipeline.simulation import Signal, SimulatedBlock, Simulation
 
 MakeSimulation = Callable[..., Simulation]
 
@@ -61,6 +61,45 @@ def test_every_signal_is_in_one_group(make_simulation: MakeSimulation) -> None:
     grouped = [one.name for group in groups_of(simulation) for one in group.signals]
     assert sorted(grouped) == sorted(one.name for one in simulation.signals)
     assert all(len({(one.block, one.unit) for one in group.signals}) == 1 for group in groups_of(simulation))
+
+
+def test_three_blocks_of_one_kind_are_plotted_variable_by_variable(make_simulation: MakeSimulation) -> None:
+    simulation = make_simulation(2)
+    names = ["a1", "log", "a2", "a3"]
+    signals = [
+        Signal(name, variable, np.zeros((2, width)), unit)
+        for name in names
+        for variable, width, unit in (("Mk", 1, "N.m"), ("q", 4, "rad"))
+    ]
+    blocks = tuple(
+        SimulatedBlock(name, "unit", "log_source" if name == "log" else "dc_drive", "") for name in names
+    )
+    groups = groups_of(replace(with_signals(simulation, *signals), blocks=blocks))
+    assert [(one.block, one.variables, [signal.block for signal in one.signals]) for one in groups] == [
+        ("a1 ... a3", "Mk", ["a1", "a2", "a3"]),
+        ("a1 ... a3", "q", ["a1", "a2"]),  # eight lines
+        ("a1 ... a3", "q", ["a3"]),
+        ("log", "Mk", ["log"]),
+        ("log", "q", ["log"]),
+    ]
+    assert groups[0].names == (("a1.Mk[1]",), ("a2.Mk[1]",), ("a3.Mk[1]",))
+    assert groups[3].names == (("Mk[1]",),)
+
+
+@pytest.mark.parametrize("other", ["unit", "variable", "verdict"])
+def test_blocks_that_differ_or_are_judged_are_plotted_by_themselves(
+    make_simulation: MakeSimulation, other: str
+) -> None:
+    simulation = make_simulation(2)
+    signals = [Signal(name, "x", np.zeros(2), "V") for name in ("a", "b", "meter")]
+    if other == "unit":
+        signals[0] = replace(signals[0], unit="A")
+    if other == "variable":
+        signals[0] = replace(signals[0], variable="y")
+    blocks = tuple(SimulatedBlock(name, "unit", "any", "") for name in ("a", "b", "meter"))
+    verdicts = simulation.verdicts if other == "verdict" else ()
+    found = groups_of(replace(simulation, signals=tuple(signals), blocks=blocks, verdicts=verdicts))
+    assert [one.block for one in found] == ["a", "b", "meter"]
 
 
 @pytest.mark.parametrize(

@@ -87,9 +87,10 @@ def test_what_does_not_fit_together_is_refused_all_at_once(make_simulation: Make
         Signal("b", "z", np.zeros((3, 2))),
         Signal("b", "z[2]", np.zeros(3)),
     )  # fmt: skip
+    late = replace(simulation.verdicts[0], sample=3)
     with pytest.raises(CosimulationError) as caught:
         replace(
-            simulation, t_ns=np.array([0, 5, 5]), signals=signals,
+            simulation, verdicts=(late,), t_ns=np.array([0, 5, 5]), signals=signals,
             arms=(Arm("chain", simulation.arms[0].chain, np.zeros((3, 5))),),
         )  # fmt: skip
     assert str(caught.value).splitlines() == [
@@ -97,5 +98,6 @@ def test_what_does_not_fit_together_is_refused_all_at_once(make_simulation: Make
         "simulation log-to-delta: a.x: found values of shape (2,), allowed: (3,) or (3, size)",
         "simulation log-to-delta: a.y: found values of shape (3, 1, 1), allowed: (3,) or (3, size)",
         "simulation log-to-delta: b.z[2]: found 2 signals of this name, allowed: one",
+        "simulation log-to-delta: verdict of meter: found sample 3, allowed: 0 to 2",
         "simulation log-to-delta: arm of chain: found joints of shape (3, 5), allowed: (3, 6)",
     ]

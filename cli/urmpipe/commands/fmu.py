@@ -57,6 +57,12 @@ def list_(as_json: bool, quiet: bool) -> int:
     "--log", type=click.Path(path_type=Path), help="The log of a unit that plays one: CSV, or a folder."
 )
 @click.option(
+    "--map",
+    "log_map",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="How to read the log (TOML), as ingest --write-map wrote it.",
+)
+@click.option(
     "-s",
     "--option",
     "given",
@@ -68,7 +74,7 @@ def list_(as_json: bool, quiet: bool) -> int:
 @click.option(
     "--backend",
     type=click.Choice(["native", "python"]),
-    help="native: C inside, needs nothing on the target. python: needs Python and urmpipe there"
+    help="native: C inside, needs nothing on the target. python: needs Python with NumPy there"
     " [default: native if it can be built here].",
 )
 @click.option(
@@ -91,6 +97,7 @@ def build(
     unit: str,
     robot: str | None,
     log: Path | None,
+    log_map: Path | None,
     given: dict[str, str],
     backend: Literal["native", "python"] | None,
     platforms: tuple[str, ...],
@@ -105,7 +112,7 @@ def build(
     \b
     Examples:
       urmpipe fmu build kinematic_chain --robot urm6
-      urmpipe fmu build kinematic_chain --robot arm.urdf -s rates=true -s sensors=p7
+      urmpipe fmu build kinematic_chain --robot arm.urdf -s rates=true -s points=p6,p7
       urmpipe fmu build repolarizer -s joints=6 --platforms linux64,win64
       urmpipe fmu build log_source --log log.csv -o fmus
       urmpipe fmu build my_unit.py
@@ -115,10 +122,14 @@ def build(
     from urmpipe.guards import place_robot
     from urmpipe.log_tables import read_table
     from urmpipe.printing import print_json, print_warnings
+    from urmpipe_pipeline.sources import read_map
 
+    if log_map and not log:
+        raise click.UsageError("--map: found without a log, allowed: with --log LOG")
     options = {name: option_value(text) for name, text in given.items()}
     arm = place_robot(robot)
-    table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm)
+    read = read_map(log_map).read if log_map else None
+    table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm, read=read)
     if table and not quiet:
         print_warnings(table.warnings)
     made = build_fmu(

@@ -62,7 +62,7 @@ def simulate(
     Examples:
       urmpipe simulate --list
       urmpipe simulate log-to-delta
-      urmpipe simulate log-to-delta --set log=log.csv --set path=path.csv --set robot=urm6
+      urmpipe simulate log-to-delta --set log=log.csv --set reference=path.csv
       urmpipe simulate one-drive --step 0.5ms --draw one-drive.svg
       urmpipe simulate my-system.toml -o run.rrd --json
 

@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from urmpipe_fmus.dependencies import LOGICAL
 from urmpipe_models.errors import UnitError
 
 Formula = Callable[..., Any]
@@ -117,7 +118,7 @@ def _built(
     made = (
         formulas[name](*inputs, **options) if name in _OPTIONS else formulas[name](*map(expression, inputs))
     )
-    return Symbol(made, logical=name in _LOGICAL)
+    return Symbol(made, logical=name in LOGICAL)
 
 
 def _is_logical(value: Any) -> bool:
@@ -129,13 +130,6 @@ _OPTIONS = {"round": ("decimals",), "around": ("decimals",), "clip": ("a_min", "
 
 _NOT_OF_TRUTH = ("add", "subtract", "negative", "positive")
 """What adds truth values in one form of NumPy, and joins or refuses them in another."""
-
-_LOGICAL = (
-    *("less", "less_equal", "greater", "greater_equal", "equal", "not_equal"),
-    *("logical_and", "logical_or", "logical_not", "logical_xor"),
-    *("bitwise_and", "bitwise_or", "invert", "bitwise_xor"),
-    *("isnan", "isfinite", "isinf", "signbit"),
-)
 
 
 def _ufuncs() -> dict[str, Formula]:
@@ -202,9 +196,21 @@ def _functions() -> dict[str, Formula]:
     return {"where": c.if_else, "round": _round, "around": _round, "clip": _clip}
 
 
+MOST_FACTORS = 16
+"""Up to this exponent a whole power is a product, whose bits are those of any platform; C's pow is not."""
+
+
 def _power(x: Any, y: Any) -> Any:
-    """Return x**y; x**2 as x x, as NumPy does."""
-    return x * x if y.is_constant() and float(y) == 2.0 else x**y
+    """Return x**y."""
+    exponent = float(y) if y.is_constant() else 0.5
+    if exponent != round(exponent) or not 1 <= abs(exponent) <= MOST_FACTORS:
+        return x**y
+    product = x
+    for digit in f"{int(abs(exponent)):b}"[1:]:
+        product = product * product
+        if digit == "1":
+            product = product * x
+    return product if exponent > 0.0 else 1.0 / product
 
 
 def _rounded(x: Any) -> Any:

@@ -15,8 +15,6 @@ from functools import wraps
 from math import isfinite
 from typing import Any, ClassVar, NamedTuple
 
-import numpy as np
-
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import LARGEST_INTEGER, ValueType
@@ -53,8 +51,7 @@ def guarded(method: Callable[..., Any]) -> Callable[..., Any]:
     @wraps(method)
     def call(self: Fmi2Slave, *arguments: Any) -> Any:
         try:
-            with np.errstate(all="ignore"):
-                return method(self, *arguments)
+            return method(self, *arguments)
         except BaseException as error:  # an interrupt too must not pass the binary unguarded
             said = self.told(error)
         for one in (type(self), self, self.log_queue):
@@ -83,7 +80,7 @@ class Fmi2Slave:
         """Return what an error says, fit for a log that takes it for a format of C's printf."""
         text = str(error) if isinstance(error, UnitError) else f"{type(error).__name__}: {error}"
         start = f"unit {self.unit.name}: "
-        text = text if text.startswith(start) else start + text
+        text = text if start in text else start + text
         return text.encode("utf-8", "backslashreplace").decode().replace("%", "%%")
 
     @guarded
@@ -103,8 +100,7 @@ class Fmi2Slave:
     def do_step(self, time: float, step: float) -> bool:
         """Go one step; if that fails nothing has changed, the reason is logged, and False is fmi2Discard."""
         try:
-            with np.errstate(all="ignore"):
-                self.instance.do_step(time, step)
+            self.instance.do_step(time, step)
         except BaseException as error:  # see `guarded`
             self.log_queue.append(Message(ERROR, "logStatusError", self.told(error)))
             return False

@@ -52,7 +52,7 @@ def unit_options(name: str) -> Mapping[str, str]:
     return cast("Mapping[str, str]", import_module(f"{__name__}.{name}").OPTIONS)
 
 
-def make_unit(name: str, **options: Any) -> Unit:
+def make_unit(name: str, /, **options: Any) -> Unit:
     """Return a unit.
 
     Args:

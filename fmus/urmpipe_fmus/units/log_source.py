@@ -52,6 +52,8 @@ def log_source(table: Table, columns: Sequence[Column | Sequence[Any]], interpol
         UnitError: If the columns are not as many as the table has, or with what is wrong with their names.
     """
     yes_or_no("log_source", "interpolate", interpolate)
+    if not isinstance(table, Table) or isinstance(columns, str) or not isinstance(columns, Sequence):
+        raise UnitError("unit log_source: found no table and columns, allowed: a Table, a list of columns")
     shown = [_column(one) for one in columns]
     width = sum(one.size or 1 for one in shown)
     if width != table.columns or not shown:
@@ -93,11 +95,13 @@ def _column(given: Column | Sequence[Any]) -> Column:
     Raises:
         UnitError: If it makes none.
     """
-    if isinstance(given, str) or not 1 <= len(given) <= len(Column._fields):
+    parts = () if isinstance(given, str) or not isinstance(given, Sequence) else tuple(given)
+    texts = (*parts[:2], *parts[3:])
+    if not 1 <= len(parts) <= len(Column._fields) or not all(isinstance(one, str) for one in texts):
         raise UnitError(
             f"unit log_source: option columns: found {given!r}, allowed: name, unit, size and description"
         )
-    column = Column(*given)
+    column = Column(*parts)
     if column.size is not None:
         whole_number("log_source", f"columns: {column.name}: size", column.size)
     return column

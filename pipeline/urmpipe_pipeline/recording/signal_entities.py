@@ -61,8 +61,8 @@ def simulation_blocks(simulation: Simulation) -> list[Block]:
     entities = signal_entities(simulation)
     worst = {one.block: one.sample for one in simulation.verdicts}
     for group in groups_of(simulation):
-        for one, colours in zip(group.signals, group.colours, strict=True):
-            names = tuple(printable(name) for name in one.variables)
+        for one, called, colours in zip(group.signals, group.names, group.colours, strict=True):
+            names = tuple(map(printable, called))
             row = worst.get(one.block)
             found.append(Block(entities[one.name], t_ns, one.columns, "signal", names, samples, row, colours))
     for arm, entity in zip(simulation.arms, arm_entities(simulation), strict=True):

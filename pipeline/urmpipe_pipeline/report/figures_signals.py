@@ -28,9 +28,11 @@ def signals_figure(simulation: Simulation, group: Group) -> Figure | None:
     shapes = [] if simulation.failed is None else [instant(end, "failed", end)]
     spec = stacked([panel], end, shapes)
     spec["layout"]["xaxis"]["range"] = [start, end if end > start else start + 1.0]
+    if all(one.type == "Boolean" for one in group.signals):
+        spec["layout"]["yaxis"] |= {"range": [-0.1, 1.1], "tickvals": [0, 1]}
     return Figure(
         group.variables,
-        " ".join(_described(one) for one in group.signals) + _shading(group),
+        " ".join(dict.fromkeys(map(_described, group.signals))) + _shading(group),
         f"{group.variables} of {group.block} over time. {_ends(simulation, group)}",
         spec,
         SIGNALS_PX,
@@ -42,7 +44,7 @@ def _lines(simulation: Simulation, group: Group, number: int, factor: float) -> 
     signal, unit = group.signals[number], group.shown[0]
     before = sum(one.columns.shape[1] for one in group.signals[:number])
     lines = []
-    for k, (name, values) in enumerate(zip(signal.variables, signal.columns.T, strict=True)):
+    for k, (name, values) in enumerate(zip(group.names[number], signal.columns.T, strict=True)):
         colour = group.colours[number][k]
         look = stroke(colour, DASHES[(before + k) // MOST % len(DASHES)])
         if signal.type != "Real":
@@ -82,8 +84,8 @@ def _ends(simulation: Simulation, group: Group) -> str:
     unit, factor = group.shown
     scalars = [
         (name, values)
-        for one in group.signals
-        for name, values in zip(one.variables, one.columns.T, strict=True)
+        for one, names in zip(group.signals, group.names, strict=True)
+        for name, values in zip(names, one.columns.T, strict=True)
     ]
     said = []
     for name, values in scalars[:ENDS_TOLD]:

@@ -23,7 +23,7 @@ from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_fact
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
 from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.signal_groups import groups_of
+from urmpipe_pipeline.signal_groups import Group, groups_of
 from urmpipe_pipeline.simulation import Result, Simulation
 from urmpipe_pipeline.wording import tolerance_words
 
@@ -150,15 +150,18 @@ def _simulations_summary(simulations: Sequence[Simulation], links: Sequence[str]
     return Summary("Simulations" if several else "Simulation", tuple(cards), tables)
 
 
+def _signals_part(simulation: Simulation, groups: Sequence[Group], link: str) -> Part:
+    """Return the part of a block, or of several like ones: its signals."""
+    title = f"{'Blocks' if groups[0].family else 'Block'} {groups[0].block}"
+    return Part(title, tuple(gallery.signal_figures(simulation, groups)), link=link)
+
+
 def _simulation_part(simulation: Simulation, ident: str) -> Part:
     """Return the part of a simulation: the system, its verdicts, then what each block did."""
     meters = (simulation_tables.meters_table(simulation.verdicts),) if simulation.verdicts else ()
     drawing, file = system_drawing(simulation), system_file(simulation)
     groups = groupby(groups_of(simulation), key=lambda group: group.block)
-    blocks = tuple(
-        Part(f"Block {name}", tuple(gallery.signal_figures(simulation, list(some))), link=ident)
-        for name, some in groups
-    )
+    blocks = [_signals_part(simulation, list(some), ident) for _, some in groups]
     made = (
         simulation_tables.signals_table(simulation),
         simulation_tables.settings_table(simulation),

@@ -25,6 +25,9 @@ CAMERA = {"eye": {"x": 1.5, "y": -1.5, "z": 0.86}, "center": {"x": 0.0, "y": 0.0
 
 HANDLING = "Drag to turn; pinch to zoom, with a mouse by the bar at the top right."
 
+AROUND, CLOSEST = 0.05, 1e-3
+"""Space around the path of an arm as a share of its extent, and half of the shortest axis in [m]."""
+
 SCENE_PX = 540
 """Height of a scene."""
 
@@ -84,12 +87,14 @@ def arms_path_figure(simulation: Simulation) -> Figure | None:
         _way(block, position, simulation.t, run_colour(i), 4) for i, (block, position) in enumerate(found)
     ]
     low, high = every.min(axis=0), every.max(axis=0)
+    spec = _scene([*ways, *_ends(known[0] if len(known[0]) else every)])
+    _frame(spec, low, high)
     return Figure(
         "Path in space",
         f"The tip of each arm, equal scale on all axes. {HANDLING}",
         f"Path of {', '.join(block for block, _ in found)} in three dimensions, within ({text.point(low)}) m"
         f" and ({text.point(high)}) m.",
-        _scene([*ways, *_ends(known[0] if len(known[0]) else every)]),
+        spec,
         SCENE_PX,
         space=True,
     )
@@ -188,6 +193,14 @@ def _spot(name: str, position: FloatArray, colour: str, symbol: str) -> Spec:
 def _in_space(position: FloatArray) -> Spec:
     x, y, z = (typed(column) for column in position.T)
     return {"type": "scatter3d", "x": x, "y": y, "z": z}
+
+
+def _frame(spec: Spec, low: FloatArray, high: FloatArray) -> None:
+    """Give a scene axes of one length around what lies between two corners: a slim path stays in view."""
+    spec["layout"]["scene"]["aspectmode"] = "cube"
+    half = max(float((high - low).max()) / 2.0 * (1.0 + AROUND), CLOSEST)
+    for name, middle in zip("xyz", ((low + high) / 2.0).tolist(), strict=True):
+        spec["layout"]["scene"][f"{name}axis"]["range"] = [middle - half, middle + half]
 
 
 def _scene(traces: list[Spec]) -> Spec:

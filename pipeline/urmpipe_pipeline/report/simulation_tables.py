@@ -62,7 +62,7 @@ def blocks_table(simulation: Simulation) -> Table:
     """Return what the blocks are, and by which content they are known again."""
     rows = [(one.name, one.kind, one.source, one.content, one.description) for one in simulation.blocks]
     columns = words("Block", "Kind", "Which", "GUID or hash", "Description")
-    return listing(f"Blocks ({len(rows)})", columns, rows, folded=False)
+    return listing(f"Blocks ({len(rows)})", columns, rows)
 
 
 def connections_table(simulation: Simulation) -> Table:

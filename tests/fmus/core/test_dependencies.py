@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 
-from random_units import random_units
+from random_units import PATIENT, random_units
 from urmpipe_fmus.dependencies import FUNCTIONS, TIME, Dependencies
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
@@ -149,6 +149,7 @@ def test_the_functions_that_are_allowed_are_those_that_become_c() -> None:
     assert sorted(FUNCTIONS) == sorted(traceable())
 
 
+@settings(**PATIENT)
 @given(random_units())
 def test_what_an_expression_of_casadi_depends_on_is_remembered_and_nothing_else(unit: Unit) -> None:
     casadi = pytest.importorskip("casadi")

@@ -62,6 +62,15 @@ def test_elements_go_in_by_kind_and_come_out_in_order() -> None:
             ],
         ),
         (
+            {"y": "1.0", "p": (1j, None), 3: 4.0},
+            [
+                "3: found in what it returns, allowed: y, p",
+                "y: found str, allowed: one element",
+                "p[1]: found complex, allowed: one element",
+                "p[2]: found nothing (None), allowed: one element",
+            ],
+        ),
+        (
             {"y": (1.0,), "p": (1.0, 2.0, 3.0)},
             ["y: found tuple, allowed: one element", "p: found 3 elements, allowed: 2"],
         ),

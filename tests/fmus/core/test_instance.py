@@ -8,10 +8,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from random_units import random_columns, random_starts, random_units
+from random_units import PATIENT, random_columns, random_starts, random_units
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.unit import INTERNAL_STEP, Unit
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
@@ -235,6 +235,7 @@ def test_a_step_is_divided_into_equal_internal_steps() -> None:
         ]
 
 
+@settings(**PATIENT)
 @given(
     random_units().flatmap(
         lambda unit: st.tuples(st.just(unit), random_starts(unit), random_columns(unit, 6))

@@ -6,10 +6,10 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from random_units import random_columns, random_starts, random_units
+from random_units import PATIENT, random_columns, random_starts, random_units
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
@@ -95,6 +95,7 @@ def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:
     assert found["m"].tolist() == [10.0, 11.0, 13.0, 17.0]
 
 
+@settings(**PATIENT)
 @given(
     random_units(remembers=False).flatmap(
         lambda unit: st.tuples(st.just(unit), random_starts(unit), random_columns(unit, 5))

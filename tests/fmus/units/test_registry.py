@@ -73,6 +73,8 @@ def test_unknown_and_missing_options_are_all_told_at_once() -> None:
         "unit repolarizer: option period: found, allowed: joints",
         "unit repolarizer: option joints: not found, it needs the number of joints, such as 6",
     ]
+    with pytest.raises(UnitError, match=r"^unit delta_meter: option name: found, allowed: none"):
+        make_unit("delta_meter", name="mine")
     with pytest.raises(UnitError) as error:
         make_unit("delta_meter", tolerance=0.001)
     assert str(error.value) == ("unit delta_meter: option tolerance: found, allowed: none, it has no options")

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import math
 import re
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
 
+from random_units import PATIENT, random_unit_sources
 from urmpipe_fmus.run import run
 from urmpipe_fmus.user_unit import load_unit_file, unit_of_source
 from urmpipe_models.errors import UnitError
@@ -77,6 +80,15 @@ def test_a_unit_carries_the_text_of_its_file_from_which_it_is_made_again(tmp_pat
     again = unit_of_source(unit.recipe.source, "own.py")
     assert again.variables == unit.variables
     assert run(again, np.array([0.0]), {"u": np.array([3.0])})["y"].tolist() == [6.0]
+
+
+@settings(max_examples=30, **PATIENT)
+@given(random_unit_sources())
+def test_any_file_with_a_sound_unit_is_taken(source: str) -> None:
+    with tempfile.TemporaryDirectory() as folder:
+        unit = load_unit_file(written(Path(folder), source))
+    assert unit.recipe.source == source
+    assert unit.variables == unit_of_source(source, "own.py").variables
 
 
 def test_two_files_of_one_name_keep_their_own_functions(tmp_path: Path) -> None:

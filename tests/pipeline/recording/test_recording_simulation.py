@@ -103,6 +103,19 @@ def test_a_long_one_comes_back_in_the_order_of_time(make_simulation: MakeSimulat
     assert "/overview/signals" not in rows
 
 
+def test_columns_of_a_wider_array_come_back_as_they_were(
+    make_simulation: MakeSimulation, tmp_path: Path
+) -> None:
+    """A co-simulation records all scalars in one array; its signals are views into it."""
+    recorded = np.random.default_rng(5).normal(size=(40, 9))
+    signals = (
+        Signal("b", "x", recorded[:, 4]), Signal("b", "y", recorded[:, 1:4]),
+        Signal("b", "z", np.asfortranarray(recorded[:, 5:])), Signal("b", "w", recorded[::-1, 0]),
+    )  # fmt: skip
+    simulation = replace(make_simulation(40), signals=signals, verdicts=())
+    assert_comes_back(simulation, tmp_path)
+
+
 def test_a_variable_is_an_entity_with_a_column_a_scalar(
     make_simulation: MakeSimulation, tmp_path: Path
 ) -> None:

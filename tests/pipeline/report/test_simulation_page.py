@@ -156,8 +156,21 @@ def test_each_block_and_unit_has_a_plot_in_the_unit_that_people_like(
     levels = [shape["y0"] for shape in spec["layout"]["shapes"] if shape["type"] == "line"]
     assert levels == [3.5, -3.5]
     assert found["Block log/q"].spec["layout"]["yaxis"]["title"]["text"] == "q [deg]"
-    flag = found["Block meter/out_of_tolerance"].spec["data"][0]
-    assert flag["line"]["shape"] == "hv"
+    flag = found["Block meter/out_of_tolerance"].spec
+    assert flag["data"][0]["line"]["shape"] == "hv"
+    assert flag["layout"]["yaxis"]["tickvals"] == [0, 1]
+
+
+def test_a_slim_path_stands_in_a_box_of_equal_sides(make_simulation: MakeSimulation) -> None:
+    simulation = make_simulation()
+    found = figures(lay_out([simulation]).parts[0])["Simulation log-to-delta/Path in space"]
+    scene = found.spec["layout"]["scene"]
+    assert scene["aspectmode"] == "cube"
+    position = simulation.signal("chain.p7").values
+    ranges = np.array([scene[f"{axis}axis"]["range"] for axis in "xyz"])
+    np.testing.assert_allclose(np.ptp(ranges, axis=1), 1.05 * np.ptp(position, axis=0).max(), rtol=1e-9)
+    assert (ranges[:, 0] < position.min(axis=0)).all()
+    assert (ranges[:, 1] > position.max(axis=0)).all()
 
 
 def test_a_long_simulation_is_drawn_with_few_points_and_every_peak(make_simulation: MakeSimulation) -> None:

@@ -38,9 +38,4 @@ void model_outputs(double time, const double *v, const Rows *rows, double *outpu
 void model_derivatives(double time, const double *v, const Rows *rows, double *derivatives);
 void model_update(double time, const double *v, const Rows *rows, double *next);
 
-/* Functions of NumPy that C does not have: sign, minimum and maximum; a NaN goes through. */
-static inline double sign_of(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x == 0.0 ? 0.0 : x; }
-static inline double lesser(double x, double y) { return x <= y || x != x ? x : y; }
-static inline double greater(double x, double y) { return x >= y || x != x ? x : y; }
-
 #endif

@@ -1,0 +1,90 @@
+"""An FMU of a unit run as a master runs it: set, get, step, on FMPy's low-level calls."""
+
+from __future__ import annotations
+
+import tempfile
+from collections.abc import Mapping, Sequence
+from itertools import groupby
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.variable import Variable
+
+FloatArray = NDArray[np.float64]
+
+
+class FmuRun:
+    """An instance of an FMU, from which variables are set and got by the unit's names.
+
+    Args:
+        path: The FMU.
+        unit: What is in it.
+        start: Parameters, inputs and states to set before the first step.
+        time: Where it starts in [s].
+    """
+
+    def __init__(self, path: Path, unit: Unit, start: Mapping[str, Any], time: float = 0.0) -> None:
+        self.path, self.unit, self.start, self.time = path, unit, start, time
+        self._index = {name: index for index, (name, _) in enumerate(unit.scalars)}
+
+    def __enter__(self) -> Self:
+        from fmpy import extract, read_model_description
+        from fmpy.fmi2 import FMU2Slave
+
+        self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
+        extract(str(self.path), self._folder.name)
+        described = read_model_description(self._folder.name)
+        self.fmu = FMU2Slave(
+            guid=described.guid,
+            unzipDirectory=self._folder.name,
+            modelIdentifier=described.coSimulation.modelIdentifier,
+            instanceName=self.unit.name,
+        )
+        self.fmu.instantiate()
+        self.fmu.setupExperiment(startTime=self.time)
+        self.put(self.start)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.fmu.terminate()
+        self.fmu.freeInstance()
+        self._folder.cleanup()
+
+    def put(self, values: Mapping[str, Any]) -> None:
+        """Set variables by name."""
+        for one in self.unit.variables:
+            if one.name in values:
+                found = np.ravel(np.broadcast_to(values[one.name], (one.width,))).tolist()
+                whole = [value if one.type == "Real" else int(value) for value in found]
+                getattr(self.fmu, f"set{one.type}")(self._references(one), whole)
+
+    def get(self, variables: Sequence[Variable]) -> list[float]:
+        """Return the scalars of some variables."""
+        found: list[float] = []
+        for kind, some in groupby(variables, key=lambda one: one.type):
+            references = [reference for one in some for reference in self._references(one)]
+            found += [float(value) for value in getattr(self.fmu, f"get{kind}")(references)]
+        return found
+
+    def over(self, t: FloatArray, columns: Mapping[str, Any]) -> FloatArray:
+        """Return what it shows at every sample for the inputs of that sample, a column a scalar."""
+        shown = [one for one in self.unit.variables if one.causality == "output"]
+        rows = []
+        for k, time in enumerate(t.tolist()):
+            self.put({name: column[k] for name, column in columns.items()})
+            rows.append(self.get(shown))
+            if k + 1 < len(t):
+                self.fmu.doStep(time, float(t[k + 1]) - time)
+        return np.array(rows, dtype=np.float64)
+
+    def _references(self, one: Variable) -> list[int]:
+        return [self._index[name] for name in one.names]

@@ -1,0 +1,128 @@
+"""From a unit to a file: both backends, the choice between them, the content."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree as ET
+
+import pytest
+from fmpy.validation import validate_fmu
+
+from loaded_fmu import Loaded
+from urmpipe_fmus.archive import content_guid
+from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.native import native_missing, this_platform
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.units import make_unit, unit_names
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.errors import FmuError
+
+Make = Callable[..., Unit]
+WHY = native_missing([this_platform()])
+needs_native = pytest.mark.skipif(WHY is not None, reason=f"needs the native backend: {WHY}")
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    with zipfile.ZipFile(path) as archive:
+        return {name: archive.read(name) for name in archive.namelist()}
+
+
+def guid_in(path: Path) -> str:
+    return ET.fromstring(contents(path)["modelDescription.xml"]).get("guid", "")
+
+
+@needs_native
+def test_a_native_fmu_is_valid_and_the_same_bytes_again(unit: Unit, tmp_path: Path) -> None:
+    made = build_fmu(unit, tmp_path, backend="native")
+    first = made.path.read_bytes()
+    assert validate_fmu(str(made.path)) == []
+    assert (made.path, made.backend, made.platforms, made.note) == (
+        tmp_path / f"{unit.name}.fmu",
+        "native",
+        (this_platform(),),
+        "",
+    )
+    assert guid_in(made.path) == made.guid
+    assert build_fmu(unit, tmp_path, backend="native").path.read_bytes() == first
+
+
+@needs_native
+def test_a_native_fmu_holds_description_binary_sources_and_documentation(make: Make, tmp_path: Path) -> None:
+    found = contents(build_fmu(make("playback"), tmp_path, backend="native").path)
+    compiled = [one.get("name") for one in ET.fromstring(found["modelDescription.xml"]).findall(".//File")]
+    assert compiled == sorted(
+        name.removeprefix("sources/") for name in found if name.startswith("sources/") and name.endswith(".c")
+    )
+    assert "model.c" in compiled
+    assert {"sources/guid.h", "resources/table.bin", "documentation/index.html"} <= set(found)
+    assert sum(name.startswith("binaries/") for name in found) == 1
+
+
+def test_the_guid_is_that_of_the_content(make: Make, tmp_path: Path) -> None:
+    made = build_fmu(make("spring"), tmp_path, backend="python")
+    found = contents(made.path)
+    assert guid_in(made.path) == made.guid
+    found["modelDescription.xml"] = found["modelDescription.xml"].replace(made.guid.encode(), b"")
+    assert content_guid(found) == made.guid
+
+
+def test_other_descriptions_tables_and_backends_have_other_guids(make: Make, tmp_path: Path) -> None:
+    units = [make("spring"), make("playback"), make("playback", gain=2.0)]
+    guids = {build_fmu(one, tmp_path, backend="python").guid for one in units}
+    assert len(guids) == len(units)
+
+
+@needs_native
+def test_native_is_the_default_where_it_can_be_built(make: Make, tmp_path: Path) -> None:
+    made = build_fmu(make("arm"), tmp_path / "any.fmu")
+    assert (made.backend, made.note, made.path) == ("native", "", tmp_path / "any.fmu")
+
+
+def test_without_a_compiler_it_is_python_and_a_line_says_why(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "no-such-compiler")
+    made = build_fmu(make("arm"), tmp_path)
+    assert made.backend == "python"
+    assert made.platforms == ("linux64", "win64")
+    assert made.note == f"arm.fmu runs on Python, as no native one can be built here: {native_missing(())}"
+    assert "no C compiler" in made.note
+    with pytest.raises(FmuError, match=r"^unit arm: no native FMU can be built: no C compiler"):
+        build_fmu(make("arm"), tmp_path, backend="native")
+
+
+def test_a_failed_build_leaves_the_file_that_was_there(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = build_fmu(make("arm"), tmp_path, backend="python").path
+    before = path.read_bytes()
+    monkeypatch.setenv("CC", "no-such-compiler")
+    with pytest.raises(FmuError):
+        build_fmu(make("arm"), tmp_path, backend="native")
+    assert path.read_bytes() == before
+    assert list(tmp_path.iterdir()) == [path]
+
+
+OPTIONS: dict[str, dict[str, Any]] = {
+    "kinematic_chain": {"robot": load_robot("urm6")},
+    "repolarizer": {"joints": 6},
+}
+
+
+@pytest.mark.parametrize("name", [name for name in unit_names() if name != "log_source"])
+def test_every_shipped_unit_is_a_valid_python_fmu_that_starts_as_it_says(name: str, tmp_path: Path) -> None:
+    unit = make_unit(name, **OPTIONS.get(name, {}))
+    path = build_fmu(unit, tmp_path, backend="python").path
+    assert validate_fmu(str(path)) == []
+    fmu = Loaded(path)
+    starts = {
+        scalar: one.starts[one.names.index(scalar)]
+        for scalar, one in unit.scalars
+        if one not in unit.computed
+    }
+    assert fmu.get(list(starts)) == list(starts.values())
+    fmu.get([scalar for one in unit.computed for scalar in one.names])
+    fmu.free()

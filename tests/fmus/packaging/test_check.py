@@ -1,0 +1,236 @@
+"""Checking FMUs: good ones, ones of other tools, ones that fail, crash or hang, and files that are none."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import zipfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+
+from urmpipe_fmus import check
+from urmpipe_fmus.archive import write_fmu
+from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.check import check_fmu
+from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.native import native_missing, this_platform
+from urmpipe_fmus.unit import Recipe, Unit
+from urmpipe_fmus.user_unit import unit_of_source
+from urmpipe_models.errors import FmuError
+
+Make = Callable[..., Unit]
+BACKENDS = ["python", "native"]
+
+
+def built(unit: Unit, folder: Path, backend: str = "python") -> Path:
+    missing = native_missing([this_platform()])
+    if backend == "native" and missing:
+        pytest.skip(f"needs the native backend: {missing}")
+    return build_fmu(unit, folder, backend=backend).path  # type: ignore[arg-type]
+
+
+def changed(path: Path, old: str, new: str) -> Path:
+    """The FMU with another model description."""
+    with zipfile.ZipFile(path) as archive:
+        files = {name: archive.read(name) for name in archive.namelist()}
+    described = files["modelDescription.xml"].decode()
+    assert old in described
+    write_fmu(path, files | {"modelDescription.xml": described.replace(old, new).encode()})
+    return path
+
+
+@pytest.mark.parametrize("backend", BACKENDS)
+def test_a_good_fmu_has_no_problems_and_its_values_are_those_of_an_instance(
+    unit: Unit, tmp_path: Path, backend: str
+) -> None:
+    found = check_fmu(built(unit, tmp_path, backend))
+    instance = Instance(unit)
+    everything = range(len(unit.scalars))
+    before = [float(one) for one in instance.get(everything)]
+    for k in range(found.steps):
+        instance.do_step(k * found.step, found.step)
+    assert (found.problems, found.ran, found.name) == ((), True, unit.name)
+    assert [one.name for one in found.variables] == [name for name, _ in unit.scalars]
+    # Native code may round the last bit of a function of the C library otherwise than NumPy.
+    assert [one.before for one in found.variables] == pytest.approx(before, rel=1e-14, abs=1e-15)
+    after = [float(one) for one in instance.get(everything)]
+    assert [one.after for one in found.variables] == pytest.approx(after, rel=1e-13, abs=1e-15)
+
+
+def test_what_was_found_goes_into_json(make: Make, tmp_path: Path) -> None:
+    path = built(make("playback"), tmp_path)
+    found = json.loads(json.dumps(check_fmu(path).to_dict(), allow_nan=False))
+    assert found["path"] == str(path)
+    assert (found["step"], found["steps"], found["problems"], found["ran"]) == (0.1, 3, [], True)
+    assert found["platforms"] == ["linux64", "win64"]
+    assert found["variables"][2] == {
+        "name": "between",
+        "causality": "output",
+        "variability": "continuous",
+        "type": "Real",
+        "unit": "m",
+        "start": "",
+        "before": 0.5,
+        "after": 1.5,
+        "description": "The second column, interpolated",
+    }
+
+
+FOREIGN = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Integer, Real, String
+class Foreign(Fmi2Slave):
+    def __init__(self, **options):
+        super().__init__(**options)
+        self.x, self.n, self.s = 0.0, 3, "text"
+        self.register_variable(Real("x", causality=Fmi2Causality.output))
+        self.register_variable(Integer("n", causality=Fmi2Causality.output))
+        self.register_variable(String("s", causality=Fmi2Causality.output))
+    def do_step(self, time, step):
+        self.x += step
+        return True
+"""
+
+
+def test_an_fmu_of_another_tool_is_checked_too(tmp_path: Path) -> None:
+    (tmp_path / "foreign.py").write_text(FOREIGN)
+    command = [sys.executable, "-m", "pythonfmu", "build", "-f", "foreign.py"]
+    subprocess.run(command, cwd=tmp_path, check=True, capture_output=True)
+    found = check_fmu(tmp_path / "Foreign.fmu")
+    assert found.ran
+    assert found.problems == (
+        'The variable "n" (line 15) is of type Integer and must have variability != "continuous".',
+        'The variable "s" (line 18) is of type String and must have variability != "continuous".',
+        "ModelStructure/InitialUnknowns does not contain the expected set of variables. Expected {n, s, x}"
+        " but was {}.",
+    )
+    assert [one.before for one in found.variables] == [0.0, 3, "text"]
+    assert [one.after for one in found.variables] == [pytest.approx(20 * 0.005, rel=1e-14), 3, "text"]
+
+
+FAILING = '''"""A unit that fails on its way."""
+import os, time
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.variable import Memory
+
+def failing(v):
+    if isinstance(v.time, float) and v.time > 0.012:
+        {how}
+    return {{"n": v.n + 1.0}}
+
+unit = Unit(name="failing", description="", update=failing,
+    variables=(Memory(name="n", description="", output=True),))
+'''
+
+
+def failing(how: str) -> Unit:
+    source = FAILING.format(how=how)
+    return replace(unit_of_source(source, "failing.py"), recipe=Recipe("failing.py", source=source))
+
+
+def test_a_step_that_fails_is_told_with_the_last_lines_of_the_log(tmp_path: Path) -> None:
+    found = check_fmu(built(failing('raise ValueError("no more")'), tmp_path))
+    assert found.problems == (
+        "fmi2DoStep at 0.015 s: fmi2DoStep failed with status 2 (discard).",
+        "its log: failing.py:8: unit failing: update: ValueError: no more",
+    )
+    assert not found.ran
+    assert found.variables[0].before == 0.0
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
+def test_an_fmu_that_ends_its_process_does_not_end_ours(tmp_path: Path) -> None:
+    found = check_fmu(built(failing("os.abort()"), tmp_path))
+    assert found.problems == ("fmi2DoStep at 0.015 s ended its process: Aborted",)
+    assert not found.ran
+    found = check_fmu(built(failing("os._exit(3)"), tmp_path))
+    assert found.problems == ("fmi2DoStep at 0.015 s ended its process with exit code 3",)
+
+
+def test_an_fmu_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(check, "SECONDS", 3.0)
+    found = check_fmu(built(failing("time.sleep(1000)"), tmp_path))
+    assert len(found.problems) == 1
+    assert found.problems[0].endswith(" did not return within 3 s")
+
+
+def test_an_fmu_that_ends_well_but_early_is_no_good_one(tmp_path: Path) -> None:
+    found = check_fmu(built(failing("os._exit(0)"), tmp_path))
+    assert found.problems == ("fmi2DoStep at 0.015 s ended its process with exit code 0",)
+
+
+def test_a_wrong_guid_is_told_with_what_the_fmu_logged(make: Make, tmp_path: Path) -> None:
+    path = built(make("arm"), tmp_path, "native")
+    found = check_fmu(changed(path, 'guid="{', 'guid="{0'))
+    assert found.problems[0] == "fmi2Instantiate: Failed to instantiate model"
+    assert found.problems[1].startswith("its log: unit arm: GUID: found {0")
+
+
+def test_problems_of_the_description_are_told_and_it_runs_all_the_same(make: Make, tmp_path: Path) -> None:
+    path = built(make("spring"), tmp_path)
+    found = check_fmu(changed(path, '<Unit name="kg">', '<Unit name="kilo">'))
+    assert found.problems == ('The unit "kg" of variable "m" (line 40) is not defined.',)
+    assert found.ran
+    found = check_fmu(changed(path, '<Unit name="m">', '<Unit name="metre">'))
+    assert found.problems == ("the validation ended with KeyError: 'm'",)
+    assert found.ran
+
+
+def test_without_a_binary_for_this_platform_it_is_not_run(make: Make, tmp_path: Path) -> None:
+    other = "win64" if this_platform() == "linux64" else "linux64"
+    path = build_fmu(make("arm"), tmp_path, backend="python", platforms=[other]).path
+    found = check_fmu(path)
+    assert found.problems == (
+        f"found binaries for {other}, allowed for a run here: {this_platform()}; it was not run",
+    )
+    assert (found.ran, found.variables[0].before, found.variables[0].start) == (False, None, "0.1")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('fmiVersion="2.0"', 'fmiVersion="3.0"', "found FMI 3.0, allowed: FMI 2.0 for co-simulation"),
+        (
+            "CoSimulation",
+            "ModelExchange",
+            "found no FMU for co-simulation, allowed: FMI 2.0 for co-simulation",
+        ),
+    ],
+)
+def test_fmus_of_other_kinds_are_refused_with_what_is_allowed(
+    make: Make, tmp_path: Path, old: str, new: str, said: str
+) -> None:
+    path = changed(built(make("arm"), tmp_path), old, new)
+    with pytest.raises(FmuError) as caught:
+        check_fmu(path)
+    assert str(caught.value) == f"{path}: {said}"
+
+
+def test_files_that_are_no_fmus_are_refused_with_their_name(make: Make, tmp_path: Path) -> None:
+    missing, text, empty = (tmp_path / name for name in ("missing.fmu", "text.fmu", "empty.fmu"))
+    text.write_text("no zip")
+    write_fmu(empty, {"readme.txt": b""})
+    broken = changed(built(make("arm"), tmp_path), "</fmiModelDescription>", "")
+    for path, said in (
+        (missing, "cannot be read: No such file or directory"),
+        (tmp_path, "cannot be read: Is a directory"),
+        (text, "found no zip, or a damaged one (File is not a zip file), allowed: an FMU"),
+        (empty, "found no modelDescription.xml, allowed: an FMU"),
+        (broken, "modelDescription.xml cannot be read: no element found: line"),
+    ):
+        with pytest.raises(FmuError) as caught:
+            check_fmu(path)
+        assert str(caught.value).startswith(f"{path}: {said}")
+
+
+def test_a_damaged_fmu_is_refused_with_its_name(make: Make, tmp_path: Path) -> None:
+    path = built(make("arm"), tmp_path)
+    content = bytearray(path.read_bytes())
+    content[2000:60000] = bytes(58000)  # in the first entry, a binary
+    path.write_bytes(content)
+    with pytest.raises(FmuError) as caught:
+        check_fmu(path)
+    assert str(caught.value).startswith(f"{path}: cannot be extracted: ")
