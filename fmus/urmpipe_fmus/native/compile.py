@@ -42,9 +42,12 @@ def native_missing(platforms: Sequence[str] = ()) -> str | None:
     unknown = [one for one in platforms if one not in TARGETS and one != this_platform()]
     if unknown:
         return f"platform {', '.join(unknown)}: allowed: {', '.join(sorted({*TARGETS, this_platform()}))}"
+    if find_spec("ziglang") or _compiles_itself(platforms or (this_platform(),)):
+        return None
+    zig = "ziglang is not installed (pip install 'urmpipe[cross]')"
     if _is_local(platforms or (this_platform(),)):
-        return None if _system_compiler() else "no C compiler is found (cc, or what the variable CC names)"
-    return None if find_spec("ziglang") else "ziglang is not installed (pip install 'urmpipe[cross]')"
+        return f"no C compiler is found (cc, or what the variable CC names), and {zig}"
+    return zig
 
 
 def native_binaries(
@@ -88,11 +91,16 @@ def _system_compiler() -> list[str] | None:
     return command if command and shutil.which(command[0]) else None
 
 
+def _compiles_itself(platforms: Sequence[str]) -> bool:
+    """Return whether the system's compiler makes all that is wanted."""
+    return _is_local(platforms) and _system_compiler() is not None
+
+
 def _command(platforms: Sequence[str], one: str) -> list[str]:
     """Return the compiler and flags for one of some platforms."""
     position = [] if one.startswith("win") else ["-fPIC"]
-    local = _system_compiler() if _is_local(platforms) else None
-    if local:
+    local = _system_compiler()
+    if local and _is_local(platforms):
         linked = ["-Wl,--build-id=none"] if one.startswith("linux") else []
         return [*local, *FLAGS, *position, *linked]
     return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[one], *FLAGS, *position]

@@ -54,7 +54,7 @@ def _function(unit: Unit, name: str) -> Any:
     method: Callable[..., list[Any]] = getattr(Equations(unit), name)
     found = method(Symbol(time), given, rows)
     try:
-        result = casadi.vertcat(*map(expression, found))
+        result = casadi.densify(casadi.vertcat(*map(expression, found)))
     except UnitError as error:
         raise UnitError(*(f"unit {unit.name}: {name}: {one}" for one in error.findings)) from error
     arguments = [time, *(casadi.vertcat(*group) for group in (values, before, after)), fraction]

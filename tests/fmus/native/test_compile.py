@@ -17,7 +17,7 @@ import pytest
 
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
-from urmpipe_fmus.native.compile import TARGETS
+from urmpipe_fmus.native.compile import SUFFIXES, TARGETS
 from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
@@ -77,20 +77,27 @@ def test_the_error_of_a_compiler_is_told(oscillator: Unit, monkeypatch: pytest.M
     assert said[0] == f"unit oscillator: the C compiler failed for {this_platform()} (exit code 1)"
     assert "model.c:1:14: error" in said[1]
     monkeypatch.setenv("CC", "no-such-compiler")
+    only_casadi(monkeypatch)
     with pytest.raises(FmuError) as error:
         native_binaries(oscillator, native_sources(oscillator), GUID, [this_platform()])
     assert str(error.value) == (
         "unit oscillator: no native FMU can be built:"
-        " no C compiler is found (cc, or what the variable CC names)"
+        " no C compiler is found (cc, or what the variable CC names),"
+        " and ziglang is not installed (pip install 'urmpipe[cross]')"
+    )
+
+
+def only_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hide ziglang."""
+    monkeypatch.setattr(
+        "urmpipe_fmus.native.compile.find_spec", lambda name: None if name == "ziglang" else name
     )
 
 
 def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     allowed = ", ".join(sorted({*TARGETS, this_platform()}))
     assert native_missing(["amiga"]) == f"platform amiga: allowed: {allowed}"
-    monkeypatch.setattr(
-        "urmpipe_fmus.native.compile.find_spec", lambda name: None if name == "ziglang" else name
-    )
+    only_casadi(monkeypatch)
     assert native_missing(["linux64", "win64"]) == "ziglang is not installed (pip install 'urmpipe[cross]')"
     monkeypatch.setattr("urmpipe_fmus.native.compile.find_spec", lambda _: None)
     assert native_missing() == "casadi is not installed (pip install 'urmpipe[native]')"
@@ -224,6 +231,25 @@ def test_cross_compiled_binaries_are_the_same_bytes_in_any_folder(
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setenv("ZIG_LOCAL_CACHE_DIR", str(tmp_path / "cache"))
     assert native_binaries(oscillator, sources, GUID, ["linux64", "win64"]) == once
+
+
+@pytest.mark.slow
+@needs_zig
+def test_zig_compiles_for_this_platform_where_there_is_no_other_compiler(
+    player: Unit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if this_platform() not in TARGETS:
+        pytest.skip("needs a platform that zig compiles for")
+    monkeypatch.setenv("CC", "no-such-compiler")
+    sources = native_sources(player)
+    (one,) = native_binaries(player, sources, GUID, [this_platform()]).values()
+    monkeypatch.delenv("CC")
+    assert (
+        native_binaries(player, sources, GUID, sorted(TARGETS))[
+            f"binaries/{this_platform()}/player{SUFFIXES.get(this_platform(), '.so')}"
+        ]
+        == one
+    )
 
 
 @pytest.mark.slow

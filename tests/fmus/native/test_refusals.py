@@ -125,13 +125,13 @@ def test_calls_out_of_their_sequence_are_refused(native: Callable[..., Any], osc
     one = native(oscillator)
     fmu = one.fmu
     assert one.refused(fmu.enterInitializationMode) == [
-        "unit oscillator: fmi2EnterInitializationMode: found a call after fmi2ExitInitializationMode,"
-        " allowed: before fmi2EnterInitializationMode"
+        "unit oscillator: fmi2EnterInitializationMode: found a call after fmi2ExitInitializationMode"
+        " and before fmi2Terminate, allowed: before fmi2EnterInitializationMode"
     ]
     fmu.terminate()
     assert one.refused(lambda: one.step(0.0, 0.1)) == [
         "unit oscillator: fmi2DoStep: found a call after fmi2Terminate,"
-        " allowed: after fmi2ExitInitializationMode, before fmi2Terminate"
+        " allowed: after fmi2ExitInitializationMode and before fmi2Terminate"
     ]
     assert one.refused(lambda: fmu.setReal([GOAL], [1.0])) == [
         "unit oscillator: fmi2SetReal: found a call after fmi2Terminate, allowed: before fmi2Terminate"
@@ -227,16 +227,29 @@ def test_a_table_that_is_missing_cut_or_foreign_is_refused(built: Callable[..., 
     assert said_of(swapped) == "found times that fall, allowed: rising ones"
 
 
-def test_a_folder_with_any_letters_is_found(built: Callable[..., Path], native: Any, player: Unit) -> None:
-    folder = built(player, "a folder, 100% \u00fc\u4e2d#")
-    from fmpy import fmi2
+def first_value(folder: Path, resources: str | None) -> float | None:
+    """What the player shows at 0 s if it is told that its resources are somewhere; None if it is not made."""
+    (path,) = folder.glob("binaries/*/player*")
+    library = ctypes.CDLL(str(path))
+    library.fmi2Instantiate.restype = ctypes.c_void_p
+    place = None if resources is None else resources.encode()
+    guid = b"{12345678-0000-0000-0000-000000000000}"
+    made = library.fmi2Instantiate(b"one", 1, guid, place, None, 0, 0)
+    if made is None:
+        return None
+    value = (ctypes.c_double * 1)()
+    assert library.fmi2GetReal(ctypes.c_void_p(made), (ctypes.c_uint * 1)(0), ctypes.c_size_t(1), value) == 0
+    library.fmi2FreeInstance(ctypes.c_void_p(made))
+    return value[0]
 
-    fmu = fmi2.FMU2Slave(
-        guid="{12345678-0000-0000-0000-000000000000}",
-        modelIdentifier="player",
-        unzipDirectory=str(folder),
-        instanceName="one",
-    )
-    fmu.instantiate()
-    assert fmu.getReal([0]) == [2.0]
-    fmu.freeInstance()
+
+def test_resources_are_found_in_any_form_of_a_uri(built: Callable[..., Path], player: Unit) -> None:
+    folder = built(player, "a folder, 100% \u00fc\u4e2d#")
+    resources = folder / "resources"
+    uri = resources.as_uri()
+    path = uri.removeprefix("file://")
+    for form in (uri, f"{uri}/", f"file:{path}", f"file://localhost{path}", str(resources), f"{resources}/"):
+        assert first_value(folder, form) == 2.0
+    assert first_value(folder, None) is None
+    for form in ("", "file:", "file:///nowhere", f"{uri}%", "file:///" + "a" * 5000, "b" * 5000):
+        assert first_value(folder, form) is None

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The elementary functions: the argument is brought near 0, and a Taylor series summed there. */
 #include "elementary.h"
 

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The elementary functions, computed alike on every platform.
 
    C libraries differ in the last bits of sin, exp and their like, and so would an FMU on Linux and on Windows. These

@@ -1,4 +1,11 @@
-/* The functions of FMI 2.0 for co-simulation: the life cycle of an instance, and who does the work. */
+/* SPDX-License-Identifier: MIT */
+/* The functions of FMI 2.0 for co-simulation: the life cycle of an instance, and who does the work.
+
+   All sources of the FMU are compiled by
+
+       cc -shared -fPIC -O2 -ffp-contract=off -fvisibility=hidden -o NAME.so *.c -lm
+
+   What is the model's own is in model.c; what is generated is model.c, model_sizes.h and guid.h. */
 #include <math.h>
 #include <string.h>
 
@@ -21,7 +28,7 @@ static const char *phase_name(int phase) {
     switch (phase) {
     case INSTANTIATED: return "before fmi2EnterInitializationMode";
     case INITIALIZING: return "in initialization mode";
-    case STEPPING: return "after fmi2ExitInitializationMode";
+    case STEPPING: return "after fmi2ExitInitializationMode and before fmi2Terminate";
     default: return "after fmi2Terminate";
     }
 }
@@ -31,11 +38,7 @@ static int may(const Instance *me, const char *function, int phases) {
     if (!me) return 0;
     if (me->state.phase & phases) return 1;
     report(me, "%s: found a call %s, allowed: %s", function, phase_name(me->state.phase),
-          phases == INSTANTIATED     ? "before fmi2EnterInitializationMode"
-          : phases == INITIALIZING   ? "in initialization mode"
-          : phases == STEPPING       ? "after fmi2ExitInitializationMode, before fmi2Terminate"
-          : phases == NOT_TERMINATED ? "before fmi2Terminate"
-                                     : "at any time");
+           phases == NOT_TERMINATED ? "before fmi2Terminate" : phase_name(phases));
     return 0;
 }
 
@@ -189,6 +192,8 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
     const SavedState *saved = FMUstate;
     if (!me) return fmi2Error;
     if (!saved) return report(me, "FMUstate: found none, allowed: one of fmi2GetFMUstate");
+    if (memcmp(saved->guid, MODEL_GUID, sizeof saved->guid) != 0)
+        return report(me, "FMUstate: found that of another FMU, allowed: GUID %s", MODEL_GUID);
     memcpy(&me->state, &saved->state, sizeof me->state);
     me->stale = 1;
     return fmi2OK;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Making and freeing an instance, and what it says to the tool that runs it. */
 #include "instance.h"
 
@@ -72,8 +73,9 @@ static int fetch_table(Instance *me, const char *resources) {
 Instance *make_instance(const char *name, const char *guid, const char *resources, fmi2Type type,
                         const fmi2CallbackFunctions *callbacks) {
     Instance blank = {0}; /* what reports an error before there is an instance */
-    blank.allocate = callbacks && callbacks->allocateMemory ? callbacks->allocateMemory : calloc;
-    blank.release = callbacks && callbacks->freeMemory ? callbacks->freeMemory : free;
+    int has_memory = callbacks && callbacks->allocateMemory && callbacks->freeMemory;
+    blank.allocate = has_memory ? callbacks->allocateMemory : calloc;
+    blank.release = has_memory ? callbacks->freeMemory : free;
     if (callbacks) {
         blank.logger = callbacks->logger;
         blank.environment = callbacks->componentEnvironment;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* An instance of the model: what it remembers, and what it is given by the tool that runs it. */
 #ifndef INSTANCE_H
 #define INSTANCE_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a model consists of: model.c and model_sizes.h, which urmpipe generates, define it.
 
    All values are doubles, by value reference, in one array; an Integer is a whole number, a Boolean is 0 or 1. */

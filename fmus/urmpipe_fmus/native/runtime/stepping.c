@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A step through time: the rules are those of urmpipe's Instance in Python, and so is the order of operations. */
 #include "stepping.h"
 

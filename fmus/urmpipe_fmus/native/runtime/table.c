@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The table of a model: what is in its file, and its rows about an instant.
 
    The file, all of it little-endian:

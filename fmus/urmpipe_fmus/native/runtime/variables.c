@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Getting and setting the values of variables: what is refused, and outputs that are always fresh. */
 #include "variables.h"
 
