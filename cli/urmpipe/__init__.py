@@ -5,6 +5,8 @@
     comparison = urmpipe.compare("path.csv", ["log.csv"], robot="urm6")
     urmpipe.report([comparison], "report.html")
     urmpipe.export(run, "log.parquet")
+    simulation = urmpipe.simulate("log-to-delta", arguments={"log": "log.csv"})
+    urmpipe.build_fmu("kinematic_chain", robot="urm6")
 
 The functions are loaded when they are first used.
 """
@@ -20,7 +22,10 @@ if TYPE_CHECKING:
     from urmpipe.api import report as report
     from urmpipe.api import view as view
     from urmpipe.api import write_map as write_map
+    from urmpipe.building import build_fmu as build_fmu
     from urmpipe.comparing import compare as compare
+    from urmpipe.simulating import simulate as simulate
+    from urmpipe_fmus.build import BuiltFmu as BuiltFmu
     from urmpipe_models.catalogue import load_robot as load_robot
     from urmpipe_models.catalogue import robot_names as robot_names
     from urmpipe_models.chain import Chain as Chain
@@ -30,12 +35,14 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.recording import read_recording as read_recording
     from urmpipe_pipeline.recording import write_recording as write_recording
     from urmpipe_pipeline.results import Run as Run
+    from urmpipe_pipeline.simulation import Simulation as Simulation
     from urmpipe_pipeline.sources import ReadOptions as ReadOptions
     from urmpipe_pipeline.sources import read_map as read_map
 
 __version__ = "0.1.0"
 
 _HOME = {
+    "BuiltFmu": "urmpipe_fmus.build",
     "Chain": "urmpipe_models.chain",
     "Comparison": "urmpipe_pipeline.comparison",
     "ReadOptions": "urmpipe_pipeline.sources",
@@ -43,6 +50,8 @@ _HOME = {
     "Report": "urmpipe.api",
     "Run": "urmpipe_pipeline.results",
     "UrmpipeError": "urmpipe_models.errors",
+    "Simulation": "urmpipe_pipeline.simulation",
+    "build_fmu": "urmpipe.building",
     "compare": "urmpipe.comparing",
     "export": "urmpipe.api",
     "ingest": "urmpipe.api",
@@ -51,6 +60,7 @@ _HOME = {
     "read_recording": "urmpipe_pipeline.recording",
     "report": "urmpipe.api",
     "robot_names": "urmpipe_models.catalogue",
+    "simulate": "urmpipe.simulating",
     "view": "urmpipe.api",
     "write_map": "urmpipe.api",
     "write_recording": "urmpipe_pipeline.recording",

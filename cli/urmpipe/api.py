@@ -30,6 +30,7 @@ from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.outputs import OutputKind, guarded_output
 from urmpipe_pipeline.recording import is_recording, read_recording, record
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result, Simulation
 from urmpipe_pipeline.sources import ReadOptions, map_of, read_map
 
 if TYPE_CHECKING:
@@ -57,7 +58,7 @@ class Report:
     """
 
     path: Path
-    results: tuple[Run | Comparison, ...]
+    results: tuple[Result, ...]
     figures: tuple[FigureFile, ...] = ()
 
     def to_frame(self) -> pd.DataFrame:
@@ -70,7 +71,7 @@ class Report:
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe report --json` prints."""
         kinds = [
-            {"name": result.name, "verdict": result.verdict if isinstance(result, Comparison) else None}
+            {"name": result.name, "verdict": None if isinstance(result, Run) else result.verdict}
             for result in self.results
         ]
         return {
@@ -150,7 +151,7 @@ def ingest(
 
 
 def report(
-    results: Sequence[PathLike | Run | Comparison],
+    results: Sequence[PathLike | Result],
     output: PathLike,
     *,
     figures: PathLike | None = None,
@@ -160,7 +161,7 @@ def report(
     """Write one self-contained HTML file about recordings or results, and its figures as files: all or none.
 
     Args:
-        results: Recordings (.rrd), or what `ingest` and `compare` returned; at least one.
+        results: Recordings (.rrd), or what `ingest`, `compare` and `simulate` returned.
         output: The HTML file to write.
         figures: A folder to write every figure to as a file; needs the extra `figures` and Chromium.
         formats: svg, png or both.
@@ -176,7 +177,7 @@ def report(
     refuse_foreign(files)
     reading, writing = _halves(progress)
 
-    def read(numbered: tuple[int, PathLike | Run | Comparison]) -> Run | Comparison:
+    def read(numbered: tuple[int, PathLike | Result]) -> Result:
         """Return a result, read if it is a recording, and tell how far it is."""
         number, one = numbered
         found = read_recording(Path(one)) if isinstance(one, (str, Path)) else one
@@ -252,17 +253,17 @@ def _files_and_name(log: PathLike | Sequence[PathLike]) -> tuple[list[Path], str
 
 
 def export(
-    result: PathLike | Run | Comparison,
+    result: PathLike | Result,
     output: PathLike | None = None,
     *,
     to: Format | None = None,
     rows: Rows | None = None,
     tcp: Tcp | None = None,
 ) -> Exported:
-    """Write a run or a comparison as tables (CSV, Parquet, MAT) or as trajectories (TUM).
+    """Write a run, a comparison or a simulation as tables (CSV, Parquet, MAT) or as trajectories (TUM).
 
     Args:
-        result: A recording (.rrd), or what `ingest` or `compare` returned.
+        result: A recording (.rrd), or what `ingest`, `compare` or `simulate` returned.
         output: The file to write; default: NAME-grid.csv and the like in the working folder.
         to: csv, parquet, mat or tum; default: by the output's suffix.
         rows: grid: t, q, rates and the tool centre point on the run's grid, in SI; file: the columns of
@@ -277,7 +278,7 @@ def export(
 
     target = None if output is None else Path(output)
     options = ExportOptions(format_of(to, target), rows, tcp)
-    if isinstance(result, (Run, Comparison)):
+    if isinstance(result, (Run, Comparison, Simulation)):
         return export_result(result, target, options, [result.recording] if result.recording else [])
     refuse_foreign([Path(result)])
     return export_result(read_recording(Path(result)), target, options, [Path(result)])

@@ -160,8 +160,9 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
     refuse_foreign([path])
     result = read_recording(path)
     if not isinstance(result, Comparison):
+        held = "one log" if isinstance(result, Run) else "a simulation"
         raise RecordingError(
-            Finding("found the recording of one log, allowed: that of a comparison (--baseline)", str(path))
+            Finding(f"found the recording of {held}, allowed: that of a comparison (--baseline)", str(path))
         )
     return result
 

@@ -21,7 +21,8 @@ import click
 NAME = "urmpipe.toml"
 
 EACH_TIME = (
-    "--output", "--audit", "--write-map", "--explain", "--json", "--junit", "--csv", "--baseline",
+    "--output", "--audit", "--write-map", "--explain", "--json", "--junit", "--csv", "--baseline", "--draw",
+    "--list",
 )  # fmt: skip
 """Options of what one call is to give: no file says them for all."""
 

@@ -31,6 +31,8 @@ COMMANDS = {
     "view": "Open recordings in the viewer.",
     "export": "Write a recording as CSV, Parquet, MAT or TUM.",
     "robot": "List, show and export robots.",
+    "fmu": "List units, build and check FMUs.",
+    "simulate": "Run a system of blocks.",
 }
 """Each command and its short help: --help must not import them all (a test holds both together)."""
 

@@ -14,6 +14,7 @@ import shlex
 import shutil
 import sys
 import uuid
+from collections.abc import Callable
 from functools import cache
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
@@ -41,7 +42,9 @@ def cache_folder() -> Path:
     return (Path(home) if home else Path.home() / ".cache") / "urmpipe"
 
 
-def cached_fmu(unit: Unit, backend: Backend | None = None) -> Path:
+def cached_fmu(
+    unit: Unit, backend: Backend | None = None, *, told: Callable[[str], None] | None = None
+) -> Path:
     """Return the FMU of a unit for this platform, built if it is not in the cache, or damaged there.
 
     A unit without a recipe is built each time, as nothing tells what its functions do; its place is named by
@@ -50,6 +53,7 @@ def cached_fmu(unit: Unit, backend: Backend | None = None) -> Path:
     Args:
         unit: The unit.
         backend: Native or Python; None for native if it can be built here, else Python.
+        told: Told the name of the unit before it is built, which takes its time.
 
     Raises:
         FmuError: If it cannot be built, or the cache cannot be written.
@@ -58,14 +62,17 @@ def cached_fmu(unit: Unit, backend: Backend | None = None) -> Path:
     from urmpipe_fmus.native import native_missing, this_platform
 
     chosen: Backend = backend or ("python" if native_missing(()) else "native")
+    tell = told or (lambda name: None)
     folder = cache_folder() / "fmus"
     try:
         folder.mkdir(parents=True, exist_ok=True)
         if not unit.recipe.module:
+            tell(unit.name)
             return _built_anew(unit, chosen, this_platform(), folder)
         folder /= _key(unit, chosen, this_platform())
         path, digest = folder / f"{unit.name}.fmu", folder / f"{unit.name}.sha256"
         if not _is_whole(path, digest):
+            tell(unit.name)
             folder.mkdir(exist_ok=True)
             build_fmu(unit, path, backend=chosen, platforms=(this_platform(),))
             _write(digest, _hash_of(path))

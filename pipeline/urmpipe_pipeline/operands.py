@@ -12,11 +12,17 @@ from urmpipe_pipeline.derivatives import Method
 from urmpipe_pipeline.ingest import OF_ROBOT, ingest_log, kinematics
 from urmpipe_pipeline.recording import is_recording, read_recording
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Simulation
 from urmpipe_pipeline.sources import ReadOptions
 
 COMPARISON = (
     "found the recording of a comparison, allowed: one that ingest wrote; to hold it against another"
     " comparison, give it alone, with --baseline OTHER.rrd"
+)
+
+SIMULATION = (
+    "found the recording of a simulation, allowed: one that ingest wrote; a simulation is judged by the delta"
+    " meters in it: urmpipe report shows what they found"
 )
 
 
@@ -39,7 +45,7 @@ def load_run(
 
     Raises:
         LogError: If the CSV is bad.
-        RecordingError: If the recording is bad, or holds a comparison.
+        RecordingError: If the recording is bad, or holds no run.
     """
     if not _is_recording(operand):
         name = operand.resolve().name if operand.is_dir() else None
@@ -49,6 +55,8 @@ def load_run(
     result = read_recording(operand)
     if isinstance(result, Comparison):
         raise RecordingError(Finding(COMPARISON, file=str(operand)))
+    if isinstance(result, Simulation):
+        raise RecordingError(Finding(SIMULATION, file=str(operand)))
     if robot is not None and robot != result.robot:
         tcp, warnings = kinematics(robot, result.q, result.qd, result.qdd)
         others = [warning for warning in result.warnings if warning.kind not in OF_ROBOT]

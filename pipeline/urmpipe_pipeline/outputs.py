@@ -8,6 +8,7 @@ from __future__ import annotations
 import os
 import re
 import uuid
+import zlib
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -15,9 +16,11 @@ from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
 
-OutputKind = Literal["recording", "report", "map", "export", "audit", "junit", "statistics", "figure"]
+OutputKind = Literal[
+    "recording", "report", "map", "export", "audit", "junit", "statistics", "figure", "drawing", "fmu"
+]
 
-NOUNS: dict[str, str] = {"junit": "JUnit file", "statistics": "table of statistics"}
+NOUNS: dict[str, str] = {"junit": "JUnit file", "statistics": "table of statistics", "fmu": "FMU"}
 """What people call a kind, where that is not its name."""
 
 AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")
@@ -35,16 +38,23 @@ STATISTICS_HEADER = "run,sync_offset,quantity,kind,unit,max,"
 JUNIT_HEADER = '<?xml version="1.0" encoding="UTF-8"?><!-- urmpipe: verdict of a comparison -->'
 """The first line of a JUnit file of ours."""
 
+DRAWING_HEADER = "<!-- Generator: urmpipe "
+"""How a drawing of ours (SVG) begins."""
+
 FIRST_LINES: dict[str, str] = {
     "map": MAP_HEADER,
     "audit": ",".join(AUDIT_COLUMNS),
     "statistics": STATISTICS_HEADER,
     "junit": JUNIT_HEADER,
+    "drawing": DRAWING_HEADER,
 }
 """How the first line of a text of ours begins, by kind."""
 
 FIGURE = re.compile(rb"\A<!-- Generator: urmpipe |\A\x89PNG.{29}.{4}tEXtSoftware\0urmpipe ", re.DOTALL)
 """How a figure of ours (SVG, PNG) tells where it comes from."""
+
+GENERATION_TOOL = re.compile(rb"<fmiModelDescription\s[^>]*\sgenerationTool=\"urmpipe\b")
+"""How the model description of an FMU of ours tells where it comes from."""
 
 HEAD = 4096
 """The mark of an output stands within so many bytes of its start."""
@@ -85,6 +95,17 @@ def is_report(path: Path) -> bool:
         return GENERATOR.search(file.read(HEAD)) is not None
 
 
+def is_fmu(path: Path) -> bool:
+    """Tell whether a file is an FMU that urmpipe wrote: its model description names urmpipe as the tool."""
+    from zipfile import BadZipFile, ZipFile
+
+    try:
+        with ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
+            return GENERATION_TOOL.search(file.read(HEAD)) is not None
+    except (BadZipFile, KeyError, NotImplementedError, RuntimeError, zlib.error):
+        return False  # no archive, none with a model description, or one that cannot be read
+
+
 def _refuse(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
     """Raise an `OutputError` if the output may not be written there."""
     if kind == "recording" and not _is_text(path):
@@ -110,7 +131,7 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     if any(one.exists() and path.samefile(one) for one in inputs):
         return f"found an input of this command, allowed: any other name for the {noun}"
     if not path.is_file() or not _is_ours(path, kind):
-        such = f"such {'an' if kind in ('audit', 'export') else 'a'} {noun}"
+        such = f"such {'an' if kind in ('audit', 'export', 'fmu') else 'a'} {noun}"
         return f"found a file that is no {noun} of urmpipe's, allowed: a new name, or {such} to replace"
     return None
 
@@ -127,6 +148,8 @@ def _is_text(path: Path) -> bool:
 def _is_ours(path: Path, kind: OutputKind) -> bool:
     if kind == "report":
         return is_report(path)
+    if kind == "fmu":
+        return is_fmu(path)
     if kind == "figure":
         with path.open("rb") as file:
             return FIGURE.match(file.read(HEAD)) is not None

@@ -6,6 +6,7 @@ from urmpipe_models.chain import Chain
 from urmpipe_pipeline import text
 from urmpipe_pipeline.alignment import tool_with
 from urmpipe_pipeline.comparison import Comparison, Statistics
+from urmpipe_pipeline.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.trajectory import Alignment, Sync
 
 
@@ -25,6 +26,17 @@ def tolerance_words(comparison: Comparison) -> str:
     """Return what a comparison allows, that of joints in the units of those that were compared."""
     units = {one.unit for run in comparison.runs for one in run.joint_statistics.values()}
     return text.tolerance(comparison.tolerance, units or {"rad"})
+
+
+def meter_words(one: DeltaVerdict) -> str:
+    """Return what a delta meter found: how much of how much, when, and how often it was too much."""
+    if one.used is None or one.allowed is None:
+        said = f"no value at t = {text.seconds(one.t)} s"
+    else:
+        size = "‖Δ‖" if one.quantity == "norm" else f"|Δ{one.quantity}|"
+        amount = text.quantity(one.worst, "m", one.allowed)
+        said = f"{size} = {amount} of {text.limit(one.allowed)} mm allowed at t = {text.seconds(one.t)} s"
+    return f"{said}; out of tolerance: {one.out_of_tolerance} of {text.counted(one.samples, 'sample')}"
 
 
 def correlation(r: float | None) -> str:

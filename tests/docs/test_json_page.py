@@ -6,10 +6,15 @@ import re
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import urmpipe
 from urmpipe_datasets import LOGS
+from urmpipe_pipeline.delta_verdict import delta_verdict
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.simulation import Signal, SimulatedBlock, Simulation
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"`(\w+)`", PAGE))
@@ -39,3 +44,16 @@ def printed() -> list[dict[str, Any]]:
 def test_each_key_is_named(printed: list[dict[str, Any]]) -> None:
     assert keys(printed) - NAMED == set()
     assert {"from", "half_period", "share_out", "sample_max"} <= keys(printed)
+
+
+def test_each_key_of_a_simulation_is_named() -> None:
+    t_ns, block = np.arange(2), SimulatedBlock("meter", "unit", "delta_meter", "")
+    simulation = Simulation(
+        name="system", description="", t_ns=t_ns, step=0.005, signals=(Signal("meter", "norm", np.zeros(2)),),
+        system_svg="", system_text="", blocks=(block,), failed=None, warnings=(LogWarning("gap", "a gap"),),
+        provenance=provenance("simulate", {}, ()),
+        verdicts=tuple(filter(None, [delta_verdict("meter", t_ns, np.zeros((2, 3)), {"axis": 1.0})])),
+    )  # fmt: skip
+    found = keys(simulation.to_dict())
+    assert found - NAMED == set()
+    assert {"t_min", "quantity", "content", "message"} <= found

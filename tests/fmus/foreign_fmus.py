@@ -53,6 +53,7 @@ class Foreign:
     compute: str = ""
     step: str = ""
     start: str = ""
+    free: str = ""
     fresh: bool = True
     can_save: bool = True
     once: bool = False
@@ -72,7 +73,8 @@ class Foreign:
         work = folder / self.name
         work.mkdir()
         (work / "model.h").write_text(
-            f'#define GUID "{self.guid}"\n#define FRESH {int(self.fresh)}\n#define START {self.start}\n'
+            f'#define GUID "{self.guid}"\n#define FRESH {int(self.fresh)}\n'
+            f"#define START {self.start}\n#define FREE {self.free}\n"
             f"static void compute(Model *m) {{ Values *v = &m->v; (void)v; {self.compute} }}\n"
             "static fmi2Status step(Model *m, double t, double h) {\n"
             f"    Values *v = &m->v; (void)v; {self.step}\n    return fmi2OK;\n}}\n"

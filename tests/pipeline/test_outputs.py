@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import zipfile
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -204,3 +205,61 @@ def test_two_writers_of_one_output_do_not_meet(tmp_path: Path) -> None:
         one.write_text("one")
         other.write_text("other")
     assert [(file, file.read_text()) for file in tmp_path.iterdir()] == [(path, "one")]
+
+
+def write_fmu(path: Path, description: str | None, method: int = zipfile.ZIP_DEFLATED) -> None:
+    """Write an archive with a model description, or with none."""
+    with zipfile.ZipFile(path, "w", method) as archive:
+        archive.writestr("other.txt", "")
+        if description is not None:
+            archive.writestr("modelDescription.xml", description)
+
+
+DESCRIPTION = (
+    '<?xml version="1.0" encoding="UTF-8"?>\n'
+    '<fmiModelDescription fmiVersion="2.0" modelName="chain" generationTool="urmpipe 0.1.0" guid="1">'
+)
+
+
+def test_an_fmu_of_ours_is_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "chain.fmu"
+    write_fmu(path, DESCRIPTION)
+    write(path, kind="fmu")
+    assert path.read_text() == "new"
+
+
+@pytest.mark.parametrize(
+    "description",
+    [
+        None,
+        DESCRIPTION.replace("urmpipe", "Dymola"),
+        DESCRIPTION.replace("urmpipe 0.1.0", "urmpipeline"),
+        DESCRIPTION.replace("generationTool", "author"),
+        '<fmiModelDescription modelName="chain"><!-- generationTool="urmpipe 0.1.0" -->',
+    ],
+)
+def test_an_fmu_of_another_tool_is_not_replaced(tmp_path: Path, description: str | None) -> None:
+    path = tmp_path / "chain.fmu"
+    write_fmu(path, description)
+    assert refusal(path, kind="fmu") == (
+        "found a file that is no FMU of urmpipe's, allowed: a new name, or such an FMU to replace"
+    )
+
+
+def test_an_fmu_that_cannot_be_read_is_not_replaced(tmp_path: Path) -> None:
+    path = tmp_path / "chain.fmu"
+    write_fmu(path, DESCRIPTION)
+    whole = path.read_bytes()
+    for broken in (b"", b"no archive", whole[: len(whole) // 2], whole.replace(b"\x08\x00", b"\x63\x00")):
+        path.write_bytes(broken)
+        assert "found a file that is no FMU of urmpipe's" in refusal(path, kind="fmu")
+
+
+def test_a_drawing_of_ours_is_replaced_and_another_is_not(tmp_path: Path) -> None:
+    path = tmp_path / "system.svg"
+    path.write_text("<!-- Generator: urmpipe 0.1.0 -->\n<svg/>")
+    write(path, kind="drawing")
+    path.write_text("<svg/>")
+    assert refusal(path, kind="drawing") == (
+        "found a file that is no drawing of urmpipe's, allowed: a new name, or such a drawing to replace"
+    )

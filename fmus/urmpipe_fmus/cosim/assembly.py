@@ -87,15 +87,27 @@ class Assembly:
         )
 
     def _loop(self, loop: Loop) -> LoopJob:
-        torn = [self._plan.variable(port) for port in loop.torn]
+        minimum, maximum = self._limits(loop)
         return LoopJob(
             exchanges=tuple(self._exchange(one) for one in loop.exchanges),
             torn=tuple(self._places[port] for port in loop.torn),
             sources=tuple(self._places[self._sources[port]] for port in loop.torn),
-            minimum=np.array([one.minimum for one in torn]),
-            maximum=np.array([one.maximum for one in torn]),
+            minimum=minimum,
+            maximum=maximum,
             ring=loop.ring,
         )
+
+    def _limits(self, loop: Loop) -> tuple[np.ndarray, np.ndarray]:
+        """Return the least and the largest value that each place may have for the loop's inputs."""
+        size = len(self.recorded["Real"]) + len(self._torn)
+        minimum, maximum = np.full(size, -np.inf), np.full(size, np.inf)
+        for one in loop.exchanges:
+            for port in (Port(one.block, name) for name in one.inputs):
+                variable, place = self._plan.variable(port), self._places[port]
+                if variable.type == "Real":
+                    minimum[place] = max(minimum[place], variable.minimum)
+                    maximum[place] = min(maximum[place], variable.maximum)
+        return minimum, maximum
 
     def _of_block(self, name: str, folder: Path) -> BlockJob:
         shown = self._plan.interfaces[name]

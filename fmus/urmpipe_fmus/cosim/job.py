@@ -109,8 +109,8 @@ class LoopJob:
         exchanges: One sweep.
         torn: Places of the torn inputs.
         sources: Places of their sources.
-        minimum: The least values of the torn inputs, shape (torn,).
-        maximum: Their largest values.
+        minimum: The least value that an input of the loop may have, at the place that it follows.
+        maximum: The largest.
         ring: The loop, for people.
     """
 

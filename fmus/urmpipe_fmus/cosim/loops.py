@@ -51,6 +51,7 @@ class LoopSolver:
     ) -> None:
         self._loop, self._values, self._sweeps, self._tolerance = loop, values, sweeps, tolerance
         self._torn, self._sources = np.array(loop.torn, np.intp), np.array(loop.sources, np.intp)
+        self._minimum, self._maximum = loop.minimum[self._torn], loop.maximum[self._torn]
         self._jacobian: FloatArray | None = None
 
     def solve(self) -> int:
@@ -99,7 +100,7 @@ class LoopSolver:
         columns = []
         for i, each in enumerate(x):
             h = DIFFERENCE * (1.0 + abs(each))
-            h = -h if each + h > self._loop.maximum[i] else h
+            h = -h if each + h > self._maximum[i] else h
             moved = x.copy()
             moved[i] += h
             columns.append((self._residual(moved) - r) / (moved[i] - each))
@@ -108,7 +109,7 @@ class LoopSolver:
     def _line(self, x: FloatArray, r: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return a point along a step, in the range of the inputs, that leaves less, and what it leaves."""
         for _ in range(SHRINKS):
-            following = np.clip(x + step, self._loop.minimum, self._loop.maximum)
+            following = np.clip(x + step, self._minimum, self._maximum)
             left = self._residual(following)
             if np.isfinite(left).all() and _size(left) < _size(r):
                 break

@@ -55,6 +55,7 @@ class Master:
         self._time, self._step, self._exact = (ctypes.c_double(one) for one in (0.0, job.step, job.step))
         self._slaves: list[Slave] = []
         self._members: dict[int, Member] = {}
+        self._looped: list[tuple[str, str, Exchange]] = []
         self.warnings: dict[int, int] = {}
         self._columns = self._shares(job)
 
@@ -66,13 +67,24 @@ class Master:
             NoConvergence: If a loop was not solved.
             Ended: If a block ended the simulation.
         """
-        try:
-            self._start()
-            self._loop()
-        finally:
-            for slave in self._slaves:
-                slave.end()
-            self._progress.call = ELSEWHERE
+        self._start()
+        self._loop()
+
+    def end(self) -> None:
+        """Terminate and free the blocks, as far as their status lets them."""
+        for slave in self._slaves:
+            slave.end()
+        self._progress.call = ELSEWHERE
+
+    @property
+    def notes(self) -> list[str]:
+        """What should be seen of a run: outputs in loops that may be a step late."""
+        return [
+            f"algebraic loop: {ring}: the outputs of block {name} never followed its inputs: they do not"
+            " depend on them, or are those of the step before"
+            for name, ring, exchange in self._looped
+            if not exchange.followed
+        ]
 
     def _start(self) -> None:
         """Instantiate the blocks, set their start values, and exchange what they start with."""
@@ -104,12 +116,9 @@ class Master:
                 slave = self._slaves[number]
                 self._members[number] = Member(slave, self._time, self._length(slave), self._check)
         self._point: list[Prepared] = []
-        self._solvers: list[LoopSolver] = []
         for one in self._job.order:
             if isinstance(one, LoopJob):
-                solver = self._solver(one)
-                self._solvers.append(solver)
-                self._point.append((ELSEWHERE, solver.solve))
+                self._point.append((ELSEWHERE, self._solver(one).solve))
             else:
                 self._point += self._sets(one) + self._gets(one)
         self._steps = [
@@ -136,13 +145,13 @@ class Master:
         sweeps: list[Callable[[], None]] = []
         for one in loop.exchanges:
             sets, gets = partial(self._run, self._sets(one)), partial(self._run, self._gets(one))
-            if one.block in self._members:
-                places = sorted(p for t in one.sets if t.type == "Real" for p in t.places if p in moving)
-                shown = [self._values[t.type][t.places[0] : t.places[-1] + 1] for t in one.gets]
-                moved = Moved(reals, np.array(places, dtype=np.intp), shown)
-                sweeps.append(Exchange(self._members[one.block], sets, gets, moved))
-            else:
-                sweeps += [sets, gets]
+            at = sorted(p for t in one.sets if t.type == "Real" for p in t.places if p in moving)
+            places = np.array(at, dtype=np.intp)
+            shown = [self._values[t.type][t.places[0] : t.places[-1] + 1] for t in one.gets]
+            moved = Moved(reals, places, loop.minimum[places], loop.maximum[places], shown)
+            exchange = Exchange(self._members.get(one.block), sets, gets, moved)
+            sweeps.append(exchange)
+            self._looped.append((self._job.blocks[one.block].name, loop.ring, exchange))
         return LoopSolver(loop, reals, sweeps, self._job.tolerance)
 
     def _loop(self) -> None:

@@ -60,7 +60,7 @@ class Member:
 
     @property
     def undecided(self) -> bool:
-        """Whether it is to be seen if its outputs follow its inputs."""
+        """Whether it is still to be seen if its outputs follow its inputs only after a step."""
         return self.stale is None and self._stepped
 
     def step_again(self, sets: Callable[[], None]) -> None:
@@ -91,27 +91,42 @@ class Moved(NamedTuple):
     Attributes:
         values: The vector of the Reals.
         places: Where the inputs that the loop moves stand in it.
+        minimum: The least values that they may have.
+        maximum: The largest.
         read: The outputs that may follow them.
     """
 
     values: NDArray[np.float64]
     places: NDArray[np.intp]
+    minimum: NDArray[np.float64]
+    maximum: NDArray[np.float64]
     read: Sequence[NDArray[Any]]
 
 
 class Exchange:
-    """An exchange of a block that can go back: called, it sets its inputs and reads its outputs."""
+    """An exchange of a block in a loop: called, it sets its inputs and reads its outputs.
+
+    Args:
+        member: The block, if it can go back.
+        sets: Sets its inputs.
+        gets: Reads its outputs.
+        moved: What the loop moves of it.
+
+    Attributes:
+        followed: Whether its outputs were ever seen to follow its inputs, at once or after a step.
+    """
 
     def __init__(
-        self, member: Member, sets: Callable[[], None], gets: Callable[[], None], moved: Moved
+        self, member: Member | None, sets: Callable[[], None], gets: Callable[[], None], moved: Moved
     ) -> None:
         self._member, self._sets, self._gets, self._moved = member, sets, gets, moved
+        self.followed = not len(moved.places)
 
     def __call__(self) -> None:
         """Set the inputs and read the outputs that they give."""
-        if self._member.undecided:
+        if not self.followed:
             self._decide()
-        if self._member.stale:
+        if self._member is not None and self._member.stale:
             self._member.step_again(self._sets)
         else:
             self._sets()
@@ -122,22 +137,27 @@ class Exchange:
 
         If they follow neither way the inputs may not matter at this instant: it is seen again at the next.
         """
-        if not len(self._moved.places):
-            return
-        if self._follow(self._sets):
-            self._member.stale = False
-            return
-        self._member.keep()
-        if self._follow(lambda: self._member.step_again(self._sets)):
-            self._member.stale = True
-        self._member.return_to_kept()
+        member = self._member
+        if member is not None and member.stale:
+            self.followed = True  # another of its exchanges saw it
+        elif self._follow(self._sets):
+            self.followed = True
+            if member is not None:
+                member.stale = bool(member.stale)
+        elif member is not None and member.undecided:
+            member.keep()
+            if self._follow(lambda: member.step_again(self._sets)):
+                member.stale = self.followed = True
+            member.return_to_kept()
 
     def _follow(self, apply: Callable[[], None]) -> bool:
         """Return whether the outputs change when the inputs are moved a little."""
-        values, places, read = self._moved
+        values, places, minimum, maximum, read = self._moved
         found = []
         inputs = values[places].copy()
-        for moved in (inputs + NUDGE * (1.0 + np.abs(inputs)), inputs):
+        nudge = NUDGE * (1.0 + np.abs(inputs))
+        nudged = np.where(inputs + nudge > maximum, np.maximum(inputs - nudge, minimum), inputs + nudge)
+        for moved in (nudged, inputs):
             values[places] = moved
             apply()
             self._gets()

@@ -43,6 +43,10 @@ LAST_LINES = 5
 """So many of a block's last log lines are told with an error."""
 
 
+TAIL = 65_536
+"""So many of the last bytes that a process printed are looked at."""
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Recorded:
     """What a co-simulation recorded, until its end or until it failed.
@@ -182,7 +186,9 @@ def _recorded(
         if Port(block, one.name) in shown
     )
     result = _result(folder)
-    failed = _crash(job, folder, state, exit_code) if result is None else _failure(job, folder, state, result)
+    failed = _failure(job, folder, state, result) if result else None
+    if failed is None and exit_code:
+        failed = _crash(job, folder, state, exit_code)
     points = np.arange(state.rows) * job.record_every * job.step
     return Recorded(
         t_ns=np.round(points * 1e9).astype(np.int64),
@@ -214,7 +220,7 @@ def _crash(job: Job, folder: Path, state: Progress, exit_code: int) -> str:
     """Return how a run failed that could not say so itself."""
     how = _ending(exit_code)
     if state.call == ELSEWHERE:
-        return one_line(f"the process of the co-simulation {how}" + _quoted(_said(folder)))
+        return one_line(f"the process of the co-simulation {how}" + _quoted(_said(folder)[-LAST_LINES:]))
     return _told(job, folder, state, state.call, how)
 
 
@@ -251,14 +257,16 @@ def _log(folder: Path) -> list[tuple[str, str, str]]:
 
 
 def _said(folder: Path) -> list[str]:
-    """Return what the process printed."""
-    text = (folder / SAID).read_text(encoding="utf-8", errors="replace")
+    """Return what the process printed last."""
+    with (folder / SAID).open("rb") as file:
+        file.seek(max(0, file.seek(0, os.SEEK_END) - TAIL))
+        text = file.read().decode("utf-8", errors="replace")
     return [line.strip() for line in text.splitlines() if line.strip()]
 
 
 def _notes(job: Job, folder: Path, result: dict[str, Any]) -> list[str]:
     """Return what a run that could say how it ended leaves to be seen."""
-    notes = [result["note"]] if result["note"] else []
+    notes = list(result["notes"])
     for code, count in result["warnings"]:
         number, function = called(code)
         name = job.blocks[number].name

@@ -98,7 +98,7 @@ def work(folder: Path) -> None:
     log = Log(folder / LOG, job, progress)
     callbacks = callbacks_with(log)
     master = Master(job, progress, recorded, callbacks)
-    result: dict[str, Any] = {"failed": None, "code": ELSEWHERE, "note": None}
+    result: dict[str, Any] = {"failed": None, "code": ELSEWHERE, "notes": []}
     try:
         master.run()
     except FmuFailed as error:
@@ -106,11 +106,13 @@ def work(folder: Path) -> None:
     except NoConvergence as error:
         result |= {"failed": str(error)}
     except Ended as ended:
-        result |= {"note": str(ended)}
+        result["notes"] += [str(ended)]
+    result["notes"] += master.notes
     result["warnings"] = sorted(master.warnings.items())
     partial = folder / f"{RESULT}.part"
     partial.write_text(json.dumps(result), encoding="utf-8")
     partial.replace(folder / RESULT)
+    master.end()  # last: what an FMU does there must not hide how the run ended
 
 
 def end_with_parent() -> None:

@@ -1,4 +1,4 @@
-"""MATLAB's MAT (version 5), which MATLAB, Octave and SciPy load: one struct, `run` or `comparison`."""
+"""MATLAB's MAT (version 5), which MATLAB, Octave and SciPy load: one struct by the result's kind."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from urmpipe_pipeline.export.tables import Table
 from urmpipe_pipeline.export.times import Times
 from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Simulation
 
 DESCRIPTION = 116
 """Bytes at the start of a MAT file that are free text."""
@@ -101,6 +102,24 @@ def comparison_fields(comparison: Comparison, about: Mapping[str, Any]) -> dict[
         "verdict": comparison.verdict,
         "tolerance": dict(comparison.tolerance),
         "runs": cells([_deviation(run) for run in comparison.runs]),
+        "metadata": as_json(dict(about)),
+    }
+
+
+def simulation_fields(simulation: Simulation, table: Table, about: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the fields of a simulation in the units of its signals: a column a scalar, and their names.
+
+    The system file and why it failed stand in the metadata, in ASCII.
+    """
+    signals = [column for column in table.columns if not isinstance(column.values, Times)]
+    values = [np.asarray(column.values) for column in signals]
+    return {
+        "name": printable(simulation.name),
+        "t": simulation.t[:, np.newaxis],  # a vector without a row would be written as 0 x 0
+        "clock_ns": simulation.t_ns[:, np.newaxis],
+        "values": np.column_stack(values) if values else np.empty((len(simulation.t_ns), 0)),
+        "names": cells([column.name for column in signals]),
+        "units": cells([column.unit for column in signals]),
         "metadata": as_json(dict(about)),
     }
 

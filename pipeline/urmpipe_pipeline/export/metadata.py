@@ -7,13 +7,14 @@ from dataclasses import asdict
 from typing import Any
 
 from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.results import Run, json_ready
+from urmpipe_pipeline.results import json_ready
+from urmpipe_pipeline.simulation import Result, Simulation
 
 MARK = "urmpipe export"
 """Stands in every file that can hold it; only such a file is replaced."""
 
 
-def describe(result: Run | Comparison, rows: str) -> dict[str, Any]:
+def describe(result: Result, rows: str) -> dict[str, Any]:
     """Return what a reader of the file needs to know: what it is, its clock, where it came from."""
     made = result.provenance
     about: dict[str, Any] = {
@@ -33,6 +34,15 @@ def describe(result: Run | Comparison, rows: str) -> dict[str, Any]:
             "tolerance": dict(result.tolerance),
             "verdict": result.verdict,
             "runs": [run.name for run in result.runs],
+        }
+    if isinstance(result, Simulation):
+        return about | {
+            "description": result.description,
+            "step": result.step,
+            "failed": result.failed,
+            "verdict": result.verdict,
+            "verdicts": [one.to_dict() for one in result.verdicts],
+            "system": result.system_text,
         }
     return about | {
         "source": result.log.source,

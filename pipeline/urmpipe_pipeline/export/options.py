@@ -8,8 +8,8 @@ from typing import Literal, get_args
 
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.compare import Tcp
-from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result, Simulation
 
 Format = Literal["csv", "parquet", "mat", "tum"]
 FORMATS: tuple[Format, ...] = get_args(Format)
@@ -51,14 +51,16 @@ class ExportOptions:
         """The rows that leave of a run."""
         return self.rows or ("file" if self.tcp == "recorded" else "grid")
 
-    def check(self, result: Run | Comparison) -> None:
-        """Raise an `OptionError` if a comparison is asked for what only a run has."""
-        if not isinstance(result, Comparison):
+    def check(self, result: Result) -> None:
+        """Raise an `OptionError` if a comparison or a simulation is asked for what only a run has."""
+        if isinstance(result, Run):
             return
+        has = "a comparison, which has the samples that it compared"
+        if isinstance(result, Simulation):
+            has = "a simulation, which has the samples that it recorded"
         for option, value in (("--rows", self.rows), ("--tcp", self.tcp)):
             if value is not None:
-                found = "found with a comparison, which has the samples that it compared"
-                raise OptionError(f"{option}: {found}, allowed: with a run")
+                raise OptionError(f"{option}: found with {has}, allowed: with a run")
 
 
 def format_of(to: Format | None, output: Path | None) -> Format:

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from urmpipe_models.chain import Chain
 from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.kinematics import poses_over_log
 from urmpipe_pipeline.compare import Tcp
-from urmpipe_pipeline.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.export.options import ExportOptions, Rows
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result, Simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -35,19 +38,57 @@ class Poses:
     left_out: int = 0
 
 
-def poses_of(result: Run | Comparison, options: ExportOptions) -> tuple[list[Poses], list[LogWarning]]:
+def poses_of(result: Result, options: ExportOptions) -> tuple[list[Poses], list[LogWarning]]:
     """Return the trajectories of a result and what is to be said of them.
 
     Raises:
-        RecordingError: If a run has neither a robot nor, if that is asked for, a recorded pose.
+        RecordingError: If a run has neither a robot nor, if that is asked for, a recorded pose, or a
+            simulation no arm.
     """
     if isinstance(result, Run):
         poses = _run_poses(result, options.tcp or "fk", options.chosen_rows)
-        said = f"{poses.left_out} of {poses.left_out + len(poses.clock_ns)} rows have no pose: left out"
-        return [poses], [LogWarning("left-out", said)] if poses.left_out else []
+        return [poses], list(_left_out([poses]))
+    if isinstance(result, Simulation):
+        arms = _arm_poses(result)
+        return arms, list(_left_out(arms))
     said = "a comparison holds positions: every orientation is written as 0 0 0 1, compare translations only"
     found = [one for run in result.runs for one in _deviation_poses(run, alone=len(result.runs) == 1)]
     return found, [LogWarning("no-orientation", said)]
+
+
+def _left_out(found: Sequence[Poses]) -> Iterator[LogWarning]:
+    """Yield a warning for each trajectory that lacks rows."""
+    for poses in found:
+        if poses.left_out:
+            said = f"{poses.left_out} of {poses.left_out + len(poses.clock_ns)} rows have no pose: left out"
+            one = LogWarning("left-out", said)
+            yield one.of(poses.name) if poses.name else one
+
+
+def _arm_poses(simulation: Simulation) -> list[Poses]:
+    """Return the trajectory of the tip of each arm of a simulation."""
+    where = _where(simulation)
+    if not simulation.arms:
+        found = "found no block of kinematics, so no pose; allowed: --to csv, parquet or mat"
+        raise RecordingError(Finding(found, where))
+    return [
+        _by_kinematics(
+            arm.block if len(simulation.arms) > 1 else "", arm.chain, simulation.t_ns, arm.q, where
+        )
+        for arm in simulation.arms
+    ]
+
+
+def _by_kinematics(name: str, robot: Chain, clock_ns: IntArray, q: FloatArray, where: str) -> Poses:
+    """Return the trajectory of an arm's tip by forward kinematics, without the rows that lack a joint."""
+    there = np.flatnonzero(np.isfinite(q).all(axis=1))
+    if not len(there):
+        raise RecordingError(Finding("found no row with a pose, allowed: at least one", where))
+    from scipy.spatial.transform import Rotation
+
+    position, rotation = poses_over_log(robot, q[there])
+    quat = np.asarray(Rotation.from_matrix(rotation).as_quat(), dtype=np.float64)
+    return Poses(name, clock_ns[there], position, continuous_quaternions(quat), len(q) - len(there))
 
 
 def _run_poses(run: Run, tcp: Tcp, rows: Rows) -> Poses:
@@ -58,14 +99,7 @@ def _run_poses(run: Run, tcp: Tcp, rows: Rows) -> Poses:
         allowed = "a log ingested with --robot NAME|FILE, or --tcp recorded of a log that recorded its pose"
         raise _lacking(run, f"found no {lacks}, so no pose; allowed: {allowed}")
     t_ns, q = (run.t_ns, run.q) if rows == "grid" else (run.log.t_ns, run.log.q)
-    there = np.flatnonzero(np.isfinite(q).all(axis=1))
-    _refuse_none(run, there)
-    from scipy.spatial.transform import Rotation
-
-    position, rotation = poses_over_log(run.robot, q[there])
-    quat = np.asarray(Rotation.from_matrix(rotation).as_quat(), dtype=np.float64)
-    clock = run.log.clock_start_ns + t_ns[there]
-    return Poses("", clock, position, continuous_quaternions(quat), len(q) - len(there))
+    return _by_kinematics("", run.robot, run.log.clock_start_ns + t_ns, q, _where(run))
 
 
 def _recorded_poses(run: Run) -> Poses:
@@ -97,4 +131,9 @@ def _refuse_none(run: Run, there: IntArray) -> None:
 
 
 def _lacking(run: Run, message: str) -> RecordingError:
-    return RecordingError(Finding(message, str(run.recording) if run.recording else run.name))
+    return RecordingError(Finding(message, _where(run)))
+
+
+def _where(result: Run | Simulation) -> str:
+    """Return what an error names: the recording, or the result where it has none."""
+    return str(result.recording) if result.recording else result.name

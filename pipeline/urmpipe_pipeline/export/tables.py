@@ -17,6 +17,7 @@ from urmpipe_pipeline.export.times import DATE, DAY, TIME_OF_DAY, Times, shares
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Simulation
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
 Values: TypeAlias = FloatArray | IntArray | NDArray[np.str_] | Times
@@ -141,6 +142,20 @@ def delta_table(comparison: Comparison) -> Table:
     columns.append(Column("out_of_tolerance", "", outside))
     clock = np.concatenate([run.run.log.clock_start_ns + run.t_ns for run in runs])
     return Table(tuple(columns), clock)
+
+
+def simulation_table(simulation: Simulation) -> Table:
+    """Return every signal of a simulation, a column a scalar: t, then `block.variable` with its unit."""
+    columns = [Column("t [s]", "s", Times(simulation.t_ns, "s"))]
+    for one in simulation.signals:
+        unit = printable(one.unit)
+        columns += [
+            Column(
+                f"{printable(name)} [{unit}]" if unit else printable(name), unit, np.ascontiguousarray(values)
+            )
+            for name, values in zip(one.names, one.columns.T, strict=True)
+        ]
+    return Table(tuple(columns), simulation.t_ns)
 
 
 def _group(names: Sequence[str], units: Sequence[str], values: FloatArray) -> list[Column]:

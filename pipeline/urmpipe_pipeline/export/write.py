@@ -13,16 +13,23 @@ from typing import Any
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.export.csv_file import write_csv
-from urmpipe_pipeline.export.mat_file import comparison_fields, file_fields, run_fields, write_mat
+from urmpipe_pipeline.export.mat_file import (
+    comparison_fields,
+    file_fields,
+    run_fields,
+    simulation_fields,
+    write_mat,
+)
 from urmpipe_pipeline.export.metadata import describe
 from urmpipe_pipeline.export.options import ExportOptions, Format
 from urmpipe_pipeline.export.parquet_file import write_parquet
 from urmpipe_pipeline.export.poses import Poses, poses_of
-from urmpipe_pipeline.export.tables import Table, delta_table, file_table, grid_table
+from urmpipe_pipeline.export.tables import Table, delta_table, file_table, grid_table, simulation_table
 from urmpipe_pipeline.export.tum_file import write_tum
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result, Simulation
 
 POSE_COLUMNS = (
     ("t", "s"), ("x", "m"), ("y", "m"), ("z", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""),
@@ -47,9 +54,9 @@ class Exported:
     """What left.
 
     Attributes:
-        files: The files: one, or of a comparison as trajectories two a log.
+        files: The files: one, or as trajectories two a log of a comparison, one an arm of a simulation.
         to: Their format.
-        rows: Which rows they hold: grid, file, or compared (of a comparison).
+        rows: Which rows they hold: grid, file, compared (of a comparison) or simulated.
         columns: Name and unit of each column.
         left_out: Rows without a pose, which a trajectory cannot hold.
         warnings: What could not leave.
@@ -76,12 +83,12 @@ class Exported:
 
 
 def export_result(
-    result: Run | Comparison, output: Path | None, options: ExportOptions, inputs: Sequence[Path] = ()
+    result: Result, output: Path | None, options: ExportOptions, inputs: Sequence[Path] = ()
 ) -> Exported:
     """Write a result as tables or trajectories.
 
     Args:
-        result: A run or a comparison.
+        result: A run, a comparison or a simulation.
         output: The file; None names it after the recording or the result, in the working folder. Of
             several trajectories each has its own name behind that of the file.
         options: What leaves, and how.
@@ -93,7 +100,7 @@ def export_result(
         OutputError: If a file may not be written there, or did not read back as it was written.
     """
     options.check(result)
-    rows = "compared" if isinstance(result, Comparison) else options.chosen_rows
+    rows = _rows(result, options)
     ending = f"-{rows}" if isinstance(result, Run) else ""
     name = result.recording.stem if result.recording else _file_name(result.name)
     target = output or Path(f"{name}{ending}.{options.to}")
@@ -105,17 +112,24 @@ def export_result(
     return Exported((ExportedFile(target, table.rows),), options.to, rows, names, 0, table.warnings)
 
 
-def _table(result: Run | Comparison, options: ExportOptions) -> Table:
+def _rows(result: Result, options: ExportOptions) -> str:
+    """Return what the rows of an export are called."""
+    if isinstance(result, Run):
+        return options.chosen_rows
+    return "compared" if isinstance(result, Comparison) else "simulated"
+
+
+def _table(result: Result, options: ExportOptions) -> Table:
     if isinstance(result, Comparison):
         return delta_table(result)
+    if isinstance(result, Simulation):
+        return simulation_table(result)
     if options.chosen_rows == "file":
         return file_table(result.log, units_told=options.to != "csv")
     return grid_table(result)
 
 
-def _writer(
-    result: Run | Comparison, table: Table, to: Format, rows: str, target: Path
-) -> Callable[[Path], list[str]]:
+def _writer(result: Result, table: Table, to: Format, rows: str, target: Path) -> Callable[[Path], list[str]]:
     """Return what writes a table to a path."""
     about = describe(result, rows)
     if to == "csv":
@@ -124,12 +138,14 @@ def _writer(
         return partial(write_parquet, table, about)
     if isinstance(result, Comparison):
         return partial(write_mat, "comparison", comparison_fields(result, about), target=target)
+    if isinstance(result, Simulation):
+        return partial(write_mat, "simulation", simulation_fields(result, table, about), target=target)
     fields = file_fields(result, table, about) if rows == "file" else run_fields(result, about)
     return partial(write_mat, "run", fields, target=target)
 
 
 def _export_poses(
-    result: Run | Comparison, target: Path, options: ExportOptions, rows: str, inputs: Sequence[Path]
+    result: Result, target: Path, options: ExportOptions, rows: str, inputs: Sequence[Path]
 ) -> Exported:
     found, warnings = poses_of(result, options)
     targets = list(_targets(target, found))

@@ -8,15 +8,18 @@ from typing import TYPE_CHECKING
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.palette import rgb
 from urmpipe_pipeline.recording.columns import block_columns
-from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, places_of
+from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, places_of, printable
 from urmpipe_pipeline.recording.events import draw_comparison_events, draw_log_events
-from urmpipe_pipeline.recording.marks import MARK_SIZE, draw_repolarizations, draw_worst
+from urmpipe_pipeline.recording.marks import MARK_SIZE, draw_meter_worst, draw_repolarizations, draw_worst
 from urmpipe_pipeline.recording.overview import overviews
 from urmpipe_pipeline.recording.scene import Scene
 from urmpipe_pipeline.recording.scene_drawing import draw_scene
+from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE
+from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.summary import summary
-from urmpipe_pipeline.recording.tolerances import draw_tolerances
+from urmpipe_pipeline.recording.tolerances import draw_meter_tolerances, draw_tolerances
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -25,26 +28,42 @@ LINE_WIDTH = 2.0
 """Width of a series in points of the screen."""
 
 
-def draw(stream: RecordingStream, result: Run | Comparison, every: Sequence[Block], scene: Scene) -> None:
+def draw(stream: RecordingStream, result: Result, every: Sequence[Block], scene: Scene) -> None:
     """Send everything that is there to be looked at."""
     import rerun as rr
 
-    stream.log(SUMMARY, rr.TextDocument(summary(result), media_type="text/markdown"), static=True)
+    words = simulation_summary(result) if isinstance(result, Simulation) else summary(result)
+    stream.log(SUMMARY, rr.TextDocument(words, media_type="text/markdown"), static=True)
     few = list(overviews(result, every))
     _draw_styles(stream, [*every, *few])
     for block in few:
         times, values = block_columns(block, slice(None))
         stream.send_columns(block.entity, times, [values])
-    standing = places_of(result)
-    if isinstance(result, Run):
-        _draw_run(stream, standing[0], result)
+    if isinstance(result, Simulation):
+        _draw_simulation(stream, result)
+    elif isinstance(result, Run):
+        _draw_run(stream, places_of(result)[0], result)
     else:
-        draw_tolerances(stream, result)
-        for place, one in zip(standing, result.runs, strict=True):
-            _draw_run(stream, place, one.run)
-            draw_comparison_events(stream, place, one)
-            draw_worst(stream, place, one)
+        _draw_comparison(stream, result)
     draw_scene(stream, scene)
+
+
+def _draw_simulation(stream: RecordingStream, result: Simulation) -> None:
+    """Show the system file, and what the delta meters allow and found."""
+    import rerun as rr
+
+    stream.log(SYSTEM_FILE, rr.TextDocument(printable(result.system_text)), static=True)
+    draw_meter_tolerances(stream, result)
+    draw_meter_worst(stream, result)
+
+
+def _draw_comparison(stream: RecordingStream, result: Comparison) -> None:
+    """Draw what is allowed, and of each log what was done to it, how it deviates, and where it is worst."""
+    draw_tolerances(stream, result)
+    for place, one in zip(places_of(result), result.runs, strict=True):
+        _draw_run(stream, place, one.run)
+        draw_comparison_events(stream, place, one)
+        draw_worst(stream, place, one)
 
 
 def _draw_run(stream: RecordingStream, place: Place, run: Run) -> None:

@@ -1,6 +1,7 @@
 """What stands where in a recording: one table for the writer and the reader.
 
-A run stands at the root; of a comparison the first run does, and each further one below runs/<key>/.
+A run stands at the root; of a comparison the first run does, and each further one below runs/<key>/. Of a
+simulation `signal_entities` tells.
 
     joints/raw, raw_velocity, raw_acceleration                  the file's own rows: timelines t and row
     tcp/raw_position, raw_rotation
@@ -37,10 +38,16 @@ from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.trajectory import Trajectory
 
-LAYOUT_VERSION = 4
-"""Raised when an older reader would misunderstand a newer recording."""
+LAYOUTS = {"run": 4, "comparison": 4, "simulation": 5}
+"""The version that a recording says, by what it holds; raised when an older reader would misunderstand it.
 
-Series = Literal["joints", "xyz", "rotation", "euler", "delta", "number", "flag"]
+Each kind has its own, so that an older urmpipe reads what it knows, and refuses what it does not by number.
+"""
+
+LAYOUT_VERSION = LAYOUTS["run"]
+"""The version of a run and of a comparison."""
+
+Series = Literal["joints", "xyz", "rotation", "euler", "delta", "number", "flag", "signal"]
 """What the columns of an entity are."""
 
 LOG_ARRAYS: dict[str, tuple[str, Series]] = {
@@ -104,6 +111,7 @@ class Block:
         names: Name of each column.
         numbers: Name of the second timeline and its values, shape (n,); None without one.
         worst: Row that is verified besides the first and the last, or None.
+        palette: The colour of each column, where the series does not tell.
     """
 
     entity: str
@@ -113,6 +121,7 @@ class Block:
     names: tuple[str, ...]
     numbers: tuple[str, IntArray] | None = None
     worst: int | None = None
+    palette: tuple[str, ...] = ()
 
     @property
     def verified(self) -> tuple[int, ...]:
@@ -123,6 +132,8 @@ class Block:
     @property
     def colours(self) -> list[str]:
         """The colour of each column as #rrggbb."""
+        if self.palette:
+            return list(self.palette)
         if self.series == "joints":
             return [joint_colour(j) for j in range(len(self.names))]
         if self.series == "number":

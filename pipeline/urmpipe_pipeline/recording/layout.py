@@ -17,8 +17,11 @@ from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
 from urmpipe_pipeline.recording.plots import Plots, decisive_plot
 from urmpipe_pipeline.recording.scene import Scene
+from urmpipe_pipeline.recording.simulation_layout import simulation_plots, simulation_words
+from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint, Container, Spatial3DView, TextLogView, View
@@ -42,14 +45,29 @@ LINE_LENGTH = 115
 """Characters that fit in a line of the summary where it has half of a usual window's width."""
 
 
-def viewer_layout(result: Run | Comparison, scene: Scene) -> Blueprint:
-    """Return the views of a run or a comparison, each with its unit, on the timeline t."""
+def viewer_layout(result: Result, scene: Scene) -> Blueprint:
+    """Return the views of a result, each with its unit, on the timeline t."""
     import rerun.blueprint as rrb
 
+    if isinstance(result, Simulation):
+        return _blueprint(simulation_words(), simulation_summary(result), simulation_plots(result), scene)
     right = _of_run(result) if isinstance(result, Run) else _of_comparison(result)
-    text = rrb.TextDocumentView(origin=SUMMARY, name="Summary")
+    return _blueprint(rrb.TextDocumentView(origin=SUMMARY, name="Summary"), summary(result), right, scene)
+
+
+def _blueprint(text: View | Container, words: str, right: View | Container, scene: Scene) -> Blueprint:
+    """Return the summary and the 3D view at the left, the plots at the right.
+
+    Args:
+        text: The view of the summary.
+        words: What stands in it, by which it gets its height.
+        right: The plots.
+        scene: The 3D view; without anything in it, the summary stands above the plots.
+    """
+    import rerun.blueprint as rrb
+
     length = 2 * LINE_LENGTH if scene.empty else LINE_LENGTH
-    lines = sum(math.ceil(len(line) / length) for line in summary(result).splitlines())
+    lines = sum(math.ceil(len(line) / length) for line in words.splitlines())
     share = min(MOST_TEXT, HEAD_SHARE + LINE_SHARE * lines)
     shares = [share, 1 - share]
     root: Container = rrb.Vertical(text, right, row_shares=shares)
@@ -66,8 +84,11 @@ def viewer_layout(result: Run | Comparison, scene: Scene) -> Blueprint:
     )
 
 
-def opening_time(result: Run | Comparison) -> int:
-    """Return where the viewer should stand in [ns]: at the worst sample of the log that is open."""
+def opening_time(result: Result) -> int:
+    """Return where the viewer should stand in [ns]: at the worst sample of what is open, else the first."""
+    if isinstance(result, Simulation):
+        worst = result.judged_worst.sample if result.judged_worst is not None else 0
+        return int(result.t_ns[worst]) if len(result.t_ns) else 0
     if isinstance(result, Run):
         return int(result.t_ns[0])
     open_first = result.ranking[-1]

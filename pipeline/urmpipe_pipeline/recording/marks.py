@@ -14,7 +14,9 @@ from urmpipe_pipeline.palette import NEUTRAL_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.recording.columns import scalar_column, time_columns
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.recording.overview import COMPARED
+from urmpipe_pipeline.recording.signal_entities import verdict_entities
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Simulation
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -61,26 +63,45 @@ def draw_repolarizations(stream: RecordingStream, place: Place, run: Run) -> Non
 
 def draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
     """Draw a line through the worst sample in every plot, as high as what is plotted there."""
-    import rerun as rr
-
     if len(one.run.t_ns) < 2:
         return  # the line's nanosecond would be the whole axis
-    # A line between two values at one time is drawn as a point: one of them is a nanosecond later.
-    t_ns = one.t_ns[one.worst] + np.arange(2)
+    for plot, values in _plots(one):
+        _draw_instant(stream, worst_entity(place, plot), int(one.t_ns[one.worst]), values)
+
+
+def draw_meter_worst(stream: RecordingStream, result: Simulation) -> None:
+    """Draw a line through the worst sample of each delta meter in the plot of what it is judged by."""
+    if len(result.t_ns) < 2:
+        return
+    for one, entity in zip(result.verdicts, verdict_entities(result, "marks/worst"), strict=True):
+        judged = [
+            signal.columns
+            for signal in result.signals
+            if signal.block == one.block and signal.variable in one.variables
+        ]
+        if judged:
+            _draw_instant(stream, entity, int(result.t_ns[one.sample]), np.column_stack(judged))
+
+
+def _draw_instant(stream: RecordingStream, entity: str, at_ns: int, values: FloatArray) -> None:
+    """Draw a line at one time, as high as some values."""
+    import rerun as rr
+
+    if not values.size:  # a path has no joints
+        return
+    ends = [ufunc.reduce(values, axis=None) for ufunc in (np.fmin, np.fmax)]  # of what is no NaN
+    if not np.isfinite(ends).all():
+        return
     style = rr.SeriesLines(
         colors=[rgb(NEUTRAL_COLOUR)],
         names=["worst"],
         widths=[WORST_WIDTH],
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
-    for plot, values in _plots(one):
-        if not values.size:  # a path has no joints
-            continue
-        ends = [ufunc.reduce(values, axis=None) for ufunc in (np.fmin, np.fmax)]  # of what is no NaN
-        if np.isfinite(ends).all():
-            entity = worst_entity(place, plot)
-            stream.log(entity, style, static=True)
-            stream.send_columns(entity, time_columns(t_ns), [scalar_column(np.array(ends)[:, np.newaxis])])
+    stream.log(entity, style, static=True)
+    # A line between two values at one time is drawn as a point: one of them is a nanosecond later.
+    times = time_columns(at_ns + np.arange(2))
+    stream.send_columns(entity, times, [scalar_column(np.array(ends)[:, np.newaxis])])
 
 
 def _plots(one: Deviation) -> Iterator[tuple[str, FloatArray]]:

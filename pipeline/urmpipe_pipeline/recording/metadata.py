@@ -17,7 +17,7 @@ from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.comparison import Comparison, Deviation, Statistics
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, Block, Place, places_of
+from urmpipe_pipeline.recording.entities import LAYOUTS, Block, Place, places_of
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.trajectory import Alignment, Sync, Trajectory
 
@@ -28,29 +28,32 @@ if TYPE_CHECKING:
 def to_json(result: Run | Comparison, blocks: list[Block]) -> str:
     """Return the metadata of a result as JSON, with the shape of every array that belongs to it."""
     standing = places_of(result)
-    document = {
-        "layout_version": LAYOUT_VERSION,
-        "kind": "run" if isinstance(result, Run) else "comparison",
-        "arrays": {block.entity: list(block.values.shape) for block in blocks},
-        "result": _run(result, standing[0]) if isinstance(result, Run) else _comparison(result, standing),
-    }
-    return json.dumps(document, default=_plain)
+    if isinstance(result, Run):
+        return document("run", _run(result, standing[0]), blocks)
+    return document("comparison", _comparison(result, standing), blocks)
+
+
+def document(kind: str, data: Mapping[str, Any], blocks: list[Block]) -> str:
+    """Return the metadata of a kind of result as JSON, with the shape of every array."""
+    shapes = {block.entity: list(block.values.shape) for block in blocks}
+    about = {"layout_version": LAYOUTS[kind], "kind": kind, "arrays": shapes, "result": data}
+    return json.dumps(about, default=_plain)
 
 
 def provenance_from(data: Mapping[str, Any]) -> Provenance:
     """Return the provenance that a JSON object tells of."""
-    return Provenance(**{**data, "inputs": _files(data["inputs"])})
+    return Provenance(**{**data, "inputs": files_from(data["inputs"])})
 
 
 def log_fields(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of a `JointLog` that are no arrays."""
     return {
         **data,
-        "files": _files(data["files"]),
+        "files": files_from(data["files"]),
         "joints": tuple(data["joints"]),
         "columns": tuple(LogColumn(**one) for one in data["columns"]),
         "inferences": tuple(Inference(**one) for one in data["inferences"]),
-        "warnings": _warnings(data["warnings"]),
+        "warnings": warnings_from(data["warnings"]),
     }
 
 
@@ -59,9 +62,9 @@ def run_fields(data: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "name": data["name"],
         "tsp": data["tsp"],
-        "robot": _robot(data["robot"]),
+        "robot": robot_from(data["robot"]),
         "audit": tuple(AuditEntry(**one) for one in data["audit"]),
-        "warnings": _warnings(data["warnings"]),
+        "warnings": warnings_from(data["warnings"]),
         "provenance": provenance_from(data["provenance"]),
     }
 
@@ -88,7 +91,7 @@ def comparison_fields(data: Mapping[str, Any]) -> dict[str, Any]:
     return {
         "name": data["name"],
         "tolerance": data["tolerance"],
-        "warnings": _warnings(data["warnings"]),
+        "warnings": warnings_from(data["warnings"]),
         "provenance": provenance_from(data["provenance"]),
     }
 
@@ -97,7 +100,7 @@ def reference_fields(data: Mapping[str, Any]) -> dict[str, Any]:
     """Return the fields of the reference `Trajectory` that are no arrays."""
     return {
         "name": data["name"],
-        "files": _files(data["files"]),
+        "files": files_from(data["files"]),
         "joints": tuple(data["joints"]),
         "joint_units": tuple(data["joint_units"]),
     }
@@ -111,13 +114,13 @@ def _alignment(data: Mapping[str, Any]) -> Alignment:
 
 def _run(run: Run, place: Place) -> dict[str, Any]:
     return {
-        "place": _flat(place),
+        "place": flat(place),
         "name": run.name,
         "tsp": run.tsp,
-        "robot": _robot_data(run.robot),
-        "audit": [_flat(one) for one in run.audit],
-        "warnings": [_flat(one) for one in run.warnings],
-        "provenance": _provenance(run.provenance),
+        "robot": robot_data(run.robot),
+        "audit": [flat(one) for one in run.audit],
+        "warnings": [flat(one) for one in run.warnings],
+        "provenance": provenance_data(run.provenance),
         "log": _log(run.log),
     }
 
@@ -126,15 +129,15 @@ def _log(log: JointLog) -> dict[str, Any]:
     return {
         "name": log.name,
         "source": log.source,
-        "files": [_flat(one) for one in log.files],
+        "files": [flat(one) for one in log.files],
         "joints": list(log.joints),
         "clock_start_ns": log.clock_start_ns,
         "first_line": log.first_line,
         "rotation_form": log.rotation_form,
-        "columns": [_flat(one) for one in log.columns],
+        "columns": [flat(one) for one in log.columns],
         "digits": log.digits,
-        "inferences": [_flat(one) for one in log.inferences],
-        "warnings": [_flat(one) for one in log.warnings],
+        "inferences": [flat(one) for one in log.inferences],
+        "warnings": [flat(one) for one in log.warnings],
     }
 
 
@@ -144,15 +147,15 @@ def _comparison(result: Comparison, standing: list[Place]) -> dict[str, Any]:
         "reference": _reference(result.reference),
         "runs": [_deviation(one, place) for one, place in zip(result.runs, standing, strict=True)],
         "tolerance": dict(result.tolerance),
-        "warnings": [_flat(one) for one in result.warnings],
-        "provenance": _provenance(result.provenance),
+        "warnings": [flat(one) for one in result.warnings],
+        "provenance": provenance_data(result.provenance),
     }
 
 
 def _reference(reference: Trajectory) -> dict[str, Any]:
     return {
         "name": reference.name,
-        "files": [_flat(one) for one in reference.files],
+        "files": [flat(one) for one in reference.files],
         "joints": list(reference.joints),
         "joint_units": list(reference.joint_units),
     }
@@ -162,12 +165,12 @@ def _deviation(one: Deviation, place: Place) -> dict[str, Any]:
     return {
         "name": one.name,
         "joint_turns": list(one.joint_turns),
-        "sync": _flat(one.sync),
-        "alignment": _flat(one.alignment),
+        "sync": flat(one.sync),
+        "alignment": flat(one.alignment),
         "left_out": one.left_out,
         "reference_left_out": one.reference_left_out,
-        "statistics": {name: _flat(values) for name, values in one.statistics.items()},
-        "joint_statistics": {name: _flat(values) for name, values in one.joint_statistics.items()},
+        "statistics": {name: flat(values) for name, values in one.statistics.items()},
+        "joint_statistics": {name: flat(values) for name, values in one.joint_statistics.items()},
         "start": list(one.start),
         "speed_correlation": one.speed_correlation,
         "verdict": one.verdict,
@@ -175,17 +178,19 @@ def _deviation(one: Deviation, place: Place) -> dict[str, Any]:
     }
 
 
-def _provenance(provenance: Provenance) -> dict[str, Any]:
+def provenance_data(provenance: Provenance) -> dict[str, Any]:
+    """Return a provenance as JSON has it."""
     return {
         "command": provenance.command,
         "options": dict(provenance.options),
-        "inputs": [_flat(one) for one in provenance.inputs],
+        "inputs": [flat(one) for one in provenance.inputs],
         "versions": dict(provenance.versions),
         "created": provenance.created,
     }
 
 
-def _robot_data(robot: Chain | None) -> dict[str, Any] | None:
+def robot_data(robot: Chain | None) -> dict[str, Any] | None:
+    """Return an arm as JSON has it; None without one."""
     if robot is None:
         return None
     from urmpipe_models.robot_file import chain_to_dict
@@ -193,7 +198,8 @@ def _robot_data(robot: Chain | None) -> dict[str, Any] | None:
     return chain_to_dict(robot)
 
 
-def _robot(data: Mapping[str, Any] | None) -> Chain | None:
+def robot_from(data: Mapping[str, Any] | None) -> Chain | None:
+    """Return the arm that a JSON object tells of; None without one."""
     if data is None:
         return None
     from urmpipe_models.robot_file import chain_from_dict
@@ -201,15 +207,17 @@ def _robot(data: Mapping[str, Any] | None) -> Chain | None:
     return chain_from_dict(data)
 
 
-def _files(data: list[dict[str, Any]]) -> tuple[SourceFile, ...]:
+def files_from(data: list[dict[str, Any]]) -> tuple[SourceFile, ...]:
+    """Return the input files that a JSON list tells of."""
     return tuple(SourceFile(**one) for one in data)
 
 
-def _warnings(data: list[dict[str, Any]]) -> tuple[LogWarning, ...]:
+def warnings_from(data: list[dict[str, Any]]) -> tuple[LogWarning, ...]:
+    """Return the warnings that a JSON list tells of."""
     return tuple(LogWarning(**one) for one in data)
 
 
-def _flat(item: DataclassInstance) -> dict[str, Any]:
+def flat(item: DataclassInstance) -> dict[str, Any]:
     """Return a dataclass of plain values as a dictionary, without the deep copies of `asdict`."""
     return {field.name: getattr(item, field.name) for field in fields(item)}
 

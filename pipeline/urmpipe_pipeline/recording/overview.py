@@ -10,10 +10,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.recording.entities import Block, Place, places_of
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result, Simulation
 
 LONG = 50_000
 """Rows that the viewer still draws whole at once; of more an overview is shown first."""
@@ -36,24 +36,32 @@ def overview_entity(entity: str) -> str:
     return f"/overview{entity}"
 
 
-def overviews(result: Run | Comparison, every: Sequence[Block]) -> Iterator[Block]:
+def overviews(result: Result, every: Sequence[Block]) -> Iterator[Block]:
     """Yield the overview of each long array that has a plot, and the speed of a run.
 
     Args:
         result: What is recorded.
         every: Its arrays.
     """
+    if isinstance(result, Simulation):
+        yield from (_overview(one, ROWS) for one in every if one.series == "signal" and _long(one))
+        return
     runs = [result] if isinstance(result, Run) else [one.run for one in result.runs]
     standing = zip(runs, places_of(result), strict=True)
     plotted = {entity for run, place in standing for entity in _plotted(run, place)}
     for block in every:
-        if block.entity in plotted and len(block.t_ns) > LONG:
+        if block.entity in plotted and _long(block):
             yield _overview(block, ROWS)
     if isinstance(result, Run) and result.tcp is not None:
         velocity = result.tcp.velocity
         speed = np.sqrt(np.einsum("ij,ij->i", velocity, velocity))[:, np.newaxis]
         whole = Block(speed_entity(places_of(result)[0]), result.t_ns, speed, "number", ("speed",))
         yield _overview(whole, ROWS if len(speed) > LONG else SPEED_ROWS)
+
+
+def _long(block: Block) -> bool:
+    """Tell whether an array with values has more rows than the viewer draws at once."""
+    return len(block.t_ns) > LONG and block.values.shape[1] > 0
 
 
 def speed_entity(place: Place) -> str:

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 from uuid import UUID
 
-from urmpipe_pipeline.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison import Deviation
+from urmpipe_pipeline.joint_log import IntArray
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.recording.marks import mark_entity, worst_entity
 from urmpipe_pipeline.recording.overview import LONG, overview_entity, speed_entity
 from urmpipe_pipeline.recording.tolerances import tolerance_entities
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.signal_groups import Group
+from urmpipe_pipeline.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     from rerun.blueprint import TimeSeriesView
@@ -28,7 +31,7 @@ BEFORE, AFTER = 0.01, 0.17
 class Plots:
     """Makes the plots of a recording; all of them show its whole time."""
 
-    def __init__(self, result: Run | Comparison) -> None:
+    def __init__(self, result: Result) -> None:
         self._range = _whole_time(result)
         self._shares_axis = True
 
@@ -60,12 +63,25 @@ class Plots:
             beside: What else stands in the plot.
             legend: Whether it has room for one.
         """
+        return self._arrays(name, unit, [entity], rows, *beside, legend=legend)
+
+    def signals(
+        self, group: Group, entities: Mapping[str, str], rows: int, *beside: str
+    ) -> list[TimeSeriesView]:
+        """Return the plot of some signals of a block, as `array` does it."""
+        name = printable(f"{group.block}: {group.variables}")
+        own = [entities[one.name] for one in group.signals]
+        return self._arrays(name, printable(group.bracket), own, rows, *beside)
+
+    def _arrays(
+        self, name: str, unit: str, entities: Sequence[str], rows: int, *beside: str, legend: bool = True
+    ) -> list[TimeSeriesView]:
         if rows <= LONG:
-            return [self.series(f"{name} [{unit}]", entity, *beside, legend=legend)]
+            return [self.series(f"{name} [{unit}]", *entities, *beside, legend=legend)]
         said = f"{name} [{unit}], every peak of {rows:,} rows"
         return [
-            self.series(said, overview_entity(entity), *beside, legend=legend),
-            self.series(f"all {rows:,} rows [{unit}]", entity, *beside, legend=legend),
+            self.series(said, *map(overview_entity, entities), *beside, legend=legend),
+            self.series(f"all {rows:,} rows [{unit}]", *entities, *beside, legend=legend),
         ]
 
     def joints(self, run: Run, place: Place) -> Iterator[list[TimeSeriesView]]:
@@ -132,13 +148,22 @@ def decisive_plot(one: Deviation) -> int:
     return plots.index("delta" if kind in ("axis", "norm") else kind)
 
 
-def _whole_time(result: Run | Comparison) -> TimeRange | None:
-    """Return from the first to the last sample, with a margin; None if there is but one."""
+def _times(result: Result) -> list[IntArray]:
+    """Return all times of a result."""
+    if isinstance(result, Simulation):
+        return [result.t_ns]
+    runs: Sequence[Run] = [result] if isinstance(result, Run) else [one.run for one in result.runs]
+    return [t_ns for run in runs for t_ns in (run.log.t_ns, run.t_ns)]
+
+
+def _whole_time(result: Result) -> TimeRange | None:
+    """Return from the first to the last sample, with a margin; None if there is none or but one."""
     import rerun as rr
     import rerun.blueprint as rrb
 
-    runs: Sequence[Run] = [result] if isinstance(result, Run) else [one.run for one in result.runs]
-    every = [t_ns for run in runs for t_ns in (run.log.t_ns, run.t_ns) if len(t_ns)]
+    every = [t_ns for t_ns in _times(result) if len(t_ns)]
+    if not every:
+        return None
     first, last = min(int(t_ns[0]) for t_ns in every), max(int(t_ns[-1]) for t_ns in every)
     if first == last:
         return None

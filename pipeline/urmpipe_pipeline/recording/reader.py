@@ -10,7 +10,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.errors import RecordingError
+from urmpipe_models.errors import CosimulationError, RecordingError
 from urmpipe_models.kinematics import PointLog
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
@@ -18,6 +18,7 @@ from urmpipe_pipeline.recording import metadata
 from urmpipe_pipeline.recording.entities import (
     GRID_ARRAYS,
     LAYOUT_VERSION,
+    LAYOUTS,
     LOG_ARRAYS,
     MATCHED_ARRAYS,
     REFERENCE_ARRAYS,
@@ -25,15 +26,18 @@ from urmpipe_pipeline.recording.entities import (
     TCP_ARRAYS,
     Place,
 )
+from urmpipe_pipeline.recording.signal_entities import TIMES
+from urmpipe_pipeline.recording.simulation_data import simulation_fields
 from urmpipe_pipeline.recording.store import Chunk, Store
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Arm, Result, Signal, Simulation
 from urmpipe_pipeline.trajectory import Trajectory
 
 Data: TypeAlias = Mapping[str, Any]
 
 
-def read_recording(path: Path) -> Run | Comparison:
-    """Return the run or the comparison that a recording holds.
+def read_recording(path: Path) -> Result:
+    """Return the run, the comparison or the simulation that a recording holds.
 
     The runs inside a comparison come back without the file that they once stood in.
 
@@ -49,8 +53,10 @@ def read_recording(path: Path) -> Run | Comparison:
         arrays = _Arrays(store, document["arrays"])
         if document["kind"] == "run":
             return _run(arrays, document["result"], path)
+        if document["kind"] == "simulation":
+            return _simulation(arrays, document["result"], path)
         return _comparison(arrays, document["result"], path)
-    except (KeyError, TypeError, AttributeError) as error:
+    except (KeyError, TypeError, AttributeError, CosimulationError) as error:
         raise _damaged(store, error) from error
 
 
@@ -134,21 +140,45 @@ def _deviation(arrays: _Arrays, data: Data) -> Deviation:
     )
 
 
+def _simulation(arrays: _Arrays, data: Data, path: Path) -> Simulation:
+    return Simulation(
+        **simulation_fields(data),
+        t_ns=arrays.chunk(TIMES).t_ns,
+        signals=tuple(_signal(arrays, one) for one in data["signals"]),
+        arms=tuple(_arm(arrays, one) for one in data["arms"]),
+        recording=path,
+    )
+
+
+def _arm(arrays: _Arrays, data: Data) -> Arm:
+    from urmpipe_models.robot_file import chain_from_dict
+
+    return Arm(data["block"], chain_from_dict(data["chain"]), arrays.chunk(data["entity"]).values)
+
+
+def _signal(arrays: _Arrays, data: Data) -> Signal:
+    """Return a signal with its values: those of a scalar have no columns."""
+    told = dict(data)
+    values = arrays.chunk(told.pop("entity")).values
+    return Signal(**told, values=values) if told.pop("array") else Signal(**told, values=values[:, 0])
+
+
 def _document(store: Store) -> dict[str, Any]:
     """Return the metadata, of a layout that is known."""
     try:
         document: dict[str, Any] = json.loads(store.metadata)
         version = document["layout_version"]
-        newer, older = version > LAYOUT_VERSION, version < LAYOUT_VERSION
+        newest, allowed = max(LAYOUTS.values()), LAYOUTS.get(document.get("kind", ""), LAYOUT_VERSION)
+        newer, older = version > newest, version < allowed
     except (ValueError, KeyError, TypeError) as error:
         raise _damaged(store, error) from error
     if newer:
         raise store.error(
-            f"found layout version {version}, allowed: up to {LAYOUT_VERSION}; a newer urmpipe wrote it"
+            f"found layout version {version}, allowed: up to {newest}; a newer urmpipe wrote it"
         )
     if older:
         raise store.error(
-            f"found layout version {version}, allowed: {LAYOUT_VERSION}; an older urmpipe wrote it:"
+            f"found layout version {version}, allowed: {allowed}; an older urmpipe wrote it:"
             " make it again from its log"
         )
     return document

@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.elementwise import Vector
-from urmpipe_models.kinematics import points_over_log
+from urmpipe_models.kinematics import points_over_log, positions_over_log
 from urmpipe_models.transform import Transform, translation
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Comparison, Deviation
@@ -19,8 +19,10 @@ from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
 from urmpipe_pipeline.recording.bodies import Body, bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import enlarged
 from urmpipe_pipeline.recording.entities import Place, entity_path, places_of, printable
+from urmpipe_pipeline.recording.signal_entities import arm_keys
 from urmpipe_pipeline.recording.ways import Way, dashed, lines_of, thinned, track_of
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result, Simulation
 from urmpipe_pipeline.trajectory import Trajectory
 
 
@@ -101,8 +103,10 @@ class Scene:
         return (low + high) / 2, radius or 1.0
 
 
-def scene_of(result: Run | Comparison) -> Scene:
-    """Return what the 3D view shows of a run or a comparison."""
+def scene_of(result: Result) -> Scene:
+    """Return what the 3D view shows of a result."""
+    if isinstance(result, Simulation):
+        return _of_simulation(result)
     standing = places_of(result)
     if isinstance(result, Run):
         return Scene(_arm(result, None, run_colour(0)), tuple(_run_ways(result, standing[0])))
@@ -185,19 +189,43 @@ def _arm(run: Run, worst_ns: int | None, tip: str) -> Arm | None:
     if run.robot is None or run.tcp is None:
         return None
     worst = None if worst_ns is None else min(int(np.searchsorted(run.t_ns, worst_ns)), len(run.t_ns) - 1)
-    rows = thinned(run.t_ns, run.q, worst)
+    return _moving(run.robot, run.t_ns, run.q, worst, tip)
+
+
+def _moving(robot: Chain, t_ns: IntArray, every_q: FloatArray, worst: int | None, tip: str) -> Arm | None:
+    """Return an arm that moves, thinned out for drawing, or None without a whole sample."""
+    rows = thinned(t_ns, every_q, worst)
     if not len(rows):
         return None
-    q = run.q[rows]
-    bodies = bodies_over_log(run.robot, q)
+    q = every_q[rows]
+    bodies = bodies_over_log(robot, q)
     return Arm(
-        t_ns=run.t_ns[rows],
+        t_ns=t_ns[rows],
         sample=rows,
-        skeleton=points_over_log(run.robot, q),
-        colours=_point_colours(run.robot, tip),
+        skeleton=points_over_log(robot, q),
+        colours=_point_colours(robot, tip),
         bodies=bodies,
-        bare=lacks_shapes(run.robot, bodies),
+        bare=lacks_shapes(robot, bodies),
     )
+
+
+def _of_simulation(result: Simulation) -> Scene:
+    """Return the first arm of a simulation, and the way of the tip of each."""
+    if not result.arms or not len(result.t_ns):
+        return Scene(None, ())
+    several = len(result.arms) > 1
+    worst = result.judged_worst.sample if result.judged_worst is not None else None
+    ways = []
+    for i, (arm, key) in enumerate(zip(result.arms, arm_keys(result), strict=True)):
+        position = positions_over_log(arm.chain, arm.q)
+        track = track_of(result.t_ns, position, worst=worst)
+        entities = entity_path("path", key), entity_path("point", key)
+        strips = lines_of(position, worst=worst)
+        label = printable(arm.block) if several else ""
+        ways.append(Way(*entities, run_colour(i), False, strips, track, label))
+    first = result.arms[0]
+    arm_drawn = _moving(first.chain, result.t_ns, first.q, worst, run_colour(0))
+    return Scene(arm_drawn, tuple(ways), whose=printable(first.block) if several else "")
 
 
 def _point_colours(robot: Chain, tip: str) -> tuple[str, ...]:

@@ -26,21 +26,21 @@ def summary(result: Run | Comparison) -> str:
 
 
 def _of_run(run: Run) -> Iterator[str]:
-    files = ", ".join(_text(file.name) for file in run.log.files) or "no file"
+    files = ", ".join(shown(file.name) for file in run.log.files) or "no file"
     robot = "No robot, so no kinematics." if run.log.joints else "A path, without joints."
     if run.robot is not None:
-        robot = f"Arm: {_text(run.robot.name)}."
+        robot = f"Arm: {shown(run.robot.name)}."
     wraps, others = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
     marked = ", marked by triangles in the joint's colour" if wraps else ""
     doubts = f"; other findings: {others}, marked by crosses" if others else ""
-    yield f"### {_text(run.name)}"
+    yield f"### {shown(run.name)}"
     rows = f"{text.counted(run.log.rows, 'row')}, {run.duration:.6g} s"
-    yield f"{files}, read as {_text(run.log.source)}: {rows}. {robot}"
+    yield f"{files}, read as {shown(run.log.source)}: {rows}. {robot}"
     yield ""
     every = f", one in {1e3 * run.tsp:.6g} ms" if len(run.t_ns) > 1 else ""
     grid = f"Grid: {text.counted(len(run.t_ns), 'sample')}{every}."
     yield f"{grid} Repolarizations: {wraps}{marked}{doubts}." if run.log.joints else grid
-    yield from _warnings(run.warnings)
+    yield from warning_lines(run.warnings)
 
 
 def _of_comparison(result: Comparison) -> Iterator[str]:
@@ -52,12 +52,12 @@ def _of_comparison(result: Comparison) -> Iterator[str]:
     worst = result.ranking[-1]
     yield _worst(worst, several)
     yield ""
-    yield f"Reference: {_text(result.reference.name)} (grey, dashed). Tolerance: {tolerance_words(result)}."
+    yield f"Reference: {shown(result.reference.name)} (grey, dashed). Tolerance: {tolerance_words(result)}."
     yield ""
     yield from _table(result)
     yield from _set_up(result, several)
     told = [warning.of(one.name) for one in result.runs for warning in one.run.warnings]
-    yield from _warnings([*result.warnings, *told])
+    yield from warning_lines([*result.warnings, *told])
     yield ""
     yield "All figures, statistics and provenance: `urmpipe report` with this file."
 
@@ -66,8 +66,8 @@ def _worst(one: Deviation, several: bool) -> str:
     """Return how much, where and when of the log that comes out worst."""
     decisive = one.decisive
     used = "" if decisive.used is None else f" ({text.used(decisive)})"
-    said = f"**{_text(one.name)}**: " if several else ""
-    said += f"{_text(excess(decisive))}{used}, at {text.seconds(decisive.t_max)} s."
+    said = f"**{shown(one.name)}**: " if several else ""
+    said += f"{shown(excess(decisive))}{used}, at {text.seconds(decisive.t_max)} s."
     if one.verdict == "fail":
         out = int(np.count_nonzero(one.outside))
         said += f" Out of tolerance: {out} of {len(one.sample)} samples ({text.percent(one.share_out)})"
@@ -80,14 +80,14 @@ def _worst(one: Deviation, several: bool) -> str:
 def _table(result: Comparison) -> Iterator[str]:
     """Yield the logs from best to worst."""
     heads = ("log", "drawn", *(f"{axis} [mm]" for axis in AXES), "worst at [s]", "out", "verdict")
-    yield _row(heads)
-    yield _row("---" for _ in heads)
+    yield table_row(heads)
+    yield table_row("---" for _ in heads)
     for one in result.ranking:
-        yield _row(_cells(result.runs.index(one), one))
+        yield table_row(_cells(result.runs.index(one), one))
 
 
 def _cells(index: int, one: Deviation) -> Iterable[str]:
-    yield _text(one.name)
+    yield shown(one.name)
     yield run_colour_word(index)
     for axis in AXES:
         yield text.millimetres(one.statistics[axis].max, one.statistics[axis].tolerance)
@@ -104,10 +104,10 @@ def _set_up(result: Comparison, several: bool) -> Iterator[str]:
             said.append(f"{one.reference_left_out} samples of the reference outside its time")
         if said:
             yield ""
-            yield (f"{_text(one.name)}: " if several else "") + _text("; ".join(said))
+            yield (f"{shown(one.name)}: " if several else "") + shown("; ".join(said))
 
 
-def _warnings(warnings: Sequence[LogWarning]) -> Iterator[str]:
+def warning_lines(warnings: Sequence[LogWarning]) -> Iterator[str]:
     """Yield the first warnings as a list."""
     if warnings:
         yield ""
@@ -115,15 +115,16 @@ def _warnings(warnings: Sequence[LogWarning]) -> Iterator[str]:
         yield ""
     for one in warnings[:LISTED]:
         row = f" (row {one.row})" if one.row is not None else ""
-        yield f"- {_text(one.message)}{row}"
+        yield f"- {shown(one.message)}{row}"
     if len(warnings) > LISTED:
         yield f"- and {len(warnings) - LISTED} more, all in the report"
 
 
-def _row(cells: Iterable[str]) -> str:
+def table_row(cells: Iterable[str]) -> str:
+    """Return a row of a table in Markdown."""
     return f"| {' | '.join(cells)} |"
 
 
-def _text(value: str) -> str:
+def shown(value: str) -> str:
     """Return a text from a file so that Markdown shows it as it is."""
     return re.sub(r"([\\`*_{}\[\]<>#|~!-])", r"\\\1", " ".join(printable(value).split()))

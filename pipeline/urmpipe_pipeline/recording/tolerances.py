@@ -12,6 +12,8 @@ from urmpipe_pipeline.joint_log import IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.recording.columns import scalar_column, time_columns
 from urmpipe_pipeline.recording.entities import entity_path
+from urmpipe_pipeline.recording.signal_entities import verdict_entities
+from urmpipe_pipeline.simulation import Simulation
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -33,22 +35,38 @@ LIMIT_WIDTH = 1.5
 
 def draw_tolerances(stream: RecordingStream, result: Comparison) -> None:
     """Draw what is allowed as lines over the compared times: both signs of what has a sign."""
-    import rerun as rr
-
     ends = _ends([one.t_ns for one in result.runs])
     numbers = _ends([one.sample for one in result.runs])
     for kind, allowed in result.tolerance.items():
-        signs = (1,) if kind in UNSIGNED else (1, -1)
-        colour = rgb(AXIS_COLOURS.get(kind, REFERENCE_COLOUR))
-        what = "tolerance" if kind not in AXIS_COLOURS else f"tolerance of {kind}"
-        # The axis of a plot may show no number but 0: what is allowed says how large the rest is.
-        said = f"{what} {allowed:.6g}"
-        names = [f"{'+' if sign > 0 else '-'}{said}" if len(signs) > 1 else said for sign in signs]
-        style = rr.SeriesLines(colors=[colour] * len(signs), names=names, widths=[LIMIT_WIDTH] * len(signs))
-        entity = entity_path("tolerance", PLOTS[kind], kind)
-        stream.log(entity, style, static=True)
-        values = np.array([[sign * allowed for sign in signs]] * len(ends))
-        stream.send_columns(entity, time_columns(ends, "sample", numbers), [scalar_column(values)])
+        _draw(stream, entity_path("tolerance", PLOTS[kind], kind), kind, allowed, ends, numbers)
+
+
+def draw_meter_tolerances(stream: RecordingStream, result: Simulation) -> None:
+    """Draw what the delta meters of a simulation allow over all its samples."""
+    if not len(result.t_ns):
+        return
+    ends, numbers = result.t_ns[[0, -1]], np.array([0, len(result.t_ns) - 1])
+    for one, root in zip(result.verdicts, verdict_entities(result, "tolerance"), strict=True):
+        for kind, allowed in one.tolerance.items():
+            _draw(stream, f"{root}/{kind}", kind, allowed, ends, numbers)
+
+
+def _draw(
+    stream: RecordingStream, entity: str, kind: str, allowed: float, ends: IntArray, numbers: IntArray
+) -> None:
+    """Draw one tolerance as lines: both signs of what has a sign."""
+    import rerun as rr
+
+    signs = (1,) if kind in UNSIGNED else (1, -1)
+    colour = rgb(AXIS_COLOURS.get(kind, REFERENCE_COLOUR))
+    what = "tolerance" if kind not in AXIS_COLOURS else f"tolerance of {kind}"
+    # The axis of a plot may show no number but 0: what is allowed says how large the rest is.
+    said = f"{what} {allowed:.6g}"
+    names = [f"{'+' if sign > 0 else '-'}{said}" if len(signs) > 1 else said for sign in signs]
+    style = rr.SeriesLines(colors=[colour] * len(signs), names=names, widths=[LIMIT_WIDTH] * len(signs))
+    stream.log(entity, style, static=True)
+    values = np.array([[sign * allowed for sign in signs]] * len(ends))
+    stream.send_columns(entity, time_columns(ends, "sample", numbers), [scalar_column(values)])
 
 
 def tolerance_entities(plot: str) -> str:

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TypeAlias, TypeVar
 
 from urmpipe_models.errors import Finding, OutputError
-from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.recording.columns import block_columns
@@ -21,14 +20,17 @@ from urmpipe_pipeline.recording.identity import APPLICATION_ID, load_rerun, sett
 from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.scene import scene_of
+from urmpipe_pipeline.recording.signal_entities import simulation_blocks
+from urmpipe_pipeline.recording.simulation_data import simulation_json
 from urmpipe_pipeline.recording.store import PROPERTY
 from urmpipe_pipeline.recording.verify import verify
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
 
-Result = TypeVar("Result", bound=Run | Comparison)
+Made = TypeVar("Made", bound=Result)
 
 Early: TypeAlias = Callable[[JointLog | Run], None]
 """Takes a log that was read, or a run that lacks its kinematics, to be written meanwhile."""
@@ -44,12 +46,12 @@ SPARE = 64 * 2**20
 
 
 def write_recording(
-    result: Run | Comparison,
+    result: Result,
     path: Path,
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Path:
-    """Write the recording of a run or a comparison, read it back, and put it in its place.
+    """Write the recording of a result, read it back, and put it in its place.
 
     Args:
         result: What to record.
@@ -68,11 +70,11 @@ def write_recording(
 
 
 def record(
-    make: Callable[[Early], Result],
+    make: Callable[[Early], Made],
     path: Path,
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
-) -> Result:
+) -> Made:
     """Make a result and write its recording, some of it while the rest is still being computed.
 
     Rerun takes long to import, and longer to write a log than urmpipe to compute its kinematics: so it is
@@ -109,8 +111,7 @@ def record(
 
             result = make(early)
             ready()
-            every = blocks(result)
-            metadata = to_json(result, every)
+            every, metadata = _content(result)
             under_way.append(beside.submit(sender.send, every, progress))
             _describe(sender.stream(), result, every, metadata)
             for sending in under_way:
@@ -193,7 +194,16 @@ class _Sender:
             )
 
 
-def _describe(stream: RecordingStream, result: Run | Comparison, every: list[Block], metadata: str) -> None:
+def _content(result: Result) -> tuple[list[Block], str]:
+    """Return the arrays and the metadata of a result."""
+    if isinstance(result, Simulation):
+        arrays = simulation_blocks(result)
+        return arrays, simulation_json(result, arrays)
+    arrays = blocks(result)
+    return arrays, to_json(result, arrays)
+
+
+def _describe(stream: RecordingStream, result: Result, every: list[Block], metadata: str) -> None:
     """Send what is no array: the metadata, the viewer's layout, and what is there to be looked at."""
     import rerun as rr
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.playback import play_back
@@ -10,9 +10,17 @@ from urmpipe_pipeline.report.figures_deviation import deviation_figure, pose_fig
 from urmpipe_pipeline.report.figures_motion import motion_figure
 from urmpipe_pipeline.report.figures_overview import overview_figure
 from urmpipe_pipeline.report.figures_repolarization import joints_figure, point_figure
-from urmpipe_pipeline.report.paths import path_figure, repolarized_path_figure, run_path_figure
+from urmpipe_pipeline.report.figures_signals import signals_figure
+from urmpipe_pipeline.report.paths import (
+    arms_path_figure,
+    path_figure,
+    repolarized_path_figure,
+    run_path_figure,
+)
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.signal_groups import Group
+from urmpipe_pipeline.simulation import Simulation
 
 
 def comparison_figures(comparison: Comparison) -> list[Figure]:
@@ -37,6 +45,16 @@ def deviation_figures(deviation: Deviation) -> list[Figure]:
 def run_figures(run: Run) -> list[Figure]:
     """Return the figures of a log that was only ingested: how it was repolarized, then how it moves."""
     return _those_there([*_repolarization_figures(run), motion_figure(run), run_path_figure(run)])
+
+
+def simulation_figures(simulation: Simulation) -> list[Figure]:
+    """Return the figures of a whole simulation: where its arms were."""
+    return _those_there([arms_path_figure(simulation)])
+
+
+def signal_figures(simulation: Simulation, groups: Sequence[Group]) -> list[Figure]:
+    """Return the figures of the signals of one block, one a unit."""
+    return _those_there(signals_figure(simulation, group) for group in groups)
 
 
 def _repolarization_figures(run: Run) -> list[Figure | None]:

@@ -9,11 +9,11 @@ from typing import Any
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.audit_entry import AuditKind
-from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.report.tables import Cell, Column, Table, listing, numbers, words
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result
 
 AUDIT_NOTES: dict[AuditKind, str] = {
     "in-between": "in-between: a sample that a linear resampling left on a wrap, Step deg off the line of its"
@@ -74,8 +74,8 @@ def audit_table(run: Run) -> Table:
     return replace(table, note=" ".join(note for note in said if note))
 
 
-def warnings_table(found: Comparison | Run) -> Table:
-    """Return the warnings of a comparison or a run."""
+def warnings_table(found: Result) -> Table:
+    """Return the warnings of a result."""
     columns = (Column("Kind"), *numbers("Row"), Column("What"))
     rows = [
         (warning.kind, text.NOTHING if warning.row is None else str(warning.row), warning.message)

@@ -4,25 +4,35 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import groupby
 from typing import TypeAlias
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.report import gallery, log_tables, verdict_tables
+from urmpipe_pipeline.report import (
+    gallery,
+    log_tables,
+    simulation_parts,
+    simulation_tables,
+    verdict_tables,
+)
 from urmpipe_pipeline.report.banner import Banner, banner
 from urmpipe_pipeline.report.cards import Card, card
+from urmpipe_pipeline.report.drawings import Drawing, Listing, system_drawing, system_file
 from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_facts, run_facts
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.signal_groups import Group, groups_of
+from urmpipe_pipeline.simulation import Result, Simulation
 from urmpipe_pipeline.wording import tolerance_words
 
-Block: TypeAlias = Table | Figure
+Block: TypeAlias = Table | Figure | Drawing | Listing
 
 
 @dataclass(frozen=True, slots=True)
 class Summary:
-    """What a minute is enough to read about a comparison, or about the logs that were only ingested.
+    """What a minute is enough to read about a comparison, the simulations, or the logs only ingested.
 
     Attributes:
         title: The heading.
@@ -43,12 +53,14 @@ class Part:
 
     Attributes:
         title: The heading.
-        blocks: Its tables and figures, in order.
+        blocks: Its tables, figures, drawings and texts, in order.
         parts: The parts below it.
-        ident: Its anchor; figures of one part share their time axis.
+        ident: Its anchor.
         verdict: pass or fail, shown at the heading; empty where there is none.
         facts: What it is about.
         explained: Facts that need a word each, in a list of their own.
+        notice: What must not be overseen; empty for nothing.
+        link: What its figures, side by side, share their time axis by; empty for its anchor.
     """
 
     title: str
@@ -58,6 +70,8 @@ class Part:
     verdict: str = ""
     facts: tuple[Fact, ...] = ()
     explained: tuple[Fact, ...] = ()
+    notice: str = ""
+    link: str = ""
 
     def figures(self) -> list[tuple[str, Figure]]:
         """Return every figure of the part and of those below, each with the title of its part."""
@@ -73,7 +87,7 @@ class Page:
         title: The names of what it shows.
         banner: The verdict.
         summaries: What a minute is enough for.
-        parts: All there is, one a comparison and one a log that was only ingested.
+        parts: All there is, one a comparison, one a simulation and one a log that was only ingested.
     """
 
     title: str
@@ -87,26 +101,89 @@ class Page:
         return [found for part in self.parts for found in part.figures()]
 
 
-def lay_out(results: Sequence[Run | Comparison]) -> Page:
-    """Return the page about some results: comparisons first, then logs that were only ingested."""
+def lay_out(results: Sequence[Result]) -> Page:
+    """Return the page about some results: comparisons first, then simulations, then logs only ingested."""
     comparisons = [result for result in results if isinstance(result, Comparison)]
     runs = [result for result in results if isinstance(result, Run)]
+    simulations = [result for result in results if isinstance(result, Simulation)]
+    simulated = [f"#s{i}" for i in range(1, len(simulations) + 1)]
     links = [
         [f"#c{i}-{k}" for k in range(1, len(comparison.runs) + 1)]
         for i, comparison in enumerate(comparisons, start=1)
     ]
     summaries = [_summary(*pair) for pair in zip(comparisons, links, strict=True)]
+    if simulations:
+        summaries.append(_simulations_summary(simulations, simulated))
     if runs:
         table = log_tables.ingest_table(runs, [f"#r{i}" for i in range(1, len(runs) + 1)])
         summaries.append(Summary("Ingested logs", (), (table,)))
     return Page(
         title=", ".join(result.name for result in results),
-        banner=banner(comparisons, runs, links),
+        banner=_banner(comparisons, simulations, runs, links, simulated),
         summaries=tuple(summaries),
         parts=(
             *(_comparison_part(comparison, f"c{i}") for i, comparison in enumerate(comparisons, start=1)),
+            *(_simulation_part(one, f"s{i}") for i, one in enumerate(simulations, start=1)),
             *(_run_part(run, f"r{i}") for i, run in enumerate(runs, start=1)),
         ),
+    )
+
+
+def _banner(
+    comparisons: Sequence[Comparison],
+    simulations: Sequence[Simulation],
+    runs: Sequence[Run],
+    links: Sequence[Sequence[str]],
+    simulated: Sequence[str],
+) -> Banner:
+    """Return the verdict over all that was judged, or what was simulated or ingested."""
+    if simulations and not comparisons:
+        return simulation_parts.simulation_banner(simulations, simulated)
+    return simulation_parts.combined_banner(banner(comparisons, runs, links), simulations, simulated)
+
+
+def _simulations_summary(simulations: Sequence[Simulation], links: Sequence[str]) -> Summary:
+    """Return the cards of the simulations, and of several a table of them."""
+    several = len(simulations) > 1
+    cards = (simulation_parts.simulation_card(*pair) for pair in zip(simulations, links, strict=True))
+    tables = (simulation_tables.simulations_table(simulations, links),) if several else ()
+    return Summary("Simulations" if several else "Simulation", tuple(cards), tables)
+
+
+def _signals_part(simulation: Simulation, groups: Sequence[Group], link: str) -> Part:
+    """Return the part of a block, or of several like ones: its signals."""
+    title = f"{'Blocks' if groups[0].family else 'Block'} {groups[0].block}"
+    return Part(title, tuple(gallery.signal_figures(simulation, groups)), link=link)
+
+
+def _simulation_part(simulation: Simulation, ident: str) -> Part:
+    """Return the part of a simulation: the system, its verdicts, then what each block did."""
+    meters = (simulation_tables.meters_table(simulation.verdicts),) if simulation.verdicts else ()
+    drawing, file = system_drawing(simulation), system_file(simulation)
+    groups = groupby(groups_of(simulation), key=lambda group: group.block)
+    blocks = [_signals_part(simulation, list(some), ident) for _, some in groups]
+    made = (
+        simulation_tables.signals_table(simulation),
+        simulation_tables.settings_table(simulation),
+        log_tables.warnings_table(simulation),
+        *((file,) if file else ()),
+        log_tables.inputs_table("Input files", simulation.provenance.inputs),
+        log_tables.provenance_table(simulation.provenance),
+    )
+    return Part(
+        f"Simulation {simulation.name}",
+        (
+            *((drawing,) if drawing else ()),
+            *meters,
+            simulation_tables.blocks_table(simulation),
+            simulation_tables.connections_table(simulation),
+            *gallery.simulation_figures(simulation),
+        ),
+        (*(part for part in blocks if part.blocks), Part("Values and provenance", made)),
+        ident,
+        simulation.verdict or "",
+        simulation_parts.simulation_facts(simulation),
+        notice="" if simulation.failed is None else f"Failed: {simulation.failed}",
     )
 
 

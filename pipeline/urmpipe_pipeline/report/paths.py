@@ -4,16 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
+from urmpipe_models.kinematics import positions_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Deviation
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
-from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR
+from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.playback import Playback
 from urmpipe_pipeline.report.figures_motion import point_name
 from urmpipe_pipeline.report.figures_repolarization import BEFORE_POINTS, wrongness
 from urmpipe_pipeline.report.spec import FAULT, INK, Figure, Spec, base_layout, space_axis, typed
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Simulation
 
 DEVIATION_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
 """Small to large deviation: darker all the way, blue to red, legible on white and to the colour-blind."""
@@ -22,6 +24,9 @@ CAMERA = {"eye": {"x": 1.5, "y": -1.5, "z": 0.86}, "center": {"x": 0.0, "y": 0.0
 """Looked at from the front right, a little from above; in lengths of the scene."""
 
 HANDLING = "Drag to turn; pinch to zoom, with a mouse by the bar at the top right."
+
+AROUND, CLOSEST = 0.05, 1e-3
+"""Space around the path of an arm as a share of its extent, and half of the shortest axis in [m]."""
 
 SCENE_PX = 540
 """Height of a scene."""
@@ -66,6 +71,30 @@ def run_path_figure(run: Run) -> Figure | None:
         f"The tool centre point, equal scale on all axes. {HANDLING}",
         f"Path of {run.name} in three dimensions, within ({text.point(low)}) m and ({text.point(high)}) m.",
         _scene([*traces, *_ends(known)]),
+        SCENE_PX,
+        space=True,
+    )
+
+
+def arms_path_figure(simulation: Simulation) -> Figure | None:
+    """Return the path of the tip of each arm of a simulation in space; None without an arm that moved."""
+    found = [(arm.block, positions_over_log(arm.chain, arm.q)) for arm in simulation.arms]
+    known = [position[np.isfinite(position).all(axis=1)] for _, position in found]
+    every = np.concatenate([np.empty((0, 3)), *known])
+    if not len(every):
+        return None
+    ways = [
+        _way(block, position, simulation.t, run_colour(i), 4) for i, (block, position) in enumerate(found)
+    ]
+    low, high = every.min(axis=0), every.max(axis=0)
+    spec = _scene([*ways, *_ends(known[0] if len(known[0]) else every)])
+    _frame(spec, low, high)
+    return Figure(
+        "Path in space",
+        f"The tip of each arm, equal scale on all axes. {HANDLING}",
+        f"Path of {', '.join(block for block, _ in found)} in three dimensions, within ({text.point(low)}) m"
+        f" and ({text.point(high)}) m.",
+        spec,
         SCENE_PX,
         space=True,
     )
@@ -164,6 +193,14 @@ def _spot(name: str, position: FloatArray, colour: str, symbol: str) -> Spec:
 def _in_space(position: FloatArray) -> Spec:
     x, y, z = (typed(column) for column in position.T)
     return {"type": "scatter3d", "x": x, "y": y, "z": z}
+
+
+def _frame(spec: Spec, low: FloatArray, high: FloatArray) -> None:
+    """Give a scene axes of one length around what lies between two corners: a slim path stays in view."""
+    spec["layout"]["scene"]["aspectmode"] = "cube"
+    half = max(float((high - low).max()) / 2.0 * (1.0 + AROUND), CLOSEST)
+    for name, middle in zip("xyz", ((low + high) / 2.0).tolist(), strict=True):
+        spec["layout"]["scene"][f"{name}axis"]["range"] = [middle - half, middle + half]
 
 
 def _scene(traces: list[Spec]) -> Spec:

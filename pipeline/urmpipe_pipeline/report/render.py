@@ -8,12 +8,11 @@ from importlib.metadata import version
 from pathlib import Path
 
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions, figure_stem, write_figures
 from urmpipe_pipeline.report.markup import asset, environment, script_hash
 from urmpipe_pipeline.report.page import Page, lay_out
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result
 
 
 @dataclass(frozen=True, slots=True)
@@ -29,7 +28,7 @@ class Written:
     figures: tuple[FigureFile, ...] = ()
 
 
-def render_report(results: Sequence[Run | Comparison]) -> str:
+def render_report(results: Sequence[Result]) -> str:
     """Return the report as one HTML file that needs no network.
 
     The verdict stands first, then a card a log, then a part a log with its statistics, figures, audit,
@@ -37,7 +36,7 @@ def render_report(results: Sequence[Run | Comparison]) -> str:
     lets only the page's own two scripts run, known by their hashes.
 
     Args:
-        results: Ingested logs and comparisons, in the order in which they are shown.
+        results: Ingested logs, comparisons and simulations, in the order in which they are shown.
 
     Raises:
         OptionError: If there is nothing to report.
@@ -46,7 +45,7 @@ def render_report(results: Sequence[Run | Comparison]) -> str:
 
 
 def write_report(
-    results: Sequence[Run | Comparison],
+    results: Sequence[Result],
     path: Path,
     inputs: Sequence[Path] = (),
     figures: FigureOptions | None = None,
@@ -76,10 +75,10 @@ def write_report(
     return Written(path, files)
 
 
-def _lay_out(results: Sequence[Run | Comparison]) -> Page:
+def _lay_out(results: Sequence[Result]) -> Page:
     """Return the page about at least one result."""
     if not results:
-        raise OptionError("a report needs at least one run or comparison; found none")
+        raise OptionError("a report needs at least one run, comparison or simulation; found none")
     return lay_out(results)
 
 

@@ -89,7 +89,8 @@ def precision(values: FloatArray, digits: int = DIGITS) -> Literal["f4", "f8"]:
     if not len(known):
         return "f4"
     form = told(known, digits)
-    single = known.astype(np.float32).astype(np.float64)
+    with np.errstate(over="ignore"):  # what single precision cannot hold differs from itself
+        single = known.astype(np.float32).astype(np.float64)
     if form != EXPONENT and np.max(np.abs(single - known)) > 0.1 * 10.0**-digits:
         return "f8"
     ends = (int(np.argmin(known)), int(np.argmax(known)))

@@ -32,9 +32,11 @@ def diagrams(draw: st.DrawFn) -> Diagram:
     }
     sources = [(name, pin.name) for name, box in boxes.items() for pin in box.right]
     targets = [(name, pin.name) for name, box in boxes.items() for pin in box.left]
-    wires = [
-        Wire(*draw(st.sampled_from(sources)), *one) for one in targets if sources and draw(st.booleans())
-    ]
+    wires = []
+    for target in targets if sources else ():
+        if draw(st.booleans()):
+            source = draw(st.sampled_from(sources))
+            wires.append(Wire(*source, *target))
     return Diagram(boxes, tuple(wires))
 
 
@@ -147,7 +149,8 @@ def test_texts_fit_into_their_boxes_in_a_browser(tmp_path: Path) -> None:
                 const box = group.querySelector('rect.box').getBBox();
                 return [...group.querySelectorAll('text')].filter(text => {
                     const b = text.getBBox();
-                    return b.x < box.x || b.x + b.width > box.x + box.width || b.y + b.height > box.y + box.height;
+                    const right = box.x + box.width, low = box.y + box.height;
+                    return b.x < box.x || b.x + b.width > right || b.y + b.height > low;
                 }).map(text => text.textContent);
             })"""
         )

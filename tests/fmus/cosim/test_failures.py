@@ -159,3 +159,21 @@ def test_the_process_that_runs_the_fmus_imports_little() -> None:
 def test_a_plan_is_made_once_and_holds_no_process() -> None:
     plan = planned({"bad": TROUBLE}, None, {"bad": {"kind": 1}}, step=0.01)
     assert simulate(plan).failed == simulate(plan).failed
+
+
+def test_a_crash_at_the_end_does_not_hide_why_the_run_ended() -> None:
+    rude = Foreign(
+        name="rude",
+        scalars=(Scalar("y", 0),),
+        step='if (t > 0.25) { LOG(m, fmi2Error, "enough"); return fmi2Error; }',
+        free="raise(SIGSEGV);",
+    )
+    assert ran({"a": rude}).failed == (
+        "block a: fmi2DoStep at t = 0.3 s: returned fmi2Error; its last lines: fmi2Error: enough"
+    )
+    short = ran({"a": rude}, duration=0.2)
+    assert len(short.t_ns) == 3
+    assert short.failed == (
+        "block a: fmi2FreeInstance at t = 0.2 s: ended the process: Segmentation fault (SIGSEGV); it logged"
+        " nothing"
+    )

@@ -133,3 +133,34 @@ def test_what_has_no_solution_is_told_with_the_loop_and_what_is_left() -> None:
         " allowed: 1e-09 relative to its values, at t = 0 s"
     )
     assert len(recorded.t_ns) == 0
+
+
+def test_outputs_that_may_be_a_step_late_are_told() -> None:
+    """A block that cannot save its state cannot go back: what it gives is that of the step before."""
+    stuck = gain("stuck", fresh=False, can_save=False)
+    recorded = ran({"a": stuck}, {"a.u": "a.y"}, {"a": {"k": 0.5}}, iterate=True)
+    assert recorded.failed is None
+    assert recorded.notes == (
+        "algebraic loop: a.y -> a.u: the outputs of block a never followed its inputs: they do not depend on"
+        " them, or are those of the step before",
+    )
+    assert ran({"a": gain()}, {"a.u": "a.y"}, {"a": {"k": 0.5}}, iterate=True).notes == ()
+
+
+@pytest.mark.parametrize("fresh", [True, False])
+def test_inputs_at_the_end_of_their_range_are_not_moved_out_of_it(fresh: bool) -> None:
+    """y = u / 2 + 1 / 2 with u in 0..1: u = 1, where a larger u is refused."""
+    full = Foreign(
+        name=f"full{fresh}",
+        scalars=(
+            Scalar("u", 0, "input", start="1", extra=' min="0" max="1"'),
+            Scalar("y", 1, on=("u",)),
+            Scalar("refused", 2),
+        ),
+        compute="if (v->r[0] > 1 || v->r[0] < 0) v->r[2] += 1; v->r[1] = 0.5 * v->r[0] + 0.5;",
+        start="m->v.r[0] = 1;",
+        fresh=fresh,
+    )
+    recorded = solved({"a": full}, {"a.u": "a.y"})
+    assert np.allclose(recorded.column("a", "y")[1:], 1.0, rtol=0.0, atol=4.0 * TOLERANCE)
+    assert not recorded.column("a", "refused").any()

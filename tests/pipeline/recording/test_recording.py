@@ -21,6 +21,7 @@ from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarnin
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, record, write_recording
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Result
 from urmpipe_pipeline.trajectory import AlignMode
 
 MakeRun = Callable[..., Run]
@@ -50,7 +51,7 @@ def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
         assert found == wanted, place
 
 
-def round_trip(result: Run | Comparison, folder: Path) -> Run | Comparison:
+def round_trip(result: Result, folder: Path) -> Result:
     path = folder / "result.rrd"
     assert write_recording(result, path) == path
     back = read_recording(path)

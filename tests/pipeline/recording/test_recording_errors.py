@@ -90,7 +90,7 @@ def test_a_recording_without_metadata(tmp_path: Path) -> None:
 def test_a_recording_of_a_newer_layout(tmp_path: Path) -> None:
     newer = rr.AnyValues(metadata=json.dumps({"layout_version": 99, "something": "new"}))
     path = foreign(tmp_path / "newer.rrd", "urmpipe", newer)
-    assert trouble(path) == "found layout version 99, allowed: up to 4; a newer urmpipe wrote it"
+    assert trouble(path) == "found layout version 99, allowed: up to 5; a newer urmpipe wrote it"
 
 
 def test_a_recording_of_an_older_layout(tmp_path: Path) -> None:

@@ -23,6 +23,7 @@ from urmpipe_pipeline.recording.layout import FIELD_OF_VIEW, eye_and_target
 from urmpipe_pipeline.recording.scene import Scene, scene_of
 from urmpipe_pipeline.recording.viewer import open_window, opening_times, run_viewer
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Simulation
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
@@ -277,3 +278,21 @@ def test_view_opens_at_the_worst_sample(make_comparison: MakeComparison, tmp_pat
         assert (shown.current_timeline, shown.current_time) == ("t", worst.t_ns[worst.worst])
         assert complaints(client) == []
     assert process.poll() is not None
+
+
+def test_a_simulation_shows_its_arm_its_verdict_and_its_signals(
+    viewer: Any, make_simulation: Callable[..., Simulation], tmp_path: Path
+) -> None:
+    path = write_recording(make_simulation(), tmp_path / "simulation.rrd")
+    picture = look(viewer, path, 1.25, [AXIS_COLOURS["y"], AXIS_COLOURS["norm"], REFERENCE_COLOUR])
+    names = {view.name for view in viewer.get_state().views}
+    assert names >= {
+        SCENE_VIEW, "Summary", "log: q [rad]", "chain: p7 [m]", "meter: delta, norm [m]",
+        "meter: out_of_tolerance [-]",
+    }  # fmt: skip
+    right = picture[:, picture.shape[1] // 2 :]
+    for colour in (AXIS_COLOURS["y"], AXIS_COLOURS["norm"], JOINT_COLOURS[0]):
+        assert pixels(right, colour) > 50, colour  # lines of a pixel or two over some hundred pixels
+    left = picture[:, : picture.shape[1] // 2]
+    assert pixels(left, run_colour(0)) > 50  # the way of the tip, and its ball
+    assert complaints(viewer) == []

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,6 +17,7 @@ from urmpipe_pipeline.report import render_report
 from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Simulation
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page
@@ -117,6 +119,30 @@ def scroll_through(page: Page) -> None:
 def sideways(page: Page) -> int:
     """By how many px the page is wider than the window."""
     return int(page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
+
+
+def test_a_simulation_is_drawn_and_its_drawing_runs_no_script(
+    browser: Browser, make_simulation: Callable[..., Simulation], tmp_path: Path
+) -> None:
+    script = "<script>alert(1)</script><rect onclick='alert(2)' width='9' height='9'/></svg>"
+    sound = make_simulation(3000)
+    svg = sound.system_svg.replace("<svg ", "<svg onload='alert(3)' ").replace("</svg>", script)
+    path = tmp_path / "simulation.html"
+    path.write_text(render_report([replace(sound, system_svg=svg)]), encoding="utf-8")
+    with opened(browser, path) as page:
+        scroll_through(page)
+        image = page.locator(".drawing img")
+        assert image.evaluate("image => [image.complete, image.naturalWidth]") == [True, 640]
+        image.click()
+        plots = page.locator(".pairs .plot")
+        first, second = (box for box in (plots.nth(k).bounding_box() for k in (2, 3)) if box)
+        assert first["y"] == second["y"]  # the two plots of the meter, side by side
+        assert first["x"] + first["width"] <= second["x"]
+    with opened(browser, path, width=390, phone=True) as page:
+        scroll_through(page)
+        assert sideways(page) == 0
+        boxes = [box for box in (plot.bounding_box() for plot in page.locator(".pairs .plot").all()) if box]
+        assert all(box["x"] >= 0 and box["x"] + box["width"] <= 390 for box in boxes)
 
 
 def test_the_verdict_is_seen_first(browser: Browser, report: Path) -> None:

@@ -297,5 +297,5 @@ def test_a_log_of_one_sample_and_a_path_have_pages_too(comparison: Comparison) -
 def test_nothing_to_report_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(OptionError) as caught:
         write_report([], tmp_path / "report.html")
-    assert str(caught.value) == "a report needs at least one run or comparison; found none"
+    assert str(caught.value) == "a report needs at least one run, comparison or simulation; found none"
     assert not list(tmp_path.iterdir())

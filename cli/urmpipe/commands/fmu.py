@@ -1,0 +1,167 @@
+"""`urmpipe fmu list|build|check`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from urmpipe.options import NamesType, RobotType, output_options
+from urmpipe.unit_options import UnitType, named_values, option_value
+
+PLATFORMS = ("linux64", "win64")
+
+
+def _platforms(ctx: click.Context, param: click.Parameter, value: tuple[str, ...] | None) -> tuple[str, ...]:
+    """Return the platforms, each known."""
+    wrong = [one for one in value or () if one not in PLATFORMS]
+    if wrong:
+        raise click.BadParameter(f"found {', '.join(wrong)}, allowed: {', '.join(PLATFORMS)}")
+    return value or ()
+
+
+@click.group(short_help="List units, build and check FMUs.")
+def fmu() -> None:
+    """List the units that urmpipe brings along, package them or your own as FMUs, and check any FMU.
+
+    A unit is a model with FMI variables: the kinematics of an arm, the repolarizer, a DC drive, a log that
+    is played. Its FMU (FMI 2.0 co-simulation) runs in Simulink, Dymola, OpenModelica, OSP and FMPy.
+    """
+
+
+@fmu.command("list", short_help="List the units that urmpipe brings along.")
+@output_options
+def list_(as_json: bool, quiet: bool) -> int:
+    """List the units that urmpipe brings along, and the options that each takes.
+
+    \b
+    Examples:
+      urmpipe fmu list
+      urmpipe fmu list --json
+    """
+    from urmpipe.fmu_printing import print_units, units_dict
+    from urmpipe.printing import print_json
+
+    if as_json:
+        print_json(units_dict())
+    elif not quiet:
+        print_units()
+    return 0
+
+
+@fmu.command(short_help="Package a unit as an FMU.")
+@click.argument("unit", type=UnitType())
+@click.option("--robot", type=RobotType(), help="The arm of a unit that has one.")
+@click.option(
+    "--log", type=click.Path(path_type=Path), help="The log of a unit that plays one: CSV, or a folder."
+)
+@click.option(
+    "--map",
+    "log_map",
+    type=click.Path(dir_okay=False, path_type=Path),
+    help="How to read the log (TOML), as ingest --write-map wrote it.",
+)
+@click.option(
+    "-s",
+    "--option",
+    "given",
+    multiple=True,
+    callback=named_values,
+    metavar="NAME=VALUE",
+    help="A further option of the unit, such as joints=6 or rates=true.",
+)
+@click.option(
+    "--backend",
+    type=click.Choice(["native", "python"]),
+    help="native: C inside, needs nothing on the target. python: needs Python with NumPy there"
+    " [default: native if it can be built here].",
+)
+@click.option(
+    "--platforms",
+    type=NamesType(),
+    callback=_platforms,
+    metavar="A,B",
+    help="linux64, win64, or both, with the extra `cross` [default: this one].",
+)
+@click.option(
+    "-o",
+    "--output",
+    type=click.Path(path_type=Path),
+    default=".",
+    metavar="DIR|FILE.fmu",
+    help="Folder for UNIT.fmu, or the file [default: here].",
+)
+@output_options
+def build(
+    unit: str,
+    robot: str | None,
+    log: Path | None,
+    log_map: Path | None,
+    given: dict[str, str],
+    backend: Literal["native", "python"] | None,
+    platforms: tuple[str, ...],
+    output: Path,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Package a unit as an FMU: one of `urmpipe fmu list`, or a Python file of your own with a unit in it.
+
+    Built twice, the same unit is the same file, bit by bit. An FMU of another tool is never replaced.
+
+    \b
+    Examples:
+      urmpipe fmu build kinematic_chain --robot urm6
+      urmpipe fmu build kinematic_chain --robot arm.urdf -s rates=true -s points=p6,p7
+      urmpipe fmu build repolarizer -s joints=6 --platforms linux64,win64
+      urmpipe fmu build log_source --log log.csv -o fmus
+      urmpipe fmu build my_unit.py
+    """
+    from urmpipe.building import build_fmu, column_names
+    from urmpipe.fmu_printing import built_dict, print_built
+    from urmpipe.guards import place_robot
+    from urmpipe.log_tables import read_table
+    from urmpipe.printing import print_json, print_warnings
+    from urmpipe_pipeline.sources import read_map
+
+    if log_map and not log:
+        raise click.UsageError("--map: found without a log, allowed: with --log LOG")
+    options = {name: option_value(text) for name, text in given.items()}
+    arm = place_robot(robot)
+    read = read_map(log_map).read if log_map else None
+    table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm, read=read)
+    if table and not quiet:
+        print_warnings(table.warnings)
+    made = build_fmu(
+        unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
+    )
+    if as_json:
+        print_json(built_dict(made))
+    elif not quiet:
+        print_built(made)
+    return 0
+
+
+@fmu.command(short_help="Validate an FMU, run it and list its variables.")
+@click.argument("file", metavar="FILE.fmu", type=click.Path(path_type=Path))
+@output_options
+def check(file: Path, as_json: bool, quiet: bool) -> int:
+    """Validate an FMU of any tool, run it, and list its variables.
+
+    \b
+    Examples:
+      urmpipe fmu check kinematic_chain.fmu
+      urmpipe fmu check other.fmu --json
+
+    Exit codes: 0 nothing found, 1 problems found, 2 no FMU.
+    """
+    from urmpipe.fmu_printing import checked_dict, print_checked
+    from urmpipe.printing import print_json
+    from urmpipe_fmus.check import check_fmu
+
+    checked = check_fmu(file)
+    if as_json:
+        print_json(checked_dict(checked))
+    elif not quiet:
+        print_checked(checked)
+    return 1 if checked.problems else 0

@@ -1,0 +1,139 @@
+"""`urmpipe simulate`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Literal
+
+import click
+
+from urmpipe.options import DURATION, output_options
+from urmpipe.process import tune_pyarrow
+from urmpipe.unit_options import SystemType, named_values
+
+
+@click.command(short_help="Run a system of blocks.")
+@click.argument("system", type=SystemType(), required=False)
+@click.option("--list", "listed", is_flag=True, help="List the systems that urmpipe brings along.")
+@click.option(
+    "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: SYSTEM.rrd here]."
+)
+@click.option(
+    "--set",
+    "arguments",
+    multiple=True,
+    callback=named_values,
+    metavar="NAME=VALUE",
+    help="An argument of the system, such as log=log.csv or robot=urm6.",
+)
+@click.option("--step", type=DURATION, help="Communication step [default: that of the system].")
+@click.option(
+    "--duration",
+    type=DURATION,
+    help="How long [default: that of the system, else of the longest log it reads].",
+)
+@click.option(
+    "--draw", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw the system into a file, too."
+)
+@click.option(
+    "--backend",
+    type=click.Choice(["native", "python"]),
+    help="What the units run as [default: native if it can be built here].",
+)
+@output_options
+def simulate(
+    system: str | None,
+    listed: bool,
+    output: Path | None,
+    arguments: dict[str, str],
+    step: float | None,
+    duration: float | None,
+    draw: Path | None,
+    backend: Literal["native", "python"] | None,
+    as_json: bool,
+    quiet: bool,
+) -> int:
+    """Run a system of blocks: units of urmpipe, your own, and FMUs of any tool, connected to each other.
+
+    SYSTEM is one of --list, or a system file (TOML): blocks, connections, start values, inputs from logs.
+    Everything that is wrong with it is told before the first step.
+
+    \b
+    Examples:
+      urmpipe simulate --list
+      urmpipe simulate log-to-delta
+      urmpipe simulate log-to-delta --set log=log.csv --set reference=path.csv
+      urmpipe simulate one-drive --step 0.5ms --draw one-drive.svg
+      urmpipe simulate my-system.toml -o run.rrd --json
+
+    Exit codes: 0 done and within tolerance, 1 a delta meter out of tolerance, 2 bad input or a failed FMU.
+    """
+    if listed == (system is not None):
+        found = f"{system} and --list" if listed else "neither a system nor --list"
+        raise click.UsageError(f"found {found}, allowed: one of both")
+    if listed or system is None:
+        return _list(as_json, quiet)
+    tune_pyarrow()
+    from time import perf_counter
+
+    from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar, say
+    from urmpipe.simulating import simulate as run
+    from urmpipe.simulation_printing import print_simulation
+
+    started = perf_counter()
+    target = output or Path(default_name(system))
+
+    def told(line: str) -> None:
+        """Tell what takes its time."""
+        if not quiet:
+            say(f"note: {line}", err=True)
+
+    with progress_bar(f"Simulating {system}", quiet=quiet) as progress:
+        result = run(
+            system,
+            arguments=arguments,
+            step=step,
+            duration=duration,
+            backend=backend,
+            output=target,
+            draw=draw,
+            told=told,
+            progress=progress,
+        )
+    wall = perf_counter() - started
+    if not quiet:
+        print_warnings(result.warnings)
+    if as_json:
+        print_json(result.to_dict())
+    elif not quiet:
+        print_simulation(result, wall)
+        if draw:
+            say(f"Drawing: {draw}")
+        print_recording(result.recording)
+    if result.failed is not None:
+        say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
+        return 2
+    return 1 if result.verdict == "fail" else 0
+
+
+def _list(as_json: bool, quiet: bool) -> int:
+    """List the shipped systems."""
+    from urmpipe.printing import print_json
+    from urmpipe.simulation_printing import print_systems
+    from urmpipe_fmus.cosim import load_system, system_names
+
+    systems = [load_system(name, {}) for name in system_names()]
+    if as_json:
+        rows = [
+            {"name": one.name, "description": one.description, "arguments": dict(one.arguments)}
+            for one in systems
+        ]
+        print_json({"schema": 1, "systems": rows})
+    elif not quiet:
+        print_systems(systems)
+    return 0
+
+
+def default_name(system: str) -> str:
+    """Return SYSTEM.rrd. Bytes of no text are replaced: Rerun opens no file whose name holds such."""
+    return click.format_filename(f"{Path(system).stem}.rrd")

@@ -1,0 +1,131 @@
+"""The part of the page about a simulation, its card and what it says at the top of the page."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+from urmpipe_pipeline import text
+from urmpipe_pipeline.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.report.banner import Banner
+from urmpipe_pipeline.report.cards import Card
+from urmpipe_pipeline.report.facts import Fact
+from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.wording import meter_words
+
+STATES = {"pass": "pass", "fail": "fail", None: "simulated"}
+"""How a card looks, by the verdict."""
+
+
+def simulation_banner(simulations: Sequence[Simulation], links: Sequence[str]) -> Banner:
+    """Return the verdict over simulations: what failed or is worst, or what was simulated.
+
+    Args:
+        simulations: At least one.
+        links: Where each is told of.
+    """
+    shown, href = max(zip(simulations, links, strict=True), key=lambda pair: _badness(pair[0]))
+    if shown.failed is not None:
+        end = f"t = {text.seconds(float(shown.t[-1]))} s" if len(shown.t_ns) else "its start"
+        said = (Fact("System", shown.name, href=href), Fact("Recorded until", end), Fact("Why", shown.failed))
+        return Banner("fail", "FAILED", f"{shown.name} did not reach its end", said)
+    worst = shown.judged_worst
+    if worst is None:
+        samples = sum(len(one.t_ns) for one in simulations)
+        subject = shown.name if len(simulations) == 1 else text.counted(len(simulations), "system")
+        headline = f"{subject}: {text.counted(samples, 'sample')}"
+        return Banner("ingested", "SIMULATED", headline, detail="Nothing was judged: there is no verdict.")
+    within = "within" if worst.verdict == "pass" else "out of"
+    facts = (
+        Fact("Furthest out" if worst.verdict == "fail" else "Closest to the limit", shown.name, href=href),
+        Fact("How much", _amount(worst)),
+        Fact("When", f"t = {text.seconds(worst.t)} s"),
+        Fact("Out of tolerance", f"{worst.out_of_tolerance} of {text.counted(worst.samples, 'sample')}"),
+    )
+    return Banner(
+        worst.verdict, worst.verdict.upper(), f"{worst.block} of {shown.name} is {within} tolerance", facts
+    )
+
+
+def combined_banner(judged: Banner, simulations: Sequence[Simulation], links: Sequence[str]) -> Banner:
+    """Return the verdict of comparisons with that of simulations: whichever fails stands first.
+
+    Args:
+        judged: The verdict of the comparisons.
+        simulations: Those of the page; none leaves the verdict as it is.
+        links: Where each is told of.
+    """
+    if not simulations:
+        return judged
+    failing = [one.name for one in simulations if one.verdict == "fail"]
+    if failing and judged.state == "pass":
+        return replace(simulation_banner(simulations, links), detail="The comparisons are within tolerance.")
+    said = f"Simulations that fail: {', '.join(failing)}." if failing else "No simulation fails."
+    return replace(judged, detail=said)
+
+
+def simulation_card(simulation: Simulation, href: str) -> Card:
+    """Return the card of a simulation."""
+    worst = simulation.judged_worst
+    allowed = worst.allowed if worst is not None else None
+    return Card(
+        name=simulation.name,
+        href=href,
+        state=STATES[simulation.verdict],
+        size="Failed after" if simulation.failed is not None else _size(worst),
+        amount=_length(simulation) if simulation.failed is not None or worst is None else _worst(worst),
+        allowed="" if allowed is None or simulation.failed is not None else f"{text.limit(allowed)} mm",
+        share=None if worst is None or worst.used is None else min(worst.used, 1.0),
+        used="" if worst is None else meter_words(worst),
+        facts=_card_facts(simulation),
+    )
+
+
+def simulation_facts(simulation: Simulation) -> tuple[Fact, ...]:
+    """Return what a simulation is: its description, its samples, its step."""
+    found = (
+        Fact("Description", simulation.description),
+        Fact("Samples", str(len(simulation.t_ns))),
+        Fact("Duration", _length(simulation)),
+        Fact("Communication step", f"{text.seconds(simulation.step)} s"),
+        Fact("Recording", str(simulation.recording) if simulation.recording else ""),
+    )
+    return tuple(fact for fact in found if fact.value)
+
+
+def _card_facts(simulation: Simulation) -> tuple[Fact, ...]:
+    found = (
+        Fact("Why", simulation.failed or ""),
+        Fact("Duration", _length(simulation)),
+        Fact("Step", f"{text.seconds(simulation.step)} s"),
+        Fact("Samples", str(len(simulation.t_ns))),
+        Fact("Blocks", str(len(simulation.blocks))),
+        Fact("Warnings", str(len(simulation.warnings))),
+    )
+    return tuple(fact for fact in found if fact.value)
+
+
+def _badness(simulation: Simulation) -> tuple[bool, bool, float]:
+    """Return what puts the worst simulation last: failed, out of tolerance, share of it used up."""
+    worst = simulation.judged_worst
+    used = -1.0 if worst is None else float("inf") if worst.used is None else worst.used
+    return simulation.failed is not None, simulation.verdict == "fail", used
+
+
+def _length(simulation: Simulation) -> str:
+    return f"{text.seconds(simulation.duration)} s"
+
+
+def _size(worst: DeltaVerdict | None) -> str:
+    """Return what is worst, such as |Δx|; nothing where nothing is judged."""
+    if worst is None:
+        return "Simulated"
+    return text.SYMBOLS["norm"] if worst.quantity == "norm" else f"|{text.SYMBOLS[worst.quantity]}|"
+
+
+def _worst(worst: DeltaVerdict) -> str:
+    return "no value" if worst.used is None else text.quantity(worst.worst, "m", worst.allowed)
+
+
+def _amount(worst: DeltaVerdict) -> str:
+    return f"{_size(worst)} = {_worst(worst)} of {text.limit(worst.allowed)} mm allowed"

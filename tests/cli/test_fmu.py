@@ -1,0 +1,183 @@
+"""`urmpipe fmu build` and `check`, and `urmpipe.build_fmu`: real FMUs, compiled and run."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import zipfile
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urmpipe
+from urmpipe.building import build_fmu
+from urmpipe_datasets import LOGS
+from urmpipe_fmus.check import check_fmu
+from urmpipe_fmus.native import native_missing
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.kinematics import points_over_log
+
+RunCommand = Callable[..., Any]
+
+PAGE = (Path(__file__).parents[2] / "docs" / "fmu.md").read_text(encoding="utf-8")
+
+
+def needs_native() -> None:
+    """Skip without a C compiler or casadi."""
+    missing = native_missing()
+    if missing:
+        pytest.skip(missing)
+
+
+@pytest.fixture
+def meter(tmp_path: Path) -> Path:
+    """The FMU of the delta meter."""
+    return build_fmu("delta_meter", backend="python", output=tmp_path).path
+
+
+def test_build_writes_the_fmu_and_says_what_is_inside(urmpipe: RunCommand, tmp_path: Path) -> None:
+    needs_native()
+    ran = urmpipe("fmu", "build", "kinematic_chain", "--robot", "urm6", "--json")
+    told = json.loads(ran.out)
+    path = tmp_path / "kinematic_chain.fmu"
+    assert (ran.code, ran.err) == (0, "")
+    assert (told["fmu"], told["unit"]) == ("kinematic_chain.fmu", "kinematic_chain")
+    assert told["backend"] == "native"
+    assert (told["size"], told["note"]) == (path.stat().st_size, None)
+    assert told["size"] < 200_000
+    checked = check_fmu(path)
+    assert checked.problems == ()
+    assert (checked.guid, list(checked.platforms)) == (told["guid"], told["platforms"])
+    values = {one.name: one.before for one in checked.variables}
+    arm = load_robot("urm6")
+    tip = points_over_log(arm, np.array([arm.start]))[0, -1]
+    # both evaluate the same products of cosines; C and NumPy may differ in the last bits of a cosine
+    found = np.array([values[f"p7[{i}]"] for i in (1, 2, 3)], dtype=np.float64)
+    np.testing.assert_allclose(found, tip, rtol=0.0, atol=1e-15)
+
+
+def test_the_same_unit_is_the_same_file(tmp_path: Path) -> None:
+    first = build_fmu("repolarizer", options={"joints": 2}, output=tmp_path / "a.fmu")
+    second = build_fmu("repolarizer", options={"joints": 2}, output=tmp_path / "b.fmu")
+    other = build_fmu("repolarizer", options={"joints": 3}, output=tmp_path / "c.fmu")
+    assert first.path.read_bytes() == second.path.read_bytes()
+    assert first.guid == second.guid != other.guid
+    assert first.path == tmp_path / "a.fmu"
+
+
+def test_an_fmu_of_ours_is_replaced_and_another_never(urmpipe: RunCommand, meter: Path) -> None:
+    before = meter.read_bytes()
+    ran = urmpipe("fmu", "build", "delta_meter", "--backend", "python")
+    assert (ran.code, meter.read_bytes()) == (0, before)
+    assert ran.out.startswith("FMU: delta_meter.fmu  (python, ")
+    foreign = meter.with_name("foreign.fmu")
+    with zipfile.ZipFile(meter) as source, zipfile.ZipFile(foreign, "w") as target:
+        for name in source.namelist():
+            text = source.read(name)
+            described = name == "modelDescription.xml"
+            target.writestr(name, text.replace(b'"urmpipe', b'"Dymola') if described else text)
+    shutil.copy(foreign, meter)
+    ran = urmpipe("fmu", "build", "delta_meter", "--backend", "python")
+    said = "found a file that is no FMU of urmpipe's, allowed: a new name, or such an FMU to replace"
+    assert (ran.code, ran.err) == (2, f"error: delta_meter.fmu: {said}\n")
+    assert meter.read_bytes() == foreign.read_bytes()
+
+
+def test_an_output_is_never_an_input(tmp_path: Path) -> None:
+    unit = tmp_path / "unit.py"
+    unit.write_text(example(), encoding="utf-8")
+    with pytest.raises(UrmpipeError, match="found no folder"):
+        build_fmu(unit, output=unit)
+    shutil.copy(unit, tmp_path / "spring.fmu")
+    with pytest.raises(UrmpipeError, match="found a file that is no FMU of urmpipe's"):
+        build_fmu(unit, output=tmp_path)
+    assert unit.read_text(encoding="utf-8") == example()
+
+
+def test_a_log_is_inside_its_fmu(tmp_path: Path) -> None:
+    built = build_fmu("log_source", log=LOGS / "matlab.csv", output=tmp_path)
+    values = {one.name: one.before for one in check_fmu(built.path).variables}
+    first = urmpipe.ingest(LOGS / "matlab.csv", robot="urm6").log.q[0]
+    assert [values[f"q[{i}]"] for i in range(1, 7)] == first.tolist()
+
+
+def test_build_tells_the_warnings_of_a_log(urmpipe: RunCommand, tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("q1,q2\n0.5,1\n0.6,2\n", encoding="utf-8")
+    ran = urmpipe("fmu", "build", "log_source", "--log", "log.csv", "--backend", "python")
+    assert ran.code == 0
+    assert "warning: log: no time column: the rows are taken as 5 ms apart" in ran.err
+
+
+def example() -> str:
+    """Return the unit of docs/fmu.md."""
+    return PAGE.split("```python\n")[1].split("```")[0]
+
+
+def test_the_unit_of_the_page_is_built_and_runs(urmpipe: RunCommand, tmp_path: Path) -> None:
+    (tmp_path / "my_unit.py").write_text(example(), encoding="utf-8")
+    ran = urmpipe("fmu", "build", "my_unit.py", "-q")
+    assert (ran.code, ran.out, ran.err) == (0, "", "")
+    checked = check_fmu(tmp_path / "spring.fmu")
+    assert (checked.problems, checked.ran) == ((), True)
+    assert [one.name for one in checked.variables if one.causality == "output"] == ["x", "stopped"]
+
+
+def test_check_of_a_sound_fmu_is_0(urmpipe: RunCommand, meter: Path) -> None:
+    ran = urmpipe("fmu", "check", meter.name)
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out.splitlines()[1] == "No problem found."
+    assert "out_of_tolerance" in ran.out
+    told = json.loads(urmpipe("fmu", "check", meter.name, "--json").out)
+    assert (told["schema"], told["fmu"], told["problems"]) == (1, "delta_meter.fmu", [])
+    assert told["variables"][0] == {
+        "name": "tolerance", "causality": "parameter", "variability": "tunable", "type": "Real", "unit": "m",
+        "start": "0.0035", "before": 0.0035, "after": 0.0035,
+        "description": "Largest deviation allowed along x, y and z",
+    }  # fmt: skip
+
+
+def test_check_of_a_broken_fmu_is_1(urmpipe: RunCommand, meter: Path) -> None:
+    broken = meter.with_name("broken.fmu")
+    with zipfile.ZipFile(meter) as source, zipfile.ZipFile(broken, "w") as target:
+        for name in source.namelist():
+            text = source.read(name)
+            if name == "modelDescription.xml":
+                text = text.replace(b'unit="m"', b'unit="furlong"', 1)
+            target.writestr(name, text)
+    ran = urmpipe("fmu", "check", broken.name)
+    assert ran.code == 1
+    assert "problem: " in ran.out
+    assert "furlong" in ran.out
+    assert json.loads(urmpipe("fmu", "check", broken.name, "--json").out)["problems"]
+
+
+@pytest.mark.parametrize("content", [b"", b"t,q1\n0,1\n", b"PK\x03\x04"])
+def test_check_of_what_is_no_fmu_is_2(urmpipe: RunCommand, tmp_path: Path, content: bytes) -> None:
+    (tmp_path / "file.fmu").write_bytes(content)
+    ran = urmpipe("fmu", "check", "file.fmu")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.startswith("error: file.fmu: found no zip")
+    assert ran.err.endswith("allowed: an FMU\n")
+
+
+def test_check_of_a_missing_file_is_2(urmpipe: RunCommand) -> None:
+    ran = urmpipe("fmu", "check", "missing.fmu", "--json")
+    assert ran.code == 2
+    assert json.loads(ran.out)["errors"][0]["file"] == "missing.fmu"
+
+
+def test_without_casadi_it_is_python_and_says_why(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    from urmpipe.main import run
+
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr("urmpipe_fmus.native.native_missing", lambda platforms=(): "casadi is not installed")
+    assert run(["fmu", "build", "delta_meter"]) == 0
+    out, err = capsys.readouterr()
+    assert out.startswith("FMU: delta_meter.fmu  (python, ")
+    assert err.startswith("note: delta_meter.fmu runs on Python, as no native one can be built here: casadi")

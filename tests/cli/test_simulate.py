@@ -1,0 +1,327 @@
+"""`urmpipe simulate` and `urmpipe.simulate`: systems of blocks, run, judged and recorded."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pytest
+
+import urmpipe
+from urmpipe.commands.simulate import simulate as command
+from urmpipe.simulating import simulate
+from urmpipe.unit_options import UnitType
+from urmpipe_datasets import LOGS
+from urmpipe_models.errors import UrmpipeError
+from urmpipe_pipeline.simulation import Simulation
+
+RunCommand = Callable[..., Any]
+
+FOLLOWER = """
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.variable import Input, Output, Parameter, State
+
+unit = Unit(
+    name="follower",
+    description="A lag of the first order",
+    variables=(
+        Parameter(name="T", description="Time constant", unit="s", start=0.1, minimum=1e-3),
+        Parameter(name="gain", description="Gain of the rate", start=1.0),
+        Input(name="u", description="What is followed", unit="V"),
+        State(name="x", description="What follows", unit="V", output=True),
+        Output(name="error", description="What is left", unit="V"),
+    ),
+    outputs=lambda v: {"error": v.u - v.x},
+    derivatives=lambda v: {"x": v.gain * (v.u - v.x) / v.T},
+)
+"""
+
+FOLLOWING = """
+[system]
+name = "following"
+step = 0.01
+
+[arguments]
+log = "voltage.csv"
+gain = 1.0
+
+[blocks.lag]
+file = "follower.py"
+start = { gain = "$gain" }
+
+[inputs]
+"lag.u" = { log = "$log", column = "u" }
+"""
+
+
+@pytest.fixture
+def following(tmp_path: Path) -> Path:
+    """A system of a user's own unit, driven by a column of a table."""
+    (tmp_path / "follower.py").write_text(FOLLOWER, encoding="utf-8")
+    rows = "".join(f"{k / 100:.2f},{1.0 if k >= 10 else 0.0}\n" for k in range(101))
+    (tmp_path / "voltage.csv").write_text(f"t,u (V)\n{rows}", encoding="utf-8")
+    (tmp_path / "following.toml").write_text(FOLLOWING, encoding="utf-8")
+    return tmp_path / "following.toml"
+
+
+@pytest.mark.parametrize("log", ["coppeliasim.csv", "matlab.csv", "solidworks", "counter_rotating.csv"])
+def test_log_to_delta_is_what_compare_says(log: str) -> None:
+    result = simulate("log-to-delta", arguments={"log": str(LOGS / log), "robot": "urm6"})
+    compared = urmpipe.compare(LOGS / "path.csv", [LOGS / log], robot="urm6")
+    (run,), (judged,) = compared.runs, result.verdicts
+    np.testing.assert_array_equal(result.t_ns, run.run.t_ns[run.sample])
+    # The same formulas on the same doubles; a compiler may round products that it fuses, 1e-16 m each.
+    np.testing.assert_allclose(result.signal("delta.delta").values, run.delta[:, :3], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(result.signal("delta.norm").values, run.delta[:, 3], rtol=0.0, atol=1e-12)
+    out = np.abs(run.delta[:, :3]).max(axis=1) > 0.0035
+    np.testing.assert_array_equal(result.signal("delta.out_of_tolerance").values, out)
+    assert judged.out_of_tolerance == int(out.sum())
+    assert judged.verdict == result.verdict == compared.verdict
+    turns = result.signal("repolarizer.turns").values
+    assert int(np.abs(np.diff(turns, axis=0)).sum()) == len(run.run.repolarizations)
+
+
+def test_the_arm_of_a_kinematic_chain_is_that_of_its_joints() -> None:
+    result = simulate("log-to-delta", duration=0.5)
+    (arm,) = result.arms
+    assert (arm.block, arm.chain.name) == ("chain", "urm6")
+    np.testing.assert_array_equal(arm.q, result.signal("repolarizer.q").values)
+    assert result.t[-1] == 0.5
+
+
+def test_every_file_is_traced_and_every_log_warns() -> None:
+    result = simulate("log-to-delta", duration=0.02)
+    assert [one.name for one in result.provenance.inputs] == [
+        "log-to-delta.toml", "coppeliasim.csv", "path.csv",
+    ]  # fmt: skip
+    assert [one.kind for one in result.warnings] == ["assumed-unit"]
+    assert result.provenance.options["arguments"]["robot"] == "urm6"
+    blocks = {one.name: one for one in result.blocks}
+    assert [(one.variable, one.value, one.given) for one in blocks["delta"].settings] == [
+        ("tolerance", 0.0035, False)
+    ]
+
+
+def test_a_unit_of_ones_own_follows_a_column_of_a_table(following: Path) -> None:
+    result = simulate(following)
+    x, t = result.signal("lag.x").values, result.t
+    expected = np.where(t > 0.1, 1.0 - np.exp(-(t - 0.1) / 0.1), 0.0)
+    # RK4 in steps of 1 ms: (h / T)^5 / 120 = 1e-12 a step, 100 steps
+    np.testing.assert_allclose(x, expected, rtol=0.0, atol=1e-10)
+    assert result.signal("lag.x").unit == "V"
+    assert result.signal("lag.error").description == "What is left"
+    np.testing.assert_array_equal(result.signal("lag.u").values, (np.arange(101) >= 10).astype(float))
+    assert (result.duration, result.verdict, result.failed) == (1.0, None, None)
+
+
+def test_the_recording_reads_back_as_the_simulation(following: Path, tmp_path: Path) -> None:
+    made = simulate(following, output=tmp_path / "run.rrd", draw=tmp_path / "system.svg")
+    assert made.recording == tmp_path / "run.rrd"
+    read = urmpipe.read_recording(tmp_path / "run.rrd")
+    assert isinstance(read, Simulation)
+    np.testing.assert_array_equal(read.signal("lag.x").values, made.signal("lag.x").values)
+    assert read.system_svg == made.system_svg
+    assert read.system_text == FOLLOWING
+    drawn = (tmp_path / "system.svg").read_text(encoding="utf-8")
+    assert drawn.startswith("<!-- Generator: urmpipe ")
+    assert "follower.py" in drawn
+    simulate(following, draw=tmp_path / "system.svg")  # one of ours is replaced
+
+
+def test_an_fmu_that_fails_leaves_what_was_recorded(
+    urmpipe: RunCommand, following: Path, tmp_path: Path
+) -> None:
+    ran = urmpipe("simulate", following, "--set", "gain=-1e306", "--json")
+    result = json.loads(ran.out)
+    assert ran.code == 2
+    assert result["failed"].startswith("block lag: fmi2DoStep at t = 0.1 s: ")
+    assert f"error: {result['failed']}; what was recorded until then is in following.rrd" in ran.err
+    assert (result["samples"], result["verdict"]) == (11, "fail")
+    assert (tmp_path / "following.rrd").exists()
+
+
+def test_the_command_prints_system_verdict_and_signals(urmpipe: RunCommand, tmp_path: Path) -> None:
+    ran = urmpipe("simulate", "log-to-delta", "--duration", "0.1")
+    lines = ran.out.splitlines()
+    assert ran.code == 0
+    assert lines[0].startswith("log-to-delta: 21 samples over 0.100 s, communication step 5 ms; in ")
+    assert lines[1].startswith("PASS  delta: |Δy| = 0.4174 mm of 3.5 mm allowed at t = 0.085 s;")
+    assert any(line.startswith("delta.norm [m]") for line in lines)
+    assert lines[-1].startswith("Recording: log-to-delta.rrd")
+    assert ran.err.splitlines()[-1].startswith("warning: path: no unit is given for x, y, z")
+
+
+def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> None:
+    log = LOGS / "counter_rotating.csv"
+    ran = urmpipe("simulate", "log-to-delta", "--set", f"log={log}", "--duration", "10s", "--json", "-q")
+    result = json.loads(ran.out)
+    assert (ran.code, ran.err) == (1, "")
+    assert (result["verdict"], result["verdicts"][0]["block"]) == ("fail", "delta")
+
+
+def test_quiet_says_nothing(urmpipe: RunCommand) -> None:
+    ran = urmpipe("simulate", "log-to-delta", "--duration", "0.01", "-q")
+    assert (ran.code, ran.out, ran.err) == (0, "", "")
+
+
+def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunCommand) -> None:
+    listed = json.loads(urmpipe("simulate", "--list", "--json").out)["systems"]
+    assert [one["name"] for one in listed] == ["log-to-delta", "one-drive", "six-drives"]
+    assert listed[0]["arguments"]["log"] == "coppeliasim.csv"
+    assert "log=coppeliasim.csv" in urmpipe("simulate", "--list").out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        ((), "Error: found neither a system nor --list, allowed: one of both"),
+        (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of log-to-delta"),
+        (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo', allowed: log"),
+        (("log-to-delta", "--set", "log"), "found 'log', allowed: NAME=VALUE, each name once"),
+        (("log-to-delta", "--set", "log=missing.csv"), "error: block log: missing.csv: found no such file"),
+        (("log-to-delta", "--step", "nan"), "found 'nan', allowed: a positive time in s"),
+        (("log-to-delta", "-o", "missing/run.rrd"), "found no folder missing, allowed: a folder that exists"),
+    ],
+)
+def test_what_is_wrong_is_told_before_the_first_step(
+    urmpipe: RunCommand, tmp_path: Path, arguments: tuple[str, ...], said: str
+) -> None:
+    ran = urmpipe("simulate", *arguments)
+    assert (ran.code, ran.out) == (2, "")
+    assert said in ran.err
+    assert "Traceback" not in ran.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def refusal(system: Path, **options: Any) -> list[str]:
+    """Return all that is wrong with a system."""
+    with pytest.raises(UrmpipeError) as error:
+        simulate(system, **options)
+    return [str(one) for one in error.value.findings]
+
+
+def test_all_that_is_wrong_with_the_parts_is_told_at_once(following: Path) -> None:
+    text = FOLLOWING.replace('column = "u"', 'column = "w"').replace('gain = "$gain"', "gain = nan")
+    arm = '[blocks.arm]\nunit = "kinematic_chain"\nrobot = 6\n'
+    meter = '[blocks.meter]\nunit = "delta_meter"\njoints = 1\n'
+    following.write_text(text + arm + meter, encoding="utf-8")
+    told = "\n".join(refusal(following))
+    assert "found no column 'w', allowed: t, u (V)" in told
+    assert "block arm: robot: found 6, allowed: a name or a file" in told
+    assert "block meter: unit delta_meter: option joints: found, allowed: none, it has no options" in told
+
+
+def test_a_start_value_that_is_no_number_is_refused(following: Path) -> None:
+    following.write_text(FOLLOWING.replace('gain = "$gain"', "gain = nan"), encoding="utf-8")
+    assert refusal(following) == ["blocks.lag.start.gain: found nan, allowed: a finite number"]
+
+
+def test_a_meter_without_a_tolerance_judges_nothing(tmp_path: Path) -> None:
+    path = tmp_path / "meter.toml"
+    path.write_text(
+        '[system]\nduration = 1.0\n[blocks.meter]\nunit = "delta_meter"\n'
+        "start = { tolerance = 0.0, reference = 0.0, actual = 0.0 }\n",
+        encoding="utf-8",
+    )
+    assert refusal(path) == ["block meter: tolerance: found 0, allowed: above 0, in m"]
+
+
+@pytest.mark.parametrize("output", ["following.toml", "voltage.csv", "follower.py"])
+def test_no_input_is_ever_replaced(following: Path, tmp_path: Path, output: str) -> None:
+    before = (tmp_path / output).read_bytes()
+    (said,) = refusal(following, draw=tmp_path / output)
+    assert "found an input of this command, allowed: any other name for the drawing" in said
+    assert (tmp_path / output).read_bytes() == before
+
+
+def test_two_outputs_have_two_names(following: Path, tmp_path: Path) -> None:
+    both = tmp_path / "run.rrd"
+    assert refusal(following, output=both, draw=both) == [
+        f"found {both} as recording and as drawing; allowed: a name for each"
+    ]
+
+
+def test_an_fmu_that_fails_at_once_leaves_an_empty_recording(following: Path, tmp_path: Path) -> None:
+    unit = tmp_path / "follower.py"
+    unit.write_text(FOLLOWER.replace("v.u - v.x}", "(v.u - v.x) / (v.gain - v.gain)}"), encoding="utf-8")
+    result = simulate(following, output=tmp_path / "run.rrd")
+    assert result.failed is not None
+    assert result.failed.startswith("block lag: fmi2GetReal at t = 0 s: ")
+    assert (len(result.t_ns), result.verdict) == (0, "fail")
+    read = urmpipe.read_recording(tmp_path / "run.rrd")
+    assert isinstance(read, Simulation)
+    assert read.failed == result.failed
+
+
+def test_names_complete_in_the_shell() -> None:
+    context, argument = click.Context(command), command.params[0]
+    assert argument.type.shell_complete(context, argument, "six")[0].value == "six-drives"
+    units = UnitType().shell_complete(context, argument, "dc")
+    assert [(one.value, one.type) for one in units] == [("dc_drive", "plain"), ("dc", "file")]
+
+
+def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
+    (tmp_path / "log.csv").write_text("t,q1,q2\n0,180,90\n0.01,170,80\n", encoding="utf-8")
+    run = urmpipe.ingest(tmp_path / "log.csv", read=urmpipe.ReadOptions(units={"": "deg"}))
+    urmpipe.write_map(run, tmp_path / "lab.toml")
+    system = tmp_path / "system.toml"
+    block = '[blocks.log]\nunit = "log_source"\nlog = "log.csv"\nmap = "lab.toml"\n'
+    system.write_text(block, encoding="utf-8")
+    q = simulate(system, step=0.01).signal("log.q").values
+    # one product of two doubles: a unit in the last place
+    np.testing.assert_allclose(q, np.radians([[180.0, 90.0], [170.0, 80.0]]), rtol=2.3e-16)
+    system.write_text('[blocks.meter]\nunit = "delta_meter"\nmap = "lab.toml"\n', encoding="utf-8")
+    assert any("without a log, allowed: with log = ..." in one for one in refusal(system))
+
+
+def test_no_import_meets_those_of_rerun(following: Path, tmp_path: Path) -> None:
+    """While a system is prepared and run Rerun is imported beside: see `load_rerun`."""
+    code = (
+        "import sys, urmpipe.simulating as s, urmpipe.process as p\n"
+        "p.tune_pyarrow()\n"
+        "before = set(sys.modules)\n"
+        f"s.simulate({str(following)!r})\n"
+        "own = set(sys.modules) - before\n"
+        "for name in own: del sys.modules[name]\n"
+        "import rerun.blueprint, rerun.chunk\n"
+        "print(*sorted(own & set(sys.modules)))"
+    )
+    paths = {"URMPIPE_CACHE": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        capture_output=True,
+        text=True,
+        check=True,
+        env={**os.environ, **paths},
+    )
+    assert done.stdout.strip() == ""
+
+
+def test_a_step_and_a_duration_are_positive(following: Path) -> None:
+    assert refusal(following, step=float("nan"), duration=0.0) == [
+        "step: found nan s, allowed: above 0",
+        "duration: found 0 s, allowed: above 0",
+    ]
+
+
+def test_a_cold_build_is_told(following: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("URMPIPE_CACHE", str(tmp_path / "cache"))
+    lines: list[str] = []
+    simulate(following, told=lines.append)
+    assert lines == ["building follower for block lag ..."]
+    simulate(following, told=lines.append)
+    assert lines == ["building follower for block lag ..."]
+
+
+def test_progress_rises_to_1(following: Path, tmp_path: Path) -> None:
+    shares: list[float] = []
+    simulate(following, output=tmp_path / "run.rrd", progress=shares.append)
+    assert shares == sorted(shares)
+    assert shares[-1] == 1.0

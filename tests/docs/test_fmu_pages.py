@@ -1,0 +1,103 @@
+"""docs/fmu.md, docs/simulate.md and docs/import/fmpy.md against the code: what they show runs."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from urmpipe.fmu_printing import units_dict
+from urmpipe.simulating import simulate
+from urmpipe_datasets import LOGS
+from urmpipe_fmus.cosim import system_names
+from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.units import unit_names
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.kinematics import points_over_log
+
+DOCS = Path(__file__).parents[2] / "docs"
+NAMED = set(re.findall(r"`(\w+)`", (DOCS / "json.md").read_text(encoding="utf-8")))
+
+
+def snippets(page: str, language: str) -> list[str]:
+    """Return the code of a language in a page."""
+    text = (DOCS / page).read_text(encoding="utf-8")
+    return [
+        "\n".join(line.removeprefix("  ") for line in one.splitlines())
+        for one in re.findall(rf"^ *```{language}\n(.*?)^ *```$", text, re.DOTALL | re.MULTILINE)
+    ]
+
+
+def run_lines(lines: str, folder: Path) -> None:
+    """Run the commands of a page in a folder: those of this Python, wherever they are installed."""
+    programs = {"urmpipe": ["-m", "urmpipe"], "fmpy": ["-m", "fmpy"]}
+    for line in lines.splitlines():
+        name, *arguments = shlex.split(line)
+        done = subprocess.run(
+            [sys.executable, *programs[name], *arguments],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (0, ""), line
+
+
+def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    missing = native_missing()
+    if missing:
+        pytest.skip(missing)
+    (commands,) = snippets("import/fmpy.md", "sh")
+    run_lines(commands, tmp_path)
+    arm = load_robot("urm6")
+    posed = np.array([[0.5, *arm.start[1:]]])
+    table = np.genfromtxt(tmp_path / "points.csv", delimiter=",", names=True, deletechars="")
+    tips = np.column_stack([table[f"p7[{i}]"] for i in (1, 2, 3)])
+    assert tips.shape == (5, 3)
+    # the same products of cosines; C and NumPy may differ in their last bits
+    np.testing.assert_allclose(tips, np.tile(points_over_log(arm, posed)[0, -1], (5, 1)), atol=1e-15)
+    monkeypatch.chdir(tmp_path)
+    shown: dict[str, Any] = {}
+    for code in snippets("import/fmpy.md", "python"):
+        exec(compile(code, "fmpy.md", "exec"), shown)
+    q = np.zeros((200, 6))
+    q[:, 0] = np.sin(0.005 * np.arange(200))
+    np.testing.assert_allclose(shown["fresh"], points_over_log(arm, q)[:, -1, 0], rtol=0.0, atol=1e-15)
+
+
+def test_the_system_of_the_page_runs(tmp_path: Path) -> None:
+    system = next(one for one in snippets("simulate.md", "toml") if one.startswith("[system]"))
+    (tmp_path / "my-arm.toml").write_text(system, encoding="utf-8")
+    shutil.copy(LOGS / "matlab.csv", tmp_path / "log.csv")
+    shutil.copy(LOGS / "path.csv", tmp_path / "path.csv")
+    result = simulate(tmp_path / "my-arm.toml", duration=0.1)
+    assert (result.name, result.verdict, len(result.t_ns)) == ("my-arm", "pass", 21)
+
+
+def test_each_shipped_system_has_its_line() -> None:
+    page = (DOCS / "simulate.md").read_text(encoding="utf-8")
+    section = page.split("\n## The systems that come along\n")[1].split("\n## ")[0]
+    assert tuple(sorted(re.findall(r"^- \*\*(.+?)\*\*", section, re.MULTILINE))) == system_names()
+
+
+def test_each_key_of_the_list_of_units_is_named() -> None:
+    assert {"units", "name", "description", "options", "help"} <= NAMED
+    units = units_dict()["units"]
+    assert [one["name"] for one in units] == list(unit_names())
+    assert all(set(one) == {"name", "description", "options"} for one in units)
+
+
+@pytest.mark.parametrize("page", sorted((DOCS / "import").glob("*.md")), ids=lambda page: page.name)
+def test_each_page_tells_units_start_values_and_the_communication_step(page: Path) -> None:
+    text = page.read_text(encoding="utf-8")
+    for word in ("urmpipe fmu build", "SI", "start value", "tep", "Source", "[1]"):
+        assert word in text, word

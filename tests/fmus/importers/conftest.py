@@ -1,0 +1,44 @@
+"""What the tests of this folder share: every shipped unit, built once a session."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from peers import need_builds_for
+from shipped_units import CROSS_BUILT, shipped_unit
+from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.native import this_platform
+
+Fmu = Callable[..., Path]
+
+
+@pytest.fixture(scope="session")
+def fmu_of(tmp_path_factory: pytest.TempPathFactory) -> Fmu:
+    """Return a function that builds a shipped unit by name and backend, and builds it once."""
+    built: dict[tuple[str, str], Path] = {}
+
+    def build(name: str, backend: str = "native") -> Path:
+        if backend == "native":
+            need_builds_for(this_platform())
+        if (name, backend) not in built:
+            folder = tmp_path_factory.mktemp(f"{name}_{backend}")
+            made = build_fmu(shipped_unit(name), folder / f"{name}.fmu", backend=backend)  # type: ignore[arg-type]
+            built[name, backend] = made.path
+        return built[name, backend]
+
+    return build
+
+
+@pytest.fixture(scope="session")
+def cross_built(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Units built by zig for linux64 and win64, by name: one set for all tests."""
+    platforms = ["linux64", "win64"]
+    need_builds_for(*platforms)
+    folder = tmp_path_factory.mktemp("cross_built")
+    return {
+        name: build_fmu(shipped_unit(name), folder / f"{name}.fmu", platforms=platforms).path
+        for name in CROSS_BUILT
+    }

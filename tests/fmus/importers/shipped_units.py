@@ -1,0 +1,86 @@
+"""The shipped units as the tests of this folder need them, and inputs for them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_fmus.table import Table
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.units import make_unit, unit_names
+from urmpipe_fmus.variable import Input
+from urmpipe_models.catalogue import load_robot
+
+FloatArray = NDArray[np.float64]
+
+STEP = 0.005
+"""Communication step in [s]."""
+
+FARTHEST = 2.0
+"""Inputs without bounds are drawn from -FARTHEST to FARTHEST: angles, rates and volts for a small drive."""
+
+
+CROSS_BUILT = ("kinematic_chain", "repolarizer", "delta_meter", "log_source", "dc_drive")
+"""Units that are built for Linux and Windows: with integers, truths, a table, states."""
+
+
+def swinging_joints(rows: int, joints: int = 6, period: float = STEP) -> Table:
+    """Return a log of joints in [rad] that swing by less than half a turn."""
+    t = sample_times(rows, period)
+    phases = np.arange(joints)
+    q = np.sin(3.0 * t[:, None] + phases) + 0.1 * phases
+    return Table(np.rint(t * 1e9).astype(np.int64), q)
+
+
+def shipped_unit(name: str) -> Unit:
+    """Return a shipped unit by name, of six joints where it has some."""
+    options: dict[str, Any] = {}
+    if name == "kinematic_chain":
+        options = {"robot": load_robot("urm6"), "rates": True}
+    elif name == "log_source":
+        options = {"table": swinging_joints(400), "columns": [("q", "rad", 6)], "interpolate": True}
+    elif name == "repolarizer":
+        options = {"joints": 6}
+    return make_unit(name, **options)
+
+
+def sample_times(count: int, step: float = STEP) -> FloatArray:
+    """Return the communication points in [s]."""
+    return step * np.arange(count, dtype=np.float64)
+
+
+def shipped() -> tuple[str, ...]:
+    """Return the names of all shipped units."""
+    return unit_names()
+
+
+def drawn(one: Input, rng: np.random.Generator) -> FloatArray:
+    """Return a value that an input may take, shape (width,)."""
+    if one.type == "Boolean":
+        return rng.integers(0, 2, one.width).astype(np.float64)
+    low, high = max(one.minimum, -FARTHEST), min(one.maximum, FARTHEST)
+    values = rng.uniform(low, high, one.width)
+    return np.round(values) if one.type == "Integer" else values
+
+
+def drawn_inputs(unit: Unit, rows: int, seed: int = 5) -> dict[str, FloatArray]:
+    """Return values of all inputs that change every second row: shape (rows,), or (rows, size)."""
+    rng = np.random.default_rng(seed)
+    held: dict[str, FloatArray] = {}
+    for one in unit.inputs:
+        values = np.array([drawn(one, rng) for _ in range((rows + 1) // 2)])
+        values = np.repeat(values, 2, axis=0)[:rows]
+        held[one.name] = values[:, 0] if one.size is None else values
+    return held
+
+
+def columns(unit: Unit, values: dict[str, FloatArray]) -> dict[str, FloatArray]:
+    """Return values by variable as one column a scalar, by the scalar's name: shape (rows,)."""
+    found: dict[str, FloatArray] = {}
+    for one in unit.variables:
+        if one.name in values:
+            rows = np.asarray(values[one.name], dtype=np.float64)
+            found |= zip(one.names, rows.reshape(len(rows), -1).T, strict=True)
+    return found

@@ -1,0 +1,51 @@
+"""Every shipped unit, run native by masters that nobody here wrote: libcosim, Ecos and FMPy."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from ecos_master import run_ecos
+from fmpy_master import run_fmpy
+from libcosim_master import run_libcosim
+from peers import need
+from shipped_units import STEP, FloatArray, columns, drawn_inputs, sample_times, shipped, shipped_unit
+from systems import System, Trace, alone
+from urmpipe_fmus.run import run
+from urmpipe_fmus.unit import Unit
+
+STEPS = 61
+MASTERS: dict[str, tuple[str, Callable[[System, float, int], Trace]]] = {
+    "libcosimpy": ("libcosimpy", run_libcosim),
+    "ecospy": ("ecospy", run_ecos),
+    "fmpy": ("fmpy", run_fmpy),
+}
+
+
+def assert_is_the_run_over_a_log(unit: Unit, trace: Trace, held: dict[str, FloatArray], rtol: float) -> None:
+    """The inputs change every second sample: what is read after a step with the inputs of its beginning is at
+    every odd sample what the log's run gives there, for the inputs of that sample.
+    """
+    expected = columns(unit, run(unit, sample_times(STEPS + 1), held))
+    assert expected.keys() == trace["it"].keys()
+    for name, values in trace["it"].items():
+        np.testing.assert_allclose(values[1::2], expected[name][1::2], rtol, rtol, err_msg=name)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", shipped())
+@pytest.mark.parametrize("master", MASTERS)
+def test_a_native_unit_gives_the_numbers_of_its_run_over_a_log(
+    master: str, name: str, fmu_of: Callable[..., Path]
+) -> None:
+    module, run_master = MASTERS[master]
+    need(module)
+    unit = shipped_unit(name)
+    held = drawn_inputs(unit, STEPS + 1)
+    trace = run_master(alone(fmu_of(name), unit, columns(unit, held)), STEP, STEPS)
+    # The masters' clocks add up, so that their times and steps differ from k h in the last digits: with
+    # values up to 1e4 (torques of a drawn motion) and stiff shafts that is 1e-10 of a value, not 1e-12.
+    assert_is_the_run_over_a_log(unit, trace, held, rtol=1e-10)

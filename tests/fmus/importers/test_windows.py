@@ -1,0 +1,119 @@
+"""The Windows binaries in a Windows program that nobody here wrote: Ecos's own, under wine.
+
+That program comes with the package of ecospy for all platforms. It prints its values with six decimals; that
+the bits are those of Linux, the tests of the native backend show with a host of their own.
+"""
+
+from __future__ import annotations
+
+import csv
+import os
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from shipped_units import CROSS_BUILT, STEP, FloatArray, columns, drawn_inputs, sample_times, shipped_unit
+from urmpipe_fmus.run import run
+from urmpipe_fmus.unit import Unit
+
+STEPS = 41
+DECIMALS = 6
+SCENARIO = "http://github.com/Ecos-platform/libecos/resources/schema/ScenarioConfig"
+TAGS = {"Real": "real", "Integer": "integer", "Boolean": "boolean"}
+"""What Ecos calls FMI's types in a scenario."""
+
+TAR = "@xcopy /E /I /Y /Q unpacked %4\r\n"
+"""Ecos unpacks by Windows' own tar, which wine has not: this one copies what Python has unpacked."""
+
+
+@pytest.fixture(scope="module")
+def wine(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
+    """The environment of a wine of its own, with nothing of the user's in it and no windows opened."""
+    if sys.platform == "win32" or not shutil.which("wine"):
+        pytest.skip("needs wine (Debian: wine, wine64)")
+    kept = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "SHELL")}
+    return kept | {"WINEPREFIX": str(tmp_path_factory.mktemp("wine") / "prefix"), "WINEDEBUG": "-all"}
+
+
+def ecos_program() -> Path:
+    """Return Ecos's Windows program."""
+    from importlib.util import find_spec
+
+    found = find_spec("ecospy")
+    if found is None or found.origin is None:
+        pytest.skip("needs ecospy")
+    return Path(found.origin).parent / "binaries" / "ecos.exe"
+
+
+def scenario(unit: Unit, inputs: Mapping[str, FloatArray]) -> str:
+    """Return Ecos's description of inputs: each is set before the step whose time is its own within eps."""
+    types = {name: TAGS[one.type] for name, one in unit.scalars}
+    actions = [
+        f'<ecos:action t="{k * STEP:.17g}"><ecos:variable id="instance::{name}">'
+        f'<ecos:{types[name]} value="{written(types[name], values[k])}"/></ecos:variable></ecos:action>'
+        for name, values in inputs.items()
+        for k in range(STEPS)
+    ]
+    return (
+        f'<ecos:Scenario xmlns:ecos="{SCENARIO}" eps="1e-6">\n' + "\n".join(actions) + "\n</ecos:Scenario>\n"
+    )
+
+
+def written(tag: str, value: float) -> str:
+    """Return a value as XML has it."""
+    if tag == "real":
+        return repr(float(value))
+    return str(int(value)) if tag == "integer" else str(bool(value)).lower()
+
+
+def simulated(
+    fmu: Path, unit: Unit, inputs: Mapping[str, FloatArray], wine: Mapping[str, str]
+) -> dict[str, FloatArray]:
+    """Return what Ecos writes of an FMU, a column a scalar: from the start, then after each step."""
+    folder = fmu.parent
+    (folder / "tar.bat").write_text(TAR, encoding="ascii", newline="")
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(folder / "unpacked")
+    (folder / "inputs.xml").write_text(scenario(unit, inputs), encoding="utf-8")
+    command = ["simulate", "--path", fmu.name, "--stopTime", str(STEPS * STEP), "--stepSize", str(STEP)]
+    if inputs:
+        command += ["--scenarioConfig", "inputs.xml"]
+    said = subprocess.run(
+        ["wine", str(ecos_program()), *command],
+        cwd=folder, env=dict(wine), capture_output=True, text=True, check=False, timeout=300,
+    )  # fmt: skip
+    results = list(folder.glob("*.csv"))
+    assert said.returncode == 0 and len(results) == 1, said.stdout + said.stderr
+    with results[0].open(encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file, skipinitialspace=True)
+    names = [cell.removeprefix("instance::").rsplit("[", 1)[0] for cell in header]
+    values = np.array([list(map(number, row)) for row in rows], dtype=np.float64)
+    return dict(zip(names, values.T, strict=True))
+
+
+def number(cell: str) -> float:
+    """Return a cell of Ecos's as a number."""
+    return {"true": 1.0, "false": 0.0}[cell] if cell in ("true", "false") else float(cell)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", CROSS_BUILT)
+def test_a_windows_binary_gives_the_numbers_of_its_run_over_a_log(
+    name: str, cross_built: dict[str, Path], wine: Mapping[str, str], tmp_path: Path
+) -> None:
+    unit = shipped_unit(name)
+    held = drawn_inputs(unit, STEPS + 1)
+    fmu = Path(shutil.copy(cross_built[name], tmp_path / "it.fmu"))
+    found = simulated(fmu, unit, columns(unit, held), wine)
+    expected = columns(unit, run(unit, sample_times(STEPS + 1), held))
+    for shown, values in expected.items():
+        # Inputs change every second sample; see test_masters.py.
+        np.testing.assert_allclose(
+            found[shown][1:STEPS:2], values[1:STEPS:2], 1e-10, 0.51 * 10.0**-DECIMALS, err_msg=shown
+        )

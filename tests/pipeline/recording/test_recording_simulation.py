@@ -1,0 +1,241 @@
+"""The recording of a simulation: what is written is read back, and the viewer finds what it is to show."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import fields, is_dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from urmpipe_models.errors import RecordingError
+from urmpipe_pipeline.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.joint_log import FloatArray, LogWarning, SourceFile
+from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.recording.layout import opening_time
+from urmpipe_pipeline.recording.scene import scene_of
+from urmpipe_pipeline.recording.simulation_summary import simulation_summary
+from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.recording.viewer import opening_times
+from urmpipe_pipeline.recording.writer import SLICE
+from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.simulation import Setting, Signal, SimulatedBlock, Simulation
+
+MakeSimulation = Callable[..., Simulation]
+MakeRun = Callable[..., Run]
+
+
+def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
+    """Hold two results against each other: arrays by dtype, shape and bits, the rest by value."""
+    if isinstance(wanted, np.ndarray):
+        assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape), place
+        assert found.tobytes() == wanted.tobytes(), place
+    elif is_dataclass(wanted) and not isinstance(wanted, type):
+        assert type(found) is type(wanted), place
+        for field in fields(wanted):
+            if field.name != "recording":
+                assert_same(getattr(found, field.name), getattr(wanted, field.name), f"{place}.{field.name}")
+    elif isinstance(wanted, Mapping):
+        assert list(found) == list(wanted), place
+        for key, value in wanted.items():
+            assert_same(found[key], value, f"{place}[{key!r}]")
+    elif isinstance(wanted, tuple):
+        assert len(found) == len(wanted), place
+        for i, (one, other) in enumerate(zip(found, wanted, strict=True)):
+            assert_same(one, other, f"{place}[{i}]")
+    elif isinstance(wanted, float) and np.isnan(wanted):
+        assert np.isnan(found), place
+    else:
+        assert found == wanted, place
+
+
+def assert_comes_back(simulation: Simulation, folder: Path) -> None:
+    path = write_recording(simulation, folder / "simulation.rrd")
+    back = read_recording(path)
+    assert_same(back, simulation)
+    assert back.recording == path
+    assert [one.name for one in folder.iterdir()] == ["simulation.rrd"]
+
+
+def values_at(store: Store, entity: str) -> FloatArray:
+    return np.concatenate([chunk.values for chunk in store.chunks(entity)])
+
+
+def test_a_simulation_comes_back_as_it_was(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    assert_comes_back(make_simulation(), tmp_path)
+
+
+def test_one_that_failed_keeps_what_was_recorded(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    assert_comes_back(make_simulation(37, failed="chain: fmi2DoStep returned fmi2Error: q is NaN"), tmp_path)
+
+
+def test_one_that_failed_before_the_first_sample_is_recorded(
+    make_simulation: MakeSimulation, tmp_path: Path
+) -> None:
+    assert_comes_back(make_simulation(0, failed="chain: crashed"), tmp_path)
+
+
+def test_one_of_one_sample_is_recorded(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    assert_comes_back(make_simulation(1), tmp_path)
+
+
+def test_one_without_signals_keeps_its_times(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    assert_comes_back(replace(make_simulation(20), signals=(), verdicts=(), arms=()), tmp_path)
+
+
+def test_a_long_one_comes_back_in_the_order_of_time(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    """Three slices, the ends and the worst sample sent before the other; and each plot has an overview."""
+    simulation = make_simulation(2 * SLICE + 5)
+    assert_comes_back(simulation, tmp_path)
+    rows = Store(tmp_path / "simulation.rrd").rows
+    assert rows["/signals/log/q"] == 2 * SLICE + 5
+    assert 0 < rows["/overview/signals/log/q"] < SLICE
+    assert "/overview/signals" not in rows
+
+
+def test_columns_of_a_wider_array_come_back_as_they_were(
+    make_simulation: MakeSimulation, tmp_path: Path
+) -> None:
+    """A co-simulation records all scalars in one array; its signals are views into it."""
+    recorded = np.random.default_rng(5).normal(size=(40, 9))
+    signals = (
+        Signal("b", "x", recorded[:, 4]), Signal("b", "y", recorded[:, 1:4]),
+        Signal("b", "z", np.asfortranarray(recorded[:, 5:])), Signal("b", "w", recorded[::-1, 0]),
+    )  # fmt: skip
+    simulation = replace(make_simulation(40), signals=signals, verdicts=())
+    assert_comes_back(simulation, tmp_path)
+
+
+def test_a_variable_is_an_entity_with_a_column_a_scalar(
+    make_simulation: MakeSimulation, tmp_path: Path
+) -> None:
+    simulation = make_simulation(50)
+    store = Store(write_recording(simulation, tmp_path / "a.rrd"))
+    for one in simulation.signals:
+        np.testing.assert_array_equal(values_at(store, f"/signals/{one.block}/{one.variable}"), one.columns)
+    np.testing.assert_array_equal(values_at(store, "/arms/chain/joints"), simulation.arms[0].q)
+    np.testing.assert_array_equal(values_at(store, "/tolerance/meter/axis"), [[0.0035, -0.0035]] * 2)
+    worst = values_at(store, "/marks/worst/meter")
+    judged = np.column_stack([simulation.signals[2].values, simulation.signals[3].values])
+    np.testing.assert_array_equal(worst, [[judged.min()], [judged.max()]])
+
+
+def test_each_kind_says_its_own_layout(
+    make_simulation: MakeSimulation, make_run: MakeRun, tmp_path: Path
+) -> None:
+    """An older urmpipe, which knows layouts up to 4, refuses a simulation by number and still reads a run."""
+    paths = (
+        write_recording(make_run(rows=5), tmp_path / "run.rrd"),
+        write_recording(make_simulation(5), tmp_path / "simulation.rrd"),
+    )
+    assert [json.loads(Store(path).metadata)["layout_version"] for path in paths] == [4, 5]
+
+
+def test_rerun_finds_nothing_wrong(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    path = write_recording(make_simulation(), tmp_path / "a.rrd")
+    done = subprocess.run(
+        [sys.executable, "-m", "rerun", "rrd", "verify", str(path)],
+        capture_output=True, text=True, check=False, timeout=120,
+    )  # fmt: skip
+    assert "1 file verified without error" in done.stdout + done.stderr
+
+
+def test_the_viewer_opens_at_the_worst_sample(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    simulation = make_simulation()
+    path = write_recording(simulation, tmp_path / "a.rrd")
+    assert opening_times([path]) == {path: 1_250_000_000}
+    assert opening_time(replace(simulation, verdicts=())) == 0
+    assert opening_time(make_simulation(0)) == 0
+
+
+def test_the_first_arm_moves_and_the_tip_of_each_has_a_path(make_simulation: MakeSimulation) -> None:
+    simulation = make_simulation()
+    arms = (*simulation.arms, replace(simulation.arms[0], block="second"))
+    scene = scene_of(replace(simulation, arms=arms))
+    assert scene.arm is not None
+    np.testing.assert_allclose(
+        scene.arm.skeleton[:, -1],
+        simulation.signal("chain.p7").values[scene.arm.sample],
+        atol=1e-12,  # two orders of summing the same seven segments
+    )
+    assert [way.path for way in scene.ways] == ["/path/chain", "/path/second"]
+    assert [way.label for way in scene.ways] == ["chain", "second"]
+    assert scene_of(replace(simulation, arms=())).empty
+
+
+def test_the_summary_says_how_it_ended_and_what_is_joined(make_simulation: MakeSimulation) -> None:
+    found = simulation_summary(make_simulation(tolerance=0.005)).splitlines()
+    assert found[0] == "### PASS: log\\-to\\-delta"
+    assert (
+        "- **PASS** meter: \\|Δy\\| = 4.0000 mm of 5 mm allowed at t = 1.250 s;"
+        " out of tolerance: 0 of 600 samples" in found
+    )
+    assert "600 samples, 2.995 s, communication step 5 ms." in found
+    assert "| chain | unit kinematic\\_chain |" in found
+    assert "| chain.phi | log.q |" in found
+    failed = simulation_summary(make_simulation(10, failed="meter: <b>gone</b>")).splitlines()
+    assert failed[0] == "### FAILED: log\\-to\\-delta"
+    assert "**meter: \\<b\\>gone\\</b\\>** What was recorded until then is here." in failed
+
+
+def test_a_simulation_is_nothing_to_compare(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    path = write_recording(make_simulation(5), tmp_path / "a.rrd")
+    with pytest.raises(RecordingError) as caught:
+        load_run(path)
+    assert str(caught.value) == f"{path}: {SIMULATION}"
+    assert load_comparison(path) is None
+
+
+NAMES = st.text(st.characters(exclude_categories=[]), max_size=8)
+NUMBERS = st.floats(allow_nan=False)
+
+
+@st.composite
+def simulations(draw: st.DrawFn) -> Simulation:
+    """Draw a simulation with any names, any values, and any number of samples."""
+    samples = draw(st.integers(0, 4))
+    names = draw(st.lists(st.tuples(NAMES, NAMES), max_size=4, unique_by=".".join))
+    signals = [
+        Signal(
+            block, variable,
+            draw(arrays(np.float64, draw(st.sampled_from([(samples,), (samples, 1), (samples, 3)])))),
+            draw(NAMES), draw(NAMES), draw(st.sampled_from(["Real", "Integer", "Boolean"])), draw(NAMES),
+        )
+        for block, variable in names
+    ]  # fmt: skip
+    every = [name for one in signals for name in {one.name, *one.names}]
+    verdict = DeltaVerdict(
+        draw(NAMES), tuple(draw(st.lists(NAMES, max_size=2))), {"axis": draw(st.floats(0.0, 1e300))}, "x",
+        draw(st.floats()), 0.0, 0, 3, 1, "fail",
+    )  # fmt: skip
+    block = SimulatedBlock(
+        draw(NAMES), "fmu", draw(NAMES), draw(NAMES), (Setting(draw(NAMES), draw(NUMBERS)),)
+    )
+    times = draw(st.sets(st.integers(0, 10**15), min_size=samples, max_size=samples))
+    return Simulation(
+        name=draw(NAMES), description=draw(NAMES),
+        t_ns=np.array(sorted(times), np.int64),
+        step=draw(NUMBERS), signals=tuple(signals) if len(set(every)) == len(every) else (),
+        system_svg=draw(NAMES), system_text=draw(NAMES), blocks=(block,),
+        failed=draw(st.none() | NAMES), warnings=(LogWarning(draw(NAMES), draw(NAMES), None),),
+        provenance=Provenance("simulate", {}, (SourceFile(draw(NAMES), draw(NAMES), 1),), {}, draw(NAMES)),
+        connections=draw(st.dictionaries(NAMES, NAMES, max_size=3)),
+        verdicts=(verdict,) if samples else (),
+    )  # fmt: skip
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(simulation=simulations())
+def test_any_simulation_comes_back_as_it_was(simulation: Simulation, tmp_path: Path) -> None:
+    path = tmp_path / "any.rrd"
+    assert_same(read_recording(write_recording(simulation, path)), simulation)

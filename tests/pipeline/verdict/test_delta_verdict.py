@@ -1,0 +1,93 @@
+"""The verdict of a delta meter: what is worst, when, and how often it is too much."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.delta_verdict import delta_verdict
+from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.wording import meter_words
+
+T_NS = np.array([0, 5_000_000, 10_000_000])
+DELTA = np.array([[1e-3, 0.0, 0.0], [0.0, -4e-3, 3e-3], [3.5e-3, 0.0, 0.0]])
+
+
+def test_the_component_that_uses_up_most_is_the_worst() -> None:
+    found = delta_verdict("meter", T_NS, DELTA, {"axis": 0.0035})
+    assert found is not None
+    assert (found.quantity, found.worst, found.t, found.sample) == ("y", 4e-3, 0.005, 1)
+    assert (found.samples, found.out_of_tolerance, found.verdict) == (3, 1, "fail")  # what is allowed passes
+    assert (found.used, found.share_out) == (4e-3 / 0.0035, 1 / 3)
+    assert meter_words(found) == (
+        "|Δy| = 4.0000 mm of 3.5 mm allowed at t = 0.005 s; out of tolerance: 1 of 3 samples"
+    )
+
+
+def test_a_tolerance_of_one_coordinate_or_of_the_norm_holds_for_that_alone() -> None:
+    of_z = delta_verdict("meter", T_NS, DELTA, {"z": 0.003})
+    of_norm = delta_verdict("meter", T_NS, DELTA, {"norm": 0.0045})
+    both = delta_verdict("meter", T_NS, DELTA, {"axis": 0.005, "x": 0.001})
+    assert of_z is not None and of_norm is not None and both is not None
+    assert (of_z.quantity, of_z.worst, of_z.verdict) == ("z", 3e-3, "pass")
+    assert (of_norm.quantity, of_norm.worst, of_norm.verdict) == ("norm", 5e-3, "fail")
+    assert (both.quantity, both.sample, both.out_of_tolerance) == ("x", 2, 1)
+
+
+def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
+    lacking = DELTA.copy()
+    lacking[0, 2] = np.nan
+    found = delta_verdict("meter", T_NS, lacking, {"axis": 1.0})
+    assert found is not None
+    assert (found.sample, found.out_of_tolerance, found.verdict, found.used) == (0, 1, "fail", None)
+    assert math.isnan(found.worst) and found.to_dict()["worst"] is None
+    assert meter_words(found) == "no value at t = 0.000 s; out of tolerance: 1 of 3 samples"
+
+
+def test_nothing_allowed_is_a_tolerance() -> None:
+    found = delta_verdict("meter", T_NS, DELTA, {"axis": 0.0})
+    still = delta_verdict("meter", T_NS, np.zeros((3, 3)), {"axis": 0.0})
+    assert found is not None and still is not None
+    assert (found.out_of_tolerance, found.verdict, found.used) == (3, "fail", math.inf)
+    assert (still.out_of_tolerance, still.verdict, still.used) == (0, "pass", 0.0)
+
+
+def test_without_a_sample_there_is_no_verdict() -> None:
+    assert delta_verdict("meter", T_NS[:0], DELTA[:0], {"axis": 1.0}) is None
+
+
+@pytest.mark.parametrize(
+    ("tolerance", "message"),
+    [
+        ({}, "meter: found no tolerance, allowed: axis, x, y, z, norm"),
+        ({"axis": -1.0}, "meter: found a tolerance axis=-1, allowed: axis, x, y, z, norm; 0 or positive"),
+        ({"angle": 1.0}, "meter: found a tolerance angle=1, allowed: axis, x, y, z, norm; 0 or positive"),
+        ({"x": math.nan}, "meter: found a tolerance x=nan, allowed: axis, x, y, z, norm; 0 or positive"),
+    ],
+)
+def test_what_is_no_tolerance_is_refused(tolerance: dict[str, float], message: str) -> None:
+    with pytest.raises(OptionError) as caught:
+        delta_verdict("meter", T_NS, DELTA, tolerance)
+    assert str(caught.value) == message
+
+
+ROWS = st.lists(st.tuples(*(st.floats(-1.0, 1.0),) * 3), min_size=1, max_size=8).map(np.array)
+
+
+@given(delta=ROWS, axis=st.floats(0.0, 1.0), norm=st.floats(0.0, 2.0))
+def test_it_passes_if_and_only_if_every_quantity_of_every_sample_is_allowed(
+    delta: FloatArray, axis: float, norm: float
+) -> None:
+    found = delta_verdict("meter", np.arange(len(delta)), delta, {"axis": axis, "norm": norm})
+    assert found is not None
+    out = (np.abs(delta) > axis).any(axis=1) | (np.linalg.norm(delta, axis=1) > norm)
+    assert found.out_of_tolerance == np.count_nonzero(out)
+    assert (found.verdict == "pass") == (not out.any())
+    assert found.used is not None
+    # a size above what is allowed by its last bit may have a share that rounds to 1
+    assert found.used >= 1.0 if out.any() else found.used <= 1.0
