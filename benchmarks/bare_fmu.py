@@ -44,7 +44,8 @@ class BareFmu:
         """Return the call of fmi2SetReal and its like between the FMU and a buffer that the caller keeps."""
         held = (ctypes.c_uint32 * len(references))(*references)
         function = self._function(name, ctypes.c_uint32 * len(references), ctypes.c_size_t, ctypes.c_void_p)
-        return partial(function, self._slave.component, held, len(references), buffer.ctypes.data)
+        count, address = ctypes.c_size_t(len(references)), ctypes.c_void_p(buffer.ctypes.data)
+        return partial(function, ctypes.c_void_p(self._slave.component), held, count, address)
 
     def close(self) -> None:
         """End the instance."""
