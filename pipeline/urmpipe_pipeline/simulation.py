@@ -194,9 +194,9 @@ class Simulation:
         for name, times in Counter(name for one in shaped for name in {one.name, *one.names}).items():
             if times > 1:
                 yield f"{name}: found {times} signals of this name, allowed: one"
-        for one in self.verdicts:
-            if not 0 <= one.sample < count:
-                yield f"verdict of {one.block}: found sample {one.sample}, allowed: 0 to {count - 1}"
+        for judged in self.verdicts:
+            if not 0 <= judged.sample < count:
+                yield f"verdict of {judged.block}: found sample {judged.sample}, allowed: 0 to {count - 1}"
         for arm in self.arms:
             if arm.q.shape != (count, len(arm.chain.coordinates)):
                 allowed = f"({count}, {len(arm.chain.coordinates)})"
