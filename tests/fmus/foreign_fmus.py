@@ -9,6 +9,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
 from pathlib import Path
+from tempfile import mkdtemp
 from typing import Any
 
 import pytest
@@ -68,8 +69,6 @@ class Foreign:
         if compiler is None:
             pytest.skip("needs a C compiler: cc")
         made = folder / f"{self.name}.fmu"
-        if made.exists():
-            return made
         work = folder / self.name
         work.mkdir()
         (work / "model.h").write_text(
@@ -213,9 +212,8 @@ TROUBLE = Foreign(
 @cache
 def _folder() -> Path:
     import atexit
-    import tempfile
 
-    folder = Path(tempfile.mkdtemp(prefix="foreign-"))
+    folder = Path(mkdtemp(prefix="foreign-"))
     atexit.register(shutil.rmtree, folder, ignore_errors=True)
     return folder
 
@@ -223,7 +221,7 @@ def _folder() -> Path:
 @cache
 def fmu(foreign: Foreign) -> Path:
     """Return a foreign FMU, compiled once a test run."""
-    return foreign.write(_folder())
+    return foreign.write(Path(mkdtemp(dir=_folder())))
 
 
 def system(

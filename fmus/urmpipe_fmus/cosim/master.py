@@ -71,9 +71,14 @@ class Master:
         self._loop()
 
     def end(self) -> None:
-        """Terminate and free the blocks, as far as their status lets them."""
+        """Terminate and free the blocks, as far as their status lets them.
+
+        After fmi2Fatal no instance of that FMU may be called (FMI 2.0.4, section 2.1.3).
+        """
+        corrupted = {slave.block.folder for slave in self._slaves if slave.fatal}
         for slave in self._slaves:
-            slave.end()
+            if slave.block.folder not in corrupted:
+                slave.end()
         self._progress.call = ELSEWHERE
 
     @property
@@ -103,6 +108,7 @@ class Master:
         self._run(self._point)
         for slave in self._slaves:
             self._once(slave, "fmi2ExitInitializationMode")
+            slave.running = True
 
     def _once(self, slave: Slave, function: str, *arguments: Any) -> None:
         if slave.once(function, *arguments) == WARNING:

@@ -15,7 +15,7 @@ TRACK, SIDE = 9.0, 22.0
 """Between two tracks, and between a box and the first track, in [px]."""
 
 STRAIGHT = 0.75
-"""Ends that differ by less, in [px], are joined by a straight line."""
+"""Ends that differ by less, in [px], are joined by a line that leans, and need no track."""
 
 
 Shape = Literal["out", "through", "in"]
@@ -127,12 +127,8 @@ def _points(
     source, target = layout.boxes[wire.source], layout.boxes[wire.target]
     points = [(source.x + source.width, layout.start(wire))]
     for channel, turn in way:
-        if not turn.straight:
-            x = edges[channel] + TRACK * turn.track
-            ends = (
-                (turn.left, turn.right)
-                if turn.shape != "through" or not layout.back(wire)
-                else (turn.right, turn.left)
-            )
-            points += [(x, y) for y in ends]
+        x = edges[channel] + TRACK * turn.track
+        ends = [(x, turn.left), (x + TRACK if turn.straight else x, turn.right)]
+        if turn.left != turn.right:
+            points += reversed(ends) if layout.back(wire) and turn.shape == "through" else ends
     return [*points, (target.x, layout.end(wire))]

@@ -55,11 +55,12 @@ class Slave:
         block: Its block.
         fatal: Whether it said fmi2Fatal: nothing may be called any more.
         failed: Whether it said fmi2Error: it may only be freed.
+        running: Whether it is initialized: only then it may be terminated.
     """
 
     def __init__(self, number: int, block: BlockJob, progress: Progress) -> None:
         self.number, self.block, self._progress = number, block, progress
-        self.failed = self.fatal = False
+        self.failed = self.fatal = self.running = False
         self._kept: list[Any] = []
         self._states: list[ctypes.c_void_p] = []
         self._code = progress.call = call_code(number, "loading")
@@ -187,7 +188,7 @@ class Slave:
         """Terminate and free the instance, as far as its status lets it."""
         if self.fatal or not self._fmu.component:
             return
-        if not self.failed:
+        if self.running and not self.failed:
             try:
                 self.once("fmi2Terminate")
             except FmuFailed:

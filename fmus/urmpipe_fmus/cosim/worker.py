@@ -11,6 +11,7 @@ import json
 import mmap
 import os
 import pickle
+import shutil
 import signal
 import sys
 import threading
@@ -115,11 +116,16 @@ def work(folder: Path) -> None:
     master.end()  # last: what an FMU does there must not hide how the run ended
 
 
-def end_with_parent() -> None:
-    """End this process when the one that started it does: its end of the standard input is closed then."""
+def end_with_parent(folder: Path) -> None:
+    """End this process when the one that started it does: its end of the standard input is closed then.
+
+    Args:
+        folder: The folder of the run, of no use to anybody then.
+    """
 
     def watch() -> None:
         sys.stdin.buffer.read()
+        shutil.rmtree(folder, ignore_errors=True)
         os._exit(1)
 
     threading.Thread(target=watch, daemon=True).start()
@@ -127,6 +133,6 @@ def end_with_parent() -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted too, and ends this process
-    end_with_parent()
+    end_with_parent(Path(sys.argv[1]))
     work(Path(sys.argv[1]))
     os._exit(0)  # leaves the FMUs' libraries loaded: what they do when unloaded can no longer spoil the run

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import signal
 import subprocess
 import sys
@@ -128,11 +129,12 @@ def children(pid: int) -> list[int]:
 
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
-def test_an_fmu_that_hangs_ends_with_who_started_it(how: signal.Signals) -> None:
+def test_an_fmu_that_hangs_ends_with_who_started_it(how: signal.Signals, tmp_path: Path) -> None:
     tests = Path(__file__).parents[1]
     script = SCRIPT.format(fmus=str(tests.parents[1] / "fmus"), tests=str(tests))
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
     with subprocess.Popen(
-        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
     ) as one:
         assert one.stdout is not None
         while not one.stdout.readline().startswith(b"0.05"):
@@ -145,6 +147,7 @@ def test_an_fmu_that_hangs_ends_with_who_started_it(how: signal.Signals) -> None
     while runs.exists() and time.monotonic() < until:
         time.sleep(0.05)
     assert not runs.exists()
+    assert not list(tmp_path.glob("urmpipe-*"))
 
 
 def test_the_process_that_runs_the_fmus_imports_little() -> None:
