@@ -131,6 +131,7 @@ def _key(unit: Unit, backend: Backend, target: str) -> str:
     return digest.hexdigest()[:32]
 
 
+@cache
 def _versions() -> list[str]:
     """Return the versions of what takes part, empty for what is not installed."""
     found = []
