@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree as ET
 
+import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
@@ -15,8 +16,10 @@ from loaded_fmu import Loaded
 from urmpipe_fmus.archive import content_guid
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.native import native_missing, this_platform
+from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_names
+from urmpipe_fmus.units.log_source import log_source
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import FmuError
 
@@ -125,4 +128,18 @@ def test_every_shipped_unit_is_a_valid_python_fmu_that_starts_as_it_says(name: s
     }
     assert fmu.get(list(starts)) == list(starts.values())
     fmu.get([scalar for one in unit.computed for scalar in one.names])
+    fmu.free()
+
+
+def test_a_log_source_as_python_fmu_plays_the_table_in_its_resources(make: Make, tmp_path: Path) -> None:
+    table = make("playback").table
+    assert table is not None
+    unit = log_source(table, [("q", "rad"), ("x", "m")], interpolate=True)
+    path = build_fmu(unit, tmp_path, backend="python").path
+    assert validate_fmu(str(path)) == []
+    fmu = Loaded(path)
+    played = run(unit, np.arange(8) * 0.05)
+    for k in range(8):
+        assert fmu.get(["q", "x"]) == [played["q"][k], played["x"][k]]
+        fmu.do_step(k * 0.05, 0.05)
     fmu.free()
