@@ -80,7 +80,7 @@ class OneDrive:
 
 
 def simulated(system: OneDrive, step: float, duration: float, *names: str) -> FloatArray:
-    """Return variables at the communication points, shape (points, len(names))."""
+    """Return variables at the communication points, shape (points, len(names)), or (.., runs) with many."""
     system.exchange()
     found = [system.read(*names)]
     for k in range(round(duration / step)):
@@ -89,22 +89,17 @@ def simulated(system: OneDrive, step: float, duration: float, *names: str) -> Fl
     return np.array(found, dtype=np.float64)
 
 
-def step_map(step: float, period: float = PERIOD, **starts: float) -> FloatArray:
+def step_map(step: float, **starts: float) -> FloatArray:
     """Return the matrix that takes the states over a period of the controller, its set point at rest in 0.
 
     Args:
-        step: Communication step in [s], a whole part of the period.
-        period: Of the controller, in [s].
+        step: Communication step in [s], a whole part of the controller's period.
         starts: Parameters, as `OneDrive` takes them.
     """
-    quiet = {"set_point__target": 0.0, "controller__u_max": 1e12, "controller__period": period}
+    quiet = {"set_point__target": 0.0, "controller__u_max": 1e12}
     units = {name.replace(".", "__"): one for name, one in zip(STATES, np.eye(len(STATES)), strict=True)}
     system = OneDrive(**quiet, **units, **starts)
-    simulated_period = round(period / step)
-    system.exchange()
-    for k in range(simulated_period):
-        system.step(k * step, step)
-    return np.array(system.read(*STATES))
+    return np.asarray(simulated(system, step, PERIOD, *STATES)[-1])
 
 
 def spectral_radius(step: float, **starts: float) -> float:

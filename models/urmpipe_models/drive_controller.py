@@ -20,7 +20,7 @@ from urmpipe_models.elementwise import Element
 from urmpipe_models.set_point import JointMotion
 
 SAMPLE_SLACK = 1e-6
-"""A sample counts as reached this share of a period early: 3 x 0.005 is not quite 0.015."""
+"""A sample counts as reached this share of a period early: computed, 0.3 / 0.1 is not quite 3."""
 
 
 class Gains(NamedTuple):

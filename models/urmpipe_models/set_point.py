@@ -20,6 +20,10 @@ STEP, RAMP, TRAPEZOID = 0, 1, 2
 """The kinds, as numbers, for `set_point`."""
 
 
+CORNER_SLACK = 1e-9
+"""A corner counts as reached so early, in [s]: times that are computed miss it by their rounding."""
+
+
 class JointMotion(NamedTuple):
     """Where a joint is or shall be.
 
@@ -43,7 +47,7 @@ def step(time: Element, begin: Element, initial: Element, target: Element) -> Jo
         initial: Where from, in [rad].
         target: Where to, in [rad].
     """
-    return JointMotion(np.where(time >= begin, target, initial), 0.0 * time, 0.0 * time)
+    return JointMotion(np.where(_reached(time, begin), target, initial), 0.0 * time, 0.0 * time)
 
 
 def ramp(time: Element, begin: Element, initial: Element, target: Element, speed: Element) -> JointMotion:
@@ -59,9 +63,9 @@ def ramp(time: Element, begin: Element, initial: Element, target: Element, speed
     way, direction = np.abs(target - initial), np.sign(target - initial)
     end = begin + way / speed
     gone = np.minimum(np.maximum(time - begin, 0.0), way / speed) * speed
-    moving = np.logical_and(time >= begin, time < end)
-    position = np.where(time >= end, target, initial + direction * gone)
-    return JointMotion(position, np.where(moving, direction * speed, 0.0), 0.0 * time)
+    moving = _since(time, begin) - _since(time, end)
+    position = np.where(_reached(time, end), target, initial + direction * gone)
+    return JointMotion(position, direction * speed * moving, 0.0 * time)
 
 
 def trapezoid(
@@ -95,12 +99,12 @@ def trapezoid(
     down = _within(since - rise - cruise, rise)
     peak = acceleration * rise
     gone = 0.5 * acceleration * up * up + peak * level + (peak - 0.5 * acceleration * down) * down
-    speeding = np.logical_and(since >= 0.0, since < rise)
-    slowing = np.logical_and(since >= rise + cruise, since < total)
+    # 1 while it speeds up, 0 after that, -1 while it slows down, 0 before and after.
+    phase = _since(since, 0.0) - _since(since, rise) - _since(since, rise + cruise) + _since(since, total)
     return JointMotion(
-        np.where(since >= total, target, initial + direction * gone),
+        np.where(_reached(since, total), target, initial + direction * gone),
         direction * acceleration * (up - down),
-        direction * acceleration * (np.where(speeding, 1.0, 0.0) - np.where(slowing, 1.0, 0.0)),
+        direction * acceleration * phase,
     )
 
 
@@ -130,3 +134,13 @@ def set_point(
 def _within(time: Element, duration: Element) -> Element:
     """Return how much of a stretch that starts at 0 is over."""
     return np.minimum(np.maximum(time, 0.0), duration)
+
+
+def _reached(time: Element, corner: Element) -> Element:
+    """Return whether a time is not before a corner."""
+    return time >= corner - CORNER_SLACK
+
+
+def _since(time: Element, corner: Element) -> Element:
+    """Return 1 from a corner on, 0 before it."""
+    return np.where(_reached(time, corner), 1.0, 0.0)

@@ -178,9 +178,10 @@ def euler_zyx(rotation: tuple[Vector, Vector, Vector]) -> tuple[Element, Element
     (a11, a12, _), (a21, a22, _), (a31, a32, a33) = rotation
     cosine = np.hypot(a11, a21)
     singular = cosine < SINGULAR_COSINE
-    rz = np.arctan2(np.where(singular, -a12, a21), np.where(singular, a22, a11))
+    # + 0.0: of a signed zero atan2 would make -pi here and +pi in C, where a choice of two loses the sign
+    rz = np.arctan2(np.where(singular, -a12, a21) + 0.0, np.where(singular, a22, a11))
     ry = np.arctan2(-a31, cosine)
-    rx = np.arctan2(np.where(singular, 0.0, a32), np.where(singular, 1.0, a33))
+    rx = np.arctan2(np.where(singular, 0.0, a32) + 0.0, np.where(singular, 1.0, a33))
     return rz, ry, rx, singular
 
 

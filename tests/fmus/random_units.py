@@ -22,7 +22,10 @@ from urmpipe_fmus.variable import Variable
 
 FILE = "random_unit.py"
 
-PATIENT = {"deadline": None, "suppress_health_check": [HealthCheck.too_slow, HealthCheck.data_too_large]}
+PATIENT: dict[str, Any] = {
+    "deadline": None,
+    "suppress_health_check": [HealthCheck.too_slow, HealthCheck.data_too_large],
+}
 """Settings of tests on random units: on a busy machine a large one takes some tenths of a second to draw."""
 
 numbers = st.integers(-2000, 2000).map(lambda k: k / 1000)

@@ -184,6 +184,22 @@ def test_an_fmu_gives_what_a_run_gives(what: str, backend: Backend, tmp_path: Pa
 
 
 @pytest.mark.slow
+@needs_native
+@pytest.mark.parametrize("robot", ["urm4", "urm6", "ur5e"])
+def test_at_the_calibration_pose_angles_of_half_a_turn_are_one_whatever_their_sign(
+    robot: str, tmp_path: Path
+) -> None:
+    unit = make_unit("kinematic_chain", robot=load_robot(robot), rates=True)
+    expected = np.concatenate([np.ravel(one) for one in run(unit, np.zeros(1)).values()])
+    with FmuRun(build_fmu(unit, tmp_path, backend="native").path, unit, {}) as fmu:
+        got = np.array(fmu.get(unit.computed))
+    angle = np.array([name[0] == "r" for one in unit.computed for name in one.names])
+    assert_same(got[~angle], expected[~angle])
+    turned = np.exp(1j * got[angle]) - np.exp(1j * expected[angle])
+    assert (np.abs(turned) <= SAME).all()
+
+
+@pytest.mark.slow
 @pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
 @pytest.mark.parametrize("example", ["backlash.py", "low_pass.py"])
 def test_a_documented_unit_gives_as_an_fmu_what_a_run_gives(

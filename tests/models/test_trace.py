@@ -11,8 +11,11 @@ import pytest
 from numpy.typing import NDArray
 
 from urmpipe_models.catalogue import load_robot
+from urmpipe_models.drive import Drive, current_rate, shaft_acceleration, shaft_torque
+from urmpipe_models.drive_controller import Gains, next_voltage, sample_number
 from urmpipe_models.kinematics import forward, jacobian
 from urmpipe_models.motion import motions
+from urmpipe_models.set_point import JointMotion, set_point
 from urmpipe_models.transform import euler_zyx
 from urmpipe_models.urm import urm_chain
 
@@ -96,3 +99,39 @@ def test_one_trace_serves_a_float_and_a_column() -> None:
     singles = [forward(chain, row)[-1].translation for row in rows.tolist()]
     np.testing.assert_allclose(np.column_stack(columns), singles, rtol=0.0, atol=TRACED)
     np.testing.assert_allclose(np.array(pose_of.map(50)(rows.T)).T, singles, rtol=0.0, atol=TRACED)
+
+
+def drive_values(x: Sequence[Any]) -> list[Any]:
+    """Return what the drive's functions give for 13 elements: seven constants, then states and inputs."""
+    drive, (theta1, omega1, current, theta2, omega2, voltage) = Drive(*x[:7]), x[7:]
+    torque = shaft_torque(drive, theta1, omega1, theta2, omega2)
+    return [
+        torque,
+        shaft_acceleration(drive, current, torque),
+        current_rate(drive, voltage, omega1, current),
+    ]
+
+
+def controller_values(x: Sequence[Any]) -> list[Any]:
+    """Return what the controller's functions give for 13 elements."""
+    gains, wanted, real = Gains(*x[:3]), JointMotion(*x[3:6]), JointMotion(*x[6:9])
+    return [next_voltage(x[9], gains, wanted, real, x[10]), sample_number(x[11], x[12])]
+
+
+@pytest.mark.parametrize("values_of", [drive_values, controller_values])
+def test_drive_and_controller_trace_with_all_their_parameters(values_of: Callable[..., list[Any]]) -> None:
+    casadi.GlobalOptions.setNumpyMode(-1)
+    x = casadi.SX.sym("x", 13)
+    function = traced("values", [x], values_of(x.elements()))
+    for values in np.random.default_rng(14).uniform(0.5, 2.0, (50, 13)).tolist():
+        assert_traced(function(values), values_of(values), size=20.0)  # sums and quotients of up to 20
+
+
+@pytest.mark.parametrize("kind", [0.0, 1.0, 2.0])
+def test_set_points_trace_before_within_and_after_a_move(kind: float) -> None:
+    casadi.GlobalOptions.setNumpyMode(-1)
+    x = casadi.SX.sym("x", 7)
+    function = traced("set_point", [x], [*set_point(*x.elements())])
+    for time in np.linspace(0.0, 3.0, 31).tolist():
+        values = [kind, time, 0.5, 3.0, 1.5, 1.0, 4.0]
+        assert_traced(function(values), [*set_point(*values)], size=4.0)

@@ -97,24 +97,36 @@ _OPERATORS = {
     **{"SQ": "{0} * {0}", "TWICE": "2.0 * {}", "INV": "1.0 / {}", "IF_ELSE_ZERO": _IF},
     **{"LT": "{} < {}", "LE": "{} <= {}", "EQ": "{} == {}", "NE": "{} != {}"},
     **{"AND": "{} && {}", "OR": "{} || {}", "NOT": _NOT},
-    **{"CONSTPOW": "pow({}, {})", "SIGN": "sign_of({})", "FMIN": "lesser({}, {})", "FMAX": "greater({}, {})"},
+    **{
+        "CONSTPOW": "pow_of({}, {})",
+        "SIGN": "sign_of({})",
+        "FMIN": "lesser({}, {})",
+        "FMAX": "greater({}, {})",
+    },
 }
 """C of CasADi's operations, where it is not a function of the same name."""
 
-_OF_ONE = (
+_OUR_OWN = (
     *("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "asinh", "acosh", "atanh"),
-    *("exp", "expm1", "log", "log1p", "sqrt", "floor", "ceil", "fabs"),
+    *("exp", "expm1", "log", "log1p", "atan2", "hypot", "pow"),
 )
-_OF_TWO = ("atan2", "pow", "hypot", "fmod", "copysign")
+"""Functions of elementary.h, named as the C library's with _of: the same to the last bit everywhere."""
+
+_OF_THE_LIBRARY = ("sqrt", "floor", "ceil", "fabs", "fmod", "copysign")
+"""The C library's, which are exact."""
+
+_OF_TWO = ("atan2", "hypot", "fmod", "copysign", "pow")
 
 
 def _forms() -> dict[int, str]:
     """Return the C of CasADi's operations."""
     import casadi
 
-    forms = {**_OPERATORS}
-    forms |= {name.upper(): f"{name}({{}})" for name in _OF_ONE}
-    forms |= {name.upper(): f"{name}({{}}, {{}})" for name in _OF_TWO}
+    called = {name: f"{name}_of" for name in _OUR_OWN} | {name: name for name in _OF_THE_LIBRARY}
+    forms = {
+        name.upper(): c_name + ("({}, {})" if name in _OF_TWO else "({})") for name, c_name in called.items()
+    }
+    forms |= _OPERATORS
     return {getattr(casadi, f"OP_{name}"): form for name, form in forms.items()}
 
 

@@ -39,12 +39,21 @@ def native_missing(platforms: Sequence[str] = ()) -> str | None:
     """Return why no native FMU can be built here for some platforms (default: this one), None if it can."""
     if find_spec("casadi") is None:
         return "casadi is not installed (pip install 'urmpipe[native]')"
-    unknown = [one for one in platforms if one not in TARGETS and one != this_platform()]
+    wanted = list(platforms) or [this_platform()]
+    local = wanted == [this_platform()]
+    if local and _system_compiler():
+        return None
+    reasons = ["no C compiler is found (cc, or what the variable CC names)"] if local else []
+    unknown = [one for one in wanted if one not in TARGETS]
     if unknown:
-        return f"platform {', '.join(unknown)}: allowed: {', '.join(sorted({*TARGETS, this_platform()}))}"
-    if _is_local(platforms or (this_platform(),)):
-        return None if _system_compiler() else "no C compiler is found (cc, or what the variable CC names)"
-    return None if find_spec("ziglang") else "ziglang is not installed (pip install 'urmpipe[cross]')"
+        reasons.append(
+            f"platform {', '.join(unknown)}: zig is asked for {' and '.join(sorted(TARGETS))} only"
+        )
+    elif find_spec("ziglang") is None:
+        reasons.append("ziglang is not installed (pip install 'urmpipe[cross]')")
+    else:
+        return None
+    return ", and ".join(reasons)
 
 
 def native_binaries(
@@ -78,10 +87,6 @@ def native_binaries(
     }
 
 
-def _is_local(platforms: Sequence[str]) -> bool:
-    return list(platforms) == [this_platform()]
-
-
 def _system_compiler() -> list[str] | None:
     """Return the command of the system's compiler: what CC names, else cc."""
     command = shlex.split(os.environ.get("CC") or "cc", posix=os.name == "posix")
@@ -91,8 +96,8 @@ def _system_compiler() -> list[str] | None:
 def _command(platforms: Sequence[str], one: str) -> list[str]:
     """Return the compiler and flags for one of some platforms."""
     position = [] if one.startswith("win") else ["-fPIC"]
-    local = _system_compiler() if _is_local(platforms) else None
-    if local:
+    local = _system_compiler()
+    if local and list(platforms) == [this_platform()]:
         linked = ["-Wl,--build-id=none"] if one.startswith("linux") else []
         return [*local, *FLAGS, *position, *linked]
     return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[one], *FLAGS, *position]

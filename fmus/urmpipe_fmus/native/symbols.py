@@ -16,6 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.lib.mixins import NDArrayOperatorsMixin
 
+from urmpipe_fmus.dependencies import LOGICAL
 from urmpipe_models.errors import UnitError
 
 Formula = Callable[..., Any]
@@ -117,7 +118,7 @@ def _built(
     made = (
         formulas[name](*inputs, **options) if name in _OPTIONS else formulas[name](*map(expression, inputs))
     )
-    return Symbol(made, logical=name in _LOGICAL)
+    return Symbol(made, logical=name in LOGICAL)
 
 
 def _is_logical(value: Any) -> bool:
@@ -129,13 +130,6 @@ _OPTIONS = {"round": ("decimals",), "around": ("decimals",), "clip": ("a_min", "
 
 _NOT_OF_TRUTH = ("add", "subtract", "negative", "positive")
 """What adds truth values in one form of NumPy, and joins or refuses them in another."""
-
-_LOGICAL = (
-    *("less", "less_equal", "greater", "greater_equal", "equal", "not_equal"),
-    *("logical_and", "logical_or", "logical_not", "logical_xor"),
-    *("bitwise_and", "bitwise_or", "invert", "bitwise_xor"),
-    *("isnan", "isfinite", "isinf", "signbit"),
-)
 
 
 def _ufuncs() -> dict[str, Formula]:

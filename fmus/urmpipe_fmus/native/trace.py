@@ -1,4 +1,4 @@
-"""A unit's functions run on symbols, and what they gave written as C."""
+"""A unit's functions run on symbols: what they compute, as expressions of the scalars."""
 
 from __future__ import annotations
 
@@ -52,13 +52,13 @@ def _function(unit: Unit, name: str) -> Any:
     index = {scalar: k for k, (scalar, _) in enumerate(unit.scalars)}
     given = _symbols([values[index[scalar]] for one in unit.given for scalar in one.names])
     method: Callable[..., list[Any]] = getattr(Equations(unit), name)
+    found = method(Symbol(time), given, rows)
     try:
-        found = [expression(one) for one in method(Symbol(time), given, rows)]
+        result = casadi.densify(casadi.vertcat(*map(expression, found)))
     except UnitError as error:
-        place = f"unit {unit.name}: {name}: "
-        raise UnitError(*(place + str(one).removeprefix(place) for one in error.findings)) from error
+        raise UnitError(*(f"unit {unit.name}: {name}: {one}" for one in error.findings)) from error
     arguments = [time, *(casadi.vertcat(*group) for group in (values, before, after)), fraction]
-    return casadi.Function(name, arguments, [casadi.vertcat(*found)], {"cse": True})
+    return casadi.Function(name, arguments, [result], {"cse": True})
 
 
 def _symbols(symbols: Sequence[Any]) -> tuple[Symbol, ...]:

@@ -15,14 +15,6 @@ OPTIONS: Mapping[str, str] = {}
 SMALLEST = 1e-9
 """Stands for above 0: FMI's min is a value that is allowed."""
 
-STIFFNESS = Parameter(
-    name="k",
-    description="Torsional rigidity of the shaft (2500: the paper's wrist drive)",
-    unit="N.m/rad",
-    start=2500.0,
-    minimum=SMALLEST,
-)
-
 
 def dc_drive() -> Unit:
     """Return the unit: voltage, driven angle and its rate in; shaft torque, angle, rate and current out.
@@ -40,7 +32,7 @@ def dc_drive() -> Unit:
         internal_step=5e-4,
         equations=(
             "Mk = k (theta1 - theta2) + l (omega1 - omega2)    (eq. 14)",
-            "I1 alpha1 + Mk = Mn, alpha1 = omega1'    (eq. 15)",
+            "I1 alpha1 + Mk = Mn, alpha1 = omega1'    (eq. 15, missing in print)",
             "Mn = i_p Ms    (eq. 16)",
             "Ms = C i_a    (eq. 17)",
             "u = C i_p omega1 + R i_a + L i_a', omega1 = theta1'    (eq. 18)",
@@ -52,7 +44,7 @@ def dc_drive() -> Unit:
     )
 
 
-def drive_of(v: Values) -> Drive:
+def _drive(v: Values) -> Drive:
     """Return the constants of a drive from the unit's values."""
     return Drive(v.k, v.l, v.i_p, v.C, v.R, v.L, v.I1)
 
@@ -65,7 +57,13 @@ def _parameters() -> tuple[Parameter, ...]:
         )
 
     return (
-        STIFFNESS,
+        Parameter(
+            name="k",
+            description="Torsional rigidity of the shaft (2500: the paper's wrist drive)",
+            unit="N.m/rad",
+            start=2500.0,
+            minimum=SMALLEST,
+        ),
         assumed("l", "Damping of the shaft's torsion", "N.m.s/rad", 5.0),
         assumed("i_p", "Gear ratio: turns of the motor for one of the output shaft", "", 100.0),
         assumed("C", "Motor constant: torque for a current, voltage for a speed", "N.m/A", 0.05),
@@ -103,17 +101,17 @@ def _states() -> tuple[State, ...]:
 
 def _torque(v: Values) -> Element:
     """Return Mk."""
-    return shaft_torque(drive_of(v), v.theta1, v.omega1, v.theta2, v.omega2)
+    return shaft_torque(_drive(v), v.theta1, v.omega1, v.theta2, v.omega2)
 
 
 def _computed(v: Values) -> Mapping[str, Element]:
     torque = _torque(v)
-    return {"Mk": torque, "alpha1": shaft_acceleration(drive_of(v), v.i_a, torque)}
+    return {"Mk": torque, "alpha1": shaft_acceleration(_drive(v), v.i_a, torque)}
 
 
 def _derivatives(v: Values) -> Mapping[str, Element]:
     return {
         "theta1": v.omega1,
-        "omega1": shaft_acceleration(drive_of(v), v.i_a, _torque(v)),
-        "i_a": current_rate(drive_of(v), v.u, v.omega1, v.i_a),
+        "omega1": shaft_acceleration(_drive(v), v.i_a, _torque(v)),
+        "i_a": current_rate(_drive(v), v.u, v.omega1, v.i_a),
     }

@@ -1,4 +1,11 @@
-/* The functions of FMI 2.0 for co-simulation: the life cycle of an instance, and who does the work. */
+/* SPDX-License-Identifier: MIT */
+/* The functions of FMI 2.0 for co-simulation: the life cycle of an instance, and who does the work.
+
+   All sources of the FMU are compiled by
+
+       cc -shared -fPIC -O2 -ffp-contract=off -fvisibility=hidden -o NAME.so *.c -lm
+
+   What is the model's own is in model.c; what is generated is model.c, model_sizes.h and guid.h. */
 #include <math.h>
 #include <string.h>
 
@@ -21,7 +28,7 @@ static const char *phase_name(int phase) {
     switch (phase) {
     case INSTANTIATED: return "before fmi2EnterInitializationMode";
     case INITIALIZING: return "in initialization mode";
-    case STEPPING: return "after fmi2ExitInitializationMode";
+    case STEPPING: return "after fmi2ExitInitializationMode and before fmi2Terminate";
     default: return "after fmi2Terminate";
     }
 }
@@ -30,12 +37,8 @@ static const char *phase_name(int phase) {
 static int may(const Instance *me, const char *function, int phases) {
     if (!me) return 0;
     if (me->state.phase & phases) return 1;
-    error(me, "%s: found a call %s, allowed: %s", function, phase_name(me->state.phase),
-          phases == INSTANTIATED     ? "before fmi2EnterInitializationMode"
-          : phases == INITIALIZING   ? "in initialization mode"
-          : phases == STEPPING       ? "after fmi2ExitInitializationMode, before fmi2Terminate"
-          : phases == NOT_TERMINATED ? "before fmi2Terminate"
-                                     : "at any time");
+    report(me, "%s: found a call %s, allowed: %s", function, phase_name(me->state.phase),
+           phases == NOT_TERMINATED ? "before fmi2Terminate" : phase_name(phases));
     return 0;
 }
 
@@ -64,9 +67,9 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
     Instance *me = c;
     (void)toleranceDefined, (void)tolerance; /* the steps are fixed */
     if (!may(me, "fmi2SetupExperiment", INSTANTIATED)) return fmi2Error;
-    if (!isfinite(startTime)) return error(me, "startTime: found %g, allowed: a finite number", startTime);
+    if (!isfinite(startTime)) return report(me, "startTime: found %g, allowed: a finite number", startTime);
     if (stopTimeDefined && !(stopTime >= startTime))
-        return error(me, "stopTime: found %g, allowed: from the start time %g on", stopTime, startTime);
+        return report(me, "stopTime: found %g, allowed: from the start time %g on", stopTime, startTime);
     me->state.time = startTime;
     me->stale = 1;
     return fmi2OK;
@@ -108,7 +111,7 @@ fmi2Status fmi2GetInteger(fmi2Component c, const fmi2ValueReference vr[], size_t
         double found;
         if (get_values(c, INTEGER, vr + k, 1, &found) != fmi2OK) return fmi2Error;
         if (!(fabs(found) < 2147483647.5))
-            return error(c, "%s: found %.17g, allowed: an integer of 32 bits", model_variables[vr[k]].name, found);
+            return report(c, "%s: found %.17g, allowed: an integer of 32 bits", model_variables[vr[k]].name, found);
         value[k] = (fmi2Integer)nearbyint(found);
     }
     return fmi2OK;
@@ -157,7 +160,7 @@ fmi2Status fmi2SetBoolean(fmi2Component c, const fmi2ValueReference vr[], size_t
 /* No model has a String. */
 static fmi2Status no_strings(const Instance *me, size_t nvr) {
     if (me && nvr == 0) return fmi2OK;
-    return me ? error(me, "found a String, allowed: Real, Integer and Boolean variables") : fmi2Error;
+    return me ? report(me, "found a String, allowed: Real, Integer and Boolean variables") : fmi2Error;
 }
 
 fmi2Status fmi2GetString(fmi2Component c, const fmi2ValueReference vr[], size_t nvr, fmi2String value[]) {
@@ -177,7 +180,7 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *FMUstate) {
     if (!me || !FMUstate) return fmi2Error;
     if (!*FMUstate) *FMUstate = me->allocate(1, sizeof(SavedState)); /* else the one that is given is used again */
     SavedState *saved = *FMUstate;
-    if (!saved) return error(me, "found no memory for a state");
+    if (!saved) return report(me, "found no memory for a state");
     memset(saved, 0, sizeof *saved);
     memcpy(saved->guid, MODEL_GUID, sizeof saved->guid);
     memcpy(&saved->state, &me->state, sizeof saved->state);
@@ -188,7 +191,9 @@ fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate FMUstate) {
     Instance *me = c;
     const SavedState *saved = FMUstate;
     if (!me) return fmi2Error;
-    if (!saved) return error(me, "FMUstate: found none, allowed: one of fmi2GetFMUstate");
+    if (!saved) return report(me, "FMUstate: found none, allowed: one of fmi2GetFMUstate");
+    if (memcmp(saved->guid, MODEL_GUID, sizeof saved->guid) != 0)
+        return report(me, "FMUstate: found that of another FMU, allowed: GUID %s", MODEL_GUID);
     memcpy(&me->state, &saved->state, sizeof me->state);
     me->stale = 1;
     return fmi2OK;
@@ -212,7 +217,7 @@ fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate FMUstate, si
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate FMUstate, fmi2Byte serializedState[], size_t size) {
     if (!c || !FMUstate || !serializedState) return fmi2Error;
     if (size < sizeof(SavedState))
-        return error(c, "serializedState: found room for %lu bytes, allowed: %lu", (unsigned long)size,
+        return report(c, "serializedState: found room for %lu bytes, allowed: %lu", (unsigned long)size,
                      (unsigned long)sizeof(SavedState));
     memcpy(serializedState, FMUstate, sizeof(SavedState));
     return fmi2OK;
@@ -223,12 +228,12 @@ fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte serializedSta
     Instance *me = c;
     if (!me || !serializedState || !FMUstate) return fmi2Error;
     if (size != sizeof(SavedState))
-        return error(me, "serializedState: found %lu bytes, allowed: %lu", (unsigned long)size,
+        return report(me, "serializedState: found %lu bytes, allowed: %lu", (unsigned long)size,
                      (unsigned long)sizeof(SavedState));
     if (memcmp(serializedState, MODEL_GUID, sizeof MODEL_GUID) != 0)
-        return error(me, "serializedState: found that of another FMU, allowed: GUID %s", MODEL_GUID);
+        return report(me, "serializedState: found that of another FMU, allowed: GUID %s", MODEL_GUID);
     if (!*FMUstate) *FMUstate = me->allocate(1, sizeof(SavedState));
-    if (!*FMUstate) return error(me, "found no memory for a state");
+    if (!*FMUstate) return report(me, "found no memory for a state");
     memcpy(*FMUstate, serializedState, sizeof(SavedState));
     return fmi2OK;
 }
@@ -244,13 +249,13 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real currentCommunicationPoint, fmi2R
 
 /* A step is done when fmi2DoStep returns: there is never one to cancel. */
 fmi2Status fmi2CancelStep(fmi2Component c) {
-    return c ? error(c, "fmi2CancelStep: found no step that runs, allowed: while fmi2DoStep is pending") : fmi2Error;
+    return c ? report(c, "fmi2CancelStep: found no step that runs, allowed: while fmi2DoStep is pending") : fmi2Error;
 }
 
 /* ---- what the model description says this FMU does not do ---- */
 
 static fmi2Status cannot(const Instance *me, const char *function) {
-    return me ? error(me, "%s: found a call, allowed: what the model description says the FMU can do", function)
+    return me ? report(me, "%s: found a call, allowed: what the model description says the FMU can do", function)
               : fmi2Error;
 }
 

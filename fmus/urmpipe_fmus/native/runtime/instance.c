@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Making and freeing an instance, and what it says to the tool that runs it. */
 #include "instance.h"
 
@@ -34,7 +35,7 @@ static void log_error(const Instance *me, const char *format, va_list arguments)
     me->logger(me->environment, me->name ? me->name : "", fmi2Error, "logStatusError", escaped);
 }
 
-fmi2Status error(const Instance *me, const char *format, ...) {
+fmi2Status report(const Instance *me, const char *format, ...) {
     va_list arguments;
     va_start(arguments, format);
     log_error(me, format, arguments);
@@ -45,11 +46,11 @@ fmi2Status error(const Instance *me, const char *format, ...) {
 /* Whether it is this model, in the form that this FMU has, that is asked for. */
 static int is_ours(const Instance *me, const char *guid, fmi2Type type) {
     if (type != fmi2CoSimulation) {
-        error(me, "fmuType: found model exchange, allowed: co-simulation");
+        report(me, "fmuType: found model exchange, allowed: co-simulation");
         return 0;
     }
     if (!guid || strcmp(guid, MODEL_GUID) != 0) {
-        error(me, "GUID: found %s, allowed: %s", guid ? guid : "none", MODEL_GUID);
+        report(me, "GUID: found %s, allowed: %s", guid ? guid : "none", MODEL_GUID);
         return 0;
     }
     return 1;
@@ -65,15 +66,16 @@ static int fetch_table(Instance *me, const char *resources) {
     const char *fault = "found no fmuResourceLocation, allowed: the URI of the FMU's resources";
     if (MODEL_TABLE_COLUMNS == 0) return 1;
     if (resources) fault = read_table(&me->table, resources, MODEL_TABLE_COLUMNS, me->allocate);
-    if (fault) error(me, "table.bin in %s: %s", resources ? resources : "the resources", fault);
+    if (fault) report(me, "table.bin in %s: %s", resources ? resources : "the resources", fault);
     return !fault;
 }
 
 Instance *make_instance(const char *name, const char *guid, const char *resources, fmi2Type type,
                         const fmi2CallbackFunctions *callbacks) {
     Instance blank = {0}; /* what reports an error before there is an instance */
-    blank.allocate = callbacks && callbacks->allocateMemory ? callbacks->allocateMemory : calloc;
-    blank.release = callbacks && callbacks->freeMemory ? callbacks->freeMemory : free;
+    int has_memory = callbacks && callbacks->allocateMemory && callbacks->freeMemory;
+    blank.allocate = has_memory ? callbacks->allocateMemory : calloc;
+    blank.release = has_memory ? callbacks->freeMemory : free;
     if (callbacks) {
         blank.logger = callbacks->logger;
         blank.environment = callbacks->componentEnvironment;
@@ -81,7 +83,7 @@ Instance *make_instance(const char *name, const char *guid, const char *resource
     if (!is_ours(&blank, guid, type)) return NULL;
     Instance *me = blank.allocate(1, sizeof *me);
     if (!me) {
-        error(&blank, "found no memory for an instance, allowed: %lu bytes", (unsigned long)sizeof *me);
+        report(&blank, "found no memory for an instance, allowed: %lu bytes", (unsigned long)sizeof *me);
         return NULL;
     }
     *me = blank;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* An instance of the model: what it remembers, and what it is given by the tool that runs it. */
 #ifndef INSTANCE_H
 #define INSTANCE_H
@@ -38,8 +39,8 @@ void free_instance(Instance *me);
 void set_start_values(Instance *me);
 
 /* Report an error to the tool's logger: "unit NAME: " and the message, which is formatted as by printf.
-   Returns fmi2Error, so that the caller can `return error(...)`. */
-fmi2Status error(const Instance *me, const char *format, ...)
+   Returns fmi2Error, so that the caller can `return report(...)`. */
+fmi2Status report(const Instance *me, const char *format, ...)
 #if defined __GNUC__
     __attribute__((format(printf, 2, 3)))
 #endif

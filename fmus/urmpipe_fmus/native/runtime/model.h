@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* What a model consists of: model.c and model_sizes.h, which urmpipe generates, define it.
 
    All values are doubles, by value reference, in one array; an Integer is a whole number, a Boolean is 0 or 1. */
@@ -37,10 +38,5 @@ extern const int model_memory_references[];
 void model_outputs(double time, const double *v, const Rows *rows, double *outputs);
 void model_derivatives(double time, const double *v, const Rows *rows, double *derivatives);
 void model_update(double time, const double *v, const Rows *rows, double *next);
-
-/* Functions of NumPy that C does not have: sign, minimum and maximum; a NaN goes through. */
-static inline double sign_of(double x) { return x > 0.0 ? 1.0 : x < 0.0 ? -1.0 : x == 0.0 ? 0.0 : x; }
-static inline double lesser(double x, double y) { return x <= y || x != x ? x : y; }
-static inline double greater(double x, double y) { return x >= y || x != x ? x : y; }
 
 #endif

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The files in the FMU's folder of resources: where they are, by a file URI. */
 #include "resources.h"
 

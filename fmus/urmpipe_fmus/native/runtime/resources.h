@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The files in the FMU's folder of resources. */
 #ifndef RESOURCES_H
 #define RESOURCES_H

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A step through time: the rules are those of urmpipe's Instance in Python, and so is the order of operations. */
 #include "stepping.h"
 
@@ -47,10 +48,10 @@ static fmi2Status runge_kutta(Instance *me, double t, double h) {
 static fmi2Status integrate(Instance *me, double time, double step) {
     if (MODEL_STATES == 0) return fmi2OK;
     double largest = me->state.value[MODEL_INTERNAL_STEP];
-    double count = fmax(1.0, ceil(step / largest - STEP_SLACK));
-    if (!(count <= MOST_STEPS))
-        return error(me, "found a step of %g s in internal steps of %g s, allowed: %.0f internal steps", step, largest,
+    if (step / largest > MOST_STEPS)
+        return report(me, "found a step of %g s in internal steps of %g s, allowed: %.0f internal steps", step, largest,
                      MOST_STEPS);
+    double count = fmax(1.0, ceil(step / largest - STEP_SLACK));
     double h = step / count;
     for (double k = 0.0; k < count; k++)
         if (runge_kutta(me, time + k * h, h) != fmi2OK) return fmi2Error;
@@ -59,7 +60,7 @@ static fmi2Status integrate(Instance *me, double time, double step) {
 
 fmi2Status take_step(Instance *me, double time, double step) {
     if (!isfinite(time) || !isfinite(step) || step <= 0.0)
-        return error(me, "found a step of %g s at %g s, allowed: finite, above 0", step, time);
+        return report(me, "found a step of %g s at %g s, allowed: finite, above 0", step, time);
     me->state.running = 1;
     State before = me->state;
     if (sample(me, time) != fmi2OK || integrate(me, time, step) != fmi2OK) {

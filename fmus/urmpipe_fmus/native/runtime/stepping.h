@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A step through time. */
 #ifndef STEPPING_H
 #define STEPPING_H

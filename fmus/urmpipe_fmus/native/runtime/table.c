@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* The table of a model: what is in its file, and its rows about an instant.
 
    The file, all of it little-endian:
@@ -98,8 +99,7 @@ static size_t row_before(const Table *table, double instant) {
 }
 
 Rows rows_at(const Table *table, double time) {
-    double scaled = time * 1e9;
-    double instant = trunc(scaled + copysign(0.5, scaled));
+    double instant = round(time * 1e9);
     size_t before = row_before(table, instant);
     size_t after = before + 1 < table->rows ? before + 1 : before;
     Rows rows = {table->values + before * table->columns, table->values + after * table->columns, 0.0};

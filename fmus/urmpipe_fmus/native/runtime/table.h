@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* A table over time, read from resources/table.bin when an instance is made. */
 #ifndef TABLE_H
 #define TABLE_H

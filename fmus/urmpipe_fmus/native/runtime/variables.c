@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Getting and setting the values of variables: what is refused, and outputs that are always fresh. */
 #include "variables.h"
 
@@ -11,14 +12,14 @@ static const char *const type_names[] = {"Real", "Integer", "Boolean"};
 
 static int is_reference(const Instance *me, fmi2ValueReference reference) {
     if (reference < MODEL_VARIABLES) return 1;
-    error(me, "value reference %u: found, allowed: 0 to %d", reference, MODEL_VARIABLES - 1);
+    report(me, "value reference %u: found, allowed: 0 to %d", reference, MODEL_VARIABLES - 1);
     return 0;
 }
 
 /* Whether the variable has the type that the function `verb` (Get or Set) was called for. */
 static int is_of_type(const Instance *me, const Variable *one, Type type, const char *verb) {
     if (one->type == type) return 1;
-    error(me, "%s: found fmi2%s%s, allowed: fmi2%s%s", one->name, verb, type_names[type], verb, type_names[one->type]);
+    report(me, "%s: found fmi2%s%s, allowed: fmi2%s%s", one->name, verb, type_names[type], verb, type_names[one->type]);
     return 0;
 }
 
@@ -26,27 +27,27 @@ static int is_of_type(const Instance *me, const Variable *one, Type type, const 
 static int is_settable(const Instance *me, const Variable *one) {
     const char *allowed = NULL;
     if (one->kind == OUTPUT) {
-        error(me, "%s: set, allowed: an output is computed, not set", one->name);
+        report(me, "%s: set, allowed: an output is computed, not set", one->name);
         return 0;
     }
     if (me->state.running && (one->kind == STATE || one->kind == MEMORY)) allowed = "a state before the first step";
     if (me->state.running && one->kind == FIXED_PARAMETER) allowed = "a fixed parameter before the first step";
-    if (allowed) error(me, "%s: set while it runs, allowed: %s", one->name, allowed);
+    if (allowed) report(me, "%s: set while it runs, allowed: %s", one->name, allowed);
     return !allowed;
 }
 
 /* Whether the variable can take the value. */
 static int is_allowed(const Instance *me, const Variable *one, double value) {
     if (isnan(value)) /* C may print -nan or worse */
-        error(me, "%s: found nan, allowed: a finite number", one->name);
+        report(me, "%s: found nan, allowed: a finite number", one->name);
     else if (!isfinite(value))
-        error(me, "%s: found %g, allowed: a finite number", one->name, value);
+        report(me, "%s: found %g, allowed: a finite number", one->name, value);
     else if (!(one->min <= value && value <= one->max))
-        error(me, "%s: found %.17g, allowed: %.17g to %.17g", one->name, value, one->min, one->max);
+        report(me, "%s: found %.17g, allowed: %.17g to %.17g", one->name, value, one->min, one->max);
     else if (one->type == INTEGER && fabs(value) > LARGEST_INTEGER)
-        error(me, "%s: found %.17g, allowed: an integer of 32 bits", one->name, value);
+        report(me, "%s: found %.17g, allowed: an integer of 32 bits", one->name, value);
     else if (one->type == BOOLEAN && value != 0.0 && value != 1.0)
-        error(me, "%s: found %.17g, allowed: 0 or 1", one->name, value);
+        report(me, "%s: found %.17g, allowed: 0 or 1", one->name, value);
     else
         return 1;
     return 0;
@@ -74,7 +75,7 @@ fmi2Status put_values(Instance *me, const int references[], int count, const dou
     int refused = 0;
     for (int k = 0; k < count; k++) {
         if (isfinite(found[k])) continue;
-        error(me, "%s %s is not finite at %g s", what, model_variables[references[k]].name, me->state.time);
+        report(me, "%s %s is not finite at %g s", what, model_variables[references[k]].name, me->state.time);
         refused = 1;
     }
     if (refused) return fmi2Error;

@@ -1,3 +1,4 @@
+/* SPDX-License-Identifier: MIT */
 /* Getting and setting the values of variables. */
 #ifndef VARIABLES_H
 #define VARIABLES_H

@@ -1,0 +1,54 @@
+"""Co-simulation: systems of FMUs, described in TOML, checked before the first step, run and drawn.
+
+    system = load_system("log-to-delta", {"log": "run.csv"})
+    plan = prepare(system, make)         # make(block) gives the block's unit or its FMU
+    recorded = simulate(plan)
+
+The names are loaded when they are first used: the process that runs the FMUs needs few of them.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from urmpipe_fmus.cosim.drawing import system_svg as system_svg
+    from urmpipe_fmus.cosim.plan import LogColumn as LogColumn
+    from urmpipe_fmus.cosim.plan import Plan as Plan
+    from urmpipe_fmus.cosim.plan import prepare as prepare
+    from urmpipe_fmus.cosim.simulation import Recorded as Recorded
+    from urmpipe_fmus.cosim.simulation import simulate as simulate
+    from urmpipe_fmus.cosim.system import Block as Block
+    from urmpipe_fmus.cosim.system import Connection as Connection
+    from urmpipe_fmus.cosim.system import LogInput as LogInput
+    from urmpipe_fmus.cosim.system import Port as Port
+    from urmpipe_fmus.cosim.system import System as System
+    from urmpipe_fmus.cosim.system_file import load_system as load_system
+    from urmpipe_fmus.cosim.system_file import system_names as system_names
+
+_HOME = {
+    "Block": "system",
+    "Connection": "system",
+    "LogColumn": "plan",
+    "LogInput": "system",
+    "Plan": "plan",
+    "Port": "system",
+    "Recorded": "simulation",
+    "System": "system",
+    "load_system": "system_file",
+    "prepare": "plan",
+    "simulate": "simulation",
+    "system_names": "system_file",
+    "system_svg": "drawing",
+}
+
+__all__ = sorted(_HOME)  # noqa: PLE0605 - the names are those of _HOME
+
+
+def __getattr__(name: str) -> Any:
+    """Load a public name when it is first asked for."""
+    from importlib import import_module
+
+    if name not in _HOME:
+        raise AttributeError(f"module 'urmpipe_fmus.cosim' has no attribute {name!r}")
+    return getattr(import_module(f"urmpipe_fmus.cosim.{_HOME[name]}"), name)

@@ -1,0 +1,70 @@
+"""The arguments of a system file: `$name` in it, replaced before anything else is read."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from urmpipe_fmus.cosim.names import not_among
+
+
+def beside(folder: Path, value: Any) -> Any:
+    """Return a value in which each text that names a file of a folder is that file's path."""
+    if isinstance(value, str) and value and not value.startswith("$"):
+        path = folder / value
+        return str(path) if "\0" not in value and path.is_file() else value
+    return _mapped(lambda one: beside(folder, one), value)
+
+
+def replaced(value: Any, arguments: Mapping[str, Any]) -> Any:
+    """Return a value in which each text `$name` is the argument of that name."""
+    if isinstance(value, str) and value[:1] == "$" and value[1:] in arguments:
+        return arguments[value[1:]]
+    return _mapped(lambda one: replaced(one, arguments), value)
+
+
+def unknown(value: Any, arguments: Mapping[str, Any], where: str = "") -> Iterator[str]:
+    """Yield what is wrong with the `$name`s of a value: no such argument."""
+    if isinstance(value, str) and value[:1] == "$" and value[1:] not in arguments:
+        yield f"{where}: {not_among(value, (f'${name}' for name in arguments))} ([arguments] names them)"
+    elif isinstance(value, Mapping):
+        for key, one in value.items():
+            yield from unknown(one, arguments, f"{where}.{key}" if where else str(key))
+    elif isinstance(value, list):
+        for one in value:
+            yield from unknown(one, arguments, where)
+
+
+def given(defaults: Mapping[str, Any], arguments: Mapping[str, str], faults: list[str]) -> dict[str, Any]:
+    """Return the arguments of a system: those given, each of its default's type, and the other defaults."""
+    values = dict(defaults)
+    for name, text in arguments.items():
+        if name not in defaults:
+            faults.append(f"argument {name}: {not_among(name, defaults)}")
+            continue
+        try:
+            values[name] = _like(defaults[name], text)
+        except ValueError:
+            allowed = "true, false" if isinstance(defaults[name], bool) else "a number"
+            faults.append(f"argument {name}: found {text!r}, allowed: {allowed}, like {defaults[name]!r}")
+    return values
+
+
+def _like(default: Any, text: str) -> Any:
+    """Return a text as a value of a default's type; ValueError if it is none."""
+    if isinstance(default, bool):
+        if text not in ("true", "false"):
+            raise ValueError(text)
+        return text == "true"
+    if isinstance(default, int):
+        return int(text) if text.lstrip("+-").isdigit() else float(text)
+    return float(text) if isinstance(default, float) else text
+
+
+def _mapped(function: Callable[[Any], Any], value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {key: function(one) for key, one in value.items()}
+    if isinstance(value, list):
+        return [function(one) for one in value]
+    return value

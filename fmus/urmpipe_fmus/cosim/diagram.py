@@ -1,0 +1,162 @@
+"""What a drawing of a system shows: boxes with their ports, and lines between them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+from urmpipe_fmus.cosim.interface import ELEMENT, Interface
+from urmpipe_fmus.cosim.plan import Plan
+
+CHARACTER = 7.3
+"""Width of a character of the drawing's fixed-width letters (12 px, 0.6 em) in [px]."""
+
+ROW, HEAD, PAD = 18.0, 42.0, 10.0
+"""Height of a port, height of a box's head, margin inside a box, in [px]."""
+
+LONGEST = 36
+"""Texts are cut to so many characters."""
+
+IDLE = 10
+"""So many outputs that lead nowhere are shown of a box."""
+
+
+@dataclass(frozen=True, slots=True)
+class Pin:
+    """A port of a box: a scalar, or an array as one.
+
+    Attributes:
+        name: Of the variable.
+        size: Number of elements; 1 for a scalar.
+        unit: Their unit; empty if they have none.
+    """
+
+    name: str
+    size: int = 1
+    unit: str = ""
+
+    @property
+    def label(self) -> str:
+        """Name and size."""
+        return cut(self.name) + (f" ×{self.size}" if self.size > 1 else "")
+
+    @property
+    def length(self) -> int:
+        """Number of characters of label and unit."""
+        return len(self.label) + (len(self.unit) + 1 if self.unit else 0)
+
+
+@dataclass(slots=True, eq=False)
+class Box:
+    """A block as it is drawn.
+
+    Attributes:
+        name: Of the block, or of a log.
+        kind: What it is.
+        left: Its inputs.
+        right: Its outputs.
+        hidden: How many outputs are not shown.
+        layer: Its column, from the left.
+        x: Its left edge in [px].
+        y: Its upper edge in [px].
+    """
+
+    name: str
+    kind: str
+    left: list[Pin] = field(default_factory=list)
+    right: list[Pin] = field(default_factory=list)
+    hidden: int = 0
+    layer: int = 0
+    x: float = 0.0
+    y: float = 0.0
+
+    @property
+    def width(self) -> float:
+        """Its width in [px]: all its texts fit."""
+        rows = (
+            max((one.length for one in self.left), default=0),
+            max((one.length for one in self.right), default=0),
+        )
+        letters = max(sum(rows) + 3, len(cut(self.name)), len(cut(self.kind)), 10)
+        return letters * CHARACTER + 2.0 * PAD
+
+    @property
+    def height(self) -> float:
+        """Its height in [px]."""
+        return HEAD + ROW * max(len(self.left), len(self.right) + bool(self.hidden)) + PAD / 2.0
+
+    def offset(self, pins: Sequence[Pin], name: str) -> float:
+        """Return how far below its upper edge a port is."""
+        return HEAD + ROW * ([one.name for one in pins].index(name) + 0.5)
+
+
+@dataclass(frozen=True, slots=True)
+class Wire:
+    """A line from an output to an input.
+
+    Attributes:
+        source: Box where it starts.
+        output: Port where it starts.
+        target: Box where it ends.
+        input: Port where it ends.
+        size: How many scalars go through.
+    """
+
+    source: str
+    output: str
+    target: str
+    input: str
+    size: int = 1
+
+
+@dataclass(frozen=True, slots=True)
+class Diagram:
+    """Boxes by name, in the order of the system, and wires."""
+
+    boxes: dict[str, Box]
+    wires: tuple[Wire, ...]
+
+
+def diagram(plan: Plan) -> Diagram:
+    """Return what a drawing of a plan shows: its blocks, the logs that inputs follow, its connections."""
+    wires = [
+        Wire(*link.connection.source, *link.connection.destination, len(link.scalars)) for link in plan.links
+    ]
+    logs = {one.log: Box(one.log, "log") for one in plan.system.inputs}
+    for one in plan.system.inputs:
+        pins = logs[one.log].right
+        if one.column not in [pin.name for pin in pins]:
+            pins.append(Pin(one.column))
+        wires.append(Wire(one.log, one.column, *one.destination))
+    ends = {(w.target, w.input) for w in wires} | {(w.source, w.output) for w in wires}
+    boxes = {block.name: Box(block.name, block.kind) for block in plan.system.blocks}
+    for name, box in boxes.items():
+        shown, used = plan.interfaces[name], {port for block, port in ends if block == name}
+        box.left = [pin for pin in _pins(shown, "input", used) if pin.name in used]
+        outputs = list(_pins(shown, "output", used))
+        idle = [pin for pin in outputs if pin.name not in used][IDLE:]
+        box.right, box.hidden = [pin for pin in outputs if pin not in idle], len(idle)
+    renamed = {name: f"{name} (log)" if name in boxes else name for name in logs}
+    sources = {renamed[name]: box for name, box in logs.items()}
+    wires = [_renamed(wire, renamed) if i >= len(plan.links) else wire for i, wire in enumerate(wires)]
+    return Diagram({**sources, **boxes}, tuple(wires))
+
+
+def _renamed(wire: Wire, names: dict[str, str]) -> Wire:
+    return Wire(names[wire.source], wire.output, wire.target, wire.input, wire.size)
+
+
+def _pins(shown: Interface, causality: str, used: Iterable[str]) -> Iterable[Pin]:
+    """Yield the ports of a causality; an array is one, unless its elements are connected one by one."""
+    apart = {match[1] for match in map(ELEMENT.fullmatch, used) if match}
+    for name in shown.names(causality):
+        elements = shown.elements(name)
+        if name in apart and name in shown.arrays:
+            yield from (Pin(one.name, 1, one.unit) for one in elements)
+        else:
+            yield Pin(name, len(elements), elements[0].unit)
+
+
+def cut(text: str) -> str:
+    """Return a text that is not too long to be drawn."""
+    return text if len(text) <= LONGEST else text[: LONGEST - 1] + "…"

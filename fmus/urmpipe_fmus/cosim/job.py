@@ -1,0 +1,182 @@
+"""What the process that runs the FMUs is told: numbers, places and paths, nothing to be looked up.
+
+Values live in one vector a type. Its places are, in this order: inputs from logs, outputs in the order in
+which they are read, and torn inputs of algebraic loops. What is read together stands together.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+TYPES = ("Real", "Integer", "Boolean")
+"""The types of numbers, in the order of the recorded columns."""
+
+JOB, RECORDED, PROGRESS, RESULT, LOG, SAID = (
+    "job.pickle",
+    "recorded.bin",
+    "progress.bin",
+    "result.json",
+    "log.txt",
+    "said.txt",
+)
+"""Files in the folder of a run; LOG holds what the FMUs log, SAID what they print."""
+
+FUNCTIONS = (
+    "loading",
+    "fmi2Instantiate",
+    "fmi2SetupExperiment",
+    "fmi2SetReal",
+    "fmi2SetInteger",
+    "fmi2SetBoolean",
+    "fmi2SetString",
+    "fmi2EnterInitializationMode",
+    "fmi2ExitInitializationMode",
+    "fmi2GetReal",
+    "fmi2GetInteger",
+    "fmi2GetBoolean",
+    "fmi2DoStep",
+    "fmi2GetFMUstate",
+    "fmi2SetFMUstate",
+    "fmi2FreeFMUstate",
+    "fmi2Terminate",
+    "fmi2FreeInstance",
+)
+"""What a block can be doing."""
+
+ELSEWHERE = -1
+"""The call while no block is called."""
+
+
+class Progress(ctypes.Structure):
+    """How far a run is: shared with the parent, and still there when the process is not.
+
+    Attributes:
+        rows: Rows recorded.
+        k: The communication point.
+        call: Block and function being called, see `call_code`.
+    """
+
+    _fields_ = (("rows", ctypes.c_int64), ("k", ctypes.c_int64), ("call", ctypes.c_int64))
+
+
+def call_code(block: int, function: str) -> int:
+    """Return a block and a function as one number."""
+    return block * len(FUNCTIONS) + FUNCTIONS.index(function)
+
+
+def called(code: int) -> tuple[int, str]:
+    """Return the block and the function of a `call_code`."""
+    block, function = divmod(code, len(FUNCTIONS))
+    return block, FUNCTIONS[function]
+
+
+@dataclass(frozen=True, slots=True)
+class Transfer:
+    """Values that go into a block or come out of it in one call.
+
+    Attributes:
+        type: Real, Integer or Boolean.
+        references: Value references.
+        places: Their places in the vector of the type.
+    """
+
+    type: str
+    references: tuple[int, ...]
+    places: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class ExchangeJob:
+    """An exchange: its block by number, what is set, what is read."""
+
+    block: int
+    sets: tuple[Transfer, ...]
+    gets: tuple[Transfer, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class LoopJob:
+    """An algebraic loop.
+
+    Attributes:
+        exchanges: One sweep.
+        torn: Places of the torn inputs.
+        sources: Places of their sources.
+        minimum: The least values of the torn inputs, shape (torn,).
+        maximum: Their largest values.
+        ring: The loop, for people.
+    """
+
+    exchanges: tuple[ExchangeJob, ...]
+    torn: tuple[int, ...]
+    sources: tuple[int, ...]
+    minimum: NDArray[np.float64]
+    maximum: NDArray[np.float64]
+    ring: str
+
+
+@dataclass(frozen=True, slots=True)
+class BlockJob:
+    """A block.
+
+    Attributes:
+        name: Its name.
+        folder: Where its FMU is unpacked.
+        identifier: Name of its binary.
+        guid: Of its FMU.
+        variable_step: Whether its steps may differ in the last bit.
+        can_save: Whether its state can be saved.
+        starts: Type, value reference and value of what is set before the first step.
+    """
+
+    name: str
+    folder: Path
+    identifier: str
+    guid: str
+    variable_step: bool
+    can_save: bool
+    starts: tuple[tuple[str, int, Any], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Job:
+    """A run.
+
+    Attributes:
+        step: Communication step in [s].
+        count: Number of steps.
+        record_every: Every so many points are recorded.
+        tolerance: Of iterated loops.
+        blocks: The blocks.
+        order: The exchanges of a communication point.
+        logged: Values from logs at the points by type, shape (count + 1, inputs of the type).
+        recorded: How many places of each type are recorded, from the first.
+        start: The values at the start by type, shape (places,).
+    """
+
+    step: float
+    count: int
+    record_every: int
+    tolerance: float
+    blocks: tuple[BlockJob, ...]
+    order: tuple[ExchangeJob | LoopJob, ...]
+    logged: Mapping[str, NDArray[Any]]
+    recorded: Mapping[str, int]
+    start: Mapping[str, NDArray[Any]]
+
+    @property
+    def rows(self) -> int:
+        """How many rows a whole run records."""
+        return self.count // self.record_every + 1
+
+    @property
+    def columns(self) -> int:
+        """How many columns are recorded."""
+        return sum(self.recorded.values())

@@ -1,0 +1,244 @@
+"""A system made ready to run: its FMUs read, all of it checked, the order of its exchanges found."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_fmus.cosim.checks import Link, Start, Wiring
+from urmpipe_fmus.cosim.interface import Interface, Variable, read_interface
+from urmpipe_fmus.cosim.order import Exchange, Loop, Order
+from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
+from urmpipe_fmus.table import Table
+from urmpipe_fmus.unit import Unit
+from urmpipe_models.errors import CosimulationError, Finding, UrmpipeError
+
+Make = Callable[[Block], Unit | Path]
+
+STEP_SLACK = 1e-9
+"""Of a step: so little may be missing from the last of a duration."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class LogColumn:
+    """A column of a log that an input follows.
+
+    Attributes:
+        t_ns: Times from the log's start in [ns], strictly rising, shape (n,).
+        values: Finite, shape (n,).
+        unit: Spelled as FMI does; empty if it is not known.
+    """
+
+    t_ns: NDArray[np.int64]
+    values: NDArray[np.float64]
+    unit: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Logged:
+    """An input that follows a log.
+
+    Attributes:
+        destination: The input.
+        values: Its value at every communication point, shape (points,).
+    """
+
+    destination: Port
+    values: NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """A system that is ready to run.
+
+    Attributes:
+        system: The system.
+        interfaces: What the FMU of each block shows, in the order of the blocks.
+        links: What goes where, a line a connection.
+        starts: What is set before the first step, by block.
+        logged: The inputs from logs.
+        order: The exchanges of a communication point.
+        count: Number of communication steps: t_k = k step, k = 0 .. count.
+        notes: What is allowed but should be seen.
+    """
+
+    system: System
+    interfaces: Mapping[str, Interface]
+    links: tuple[Link, ...]
+    starts: Mapping[str, tuple[Start, ...]]
+    logged: tuple[Logged, ...]
+    order: tuple[Exchange | Loop, ...]
+    count: int
+    notes: tuple[str, ...]
+
+    @property
+    def sources(self) -> dict[Port, Port]:
+        """The source of each connected input, by scalars."""
+        return {one: source for link in self.links for one, source in link.scalars}
+
+    @property
+    def loops(self) -> tuple[Loop, ...]:
+        """Its algebraic loops."""
+        return tuple(one for one in self.order if isinstance(one, Loop))
+
+    def variable(self, port: Port) -> Variable:
+        """Return the scalar at a port."""
+        return self.interfaces[port.block].variables[port.variable]
+
+
+def prepare(
+    system: System,
+    make: Make,
+    *,
+    column: Callable[[LogInput], LogColumn] | None = None,
+    duration: float | None = None,
+) -> Plan:
+    """Make a system ready to run: everything that can be wrong with it is found here.
+
+    Args:
+        system: The system.
+        make: Gives a block's unit, whose FMU is taken from the cache or built, or an FMU.
+        column: Gives the column of a log that an input follows.
+        duration: In [s], of a system that names none and reads no log by which to tell.
+
+    Raises:
+        CosimulationError: With all that is wrong: FMUs that cannot be read, unknown variables, a destination
+            that is no input, a source that is no output, sizes, types and units that differ, inputs
+            without a source, start values that are refused, algebraic loops that may not be iterated.
+    """
+    faults: list[Finding | str] = []
+    columns: dict[Port, LogColumn] = {}
+    interfaces, ends = _interfaces(system, make, faults)
+    for one in system.inputs:
+        try:
+            columns[one.destination] = _column(one, column)
+        except UrmpipeError as error:
+            faults += error.findings
+    if faults:
+        raise CosimulationError(*dict.fromkeys(faults))
+    wiring = Wiring(system, interfaces, {port: one.unit for port, one in columns.items()})
+    ends += [float(one.t_ns[-1]) * 1e-9 for one in columns.values() if len(one.t_ns)]
+    faults += wiring.faults
+    count = _count(system, duration, ends, faults)
+    logged = tuple(_logged(system, one, columns, wiring, count, faults) for one in wiring.logged)
+    order = _order(system, interfaces, wiring, faults)
+    if faults:
+        raise CosimulationError(*dict.fromkeys(faults))
+    return Plan(
+        system,
+        interfaces,
+        wiring.links,
+        wiring.starts,
+        logged,
+        order,
+        count,
+        tuple(dict.fromkeys(wiring.notes)),
+    )
+
+
+def _interfaces(
+    system: System, make: Make, faults: list[Finding | str]
+) -> tuple[dict[str, Interface], list[float]]:
+    """Return what each block's FMU shows, and where the tables of units end in [s]."""
+    interfaces: dict[str, Interface] = {}
+    ends: list[float] = []
+    read: dict[Path, Interface] = {}
+    for block in system.blocks:
+        try:
+            made = make(block)
+            if isinstance(made, Unit):
+                ends += [float(made.table.t_ns[-1]) * 1e-9] if made.table is not None else []
+                made = _fmu_of(made)
+            if made not in read:
+                read[made] = read_interface(made)
+            elif read[made].alone:
+                faults.append(f"block {block.name}: {made} can be instantiated only once in a system")
+            interfaces[block.name] = read[made]
+        except UrmpipeError as error:
+            faults += [f"block {block.name}: {finding}" for finding in error.findings]
+    return interfaces, ends
+
+
+def _fmu_of(unit: Unit) -> Path:
+    from urmpipe_fmus.cache import cached_fmu
+
+    return cached_fmu(unit)
+
+
+def _column(one: LogInput, column: Callable[[LogInput], LogColumn] | None) -> LogColumn:
+    if column is None:
+        raise CosimulationError(
+            f"inputs.{one.destination}: found the log {one.log}, but nothing to read it with"
+        )
+    return column(one)
+
+
+def _count(system: System, duration: float | None, ends: Iterable[float], faults: list[Finding | str]) -> int:
+    """Return the number of communication steps."""
+    length = system.duration or duration or max(ends, default=0.0)
+    if not (length > 0.0 and math.isfinite(length)):
+        faults.append("system.duration: not found, and no log tells it; allowed: a number above 0, in s")
+        return 0
+    count = math.floor(length / system.step + STEP_SLACK)
+    if count < 1:
+        faults.append(
+            f"system.step: found {system.step:g} s, allowed: no more than the duration, {length:g} s"
+        )
+    return count
+
+
+def _logged(
+    system: System,
+    port: Port,
+    columns: Mapping[Port, LogColumn],
+    wiring: Wiring,
+    count: int,
+    faults: list[Finding | str],
+) -> Logged:
+    """Return the values of a log at the communication points."""
+    variable = wiring.interfaces[port.block].variables[port.variable]
+    asked = next(one for one in system.inputs if one.destination == port)
+    if asked.interpolate and variable.type != "Real":
+        faults.append(f"inputs.{port}: interpolate: found for an {variable.type}, allowed: for a Real")
+    try:
+        table = Table(columns[port].t_ns, np.asarray(columns[port].values)[:, None])
+    except UrmpipeError as error:
+        faults += [f"inputs.{port}: {finding}" for finding in error.findings]
+        return Logged(port, np.zeros(count + 1))
+    for value in (table.values.min(), table.values.max()):
+        if fault := variable.refusal(float(value)):
+            faults.append(f"inputs.{port}: {asked.log}, column {asked.column}: {fault}")
+    before, after, fraction = table.rows_at(np.arange(count + 1) * system.step)
+    values = before[0] + fraction * (after[0] - before[0]) if asked.interpolate else before[0]
+    return Logged(port, np.ascontiguousarray(values))
+
+
+def _order(
+    system: System, interfaces: Mapping[str, Interface], wiring: Wiring, faults: list[Finding | str]
+) -> tuple[Exchange | Loop, ...]:
+    """Return the order of the exchanges, and tell the loops that may not be."""
+    outputs = [Port(name, one.name) for name, shown in interfaces.items() for one in shown.outputs]
+    depends = {
+        port: [Port(port.block, name) for name in sorted(interfaces[port.block].dependencies[port.variable])]
+        for port in outputs
+    }
+    sources = {one: source for link in wiring.links for one, source in link.scalars}
+    found = Order(outputs, depends, sources, wiring.logged).steps()
+    for loop in found:
+        if not isinstance(loop, Loop):
+            continue
+        if not system.iterate:
+            faults.append(
+                f"algebraic loop: {loop.ring}: each depends on the one before at the same instant; allowed:"
+                " none, or [loops] iterate = true"
+            )
+        for port in loop.torn:
+            kind = interfaces[port.block].variables[port.variable].type
+            if kind != "Real":
+                faults.append(f"algebraic loop: {loop.ring}: found {port}, an {kind}; allowed: Reals alone")
+    return tuple(found)

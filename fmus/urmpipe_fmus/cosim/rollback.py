@@ -1,0 +1,145 @@
+"""Blocks in algebraic loops whose outputs follow their inputs only after a step: they go back and step again.
+
+FMI lets outputs be read right after inputs are set, but many an FMU computes its outputs in fmi2DoStep
+alone. What such an FMU gives at t_k for inputs at t_k is what it gives after the step to t_k with these
+inputs: its state before that step is restored, the inputs are set, and the step is done again.
+"""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_fmus.cosim.slave import Call, Slave
+
+NUDGE = 1e-4
+"""Relative: by how much inputs are moved to see whether outputs follow."""
+
+
+class Member:
+    """A block in a loop that can save its state.
+
+    Args:
+        slave: The block.
+        time: The communication point in [s], as it stands.
+        step: To the next one in [s], as it stands.
+        check: Told block, function and status of a call.
+
+    Attributes:
+        stale: Whether its outputs follow its inputs only after a step; None: not seen yet.
+    """
+
+    def __init__(
+        self,
+        slave: Slave,
+        time: ctypes.c_double,
+        step: ctypes.c_double,
+        check: Callable[[int, int], None],
+    ) -> None:
+        self.stale: bool | None = None
+        self._slave, self._check = slave, check
+        self._now, self._length = time, step
+        self._then, self._back = ctypes.c_double(), ctypes.c_double()
+        self._state, self._aside = ctypes.c_void_p(), ctypes.c_void_p()
+        self._stepped = False
+        self._forward = slave.stepper(self._now, self._length, keep=True)
+        self._again = slave.stepper(self._then, self._back, keep=True)
+        self._save, self._set_aside = slave.saver(self._state), slave.saver(self._aside)
+
+    def step(self) -> None:
+        """Do the step to the next communication point; its start is remembered."""
+        if self.stale is not False:
+            self._call(self._save)
+        self._then.value, self._back.value = self._now.value, self._length.value
+        self._call(self._forward)
+        self._stepped = True
+
+    @property
+    def undecided(self) -> bool:
+        """Whether it is to be seen if its outputs follow its inputs."""
+        return self.stale is None and self._stepped
+
+    def step_again(self, sets: Callable[[], None]) -> None:
+        """Do the last step again with other inputs."""
+        self._call(self._slave.restorer(self._state))
+        sets()
+        self._call(self._again)
+
+    def keep(self) -> None:
+        """Set the state aside as it is."""
+        self._call(self._set_aside)
+
+    def return_to_kept(self) -> None:
+        """Restore the state that was set aside."""
+        self._call(self._slave.restorer(self._aside))
+
+    def _call(self, prepared: tuple[int, Call]) -> None:
+        code, call = prepared
+        self._slave.note(code)
+        status = call()
+        if status:
+            self._check(code, status)
+
+
+class Moved(NamedTuple):
+    """What a loop moves of a block.
+
+    Attributes:
+        values: The vector of the Reals.
+        places: Where the inputs that the loop moves stand in it.
+        read: The outputs that may follow them.
+    """
+
+    values: NDArray[np.float64]
+    places: NDArray[np.intp]
+    read: Sequence[NDArray[Any]]
+
+
+class Exchange:
+    """An exchange of a block that can go back: called, it sets its inputs and reads its outputs."""
+
+    def __init__(
+        self, member: Member, sets: Callable[[], None], gets: Callable[[], None], moved: Moved
+    ) -> None:
+        self._member, self._sets, self._gets, self._moved = member, sets, gets, moved
+
+    def __call__(self) -> None:
+        """Set the inputs and read the outputs that they give."""
+        if self._member.undecided:
+            self._decide()
+        if self._member.stale:
+            self._member.step_again(self._sets)
+        else:
+            self._sets()
+        self._gets()
+
+    def _decide(self) -> None:
+        """See whether the outputs follow the inputs at once, or only after a step.
+
+        If they follow neither way the inputs may not matter at this instant: it is seen again at the next.
+        """
+        if not len(self._moved.places):
+            return
+        if self._follow(self._sets):
+            self._member.stale = False
+            return
+        self._member.keep()
+        if self._follow(lambda: self._member.step_again(self._sets)):
+            self._member.stale = True
+        self._member.return_to_kept()
+
+    def _follow(self, apply: Callable[[], None]) -> bool:
+        """Return whether the outputs change when the inputs are moved a little."""
+        values, places, read = self._moved
+        found = []
+        inputs = values[places].copy()
+        for moved in (inputs + NUDGE * (1.0 + np.abs(inputs)), inputs):
+            values[places] = moved
+            apply()
+            self._gets()
+            found.append([one.copy() for one in read])
+        return any(not np.array_equal(a, b) for a, b in zip(*found, strict=True))

@@ -1,0 +1,268 @@
+"""A plan run in a process of its own, and what it recorded."""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import mmap
+import os
+import pickle
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_fmus.cosim.assembly import Assembly
+from urmpipe_fmus.cosim.job import (
+    ELSEWHERE,
+    JOB,
+    LOG,
+    PROGRESS,
+    RECORDED,
+    RESULT,
+    SAID,
+    Job,
+    Progress,
+    called,
+)
+from urmpipe_fmus.cosim.plan import Plan
+from urmpipe_fmus.cosim.system import Port
+from urmpipe_models.errors import CosimulationError, one_line
+
+POLL = 0.02
+"""How often the progress is looked at, in [s]."""
+
+LAST_LINES = 5
+"""So many of a block's last log lines are told with an error."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Recorded:
+    """What a co-simulation recorded, until its end or until it failed.
+
+    Attributes:
+        t_ns: The recorded communication points in [ns], shape (n,).
+        names: Block and variable of each column: every output, every input from a log.
+        units: Of each column as the FMU spells it; empty if it has none.
+        types: Of each column: Real, Integer or Boolean.
+        values: shape (n, columns); Integers as they are, Booleans 0 or 1.
+        failed: Why it ended before its time, one line; None if it did not fail.
+        notes: What is allowed but should be seen.
+    """
+
+    t_ns: NDArray[np.int64]
+    names: tuple[Port, ...]
+    units: tuple[str, ...]
+    types: tuple[str, ...]
+    values: NDArray[np.float64]
+    failed: str | None
+    notes: tuple[str, ...]
+
+    def column(self, block: str, variable: str) -> NDArray[np.float64]:
+        """Return the values of a scalar, shape (n,).
+
+        Raises:
+            CosimulationError: If it was not recorded.
+        """
+        port = Port(block, variable)
+        if port not in self.names:
+            allowed = ", ".join(str(one) for one in self.names)
+            raise CosimulationError(f"{port}: not recorded; allowed: {allowed}")
+        return self.values[:, self.names.index(port)]
+
+
+def simulate(plan: Plan, *, progress: Callable[[float], None] | None = None) -> Recorded:
+    """Run a system in a process of its own: an FMU that crashes does not take this one with it.
+
+    Args:
+        plan: The system.
+        progress: Called now and then with the share that is done, 0 to 1.
+
+    Returns:
+        What was recorded, and why it failed if it did.
+
+    Raises:
+        CosimulationError: If there is no room to record, or the run could not be started.
+    """
+    with tempfile.TemporaryDirectory(prefix="urmpipe-", ignore_cleanup_errors=True) as name:
+        folder = Path(name)
+        assembly = Assembly(plan)
+        job = assembly.job(_unpacked(plan, folder))
+        _lay_out(job, folder)
+        with (folder / PROGRESS).open("r+b") as file:
+            shared = mmap.mmap(file.fileno(), ctypes.sizeof(Progress))
+        try:
+            code = _work(folder, job, shared, progress)
+            state = Progress.from_buffer_copy(shared)
+        finally:
+            shared.close()
+        return _recorded(plan, assembly, job, folder, state, code)
+
+
+def _unpacked(plan: Plan, folder: Path) -> dict[str, Path]:
+    """Unpack every FMU once; return where that of each block is."""
+    import fmpy
+
+    places: dict[Path, Path] = {}
+    for shown in plan.interfaces.values():
+        if shown.path not in places:
+            places[shown.path] = folder / f"fmu{len(places)}"
+            try:
+                fmpy.extract(
+                    shown.path, places[shown.path], include=lambda one: not one.startswith("sources/")
+                )
+            except Exception as error:  # fmpy raises Exception itself
+                raise CosimulationError(f"{shown.path}: cannot be unpacked: {error}") from error
+            (places[shown.path] / "resources").mkdir(exist_ok=True)
+    return {name: places[shown.path] for name, shown in plan.interfaces.items()}
+
+
+def _lay_out(job: Job, folder: Path) -> None:
+    """Write the job, and make room for what it records.
+
+    Room is taken at once: a disk that runs full under a memory map would end the process.
+    """
+    (folder / JOB).write_bytes(pickle.dumps(job))
+    (folder / PROGRESS).write_bytes(bytes(Progress(rows=0, k=0, call=ELSEWHERE)))
+    size = 8 * job.rows * max(job.columns, 1)
+    try:
+        with (folder / RECORDED).open("wb") as file:
+            if hasattr(os, "posix_fallocate"):
+                os.posix_fallocate(file.fileno(), 0, size)
+            else:
+                file.truncate(size)
+    except OSError as error:
+        raise CosimulationError(
+            f"found no room for {size / 1e6:.0f} MB of {job.rows} samples in {folder.parent}; a larger"
+            " system.record_every records fewer"
+        ) from error
+
+
+def _work(folder: Path, job: Job, shared: mmap.mmap, progress: Callable[[float], None] | None) -> int:
+    """Run the job in a process; return its exit code."""
+    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
+    command = [sys.executable, "-P", "-m", "urmpipe_fmus.cosim.worker", str(folder)]
+    with (
+        (folder / SAID).open("wb") as said,
+        subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT, env=environment
+        ) as process,
+    ):
+        try:
+            while True:
+                try:
+                    return process.wait(POLL)
+                except subprocess.TimeoutExpired:
+                    if progress is not None:
+                        progress(Progress.from_buffer_copy(shared).k / job.count)
+        except BaseException:
+            process.kill()
+            raise
+
+
+def _recorded(
+    plan: Plan, assembly: Assembly, job: Job, folder: Path, state: Progress, exit_code: int
+) -> Recorded:
+    """Return what a run left in its folder."""
+    ports = assembly.ports
+    values = np.fromfile(folder / RECORDED, np.float64, state.rows * job.columns)
+    values = values.reshape(state.rows, job.columns)
+    shown = {port: i for i, port in enumerate(ports)}
+    names = tuple(
+        Port(block, one.name)
+        for block, interface in plan.interfaces.items()
+        for one in interface.variables.values()
+        if Port(block, one.name) in shown
+    )
+    result = _result(folder)
+    failed = _crash(job, folder, state, exit_code) if result is None else _failure(job, folder, state, result)
+    points = np.arange(state.rows) * job.record_every * job.step
+    return Recorded(
+        t_ns=np.round(points * 1e9).astype(np.int64),
+        names=names,
+        units=tuple(plan.variable(port).unit for port in names),
+        types=tuple(plan.variable(port).type for port in names),
+        values=values[:, [shown[port] for port in names]],
+        failed=failed,
+        notes=(*plan.notes, *(_notes(job, folder, result) if result else ())),
+    )
+
+
+def _result(folder: Path) -> dict[str, Any] | None:
+    """Return how a run said it ended; None if it could not say."""
+    path = folder / RESULT
+    return dict(json.loads(path.read_text(encoding="utf-8"))) if path.exists() else None
+
+
+def _failure(job: Job, folder: Path, state: Progress, result: dict[str, Any]) -> str | None:
+    """Return how a run failed by its own words; None if it did not."""
+    if result["failed"] is None:
+        return None
+    if result["code"] == ELSEWHERE:
+        return one_line(f"{result['failed']}, at t = {state.k * job.step:.9g} s")
+    return _told(job, folder, state, result["code"], result["failed"])
+
+
+def _crash(job: Job, folder: Path, state: Progress, exit_code: int) -> str:
+    """Return how a run failed that could not say so itself."""
+    how = _ending(exit_code)
+    if state.call == ELSEWHERE:
+        return one_line(f"the process of the co-simulation {how}" + _quoted(_said(folder)))
+    return _told(job, folder, state, state.call, how)
+
+
+def _told(job: Job, folder: Path, state: Progress, code: int, what: str) -> str:
+    """Return a failure of a block: where, when, what, and its last words."""
+    number, function = called(code)
+    name = job.blocks[number].name
+    lines = [f"{status}: {text}" for block, status, text in _log(folder) if block == name]
+    words = _quoted([*lines[-LAST_LINES:], *_said(folder)[-LAST_LINES:]])
+    return one_line(f"block {name}: {function} at t = {state.k * job.step:.9g} s: {what}{words}")
+
+
+def _ending(exit_code: int) -> str:
+    """Return how a process ended, for people."""
+    if exit_code < 0:
+        try:
+            number = signal.Signals(-exit_code)
+        except ValueError:
+            return f"ended the process by signal {-exit_code}"
+        return f"ended the process: {signal.strsignal(number)} ({number.name})"
+    return f"ended the process with the exit code {exit_code if exit_code < 2**16 else hex(exit_code)}"
+
+
+def _quoted(lines: list[str]) -> str:
+    return f"; its last lines: {' | '.join(lines)}" if lines else "; it logged nothing"
+
+
+def _log(folder: Path) -> list[tuple[str, str, str]]:
+    """Return block, status and text of what the FMUs logged last."""
+    path = folder / LOG
+    texts = [one.read_text(encoding="utf-8") for one in (path.with_suffix(".before"), path) if one.exists()]
+    rows = (line.split("\t", 2) for line in "".join(texts).splitlines())
+    return [(row[0], row[1], row[2]) for row in rows if len(row) == 3]
+
+
+def _said(folder: Path) -> list[str]:
+    """Return what the process printed."""
+    text = (folder / SAID).read_text(encoding="utf-8", errors="replace")
+    return [line.strip() for line in text.splitlines() if line.strip()]
+
+
+def _notes(job: Job, folder: Path, result: dict[str, Any]) -> list[str]:
+    """Return what a run that could say how it ended leaves to be seen."""
+    notes = [result["note"]] if result["note"] else []
+    for code, count in result["warnings"]:
+        number, function = called(code)
+        name = job.blocks[number].name
+        lines = [text for block, status, text in _log(folder) if block == name and status == "fmi2Warning"]
+        last = f", the last: {lines[-1]}" if lines else ""
+        notes.append(one_line(f"block {name}: {function} returned fmi2Warning {count} times{last}"))
+    return notes

@@ -1,0 +1,205 @@
+"""One FMU in its process: FMPy's functions, called with arguments that were prepared once."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from functools import partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from fmpy.fmi1 import FMICallException
+from fmpy.fmi2 import FMU2Slave
+from numpy.typing import NDArray
+
+from urmpipe_fmus.cosim.job import BlockJob, Progress, Transfer, call_code
+
+Call = Callable[[], int]
+"""A prepared call: returns FMI's status."""
+
+OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
+"""fmi2Status (FMI 2.0.4, section 2.1.3)."""
+
+STATUS_NAMES = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
+
+LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3
+"""fmi2StatusKind (FMI 2.0.4, section 4.2.3)."""
+
+EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
+DO_STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
+STATE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p)
+
+ELEMENTS: dict[str, Any] = {"Real": ctypes.c_double, "Integer": ctypes.c_int, "Boolean": ctypes.c_int}
+
+
+class FmuFailed(Exception):  # noqa: N818 - it ends the run, and is told as a result
+    """An FMU did not do what it was asked.
+
+    Attributes:
+        code: Block and function.
+        said: What happened.
+        status: FMI's status; ERROR where the FMU gave none.
+    """
+
+    def __init__(self, code: int, said: str, status: int = ERROR) -> None:
+        super().__init__(said)
+        self.code, self.said, self.status = code, said, status
+
+
+class Slave:
+    """An instance of an FMU.
+
+    Attributes:
+        number: Number of its block.
+        block: Its block.
+        fatal: Whether it said fmi2Fatal: nothing may be called any more.
+        failed: Whether it said fmi2Error: it may only be freed.
+    """
+
+    def __init__(self, number: int, block: BlockJob, progress: Progress) -> None:
+        self.number, self.block, self._progress = number, block, progress
+        self.failed = self.fatal = False
+        self._kept: list[Any] = []
+        self._states: list[ctypes.c_void_p] = []
+        self._code = progress.call = call_code(number, "loading")
+        try:
+            self._fmu = FMU2Slave(
+                guid=block.guid,
+                unzipDirectory=str(block.folder),
+                modelIdentifier=block.identifier,
+                instanceName=block.name,
+            )
+        except Exception as error:  # FMPy raises Exception itself, ctypes OSError and AttributeError
+            raise FmuFailed(self._code, f"cannot be loaded: {error}") from error
+
+    @property
+    def _component(self) -> ctypes.c_void_p:
+        return ctypes.c_void_p(self._fmu.component)
+
+    def instantiate(self, callbacks: Any) -> None:
+        """Make the instance."""
+        code = self._progress.call = call_code(self.number, "fmi2Instantiate")
+        try:
+            self._fmu.instantiate(callbacks=callbacks, loggingOn=True)
+        except Exception as error:  # FMPy raises Exception itself
+            raise FmuFailed(code, "gave no instance") from error
+
+    def note(self, code: int) -> None:
+        """Note what is called next."""
+        self._progress.call = code
+
+    def once(self, function: str, *arguments: Any) -> int:
+        """Call a function that is not worth preparing; return FMI's status."""
+        code = self._progress.call = call_code(self.number, function)
+        try:
+            return int(getattr(self._fmu, function)(self._component, *arguments) or OK)
+        except FMICallException as error:
+            self.blame(error.status)
+            raise FmuFailed(code, f"returned {status_name(error.status)}", error.status) from error
+
+    def blame(self, status: int) -> None:
+        """Remember what may still be called after a status."""
+        self.failed = self.failed or status >= ERROR
+        self.fatal = self.fatal or status == FATAL
+
+    def set_start(self) -> int:
+        """Set the start values; return the worst of FMI's status."""
+        worst = OK
+        for kind, reference, value in self.block.starts:
+            references = (ctypes.c_uint * 1)(reference)
+            held: Any = (ctypes.c_char_p * 1)(str(value).encode()) if kind == "String" else None
+            if held is None:
+                held = (ELEMENTS[kind] * 1)(value if kind == "Real" else int(value))
+            worst = max(worst, self.once(f"fmi2Set{kind}", references, 1, held))
+        return worst
+
+    def getter(self, transfer: Transfer, values: Mapping[str, NDArray[Any]]) -> tuple[int, Call]:
+        """Return the code and the call that reads values into their places, which are neighbours."""
+        vector = values[transfer.type]
+        target = vector.ctypes.data + transfer.places[0] * vector.itemsize
+        return self._exchange(f"fmi2Get{transfer.type}", transfer.references, target)
+
+    def setter(self, transfer: Transfer, values: Mapping[str, NDArray[Any]]) -> tuple[int, Call]:
+        """Return the code and the call that sets values from their places."""
+        vector, places = values[transfer.type], transfer.places
+        function = f"fmi2Set{transfer.type}"
+        if all(b == a + 1 for a, b in pairwise(places)):
+            source = vector.ctypes.data + places[0] * vector.itemsize
+            return self._exchange(function, transfer.references, source)
+        gathered = np.empty(len(places), vector.dtype)
+        self._kept.append(gathered)
+        code, call = self._exchange(function, transfer.references, gathered.ctypes.data)
+        gather = partial(vector.take, np.array(places), None, gathered, "clip")
+
+        def gather_and_call() -> int:
+            gather()
+            return call()
+
+        return code, gather_and_call
+
+    def _exchange(self, function: str, references: Sequence[int], address: int) -> tuple[int, Call]:
+        held = (ctypes.c_uint * len(references))(*references)
+        self._kept.append(held)
+        call = partial(
+            self._function(EXCHANGE, function),
+            self._component,
+            ctypes.c_void_p(ctypes.addressof(held)),
+            ctypes.c_size_t(len(references)),
+            ctypes.c_void_p(address),
+        )
+        return call_code(self.number, function), call
+
+    def stepper(
+        self, time: ctypes.c_double, step: ctypes.c_double, *, keep: bool = False
+    ) -> tuple[int, Call]:
+        """Return the code and the call that does a step; `keep`: the state before it may be restored."""
+        flag = ctypes.c_int(0 if keep else 1)
+        call = partial(self._function(DO_STEP, "fmi2DoStep"), self._component, time, step, flag)
+        return call_code(self.number, "fmi2DoStep"), call
+
+    def saver(self, state: ctypes.c_void_p) -> tuple[int, Call]:
+        """Return the code and the call that saves the state to a place."""
+        self._states.append(state)
+        pointer = ctypes.c_void_p(ctypes.addressof(state))
+        call = partial(self._function(STATE, "fmi2GetFMUstate"), self._component, pointer)
+        return call_code(self.number, "fmi2GetFMUstate"), call
+
+    def restorer(self, state: ctypes.c_void_p) -> tuple[int, Call]:
+        """Return the code and the call that restores the state from a place."""
+        call = partial(self._function(STATE, "fmi2SetFMUstate"), self._component, state)
+        return call_code(self.number, "fmi2SetFMUstate"), call
+
+    def _function(self, kind: Any, name: str) -> Any:
+        """Return a function of the FMU with argument types that ctypes is quick with."""
+        return kind(ctypes.cast(getattr(self._fmu.dll, name), ctypes.c_void_p).value)
+
+    def terminated(self) -> bool:
+        """Return whether a discarded step means that the FMU wants to end the simulation."""
+        ended = ctypes.c_int(0)
+        try:
+            self._fmu.fmi2GetBooleanStatus(self._component, TERMINATED, ctypes.byref(ended))
+        except FMICallException:
+            return False
+        return bool(ended.value)
+
+    def end(self) -> None:
+        """Terminate and free the instance, as far as its status lets it."""
+        if self.fatal or not self._fmu.component:
+            return
+        if not self.failed:
+            try:
+                self.once("fmi2Terminate")
+            except FmuFailed:
+                if self.fatal:
+                    return
+        for state in self._states:
+            if state.value:
+                self.once("fmi2FreeFMUstate", ctypes.byref(state))
+        self._progress.call = call_code(self.number, "fmi2FreeInstance")
+        self._fmu.fmi2FreeInstance(self._component)
+
+
+def status_name(status: int) -> str:
+    """Return FMI's name of a status."""
+    return STATUS_NAMES[status] if 0 <= status < len(STATUS_NAMES) else f"status {status}"

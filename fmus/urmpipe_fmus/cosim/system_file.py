@@ -1,0 +1,254 @@
+"""A system's TOML file: read, its arguments replaced, and all that is wrong with it told at once."""
+
+from __future__ import annotations
+
+import math
+import re
+import tomllib
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+from urmpipe_fmus.cosim.arguments import beside, given, replaced, unknown
+from urmpipe_fmus.cosim.names import not_among
+from urmpipe_fmus.cosim.system import STEP, TOLERANCE, Block, Connection, LogInput, Port, System
+from urmpipe_models.errors import CosimulationError, Finding
+
+SYSTEMS = Path(__file__).parents[1] / "systems"
+"""Where the shipped systems are."""
+
+BLOCK_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+
+TABLES: dict[str, tuple[str, ...] | None] = {
+    "system": ("name", "description", "step", "duration", "record_every"),
+    "arguments": None,
+    "blocks": None,
+    "connections": None,
+    "inputs": None,
+    "loops": ("iterate", "tolerance"),
+}
+"""The tables of a file and their keys; None where the user names the keys."""
+
+
+def system_names() -> tuple[str, ...]:
+    """Return the names of the shipped systems."""
+    return tuple(sorted(path.stem for path in SYSTEMS.glob("*.toml")))
+
+
+def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = None) -> System:
+    """Read a system file.
+
+    Paths in the file are relative to its folder; those in `arguments` to the working folder.
+
+    Args:
+        name_or_path: Name of a shipped system, or a TOML file.
+        arguments: Values for the file's `$name`s instead of its defaults.
+
+    Raises:
+        CosimulationError: With all that is wrong: no such file, no TOML, unknown keys, values of another
+            type or out of range, names of no block, arguments that the file does not have.
+    """
+    path = _path_of(name_or_path)
+    table = _parsed(path)
+    faults: list[str] = []
+    defaults = _table(table, "arguments", faults)
+    here = {key: beside(path.parent, table.get(key, {})) for key in ("arguments", "blocks", "inputs")}
+    values = given(here["arguments"] if defaults else {}, arguments or {}, faults)
+    rest = {key: value for key, value in {**table, **here}.items() if key != "arguments"}
+    faults += unknown(rest, values)
+    system = _System(path, replaced(rest, values), values, faults).read()
+    if faults:
+        raise CosimulationError(*(Finding(fault, file=str(name_or_path)) for fault in faults))
+    return system
+
+
+def _path_of(name_or_path: str | Path) -> Path:
+    """Return the path of a system file."""
+    shipped = SYSTEMS / f"{name_or_path}.toml"
+    if isinstance(name_or_path, str) and name_or_path in system_names():
+        return shipped
+    path = Path(name_or_path)
+    if path.is_file():
+        return path
+    allowed = ", ".join(system_names())
+    raise CosimulationError(f"system: found {str(name_or_path)!r}, allowed: a TOML file, or one of {allowed}")
+
+
+def _parsed(path: Path) -> dict[str, Any]:
+    """Return the tables of a TOML file."""
+    try:
+        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
+        raise CosimulationError(Finding(f"cannot be read as TOML: {error}", file=str(path))) from error
+
+
+def _table(table: Mapping[str, Any], key: str, faults: list[str]) -> dict[str, Any]:
+    """Return a table of a table; an empty one where it is none."""
+    value = table.get(key, {})
+    if isinstance(value, dict):
+        return value
+    faults.append(f"{key}: found {value!r}, allowed: a table")
+    return {}
+
+
+class _System:
+    """A system file whose arguments are replaced, on its way to a System."""
+
+    def __init__(
+        self, path: Path, table: Mapping[str, Any], arguments: Mapping[str, Any], faults: list[str]
+    ) -> None:
+        self.path, self.table, self.arguments, self.faults = path, table, arguments, faults
+
+    def read(self) -> System:
+        """Return the system; what is wrong is in `faults`."""
+        self.faults += [f"{key}: {not_among(key, TABLES)}" for key in self.table if key not in TABLES]
+        head, loops = self._keys("system"), self._keys("loops")
+        blocks = tuple(self._block(name, value) for name, value in self._rows("blocks"))
+        if not blocks:
+            self.faults.append("blocks: found none, allowed: at least one [blocks.NAME]")
+        self.names = [block.name for block in blocks]
+        connections = (self._connection(*row) for row in _leaves(self._dict("connections"), str))
+        inputs = (self._input(*row) for row in _leaves(self._dict("inputs"), dict))
+        return System(
+            path=self.path,
+            name=self._text(head, "system", "name", self.path.stem),
+            description=self._text(head, "system", "description", ""),
+            step=self._positive(head, "system", "step", STEP),
+            duration=self._positive(head, "system", "duration", 0.0) if "duration" in head else None,
+            record_every=self._count(head, "record_every"),
+            arguments=self.arguments,
+            blocks=blocks,
+            connections=tuple(one for one in connections if one),
+            inputs=tuple(one for one in inputs if one),
+            iterate=self._flag(loops, "loops", "iterate"),
+            tolerance=self._positive(loops, "loops", "tolerance", TOLERANCE),
+        )
+
+    def _dict(self, key: str) -> dict[str, Any]:
+        return _table(self.table, key, self.faults)
+
+    def _keys(self, name: str) -> dict[str, Any]:
+        """Return a table whose keys are known."""
+        table, allowed = self._dict(name), TABLES[name] or ()
+        self.faults += [f"{name}.{key}: {not_among(key, allowed)}" for key in table if key not in allowed]
+        return table
+
+    def _rows(self, name: str) -> Iterator[tuple[str, dict[str, Any]]]:
+        table = self._dict(name)
+        for key, value in table.items():
+            if isinstance(value, dict):
+                yield key, value
+            else:
+                self.faults.append(f"{name}.{key}: found {value!r}, allowed: a table [{name}.{key}]")
+
+    def _block(self, name: str, table: dict[str, Any]) -> Block:
+        """Return a block."""
+        where = f"blocks.{name}"
+        if not BLOCK_NAME.fullmatch(name):
+            self.faults.append(
+                f"{where}: found {name!r} as a name, allowed: a letter, then letters, digits, _, -"
+            )
+        kinds = [key for key in ("unit", "file", "fmu") if key in table]
+        if len(kinds) != 1:
+            found = " and ".join(kinds) or "none of them"
+            self.faults.append(f"{where}: found {found}, allowed: one of unit, file, fmu")
+        options = {k: v for k, v in table.items() if k not in ("unit", "file", "fmu", "start")}
+        if "fmu" in kinds:
+            self.faults += [f"{where}.{key}: {not_among(key, ('fmu', 'start'))}" for key in options]
+        start = table.get("start", {})
+        if not isinstance(start, dict):
+            self.faults.append(f"{where}.start: found {start!r}, allowed: a table of names and values")
+            start = {}
+        return Block(
+            name=name,
+            unit=self._text(table, where, "unit", ""),
+            file=self._file(table, where, "file"),
+            fmu=self._file(table, where, "fmu"),
+            options=options,
+            start=start,
+        )
+
+    def _connection(self, destination: str, source: Any) -> Connection | None:
+        """Return a connection, if both of its ends are told."""
+        where = f"connections.{destination}"
+        if not isinstance(source, str):
+            self.faults.append(f"{where}: found {source!r}, allowed: its source as 'block.variable'")
+            return None
+        ends = self._port(where, destination), self._port(where, source)
+        return Connection(ends[0], ends[1]) if ends[0] and ends[1] else None
+
+    def _input(self, destination: str, table: Any) -> LogInput | None:
+        """Return an input from a log."""
+        where = f"inputs.{destination}"
+        if not isinstance(table, dict):
+            self.faults.append(f"{where}: found {table!r}, allowed: {{ log = FILE, column = NAME }}")
+            return None
+        allowed = ("log", "column", "interpolate")
+        self.faults += [f"{where}.{key}: {not_among(key, allowed)}" for key in table if key not in allowed]
+        port = self._port(where, destination)
+        for key in ("log", "column"):
+            if not table.get(key):
+                self.faults.append(f"{where}.{key}: not found, allowed: a text")
+        log, column = self._text(table, where, "log", ""), self._text(table, where, "column", "")
+        interpolate = self._flag(table, where, "interpolate")
+        return LogInput(destination=port, log=log, column=column, interpolate=interpolate) if port else None
+
+    def _port(self, where: str, text: str) -> Port | None:
+        """Return the port that a text `block.variable` names."""
+        block, dot, variable = text.partition(".")
+        if not (block and dot and variable):
+            self.faults.append(f"{where}: found {text!r}, allowed: block.variable")
+            return None
+        if block not in self.names:
+            self.faults.append(f"{where}: block {not_among(block, self.names)}")
+            return None
+        return Port(block, variable)
+
+    def _text(self, table: Mapping[str, Any], where: str, key: str, default: str) -> str:
+        value = table.get(key, default)
+        if isinstance(value, str):
+            return value
+        self.faults.append(f"{where}.{key}: found {value!r}, allowed: a text")
+        return default
+
+    def _file(self, table: Mapping[str, Any], where: str, key: str) -> Path | None:
+        """Return the path of a file that is there."""
+        text = self._text(table, where, key, "")
+        if not text:
+            return None
+        if "\0" in text or not Path(text).is_file():
+            self.faults.append(f"{where}.{key}: found {text!r}, allowed: a file that is there")
+        return Path(text)
+
+    def _flag(self, table: Mapping[str, Any], where: str, key: str) -> bool:
+        value = table.get(key, False)
+        if not isinstance(value, bool):
+            self.faults.append(f"{where}.{key}: found {value!r}, allowed: true, false")
+        return value is True
+
+    def _positive(self, table: Mapping[str, Any], where: str, key: str, default: float) -> float:
+        value = table.get(key, default)
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
+            self.faults.append(f"{where}.{key}: found {value!r}, allowed: a number above 0")
+            return default
+        return float(value)
+
+    def _count(self, table: Mapping[str, Any], key: str) -> int:
+        value = table.get(key, 1)
+        if isinstance(value, bool) or not isinstance(value, int) or value < 1:
+            self.faults.append(f"system.{key}: found {value!r}, allowed: an integer from 1")
+            return 1
+        return value
+
+
+def _leaves(table: Mapping[str, Any], leaf: type, name: str = "") -> Iterator[tuple[str, Any]]:
+    """Yield the rows of a table; TOML nests its keys, `drive.u`, where they stand without quotes."""
+    for key, value in table.items():
+        path = f"{name}.{key}" if name else key
+        nested = isinstance(value, dict) and (
+            leaf is not dict or (value and all(isinstance(one, dict) for one in value.values()))
+        )
+        if nested:
+            yield from _leaves(value, leaf, path)
+        else:
+            yield path, value

@@ -1,0 +1,130 @@
+"""The process in which the FMUs of a system run: `python -m urmpipe_fmus.cosim.worker FOLDER`.
+
+An FMU may end its process, so it has one of its own. The folder holds the job; the run leaves there what it
+recorded, how far it came, what the FMUs logged, and how it ended.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import json
+import mmap
+import os
+import pickle
+import signal
+import sys
+import threading
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from fmpy import calloc, free
+from fmpy.fmi2 import (
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+
+from urmpipe_fmus.cosim.job import (
+    ELSEWHERE,
+    JOB,
+    LOG,
+    PROGRESS,
+    RECORDED,
+    RESULT,
+    Job,
+    Progress,
+    called,
+)
+from urmpipe_fmus.cosim.loops import NoConvergence
+from urmpipe_fmus.cosim.master import Ended, Master
+from urmpipe_fmus.cosim.slave import FmuFailed, status_name
+
+LOG_BYTES = 1_000_000
+"""A log that is longer is begun anew; the one before is kept beside it."""
+
+
+class Log:
+    """What the FMUs log, a line a message: block, status and text, written at once."""
+
+    def __init__(self, path: Path, job: Job, progress: Progress) -> None:
+        self._path, self._job, self._progress = path, job, progress
+        self._open()
+
+    def _open(self) -> None:
+        self._file = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_TRUNC, 0o600)
+        self._size = 0
+
+    def take(
+        self, _: Any, instance: bytes | None, status: int, category: bytes | None, text: bytes | None
+    ) -> None:
+        """Take a message of the block that is being called."""
+        code = self._progress.call
+        name = self._job.blocks[called(code)[0]].name if code != ELSEWHERE else _decoded(instance)
+        words = " ".join(_decoded(text).split())
+        line = f"{name}\t{status_name(status)}\t{words}\n".encode()
+        self._size += os.write(self._file, line)
+        if self._size > LOG_BYTES:
+            os.close(self._file)
+            self._path.replace(self._path.with_suffix(".before"))
+            self._open()
+
+
+def _decoded(text: bytes | None) -> str:
+    return (text or b"").decode("utf-8", errors="replace")
+
+
+def callbacks_with(log: Log) -> Any:
+    """Return the callbacks that are given to the FMUs."""
+    from fmpy.logging import addLoggerProxy
+
+    made = fmi2CallbackFunctions()
+    made.logger = fmi2CallbackLoggerTYPE(log.take)
+    made.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
+    made.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+    addLoggerProxy(ctypes.byref(made))
+    return made
+
+
+def work(folder: Path) -> None:
+    """Run the job of a folder, and write how it ended."""
+    with (folder / JOB).open("rb") as file:
+        job: Job = pickle.load(file)
+    with (folder / PROGRESS).open("r+b") as file:
+        progress = Progress.from_buffer(mmap.mmap(file.fileno(), ctypes.sizeof(Progress)))
+    with (folder / RECORDED).open("r+b") as file:
+        recorded = np.frombuffer(mmap.mmap(file.fileno(), 0), np.float64).reshape(job.rows, -1)
+    log = Log(folder / LOG, job, progress)
+    callbacks = callbacks_with(log)
+    master = Master(job, progress, recorded, callbacks)
+    result: dict[str, Any] = {"failed": None, "code": ELSEWHERE, "note": None}
+    try:
+        master.run()
+    except FmuFailed as error:
+        result |= {"failed": error.said, "code": error.code}
+    except NoConvergence as error:
+        result |= {"failed": str(error)}
+    except Ended as ended:
+        result |= {"note": str(ended)}
+    result["warnings"] = sorted(master.warnings.items())
+    partial = folder / f"{RESULT}.part"
+    partial.write_text(json.dumps(result), encoding="utf-8")
+    partial.replace(folder / RESULT)
+
+
+def end_with_parent() -> None:
+    """End this process when the one that started it does: its end of the standard input is closed then."""
+
+    def watch() -> None:
+        sys.stdin.buffer.read()
+        os._exit(1)
+
+    threading.Thread(target=watch, daemon=True).start()
+
+
+if __name__ == "__main__":
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted too, and ends this process
+    end_with_parent()
+    work(Path(sys.argv[1]))
+    os._exit(0)  # leaves the FMUs' libraries loaded: what they do when unloaded can no longer spoil the run

@@ -1,0 +1,1 @@
+"""The systems that are shipped: one TOML file each."""

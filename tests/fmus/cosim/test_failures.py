@@ -1,0 +1,159 @@
+"""An FMU that fails is told by its name, the time and its last words; what was recorded stays."""
+
+from __future__ import annotations
+
+import os
+import signal
+import subprocess
+import sys
+import time
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foreign_fmus import TROUBLE, Foreign, Scalar, fmu, gain, planned, ran, system
+from urmpipe_fmus.cosim import prepare, simulate
+
+WELL = "fmi2OK: trouble: all is well at 0.05 s"
+
+FAILURES = {
+    1: f"ended the process: Segmentation fault (SIGSEGV); its last lines: {WELL} | fmi2Warning: about to break",
+    2: f"ended the process: Aborted (SIGABRT); its last lines: {WELL}",
+    3: f"ended the process with the exit code 7; its last lines: {WELL}",
+    4: f"returned fmi2Error; its last lines: {WELL} | fmi2Error: the motor is hot",
+    5: "returned fmi2Discard, it cannot step by 0.01 s from there: a smaller system.step may help; its last lines:"
+    f" {WELL}",
+    8: f"returned fmi2Fatal; its last lines: {WELL}",
+}
+
+
+@pytest.mark.parametrize("kind", sorted(FAILURES))
+def test_a_failing_block_is_told_and_what_was_recorded_stays(kind: int) -> None:
+    recorded = ran({"good": gain(), "bad": TROUBLE}, {"good.u": "bad.y"}, {"bad": {"kind": kind}}, step=0.01)
+    assert recorded.failed == f"block bad: fmi2DoStep at t = 0.05 s: {FAILURES[kind]}"
+    assert recorded.t_ns.tolist() == [k * 10**7 for k in range(6)]
+    assert np.array_equal(recorded.column("good", "y"), 0.01 * np.arange(6))
+
+
+def test_an_fmu_may_end_the_simulation() -> None:
+    recorded = ran({"bad": TROUBLE}, None, {"bad": {"kind": 6}}, step=0.01)
+    assert recorded.failed is None
+    assert recorded.notes == ("block bad ended the simulation at t = 0.05 s",)
+    assert len(recorded.t_ns) == 6
+
+
+def test_warnings_are_counted() -> None:
+    recorded = ran({"bad": TROUBLE}, None, {"bad": {"kind": 7}}, step=0.01)
+    assert recorded.failed is None
+    assert recorded.notes == ("block bad: fmi2DoStep returned fmi2Warning 95 times, the last: warm",)
+    assert len(recorded.t_ns) == 101
+
+
+def test_only_the_last_lines_are_kept_of_a_long_log() -> None:
+    talker = Foreign(
+        name="talker",
+        scalars=(Scalar("y", 0),),
+        step='for (int i = 0; i < 200; i++) LOG(m, fmi2OK, "%0200d", i); if (t > 4.95) { LOG(m, fmi2Error, "last'
+        ' one\\nin two lines"); return fmi2Error; }',
+    )
+    recorded = ran({"talker": talker}, duration=10.0)
+    words = [f"fmi2OK: {i:0200d}" for i in range(196, 200)] + ["fmi2Error: last one in two lines"]
+    assert recorded.failed == (
+        f"block talker: fmi2DoStep at t = 5 s: returned fmi2Error; its last lines: {' | '.join(words)}"
+    )
+
+
+def test_what_a_process_prints_is_among_its_last_words() -> None:
+    printer = Foreign(
+        name="printer",
+        scalars=(Scalar("y", 0),),
+        step='write(2, "assertion failed: x > 0\\n", 24); abort();',
+    )
+    assert ran({"p": printer}).failed == (
+        "block p: fmi2DoStep at t = 0 s: ended the process: Aborted (SIGABRT); its last lines: assertion failed:"
+        " x > 0"
+    )
+
+
+def test_an_fmu_that_gives_no_instance_is_told() -> None:
+    other = Foreign(name="other", scalars=(Scalar("y", 0),), start="free(m); return NULL;")
+    recorded = ran({"a": other})
+    assert recorded.failed == "block a: fmi2Instantiate at t = 0 s: gave no instance; it logged nothing"
+    assert recorded.values.shape == (0, 1)
+
+
+def test_a_library_that_is_none_is_told(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.fmu"
+    with zipfile.ZipFile(fmu(gain())) as given, zipfile.ZipFile(broken, "w") as made:
+        for name in given.namelist():
+            made.writestr(name, b"no library" if name.startswith("binaries") else given.read(name))
+    recorded = simulate(prepare(system({"a": gain()}, None, {"a": {"u": 0.0}}), lambda block: broken))
+    assert recorded.failed is not None
+    assert recorded.failed.startswith(
+        "block a: loading at t = 0 s: cannot be loaded: Failed to load shared library"
+    )
+
+
+def test_a_refused_value_is_told() -> None:
+    picky = Foreign(
+        name="picky",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1)),
+        step='if (v->r[0] > 0.5) { LOG(m, fmi2Error, "u = %g is too much", v->r[0]); return fmi2Error; }',
+    )
+    recorded = ran({"a": picky}, None, {"a": {"u": 0.75}})
+    assert recorded.failed == (
+        "block a: fmi2DoStep at t = 0 s: returned fmi2Error; its last lines: fmi2Error: u = 0.75 is too much"
+    )
+    assert len(recorded.t_ns) == 1
+
+
+SCRIPT = """
+import sys
+sys.path[:0] = [{fmus!r}, {tests!r}]
+from foreign_fmus import TROUBLE, planned
+from urmpipe_fmus.cosim import simulate
+plan = planned({{"bad": TROUBLE}}, None, {{"bad": {{"kind": 9}}}}, step=0.01)
+simulate(plan, progress=lambda share: print(share, flush=True))
+"""
+
+
+def children(pid: int) -> list[int]:
+    found = Path(f"/proc/{pid}/task/{pid}/children")
+    return [int(one) for one in found.read_text().split()] if found.exists() else []
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
+@pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
+def test_an_fmu_that_hangs_ends_with_who_started_it(how: signal.Signals) -> None:
+    tests = Path(__file__).parents[1]
+    script = SCRIPT.format(fmus=str(tests.parents[1] / "fmus"), tests=str(tests))
+    with subprocess.Popen(
+        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL
+    ) as one:
+        assert one.stdout is not None
+        while not one.stdout.readline().startswith(b"0.05"):
+            assert one.poll() is None
+        (child,) = children(one.pid)
+        one.send_signal(how)
+        assert one.wait(20) != 0
+    until = time.monotonic() + 20.0
+    while Path(f"/proc/{child}/exe").exists() and time.monotonic() < until:
+        time.sleep(0.05)
+    with pytest.raises(ProcessLookupError):
+        os.kill(child, 0)
+
+
+def test_the_process_that_runs_the_fmus_imports_little() -> None:
+    code = "import sys, urmpipe_fmus.cosim.worker; print(*sys.modules)"
+    loaded = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    ).stdout.split()
+    assert not {"pandas", "scipy", "casadi", "rerun", "pyarrow", "pythonfmu", "click"} & set(loaded)
+    assert not {"urmpipe_fmus.unit", "urmpipe_fmus.cosim.plan"} & set(loaded)
+
+
+def test_a_plan_is_made_once_and_holds_no_process() -> None:
+    plan = planned({"bad": TROUBLE}, None, {"bad": {"kind": 1}}, step=0.01)
+    assert simulate(plan).failed == simulate(plan).failed

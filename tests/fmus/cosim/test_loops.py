@@ -1,0 +1,135 @@
+"""Algebraic loops are solved to what their equations say, or told."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from foreign_fmus import INTEGRATOR, Foreign, Scalar, gain, ran
+from urmpipe_fmus.cosim import LogColumn, LogInput, Port, Recorded
+
+RING = {"b.u": "a.y", "a.u": "b.y"}
+TOLERANCE = 1e-12
+
+
+def solved(*arguments: object, **options: object) -> Recorded:
+    recorded = ran(*arguments, iterate=True, tolerance=TOLERANCE, **options)
+    assert recorded.failed is None
+    return recorded
+
+
+@pytest.mark.parametrize("k", [(0.5, 0.5), (-3.0, 4.0), (10.0, 10.0), (1.0, 0.0), (-1.0, 1.0)])
+def test_a_linear_ring_is_solved_even_where_plain_iteration_runs_away(k: tuple[float, float]) -> None:
+    """a = k1 b + 1, b = k2 a + 2: a = (2 k1 + 1) / (1 - k1 k2)."""
+    recorded = solved(
+        {"a": gain(), "b": gain()}, RING, {"a": {"k": k[0], "c": 1.0}, "b": {"k": k[1], "c": 2.0}}
+    )
+    a = (2.0 * k[0] + 1.0) / (1.0 - k[0] * k[1])
+    b = k[1] * a + 2.0
+    condition = max(1.0, 1.0 / abs(1.0 - k[0] * k[1])) * (1.0 + abs(k[0])) * (1.0 + abs(k[1]))
+    allowed = 2.0 * TOLERANCE * condition * (1.0 + abs(a) + abs(b))  # the residual, as the loop magnifies it
+    assert np.allclose(recorded.column("a", "y"), a, rtol=0.0, atol=allowed)
+    assert np.allclose(recorded.column("b", "y"), b, rtol=0.0, atol=allowed)
+
+
+def test_a_nonlinear_ring_is_solved() -> None:
+    """x = cos x: Dottie's number."""
+    recorded = solved({"a": gain("cosine", formula="cos(u)")}, {"a.u": "a.y"})
+    assert np.allclose(recorded.column("a", "y"), 0.7390851332151607, rtol=0.0, atol=2.0 * TOLERANCE)
+
+
+def test_the_solution_is_followed_over_time() -> None:
+    """y = k u + c(t) with u = y^3 by two blocks: y^3 - 2 y + c = 0, from its root at y = 0."""
+    t_ns = np.arange(11) * 10**8
+    c = LogColumn(t_ns, 0.08 * np.arange(11))
+    cube = gain("cube", formula="u * u * u")
+    line = Foreign(
+        name="line",
+        scalars=(Scalar("u", 0, "input"), Scalar("c", 1, "input"), Scalar("y", 2, on=("u", "c"))),
+        compute="v->r[2] = 0.5 * (v->r[0] + v->r[1]);",
+    )
+    ask = LogInput(destination=Port("b", "c"), log="c.csv", column="c")
+    recorded = solved({"a": cube, "b": line}, RING, None, [ask], column=lambda one: c)
+    y = recorded.column("b", "y")
+    assert np.allclose(y**3 - 2.0 * y + c.values, 0.0, atol=1e-11)  # the tolerance, magnified by at most ten
+    assert (np.diff(y) > 0.0).all()
+    assert (y < np.sqrt(2.0 / 3.0)).all()
+
+
+def test_a_ring_of_many_inputs_is_solved() -> None:
+    """x = A x + b, with three of each."""
+    names = range(3)
+    row = "v->r[10 + {i}] = {a} * v->r[0] + {b} * v->r[1] + {c} * v->r[2] + {i} + 1;"
+    matrix = np.array([[0.3, -2.0, 0.5], [1.5, 0.2, -0.7], [-0.4, 3.0, 0.1]])
+    map3 = Foreign(
+        name="map3",
+        scalars=(
+            *(Scalar(f"u[{i}]", i, "input") for i in names),
+            *(Scalar(f"y[{i}]", 10 + i, on=("u[0]", "u[1]", "u[2]")) for i in names),
+        ),
+        compute=" ".join(row.format(i=i, a=a, b=b, c=c) for i, (a, b, c) in enumerate(matrix)),
+    )
+    recorded = solved({"a": map3}, {"a.u": "a.y"})
+    expected = np.linalg.solve(np.eye(3) - matrix, [1.0, 2.0, 3.0])
+    assert np.allclose(recorded.values, expected, rtol=1e-10, atol=0.0)  # the tolerance, by the condition
+
+
+def test_inputs_stay_in_their_range() -> None:
+    """y = 1 / sqrt(u) of an input that must be above 0.01: u = 1, from a start at 4."""
+    root = Foreign(
+        name="root",
+        scalars=(Scalar("u", 0, "input", start="4", extra=' min="0.01"'), Scalar("y", 1, on=("u",))),
+        compute="v->r[1] = v->r[0] < 0.01 ? 1e9 : 1 / sqrt(v->r[0]);",
+        start="m->v.r[0] = 4;",
+    )
+    assert np.allclose(solved({"a": root}, {"a.u": "a.y"}).values, 1.0, rtol=0.0, atol=2.0 * TOLERANCE)
+
+
+def test_a_ring_with_a_state_is_the_implicit_equation_at_every_instant() -> None:
+    """y = x - 3 y, x' = y by Euler's method: y = x / 4."""
+    sum_of = Foreign(
+        name="sum_of",
+        scalars=(Scalar("x", 0, "input"), Scalar("y_in", 1, "input"), Scalar("y", 2, on=("x", "y_in"))),
+        compute="v->r[2] = v->r[0] - 3 * v->r[1];",
+    )
+    recorded = solved(
+        {"s": sum_of, "i": INTEGRATOR},
+        {"s.y_in": "s.y", "s.x": "i.y", "i.u": "s.y"},
+        {"i": {"x": 1.0}},
+    )
+    x = recorded.column("i", "y")
+    assert np.allclose(recorded.column("s", "y"), x / 4.0, rtol=0.0, atol=1e-11)  # tolerance times Jacobian
+    assert np.allclose(x, (1.0 + 0.1 / 4.0) ** np.arange(11), rtol=1e-10)
+
+
+@pytest.mark.parametrize("both", [False, True])
+def test_blocks_whose_outputs_follow_only_after_a_step_go_back_and_step_again(both: bool) -> None:
+    """From the first step on the ring a = -3 b + 1, b = 4 a + 2 holds at every instant: a = -5/13."""
+    stale = gain("stale", fresh=False)
+    blocks = {"a": stale if both else gain(), "b": stale}
+    recorded = solved(blocks, RING, {"a": {"k": -3.0, "c": 1.0}, "b": {"k": 4.0, "c": 2.0}})
+    assert np.allclose(recorded.column("a", "y")[1:], -5.0 / 13.0, rtol=0.0, atol=1e-10)
+    assert np.allclose(recorded.column("b", "y")[1:], 6.0 / 13.0, rtol=0.0, atol=1e-10)
+
+
+def test_going_back_undoes_what_a_block_integrated() -> None:
+    """A stale block counts each step once, however often it steps again."""
+    counting = Foreign(
+        name="counting",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1, on=("u",)), Scalar("steps", 2)),
+        compute="v->r[1] = cos(v->r[0]);",
+        step="v->r[2] += 1;",
+        fresh=False,
+    )
+    recorded = solved({"a": counting}, {"a.u": "a.y"})
+    assert recorded.column("a", "steps").tolist() == list(range(11))
+    assert np.allclose(recorded.column("a", "y")[1:], 0.7390851332151607, rtol=0.0, atol=2.0 * TOLERANCE)
+
+
+def test_what_has_no_solution_is_told_with_the_loop_and_what_is_left() -> None:
+    recorded = ran({"a": gain(), "b": gain()}, RING, {"a": {"c": 1.0}}, iterate=True)
+    assert recorded.failed == (
+        "algebraic loop: a.y -> b.u -> b.y -> a.u: not solved after 50 iterations, found a residual of 1, allowed:"
+        " 1e-09 relative to its values, at t = 0 s"
+    )
+    assert len(recorded.t_ns) == 0

@@ -1,0 +1,169 @@
+"""The master runs foreign FMUs without a delay, at the times that are meant, with the values of all types."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from foreign_fmus import COUNTER, INTEGRATOR, TROUBLE, Foreign, Scalar, gain, planned, ran
+from urmpipe_fmus.cosim import LogColumn, LogInput, Port, simulate
+from urmpipe_models.errors import CosimulationError
+
+RAMP = Foreign(
+    name="ramp",
+    scalars=(*(Scalar(f"y[{i}]", i, unit="m") for i in range(1, 4)),),
+    compute="for (int i = 1; i < 4; i++) v->r[i] = i * v->time;",
+)
+"""y_i = i t."""
+
+SUM = Foreign(
+    name="sum",
+    scalars=(
+        *(Scalar(f"u[{i}]", i, "input", unit="m") for i in range(1, 4)),
+        Scalar("y", 9, on=("u[1]", "u[2]", "u[3]"), unit="m"),
+    ),
+    compute="v->r[9] = v->r[1] + 10 * v->r[2] + 100 * v->r[3];",
+)
+"""y = u_1 + 10 u_2 + 100 u_3."""
+
+
+@pytest.mark.parametrize("count", [1, 12])
+def test_a_row_of_blocks_with_feedthrough_has_no_delay(count: int) -> None:
+    names = [f"b{i}" for i in range(count)]
+    blocks = {name: gain("metres", unit="m") for name in reversed(names)} | {"ramp": RAMP}
+    connections = {f"{b}.u": f"{a}.y" for a, b in zip(names, names[1:], strict=False)} | {"b0.u": "ramp.y[2]"}
+    recorded = ran(blocks, connections, {name: {"c": 1.0} for name in names})
+    t = 0.1 * np.arange(11)
+    assert recorded.failed is None
+    assert recorded.t_ns.tolist() == [round(k * 1e8) for k in range(11)]
+    assert recorded.column(names[-1], "y").tolist() == (2.0 * t + 1.0 * count).tolist()
+
+
+def test_a_ring_with_an_integrator_is_eulers_method() -> None:
+    recorded = ran(
+        {"decay": gain(), "x": INTEGRATOR},
+        {"decay.u": "x.y", "x.u": "decay.y"},
+        {"decay": {"k": -2.0}, "x": {"x": 3.0}},
+        step=0.01,
+    )
+    assert np.allclose(
+        recorded.column("x", "y"), 3.0 * 0.98 ** np.arange(101), rtol=1e-13, atol=0.0
+    )  # rounding
+    assert np.array_equal(recorded.column("decay", "y"), -2.0 * recorded.column("x", "y"))
+
+
+@settings(max_examples=5, deadline=None)  # each starts a process
+@given(st.floats(1e-6, 10.0), st.integers(1, 300))
+def test_time_is_k_steps_and_an_fmus_own_time_meets_it(step: float, count: int) -> None:
+    """The foreign FMUs refuse a step from a time that is not, to the last bit, where they stand."""
+    recorded = ran({"ramp": RAMP}, step=step, duration=step * count)
+    assert recorded.failed is None
+    assert recorded.column("ramp", "y[1]").tolist() == [k * step for k in range(len(recorded.t_ns))]
+    assert len(recorded.t_ns) == count + 1
+
+
+@pytest.mark.parametrize("every", [1, 3, 10, 11])
+def test_every_so_many_points_are_recorded(every: int) -> None:
+    recorded = ran({"ramp": RAMP}, record_every=every)
+    assert recorded.t_ns.tolist() == [k * 10**8 for k in range(0, 11, every)]
+    assert recorded.column("ramp", "y[3]").tolist() == [3 * (k * 0.1) for k in range(0, 11, every)]
+
+
+@pytest.mark.parametrize("order", [(1, 2, 3), (3, 1, 2), (2, 2, 1)])
+def test_arrays_and_elements_are_connected_one_by_one(order: tuple[int, int, int]) -> None:
+    connections = {f"sum.u[{i}]": f"ramp.y[{k}]" for i, k in enumerate(order, 1)}
+    recorded = ran({"sum": SUM, "ramp": RAMP}, connections)
+    factor = order[0] + 10 * order[1] + 100 * order[2]
+    assert np.allclose(
+        recorded.column("sum", "y"), factor * 0.1 * np.arange(11), rtol=1e-15
+    )  # three roundings
+    if order == (1, 2, 3):
+        whole = ran({"sum": SUM, "ramp": RAMP}, {"sum.u": "ramp.y"})
+        assert np.array_equal(whole.values, recorded.values)
+    assert recorded.names == (
+        Port("sum", "y"),
+        *(Port("ramp", f"y[{i}]") for i in (1, 2, 3)),
+    )
+    assert recorded.units == ("m",) * 4
+
+
+def test_integers_and_booleans_are_exchanged_and_recorded() -> None:
+    recorded = ran(
+        {"a": COUNTER, "b": COUNTER},
+        {"b.by": "a.n", "b.on": "a.even"},
+        {"a": {"by": 3, "on": True, "label": "one"}},
+        duration=0.5,
+    )
+    a = [0, 3, 6, 9, 12, 15]
+    b = np.concatenate([[0], np.cumsum([n if n % 2 == 0 else 0 for n in a])[:-1]])
+    assert recorded.column("a", "n").tolist() == a
+    assert recorded.column("a", "even").tolist() == [n % 2 == 0 for n in a]
+    assert recorded.column("b", "n").tolist() == b.tolist()
+    assert dict(zip(recorded.names, recorded.types, strict=True)) == {
+        Port(block, name): kind for block in "ab" for name, kind in (("n", "Integer"), ("even", "Boolean"))
+    }
+
+
+def test_inputs_follow_logs_held_or_interpolated() -> None:
+    columns = {
+        "u": LogColumn(np.array([100, 250, 800]) * 10**6, np.array([1.0, 4.0, -7.0]), "m"),
+        "n": LogColumn(np.array([0, 300]) * 10**6, np.array([2.0, 5.0])),
+        "on": LogColumn(np.array([0, 500]) * 10**6, np.array([1.0, 0.0])),
+    }
+
+    def follow(port: str, column: str, interpolate: bool = False) -> LogInput:
+        destination = Port(*port.split("."))
+        return LogInput(destination=destination, log="run.csv", column=column, interpolate=interpolate)
+
+    recorded = ran(
+        {"held": gain("metres", unit="m"), "linear": gain("metres", unit="m"), "n": COUNTER},
+        None,
+        None,
+        [follow("held.u", "u"), follow("n.by", "n"), follow("n.on", "on"), follow("linear.u", "u", True)],
+        column=lambda one: columns[one.column],
+    )
+    t = 0.1 * np.arange(11)
+    assert recorded.column("held", "y").tolist() == [1, 1, 1, 4, 4, 4, 4, 4, -7, -7, -7]
+    assert recorded.column("held", "u").tolist() == recorded.column("held", "y").tolist()
+    expected = np.interp(t, columns["u"].t_ns * 1e-9, columns["u"].values)
+    assert np.allclose(recorded.column("linear", "y"), expected, rtol=0.0, atol=1e-14)  # rounding of t and y
+    assert recorded.column("n", "n").tolist() == [0, 2, 4, 6, 11, 16, 16, 16, 16, 16, 16]
+    assert recorded.column("n", "by").tolist() == [2, 2, 2, 5, 5, 5, 5, 5, 5, 5, 5]
+
+
+def test_one_fmu_under_two_names_is_two_instances() -> None:
+    recorded = ran({"a": INTEGRATOR, "b": INTEGRATOR}, None, {"a": {"u": 1.0}, "b": {"u": -2.0, "x": 5.0}})
+    assert recorded.column("a", "y")[-1] == pytest.approx(1.0, rel=1e-15)  # ten additions
+    assert recorded.column("b", "y")[-1] == pytest.approx(3.0, rel=1e-15)
+
+
+def test_a_block_without_outputs_runs() -> None:
+    sink = Foreign(name="sink", scalars=(Scalar("u", 0, "input"),))
+    recorded = ran({"sink": sink}, None, {"sink": {"u": 1.0}})
+    assert recorded.failed is None
+    assert recorded.values.shape == (11, 0)
+
+
+def test_the_same_plan_runs_again_with_the_same_bits() -> None:
+    plan = planned(
+        {"decay": gain(), "x": INTEGRATOR}, {"decay.u": "x.y", "x.u": "decay.y"}, {"x": {"x": 1.0}}
+    )
+    assert np.array_equal(simulate(plan).values, simulate(plan).values)
+
+
+def test_progress_rises_to_what_is_done() -> None:
+    slow = Foreign(name="slow", scalars=(Scalar("y", 0),), step="usleep(20000);")
+    shares: list[float] = []
+    simulate(planned({"slow": slow}, step=0.05), progress=shares.append)
+    assert shares == sorted(shares)
+    assert all(0.0 <= one <= 1.0 for one in shares)
+    assert len(set(shares)) > 3
+
+
+def test_what_was_not_recorded_is_told() -> None:
+    recorded = ran({"a": TROUBLE})
+    with pytest.raises(CosimulationError) as caught:
+        recorded.column("a", "x")
+    assert str(caught.value) == "a.x: not recorded; allowed: a.y"

@@ -1,0 +1,266 @@
+"""What cannot run is told before the first step, all at once."""
+
+from __future__ import annotations
+
+import zipfile
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from foreign_fmus import COUNTER, INTEGRATOR, TROUBLE, Foreign, Scalar, fmu, gain, planned, system
+from urmpipe_fmus.cosim import LogColumn, LogInput, Port, prepare
+from urmpipe_fmus.cosim.interface import read_interface
+from urmpipe_models.errors import CosimulationError
+
+ARM = Foreign(
+    name="arm",
+    scalars=(
+        *(Scalar(f"phi[{i}]", i, "input", unit="rad") for i in range(1, 12)),
+        *(
+            Scalar(f"p[{i}]", 20 + i, unit="m", on=tuple(f"phi[{k}]" for k in range(1, 12)))
+            for i in (3, 1, 2)
+        ),
+        Scalar("rate", 30, unit="rad/s"),
+        Scalar("free", 31),
+        Scalar("length", 32, "parameter", start="1", unit="m", extra=' min="0.1" max="2"'),
+        Scalar("gain[1]", 33, "parameter", start="1"),
+        Scalar("gain[2]", 34, "parameter", start="1"),
+        Scalar("name", 0, "parameter", "String", start="arm"),
+        Scalar("count", 0, "parameter", "Integer", start="1"),
+        Scalar("strict", 0, "parameter", "Boolean", start="false"),
+    ),
+)
+
+
+def told(*arguments: object, **options: object) -> list[str]:
+    with pytest.raises(CosimulationError) as caught:
+        planned(*arguments, **options)
+    return [str(finding) for finding in caught.value.findings]
+
+
+def test_elements_of_an_array_are_in_the_order_of_their_numbers() -> None:
+    shown = read_interface(fmu(ARM))
+    assert [one.name for one in shown.elements("phi")] == [f"phi[{i}]" for i in range(1, 12)]
+    assert [one.name for one in shown.elements("p")] == ["p[1]", "p[2]", "p[3]"]
+    assert [one.name for one in shown.elements("p[2]")] == ["p[2]"]
+    assert shown.elements("q") == ()
+
+
+def test_every_wrong_connection_is_told() -> None:
+    every = {f"arm.phi[{i}]": "i.y" for i in range(2, 12)}
+    assert told(
+        {"arm": ARM, "i": INTEGRATOR, "n": COUNTER},
+        {
+            "arm.phi": "i.y",
+            "arm.fi": "i.y",
+            "i.u": "arm.rote",
+            "i.y": "arm.free",
+            "arm.length": "i.y",
+            "n.by": "i.y",
+            "n.on": "n.n",
+            "arm.phi[1]": "i.u",
+            **every,
+        },
+    ) == [
+        "connections.arm.phi: found i.y of size 1, allowed: 11, as many as arm.phi",
+        "connections.arm.fi: input of arm: found 'fi', allowed: phi",
+        "connections.i.u: output of arm: found 'rote', allowed: rate, free, p",
+        "connections.i.y: found i.y, causality output, allowed: an input of i: u",
+        "connections.arm.length: found arm.length, causality parameter, allowed: an input of arm: phi",
+        "connections.n.by: found i.y, Real, allowed: Integer (numbers only)",
+        "connections.n.on: found n.n, Integer, allowed: Boolean (numbers only)",
+        "connections.arm.phi[1]: found i.u, causality input, allowed: an output of i: y",
+        "blocks.arm: found inputs without a source: phi[1]; allowed: each in [connections], in [inputs], or with"
+        " a value in start",
+        "blocks.i: found inputs without a source: u; allowed: each in [connections], in [inputs], or with a value"
+        " in start",
+    ]
+
+
+def test_units_must_be_the_same_by_what_they_are_not_by_how_they_are_spelled() -> None:
+    degrees = '<Unit name="Grad"><BaseUnit rad="1" factor="0.017453292519943295"/></Unit>'
+    in_degrees = gain("in_degrees", unit="Grad", units=degrees)
+    in_deg, in_rad = gain("in_deg", unit="deg"), gain("in_rad", unit="rad")
+    in_newton_metres, in_joules = gain("in_nm", unit="N.m"), gain("in_j", unit="J")
+    without = gain("without")
+    first = {"source": {"u": 0.0}}
+    assert planned({"source": in_degrees, "b": in_deg}, {"b.u": "source.y"}, first).notes == ()
+    assert planned({"source": in_newton_metres, "b": in_joules}, {"b.u": "source.y"}, first).notes == ()
+    assert planned({"source": in_rad, "b": without}, {"b.u": "source.y"}, first).notes == (
+        "connections.b.u: source.y has rad, the input no unit: not compared",
+    )
+    assert told({"source": in_rad, "b": in_deg}, {"b.u": "source.y"}, first) == [
+        "connections.b.u: source.y: found the unit rad, allowed: that of the input, deg"
+    ]
+    unknown = gain("in_turns", unit="turns", units='<Unit name="turns"/>')
+    assert told({"source": unknown, "b": in_deg}, {"b.u": "source.y"}, first) == [
+        "connections.b.u: source.y: found the unit turns, allowed: that of the input, deg"
+    ]
+
+
+def test_an_input_has_one_source() -> None:
+    column = LogColumn(np.array([0, 10**9]), np.zeros(2))
+    ask = LogInput(destination=Port("b", "u"), log="run.csv", column="u")
+    assert told(
+        {"a": gain(), "b": gain()}, {"b.u": "a.y"}, {"a": {"u": 1.0}}, [ask], column=lambda one: column
+    ) == ["b.u: found two sources, a.y and the log, allowed: one"]
+    every = {f"arm.phi[{i}]": "i.y" for i in range(1, 12)}
+    arms = {"arm": ARM, "other": ARM, "i": INTEGRATOR}
+    (first, *rest) = told(arms, {**every, "other.phi": "other.p", "i.u": "i.y"})
+    assert first == "connections.other.phi: found other.p of size 3, allowed: 11, as many as other.phi"
+    assert len(rest) == 1
+
+
+def test_start_values_that_are_refused_are_told() -> None:
+    assert told(
+        {"arm": ARM},
+        None,
+        {
+            "arm": {
+                "phi": [0.0] * 10,
+                "lenght": 1.0,
+                "length": 3.0,
+                "gain": [1.0, float("nan")],
+                "gain[1]": True,
+                "name": 1,
+                "count": 1.5,
+                "strict": 1,
+                "free": 1.0,
+                "rate": "fast",
+            }
+        },
+    ) == [
+        "blocks.arm.start.phi: found 10 values, allowed: 11, or one for all",
+        "blocks.arm.start.lenght: found 'lenght', allowed: length, gain, name, count, strict, phi, p, rate, free",
+        "blocks.arm.start.length: found 3, allowed: 0.1 to 2",
+        "blocks.arm.start.gain: found nan, allowed: a finite number",
+        "blocks.arm.start.gain[1]: found true, allowed: a number",
+        "blocks.arm.start.name: found 1, allowed: a text",
+        "blocks.arm.start.count: found 1.5, allowed: an integer of 32 bits",
+        "blocks.arm.start.strict: found 1, allowed: true, false",
+        "blocks.arm.start.free: found free, continuous output, allowed: a parameter, input or state",
+        "blocks.arm.start.rate: found rate, continuous output, allowed: a parameter, input or state",
+        "blocks.arm: found inputs without a source: "
+        + ", ".join(f"phi[{i}]" for i in range(1, 12))
+        + "; allowed:"
+        " each in [connections], in [inputs], or with a value in start",
+    ]
+
+
+def test_a_loop_is_told_by_its_members() -> None:
+    blocks = {"a": gain(), "b": gain(), "c": INTEGRATOR}
+    assert told(blocks, {"b.u": "a.y", "a.u": "b.y", "c.u": "b.y"}) == [
+        "algebraic loop: a.y -> b.u -> b.y -> a.u: each depends on the one before at the same instant; allowed:"
+        " none, or [loops] iterate = true"
+    ]
+    assert planned(blocks, {"b.u": "a.y", "a.u": "c.y", "c.u": "b.y"}).loops == ()
+
+
+def test_an_output_that_does_not_say_depends_on_all_inputs() -> None:
+    silent = gain("silent", on=None)
+    assert told({"a": silent}, {"a.u": "a.y"})[0].startswith("algebraic loop: a.y -> a.u: ")
+    assert planned({"a": gain("deaf", on=())}, {"a.u": "a.y"}).loops == ()
+
+
+def test_a_loop_of_integers_cannot_be_iterated() -> None:
+    whole = Foreign(
+        name="whole",
+        scalars=(Scalar("u", 0, "input", "Integer"), Scalar("y", 1, "output", "Integer", on=("u",))),
+    )
+    assert told({"a": whole}, {"a.u": "a.y"}, iterate=True) == [
+        "algebraic loop: a.y -> a.u: found a.u, an Integer; allowed: Reals alone"
+    ]
+
+
+def test_the_duration_is_told_by_the_system_or_by_the_caller_or_by_the_longest_log() -> None:
+    ask = LogInput(destination=Port("a", "u"), log="run.csv", column="u")
+    column = LogColumn(np.array([0, 36_910_000_000]), np.zeros(2))
+    options = {"step": 0.005, "duration": None}
+    blocks = system({"a": gain()}, inputs=[ask], **options)
+    make = lambda block: block.fmu  # noqa: E731 - the shortest there is
+    assert prepare(blocks, make, column=lambda one: column).count == 7382
+    assert prepare(blocks, make, column=lambda one: column, duration=1.0).count == 200
+    assert told({"a": TROUBLE}, duration=None) == [
+        "system.duration: not found, and no log tells it; allowed: a number above 0, in s"
+    ]
+    assert told({"a": TROUBLE}, duration=0.05) == [
+        "system.step: found 0.1 s, allowed: no more than the duration, 0.05 s"
+    ]
+
+
+def test_a_log_must_fit_its_input() -> None:
+    u = LogInput(destination=Port("a", "u"), log="run.csv", column="u", interpolate=True)
+    n = LogInput(destination=Port("n", "by"), log="run.csv", column="n", interpolate=True)
+    phi = LogInput(destination=Port("arm", "phi"), log="run.csv", column="u")
+    columns = {
+        "u": LogColumn(np.array([0, 10**9]), np.zeros(2), "deg"),
+        "n": LogColumn(np.array([0, 10**9]), np.array([1.0, 2.5])),
+    }
+    start = {"n": {"on": True}}
+    lines = told(
+        {"a": gain("in_rad", unit="rad"), "n": COUNTER, "arm": ARM},
+        None,
+        start,
+        [u, n, phi],
+        column=lambda one: columns[one.column],
+    )
+    assert lines[:2] == [
+        "inputs.a.u: found the unit deg, allowed: that of the input, rad",
+        "inputs.arm.phi: found an array, allowed: one of " + ", ".join(f"phi[{i}]" for i in range(1, 12)),
+    ]
+    assert lines[3:] == [
+        "inputs.n.by: interpolate: found for an Integer, allowed: for a Real",
+        "inputs.n.by: run.csv, column n: found 2.5, allowed: an integer of 32 bits",
+    ]
+
+
+def test_what_is_no_fmu_for_cosimulation_is_told(tmp_path: Path) -> None:
+    broken = tmp_path / "broken.fmu"
+    broken.write_bytes(b"PK")
+    blocks = system({"a": gain(), "b": gain()})
+    with pytest.raises(CosimulationError) as caught:
+        prepare(blocks, lambda block: broken if block.name == "a" else fmu(gain()))
+    assert str(caught.value) == f"block a: {broken}: cannot be read as an FMU: File is not a zip file"
+
+
+@pytest.mark.parametrize(
+    ("found", "replaced", "told_as"),
+    [
+        (
+            'fmiVersion="2.0"',
+            'fmiVersion="3.0"',
+            "found FMI 3.0 for coSimulation, allowed: FMI 2.0 for coSimulation",
+        ),
+        (
+            "CoSimulation",
+            "ModelExchange",
+            "found FMI 2.0 for modelExchange, allowed: FMI 2.0 for coSimulation",
+        ),
+        ('modelIdentifier="gain"', 'modelIdentifier="loss"', "found binaries for {here}, allowed: {binary}"),
+        ("<Real", "<Imaginary", "cannot be read as an FMU: "),
+        ('start="1"', 'min="low"', "cannot be read as an FMU: could not convert string to float: 'low'"),
+    ],
+)
+def test_an_fmu_of_another_kind_is_told(tmp_path: Path, found: str, replaced: str, told_as: str) -> None:
+    import fmpy
+
+    other = tmp_path / "other.fmu"
+    with zipfile.ZipFile(fmu(gain())) as given, zipfile.ZipFile(other, "w") as made:
+        for name in given.namelist():
+            data = given.read(name)
+            changed = name == "modelDescription.xml"
+            made.writestr(name, data.decode().replace(found, replaced).encode() if changed else data)
+    with pytest.raises(CosimulationError) as caught:
+        prepare(system({"a": gain()}), lambda block: other)
+    binary = f"binaries/{fmpy.platform}/loss{fmpy.sharedLibraryExtension}"
+    assert str(caught.value).startswith(
+        f"block a: {other}: {told_as.format(here=fmpy.platform, binary=binary)}"
+    )
+
+
+def test_an_fmu_that_lives_alone_is_one_block() -> None:
+    alone = gain("alone", once=True)
+    assert told({"a": alone, "b": alone}, None, {"a": {"u": 0.0}, "b": {"u": 0.0}}) == [
+        f"block b: {fmu(alone)} can be instantiated only once in a system"
+    ]

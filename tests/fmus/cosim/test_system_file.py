@@ -1,0 +1,208 @@
+"""A system file says what it means, and all that is wrong with it at once."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from urmpipe_fmus.cosim import LogInput, Port, System, load_system, system_names
+from urmpipe_models.errors import CosimulationError
+
+WHOLE = """
+[system]
+name = "two"
+description = "Two blocks"
+step = 0.001
+duration = 2
+record_every = 5
+
+[arguments]
+log = "run.csv"
+k = 2500.0
+joints = 6
+held = false
+
+[blocks.source]
+unit = "log_source"
+log = "$log"
+columns = ["$log", "u"]
+
+[blocks.plant]
+file = "plant.py"
+joints = "$joints"
+start = { k = "$k", "theta[1]" = 3.14 }
+
+[blocks.other]
+fmu = "sub/other.fmu"
+
+[connections]
+"plant.phi" = "source.q"
+other.u = "plant.y"
+
+[inputs]
+"plant.u" = { log = "$log", column = "u", interpolate = "$held" }
+
+[loops]
+iterate = true
+tolerance = 1e-6
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    (tmp_path / "sub").mkdir()
+    for name in ("run.csv", "plant.py", "sub/other.fmu"):
+        (tmp_path / name).write_text("")
+    (tmp_path / "two.toml").write_text(WHOLE)
+    return tmp_path
+
+
+def said(path: Path, text: str, **arguments: str) -> list[str]:
+    path.write_text(text)
+    with pytest.raises(CosimulationError) as caught:
+        load_system(path, arguments)
+    return [finding.message for finding in caught.value.findings]
+
+
+def test_a_whole_file_is_read(folder: Path) -> None:
+    system = load_system(folder / "two.toml")
+    assert (system.name, system.description, system.step, system.duration) == (
+        "two",
+        "Two blocks",
+        0.001,
+        2.0,
+    )
+    assert (system.record_every, system.iterate, system.tolerance) == (5, True, 1e-6)
+    source, plant, other = system.blocks
+    assert (source.unit, source.kind) == ("log_source", "log_source")
+    assert (plant.file, plant.kind, other.fmu) == (folder / "plant.py", "plant.py", folder / "sub/other.fmu")
+    assert plant.options == {"joints": 6}
+    assert plant.start == {"k": 2500.0, "theta[1]": 3.14}
+    assert [str(c.destination) + " = " + str(c.source) for c in system.connections] == [
+        "plant.phi = source.q",
+        "other.u = plant.y",
+    ]
+    assert system.inputs == (
+        LogInput(destination=Port("plant", "u"), log=str(folder / "run.csv"), column="u", interpolate=False),
+    )
+
+
+def test_files_are_those_beside_the_system_file(folder: Path) -> None:
+    source = load_system(folder / "two.toml").blocks[0]
+    assert source.options == {"log": str(folder / "run.csv"), "columns": [str(folder / "run.csv"), "u"]}
+
+
+def test_an_argument_is_left_as_it_is_given_and_of_its_defaults_type(folder: Path) -> None:
+    system = load_system(folder / "two.toml", {"log": "run.csv", "k": "3", "joints": "4", "held": "true"})
+    source, plant, _ = system.blocks
+    assert source.options["log"] == "run.csv"  # the working folder's, not the one beside the system file
+    assert plant.start["k"] == 3.0
+    assert plant.options == {"joints": 4}
+    assert system.inputs[0].interpolate is True
+    assert system.arguments == {"log": "run.csv", "k": 3.0, "joints": 4, "held": True}
+
+
+def test_everything_that_is_wrong_is_told_at_once(tmp_path: Path) -> None:
+    text = """
+surprise = 1
+[system]
+name = 5
+step = 0.0
+durations = 2.0
+record_every = 1.5
+[arguments]
+log = "run.csv"
+[blocks.a]
+unit = "gain"
+fmu = "none.fmu"
+[blocks.b]
+[blocks."c.d"]
+unit = "x"
+start = 3
+[blocks.e]
+fmu = "none.fmu"
+robot = "urm6"
+[blocks.f]
+unit = "$lag"
+[connections]
+"a.u" = "z.y"
+"a" = "b.y"
+"a.v" = 7
+[inputs]
+"a.w" = { log = "$log", colunm = "u" }
+"a.x" = 1
+[loops]
+iterate = 1
+tolerance = -1.0
+"""
+    assert said(tmp_path / "bad.toml", text, speed="3") == [
+        "argument speed: found 'speed', allowed: log",
+        "blocks.f.unit: found '$lag', allowed: $log ([arguments] names them)",
+        "surprise: found 'surprise', allowed: system, arguments, blocks, connections, inputs, loops",
+        "system.durations: found 'durations', allowed: duration, description, name, step, record_every",
+        "blocks.a: found unit and fmu, allowed: one of unit, file, fmu",
+        "blocks.a.fmu: found 'none.fmu', allowed: a file that is there",
+        "blocks.b: found none of them, allowed: one of unit, file, fmu",
+        "blocks.c.d: found 'c.d' as a name, allowed: a letter, then letters, digits, _, -",
+        "blocks.c.d.start: found 3, allowed: a table of names and values",
+        "blocks.e.robot: found 'robot', allowed: fmu, start",
+        "blocks.e.fmu: found 'none.fmu', allowed: a file that is there",
+        "system.name: found 5, allowed: a text",
+        "system.step: found 0.0, allowed: a number above 0",
+        "system.record_every: found 1.5, allowed: an integer from 1",
+        "connections.a.u: block found 'z', allowed: a, b, c.d, e, f",
+        "connections.a: found 'a', allowed: block.variable",
+        "connections.a.v: found 7, allowed: its source as 'block.variable'",
+        "inputs.a.w.colunm: found 'colunm', allowed: column, log, interpolate",
+        "inputs.a.w.column: not found, allowed: a text",
+        "inputs.a.x: found 1, allowed: { log = FILE, column = NAME }",
+        "loops.iterate: found 1, allowed: true, false",
+        "loops.tolerance: found -1.0, allowed: a number above 0",
+    ]
+
+
+def test_arguments_must_be_of_their_defaults_type(folder: Path) -> None:
+    with pytest.raises(CosimulationError) as caught:
+        load_system(folder / "two.toml", {"k": "fast", "held": "maybe", "lock": "run.csv"})
+    assert str(caught.value).splitlines() == [
+        f"{folder / 'two.toml'}: argument k: found 'fast', allowed: a number, like 2500.0",
+        f"{folder / 'two.toml'}: argument held: found 'maybe', allowed: true, false, like False",
+        f"{folder / 'two.toml'}: argument lock: found 'lock', allowed: log, k, joints, held",
+    ]
+
+
+@pytest.mark.parametrize("value", ["inf", "nan", "true", '"1"', "-0.1"])
+def test_a_step_is_a_finite_number_above_zero(tmp_path: Path, value: str) -> None:
+    text = f'[system]\nstep = {value}\n[blocks.a]\nunit = "x"\n'
+    (found,) = said(tmp_path / "bad.toml", text)
+    assert found.startswith("system.step: found ")
+    assert found.endswith(", allowed: a number above 0")
+
+
+def test_what_is_no_toml_or_no_file_is_told(tmp_path: Path) -> None:
+    (found,) = said(tmp_path / "bad.toml", "[system\n")
+    assert found.startswith("cannot be read as TOML: ")
+    with pytest.raises(CosimulationError) as caught:
+        load_system("no-such-system")
+    assert str(caught.value) == (
+        f"system: found 'no-such-system', allowed: a TOML file, or one of {', '.join(system_names())}"
+    )
+    assert said(tmp_path / "bad.toml", "blocks = 3\n[system]\nstep = 1\n") == [
+        "blocks: found 3, allowed: a table",
+        "blocks: found none, allowed: at least one [blocks.NAME]",
+    ]
+
+
+@pytest.mark.parametrize("name", system_names())
+def test_shipped_systems_are_read_and_named_as_their_files(name: str) -> None:
+    system = load_system(name)
+    assert isinstance(system, System)
+    assert system.name == name
+    assert system.description
+    assert system.path.stem == name
+
+
+def test_log_to_delta_is_shipped() -> None:
+    assert "log-to-delta" in system_names()
+    assert load_system("log-to-delta").step == 0.005

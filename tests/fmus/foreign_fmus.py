@@ -1,0 +1,264 @@
+"""FMUs that nobody here exported: small models in C, with descriptions written by hand."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import zipfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from urmpipe_fmus.cosim import (
+    Block,
+    Connection,
+    LogColumn,
+    LogInput,
+    Plan,
+    Port,
+    Recorded,
+    System,
+    prepare,
+    simulate,
+)
+
+HERE = Path(__file__).parent
+
+
+@dataclass(frozen=True)
+class Scalar:
+    """A variable of a foreign FMU: its place is its value reference in the C array of its type."""
+
+    name: str
+    place: int
+    causality: str = "output"
+    type: str = "Real"
+    start: str | None = None
+    unit: str = ""
+    extra: str = ""
+    initial: str = ""
+    on: tuple[str, ...] | None = ()
+
+
+@dataclass(frozen=True)
+class Foreign:
+    """A foreign FMU: variables and C."""
+
+    name: str
+    scalars: tuple[Scalar, ...]
+    compute: str = ""
+    step: str = ""
+    start: str = ""
+    fresh: bool = True
+    can_save: bool = True
+    once: bool = False
+    units: str = ""
+    guid: str = field(default="{f0e1d2c3}")
+
+    def write(self, folder: Path) -> Path:
+        """Compile and pack it; return the FMU."""
+        import fmpy
+
+        compiler = shutil.which("cc")
+        if compiler is None:
+            pytest.skip("needs a C compiler: cc")
+        made = folder / f"{self.name}.fmu"
+        if made.exists():
+            return made
+        work = folder / self.name
+        work.mkdir()
+        (work / "model.h").write_text(
+            f'#define GUID "{self.guid}"\n#define FRESH {int(self.fresh)}\n#define START {self.start}\n'
+            f"static void compute(Model *m) {{ Values *v = &m->v; (void)v; {self.compute} }}\n"
+            "static fmi2Status step(Model *m, double t, double h) {\n"
+            f"    Values *v = &m->v; (void)v; {self.step}\n    return fmi2OK;\n}}\n"
+        )
+        library = work / f"{self.name}{fmpy.sharedLibraryExtension}"
+        includes = (f"-I{work}", f"-I{Path(fmpy.__file__).parent / 'c-code'}")
+        subprocess.run(
+            [
+                compiler,
+                "-shared",
+                "-fPIC",
+                "-O1",
+                "-w",
+                *includes,
+                HERE / "foreign_fmus.c",
+                "-o",
+                library,
+                "-lm",
+            ],
+            check=True,
+        )
+        with zipfile.ZipFile(made, "w") as archive:
+            archive.writestr("modelDescription.xml", self.description())
+            archive.write(library, f"binaries/{fmpy.platform}/{library.name}")
+        return made
+
+    def description(self) -> str:
+        places = {one.name: i for i, one in enumerate(self.scalars, 1)}
+        outputs = "".join(
+            f'<Unknown index="{places[one.name]}"'
+            + ("" if one.on is None else f' dependencies="{" ".join(str(places[n]) for n in one.on)}"')
+            + "/>"
+            for one in self.scalars
+            if one.causality == "output"
+        )
+        variables = "".join(_variable(one) for one in self.scalars)
+        return (
+            '<?xml version="1.0" encoding="UTF-8"?>'
+            f'<fmiModelDescription fmiVersion="2.0" modelName="{self.name}" guid="{self.guid}">'
+            f'<CoSimulation modelIdentifier="{self.name}" canHandleVariableCommunicationStepSize="true"'
+            f' canGetAndSetFMUstate="{str(self.can_save).lower()}"'
+            f' canBeInstantiatedOnlyOncePerProcess="{str(self.once).lower()}"/>'
+            + (f"<UnitDefinitions>{self.units}</UnitDefinitions>" if self.units else "")
+            + f"<ModelVariables>{variables}</ModelVariables>"
+            + f"<ModelStructure><Outputs>{outputs}</Outputs></ModelStructure></fmiModelDescription>"
+        )
+
+
+def _variable(one: Scalar) -> str:
+    changes = "continuous" if one.type == "Real" else "discrete"
+    changes = "tunable" if one.causality == "parameter" else changes
+    initial = f' initial="{one.initial}"' if one.initial else ""
+    needs_start = one.causality in ("parameter", "input")
+    start = one.start or (("false" if one.type == "Boolean" else "0") if needs_start else None)
+    told = f' start="{start}"' if start is not None else ""
+    unit = f' unit="{one.unit}"' if one.unit else ""
+    return (
+        f'<ScalarVariable name="{one.name}" valueReference="{one.place}" causality="{one.causality}"'
+        f' variability="{changes}"{initial}><{one.type}{unit}{told}{one.extra}/></ScalarVariable>'
+    )
+
+
+def gain(name: str = "gain", *, fresh: bool = True, formula: str = "k * u + c", **options: object) -> Foreign:
+    """y = k u + c, at once; or only after a step."""
+    unit = str(options.pop("unit", ""))
+    on = options.pop("on", ("u",))
+    return Foreign(
+        name=name,
+        scalars=(
+            Scalar("k", 0, "parameter", start="1"),
+            Scalar("c", 1, "parameter", start="0"),
+            Scalar("u", 2, "input", unit=unit),
+            Scalar("y", 3, unit=unit, on=on),  # type: ignore[arg-type]
+        ),
+        compute=f"double k = v->r[0], c = v->r[1], u = v->r[2]; (void)k; v->r[3] = {formula};",
+        start="m->v.r[0] = 1;",
+        fresh=fresh,
+        **options,  # type: ignore[arg-type]
+    )
+
+
+INTEGRATOR = Foreign(
+    name="integrator",
+    scalars=(
+        Scalar("u", 0, "input"),
+        Scalar("y", 1),
+        Scalar("x", 2, "local", start="0", initial="exact"),
+    ),
+    compute="v->r[1] = v->r[2];",
+    step="v->r[2] += h * v->r[0];",
+)
+"""y = x, x' = u by Euler's method: no direct feedthrough."""
+
+COUNTER = Foreign(
+    name="counter",
+    scalars=(
+        Scalar("by", 0, "input", "Integer"),
+        Scalar("n", 1, "output", "Integer"),
+        Scalar("on", 0, "input", "Boolean"),
+        Scalar("even", 1, "output", "Boolean", on=()),
+        Scalar("label", 0, "parameter", "String", start="none"),
+    ),
+    compute="v->b[1] = v->i[1] % 2 == 0;",
+    step="if (v->b[0]) v->i[1] += v->i[0];",
+)
+"""Counts by an Integer while a Boolean is true."""
+
+TROUBLE = Foreign(
+    name="trouble",
+    scalars=(
+        Scalar("kind", 0, "parameter", "Integer", extra=' min="0" max="9"', start="0"),
+        Scalar("at", 0, "parameter", start="0.05"),
+        Scalar("y", 1),
+    ),
+    compute="v->r[1] = v->time;",
+    step="""
+    if (t < v->r[0] - 1e-9) return fmi2OK;
+    LOG(m, fmi2OK, "%s: all is well at %g s", "trouble", t);
+    switch (v->i[0]) {
+    case 1: LOG(m, fmi2Warning, "about to break"); raise(SIGSEGV); break;
+    case 2: abort();
+    case 3: exit(7);
+    case 4: LOG(m, fmi2Error, "the motor is %s", "hot"); return fmi2Error;
+    case 5: return fmi2Discard;
+    case 6: m->terminated = 1; return fmi2Discard;
+    case 7: LOG(m, fmi2Warning, "warm"); return fmi2Warning;
+    case 8: return fmi2Fatal;
+    case 9: for (;;) pause();
+    }
+    """,
+    start="m->v.r[0] = 0.05;",
+)
+"""Breaks from a time on, in the way of its parameter `kind`."""
+
+
+@cache
+def _folder() -> Path:
+    import atexit
+    import tempfile
+
+    folder = Path(tempfile.mkdtemp(prefix="foreign-"))
+    atexit.register(shutil.rmtree, folder, ignore_errors=True)
+    return folder
+
+
+@cache
+def fmu(foreign: Foreign) -> Path:
+    """Return a foreign FMU, compiled once a test run."""
+    return foreign.write(_folder())
+
+
+def system(
+    blocks: Mapping[str, Foreign],
+    connections: Mapping[str, str] | None = None,
+    start: Mapping[str, Mapping[str, Any]] | None = None,
+    inputs: Sequence[LogInput] = (),
+    **options: Any,
+) -> System:
+    """Return a system of foreign FMUs; connections are destination: source."""
+    made = {"step": 0.1, "duration": 1.0, **options}
+    return System(
+        name="test",
+        path=Path("test.toml"),
+        blocks=tuple(
+            Block(name=name, fmu=fmu(one), start=(start or {}).get(name, {})) for name, one in blocks.items()
+        ),
+        connections=tuple(
+            Connection(Port(*to.split(".", 1)), Port(*source.split(".", 1)))
+            for to, source in (connections or {}).items()
+        ),
+        inputs=tuple(inputs),
+        **made,
+    )
+
+
+def fmu_of(block: Block) -> Path:
+    """Return the FMU of a block that names one."""
+    assert block.fmu is not None
+    return block.fmu
+
+
+def planned(*arguments: Any, column: Callable[[LogInput], LogColumn] | None = None, **options: Any) -> Plan:
+    """Return the plan of a system of foreign FMUs: the arguments are those of `system`."""
+    return prepare(system(*arguments, **options), fmu_of, column=column)
+
+
+def ran(*arguments: Any, **options: Any) -> Recorded:
+    """Return what a system of foreign FMUs recorded: the arguments are those of `planned`."""
+    return simulate(planned(*arguments, **options))

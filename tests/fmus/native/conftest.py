@@ -1,0 +1,177 @@
+"""Units built natively, and instances of them by FMPy's low-level calls."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
+from urmpipe_fmus.table import Table
+from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State
+
+GUID = "{12345678-0000-0000-0000-000000000000}"
+
+
+class Native:
+    """An instance of a native FMU, ready to step.
+
+    Attributes:
+        fmu: FMPy's.
+        said: What it told its logger.
+    """
+
+    def __init__(self, folder: Path, name: str, *, guid: str = GUID, start: float = 0.0) -> None:
+        from fmpy import fmi2
+
+        self.said: list[str] = []
+        self.fmu = fmi2.FMU2Slave(
+            guid=guid, modelIdentifier=name, unzipDirectory=str(folder), instanceName="one"
+        )
+        self._callbacks = fmi2.fmi2CallbackFunctions()
+        self._callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._hear)
+        self._callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(fmi2.calloc)
+        self._callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(fmi2.free)
+        self.fmu.instantiate(callbacks=self._callbacks)
+        self.fmu.setupExperiment(startTime=start)
+        self.fmu.enterInitializationMode()
+        self.fmu.exitInitializationMode()
+
+    def _hear(self, _environment: Any, _name: bytes, _status: int, _category: bytes, message: bytes) -> None:
+        self.said.append(message.decode())
+
+    def step(self, time: float, size: float) -> None:
+        self.fmu.doStep(time, size)
+
+    def refused(self, call: Callable[[], Any]) -> list[str]:
+        """Return what is told when a call gives fmi2Error."""
+        self.said.clear()
+        with pytest.raises(Exception, match="status 3"):
+            call()
+        return self.said
+
+    def close(self) -> None:
+        self.fmu.freeInstance()
+
+
+@pytest.fixture(scope="session")
+def compiled() -> dict[Any, dict[str, bytes]]:
+    """Binaries that were compiled before, by what they were compiled from."""
+    return {}
+
+
+@pytest.fixture
+def built(tmp_path: Path, compiled: dict[Any, dict[str, bytes]]) -> Callable[..., Path]:
+    """Build a unit in an FMU's folder, without the description."""
+    missing = native_missing()
+    if missing:
+        pytest.skip(f"no native FMU can be built here: {missing}")
+
+    done: set[Path] = set()
+
+    def build(unit: Unit, folder: str = "") -> Path:
+        place = tmp_path / (folder or unit.name)
+        if place in done:  # a library that is loaded must not be written again
+            return place
+        done.add(place)
+        sources = native_sources(unit)
+        key = (unit.name, *sources.values())
+        if key not in compiled:
+            compiled[key] = native_binaries(unit, sources, GUID, [this_platform()])
+        files = {**sources, **compiled[key]}
+        files["sources/guid.h"] = guid_header(GUID)
+        if unit.table is not None:
+            files[TABLE_FILE] = table_bytes(unit.table)
+        for name, content in files.items():
+            path = place / name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            path.write_bytes(content)
+        return place
+
+    return build
+
+
+@pytest.fixture
+def native(built: Callable[..., Path]) -> Iterator[Callable[..., Native]]:
+    """Build a unit and make an instance of it."""
+    made: list[Native] = []
+
+    def make(unit: Unit, **options: Any) -> Native:
+        made.append(Native(built(unit), unit.name, **options))
+        return made[-1]
+
+    yield make
+    for one in made:
+        one.close()
+
+
+@pytest.fixture
+def oscillator() -> Unit:
+    """A unit with something of every kind and type."""
+
+    def outputs(v: Any) -> dict[str, Any]:
+        return {
+            "force": v.k * (v.goal - v.x[0]) + np.sin(v.time),
+            "turns": v.x[0] / 0.25,
+            "far": np.abs(v.x[0]) > 1.0,
+            "inverse": 1.0 / v.k,
+        }
+
+    def derivatives(v: Any) -> dict[str, Any]:
+        push = np.where(v.on > 0.5, v.k, 0.0) * (v.goal - v.x[0])
+        return {"x": (v.x[1], push - v.damping * v.x[1] + 0.1 * np.cos(v.time))}
+
+    def update(v: Any) -> dict[str, Any]:
+        return {"count": np.remainder(v.count + 1.0, 1000.0), "last": v.goal}
+
+    return Unit(
+        name="oscillator",
+        description="a mass on a spring",
+        variables=(
+            Parameter(name="k", description="stiffness", start=2.0, minimum=0.0, maximum=100.0),
+            Parameter(name="damping", description="damping", start=0.5, tunable=False),
+            Input(name="goal", description="goal", start=1.0),
+            Input(name="on", description="on", type="Boolean", start=1.0),
+            Input(name="gear", description="gear", type="Integer", start=1.0, minimum=-1.0, maximum=5.0),
+            State(name="x", description="place and speed", size=2, start=(0.1, 0.0), output=True),
+            Memory(name="count", description="steps", type="Integer"),
+            Memory(name="last", description="the goal before"),
+            Output(name="force", description="force"),
+            Output(name="turns", description="turns", type="Integer"),
+            Output(name="far", description="far", type="Boolean"),
+            Output(name="inverse", description="inverse"),
+        ),
+        outputs=outputs,
+        derivatives=derivatives,
+        update=update,
+        internal_step=3e-3,
+    )
+
+
+@pytest.fixture
+def player() -> Unit:
+    """A unit that plays a table."""
+
+    def outputs(v: Any) -> dict[str, Any]:
+        before, after = v.table.before, v.table.after
+        pairs = zip(before, after, strict=True)
+        return {
+            "held": before[0],
+            "between": tuple(a + v.table.fraction * (b - a) for a, b in pairs),
+        }
+
+    return Unit(
+        name="player",
+        description="a table",
+        variables=(
+            Output(name="held", description="held"),
+            Output(name="between", description="between", size=2),
+        ),
+        outputs=outputs,
+        table=Table(np.array([-5, 0, 10_000_000, 25_000_000]), np.array([[1.0, 5], [2, 6], [4, 7], [-1, 8]])),
+    )

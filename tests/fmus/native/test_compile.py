@@ -1,0 +1,295 @@
+"""Compiling: clean, repeatable, for two platforms with the same bits, and errors that tell."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import struct
+import subprocess
+import sys
+from collections.abc import Callable, Sequence
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
+from urmpipe_fmus.native.compile import SUFFIXES, TARGETS
+from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.variable import Input, Output
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.errors import FmuError
+
+GUID = "{12345678-0000-0000-0000-000000000000}"
+HOST = Path(__file__).with_name("host.c")
+
+needs_compiler = pytest.mark.skipif(native_missing() is not None, reason=f"needs {native_missing()}")
+needs_zig = pytest.mark.skipif(find_spec("ziglang") is None, reason="needs ziglang")
+
+
+@needs_compiler
+def test_the_sources_compile_without_a_warning(
+    oscillator: Unit, player: Unit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("CC", "cc -Werror -Wpedantic -Wshadow")
+    for unit in (oscillator, player):
+        assert native_binaries(unit, native_sources(unit), GUID, [this_platform()])
+
+
+@needs_compiler
+def test_the_same_unit_gives_the_same_bytes(
+    oscillator: Unit, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    sources = native_sources(oscillator)
+    assert native_sources(oscillator) == sources
+    once = native_binaries(oscillator, sources, GUID, [this_platform()])
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    assert native_binaries(oscillator, sources, GUID, [this_platform()]) == once
+    (content,) = once.values()
+    assert str(tmp_path).encode() not in content
+
+
+@needs_compiler
+def test_only_fmi_is_visible(built: Callable[..., Path], oscillator: Unit) -> None:
+    if shutil.which("nm") is None:
+        pytest.skip("needs nm")
+    (path,) = built(oscillator).glob("binaries/*/oscillator*")
+    listed = subprocess.run(
+        ["nm", "-D", "--defined-only", str(path)], capture_output=True, text=True, check=True
+    )
+    names = {line.split()[-1] for line in listed.stdout.splitlines()}
+    assert all(name.startswith("fmi2") for name in names)
+    assert {"fmi2Instantiate", "fmi2DoStep", "fmi2GetReal", "fmi2SetFMUstate"} <= names
+
+
+def test_the_error_of_a_compiler_is_told(oscillator: Unit, monkeypatch: pytest.MonkeyPatch) -> None:
+    if native_missing() is not None:
+        pytest.skip(f"needs {native_missing()}")
+    sources = {**native_sources(oscillator), "sources/model.c": b"int broken = ;\n"}
+    with pytest.raises(FmuError) as error:
+        native_binaries(oscillator, sources, GUID, [this_platform()])
+    said = [str(one) for one in error.value.findings]
+    assert said[0] == f"unit oscillator: the C compiler failed for {this_platform()} (exit code 1)"
+    assert "model.c:1:14: error" in said[1]
+    monkeypatch.setenv("CC", "no-such-compiler")
+    only_casadi(monkeypatch)
+    with pytest.raises(FmuError) as error:
+        native_binaries(oscillator, native_sources(oscillator), GUID, [this_platform()])
+    assert str(error.value) == (
+        "unit oscillator: no native FMU can be built:"
+        " no C compiler is found (cc, or what the variable CC names),"
+        " and ziglang is not installed (pip install 'urmpipe[cross]')"
+    )
+
+
+def only_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Hide ziglang."""
+    monkeypatch.setattr(
+        "urmpipe_fmus.native.compile.find_spec", lambda name: None if name == "ziglang" else name
+    )
+
+
+def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+    assert native_missing(["amiga", "linux64"]) == ("platform amiga: zig is asked for linux64 and win64 only")
+    monkeypatch.setattr("urmpipe_fmus.native.compile.this_platform", lambda: "amiga")
+    monkeypatch.setattr("urmpipe_fmus.native.compile._system_compiler", lambda: None)
+    assert native_missing() == (
+        "no C compiler is found (cc, or what the variable CC names),"
+        " and platform amiga: zig is asked for linux64 and win64 only"
+    )
+    monkeypatch.undo()
+    only_casadi(monkeypatch)
+    assert native_missing(["linux64", "win64"]) == "ziglang is not installed (pip install 'urmpipe[cross]')"
+    monkeypatch.setattr("urmpipe_fmus.native.compile.find_spec", lambda _: None)
+    assert native_missing() == "casadi is not installed (pip install 'urmpipe[native]')"
+
+
+def script(unit: Unit, count: int, seed: int) -> str:
+    """Random inputs and steps for the host, in hexadecimal: not all strtod round decimals alike."""
+    rng = np.random.default_rng(seed)
+    inputs = [k for k, (_, one) in enumerate(unit.scalars) if one.causality == "input" and one.type == "Real"]
+    seen = [k for k, (_, one) in enumerate(unit.scalars) if one.type == "Real"]
+    lines = []
+    for k in range(count):
+        values = (rng.normal(size=len(inputs)) * rng.choice([0.01, 1.0, 10.0])).tolist()
+        lines.append(
+            "set " + " ".join(f"{one} {value.hex()}" for one, value in zip(inputs, values, strict=True))
+        )
+        lines.append("get " + " ".join(map(str, seen)))
+        lines.append(f"step {(k * 0.01).hex()} {(0.01).hex()}")
+        if k % 10 == 9:
+            lines.append("state")
+    return "\n".join(lines) + "\n"
+
+
+def headers() -> str:
+    import fmpy
+
+    return str(Path(fmpy.__file__).parent / "c-code")
+
+
+def host(folder: Path, command: Sequence[str], name: str = "host") -> str:
+    """Compile the host."""
+    program = str(folder / name)
+    subprocess.run(
+        [*command, "-O1", "-I", headers(), str(HOST), "-o", program], check=True, capture_output=True
+    )
+    return program
+
+
+def write(folder: Path, unit: Unit, platforms: Sequence[str]) -> None:
+    """Write sources and binaries of a unit."""
+    sources = native_sources(unit)
+    files = {**sources, "sources/guid.h": guid_header(GUID)}
+    files |= native_binaries(unit, sources, GUID, platforms) if platforms else {}
+    if unit.table is not None:
+        files[TABLE_FILE] = table_bytes(unit.table)
+    for name, content in files.items():
+        (folder / name).parent.mkdir(parents=True, exist_ok=True)
+        (folder / name).write_bytes(content)
+
+
+def ran(command: Sequence[str], folder: Path, given: str, resources: str = "") -> list[str]:
+    """What the host prints."""
+    environment = {**os.environ, "WINEDEBUG": "-all", "ASAN_OPTIONS": "detect_leaks=1"}
+    place = resources or (folder / "resources").as_uri()
+    done = subprocess.run(
+        [*command, GUID, place], input=given, capture_output=True, text=True, env=environment, check=False
+    )
+    assert done.returncode == 0, done.stdout[-2000:] + done.stderr[-4000:]
+    return done.stdout.splitlines()
+
+
+@pytest.fixture
+def elementary() -> Unit:
+    """A unit with the elementary functions that a C library computes in its own way."""
+    ones = ("sin", "cos", "tan", "arctan", "tanh", "arcsinh")
+    damped = ("exp", "expm1", "sinh", "cosh")
+
+    def outputs(v: Any) -> dict[str, Any]:
+        small = np.tanh(v.x)
+        far = 1.0 + np.abs(v.x)
+        found = {name: getattr(np, name)(v.x) for name in ones}
+        found |= {name: getattr(np, name)(-np.abs(v.x)) for name in damped}
+        found |= {name: getattr(np, name)(small) for name in ("arcsin", "arccos")}
+        found |= {"log": np.log(far), "log1p": np.log1p(small * 0.5), "arccosh": np.arccosh(far)}
+        found |= {"hypot": np.hypot(v.x, v.y), "arctan2": np.arctan2(v.y, v.x)}
+        return found | {
+            "arctanh": np.arctanh(small * 0.5),
+            "cube": v.x**3,
+            "power": far**v.y,
+            "root": np.sqrt(far),
+        }
+
+    names = outputs(type("Given", (), {"x": 0.5, "y": 0.5}))
+    return Unit(
+        name="elementary",
+        description="",
+        variables=(
+            *(Input(name=name, description="", start=0.5) for name in "xy"),
+            *(Output(name=f"np_{name}", description="") for name in names),
+        ),
+        outputs=lambda v: {f"np_{name}": value for name, value in outputs(v).items()},
+    )
+
+
+@pytest.mark.slow
+@needs_zig
+def test_windows_and_linux_give_the_same_bits(
+    elementary: Unit, oscillator: Unit, player: Unit, tmp_path: Path
+) -> None:
+    if shutil.which("wine") is None or sys.platform != "linux":
+        pytest.skip("needs wine")
+    zig = [sys.executable, "-m", "ziglang", "cc", "-target"]
+    linux = host(tmp_path, [*zig, TARGETS["linux64"]])
+    windows = host(tmp_path, [*zig, TARGETS["win64"]], "host.exe")
+    arm = make_unit("kinematic_chain", robot=load_robot("urm6"), rates=True)
+    for unit in (
+        elementary,
+        oscillator,
+        player,
+        arm,
+        make_unit("dc_drive"),
+        make_unit("repolarizer", joints=6),
+    ):
+        folder = tmp_path / f"a {unit.name} \u00fc"
+        write(folder, unit, ["linux64", "win64"])
+        given = script(unit, 1000, 1)
+        resources = (folder / "resources").as_uri()
+        on_linux = ran([linux, str(folder / f"binaries/linux64/{unit.name}.so")], folder, given, resources)
+        # wine's drive Z: is the root of the file system
+        local = resources.replace("file:///", "file:///Z:/")
+        library = folder / f"binaries/win64/{unit.name}.dll"
+        (tmp_path / "unit.dll").write_bytes(library.read_bytes())
+        on_windows = ran(["wine", windows, str(tmp_path / "unit.dll")], folder, given, local)
+        assert len(on_linux) == 3100
+        assert [a for a, b in zip(on_linux, on_windows, strict=True) if a != b] == []
+
+
+@pytest.mark.slow
+@needs_zig
+def test_cross_compiled_binaries_are_the_same_bytes_in_any_folder(
+    oscillator: Unit, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    sources = native_sources(oscillator)
+    once = native_binaries(oscillator, sources, GUID, ["linux64", "win64"])
+    assert sorted(once) == ["binaries/linux64/oscillator.so", "binaries/win64/oscillator.dll"]
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setenv("ZIG_LOCAL_CACHE_DIR", str(tmp_path / "cache"))
+    assert native_binaries(oscillator, sources, GUID, ["linux64", "win64"]) == once
+
+
+@pytest.mark.slow
+@needs_zig
+def test_zig_compiles_for_this_platform_where_there_is_no_other_compiler(
+    player: Unit, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    if this_platform() not in TARGETS:
+        pytest.skip("needs a platform that zig compiles for")
+    monkeypatch.setenv("CC", "no-such-compiler")
+    sources = native_sources(player)
+    (one,) = native_binaries(player, sources, GUID, [this_platform()]).values()
+    monkeypatch.delenv("CC")
+    assert (
+        native_binaries(player, sources, GUID, sorted(TARGETS))[
+            f"binaries/{this_platform()}/player{SUFFIXES.get(this_platform(), '.so')}"
+        ]
+        == one
+    )
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_sanitizers_find_nothing(oscillator: Unit, player: Unit, elementary: Unit, tmp_path: Path) -> None:
+    sanitized = ["cc", "-g", "-fsanitize=address,undefined", "-fno-sanitize-recover=all"]
+    program = host(tmp_path, [*sanitized, "-ldl"])
+    for unit in (oscillator, player, elementary):
+        folder = tmp_path / unit.name
+        write(folder, unit, [])
+        library = folder / "unit.so"
+        c_files = [str(one) for one in sorted((folder / "sources").glob("*.c"))]
+        subprocess.run([*sanitized, "-shared", "-fPIC", "-o", str(library), *c_files, "-lm"], check=True)
+        wrong = "set 0 nan\nset 99999 1.0\nget 4000000000\nstep nan 1\nstep 1 -1\nstep 0 1e300\n"
+        seen = ran([program, str(library)], folder, script(unit, 100, 2) + wrong)
+        assert sum(line == "state 0 1" for line in seen) == 10
+        assert sum(line.startswith("log 3 unit") for line in seen) >= 5
+
+
+@pytest.mark.slow
+@needs_compiler
+def test_a_host_in_c_sees_what_python_sees(oscillator: Unit, tmp_path: Path) -> None:
+    write(tmp_path, oscillator, [this_platform()])
+    program = host(tmp_path, ["cc"])
+    (library,) = tmp_path.glob("binaries/*/oscillator*")
+    seen = ran([program, str(library)], tmp_path, "set 2 3.5\nstep 0 0.05\nget 5 6 9\n")
+    instance = Instance(oscillator)
+    instance.set([2], [3.5])
+    instance.do_step(0.0, 0.05)
+    found = [struct.unpack(">d", bytes.fromhex(one))[0] for one in seen[-1].split()[2:]]
+    # C's math library and NumPy's differ by some units in the last place
+    np.testing.assert_allclose(found, instance.get([5, 6, 9]), rtol=1e-13)

@@ -1,0 +1,189 @@
+"""The drive as a unit: its integrator against SciPy's, its balance of energy, what an instance refuses."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+from scipy.integrate import solve_ivp
+
+from urmpipe_fmus.dependencies import Dependencies
+from urmpipe_fmus.instance import Instance
+from urmpipe_fmus.run import run
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.values import Values
+from urmpipe_fmus.variable import State
+from urmpipe_models.errors import UnitError
+
+FloatArray = NDArray[np.float64]
+
+K, DAMPING, RATIO, C, R, L, I1 = 2500.0, 5.0, 100.0, 0.05, 0.5, 1e-3, 0.5
+"""The parameters at their start values, written out: what is tested computes nothing for its own oracle."""
+
+STEP = 0.04
+HALVINGS = [2e-3 / 2**n for n in range(5)]
+BEGIN = {"theta1": 0.02, "omega1": -0.5, "i_a": 3.0, "u": 24.0, "theta2": 0.01, "omega2": 0.3}
+
+
+def instance_of(unit: Unit, values: Mapping[str, float]) -> Instance:
+    instance = Instance(unit)
+    instance.set([instance.reference(name) for name in values], list(values.values()))
+    return instance
+
+
+def read(instance: Instance, *names: str) -> FloatArray:
+    return np.array(instance.get([instance.reference(name) for name in names]))
+
+
+def orders(errors: list[float]) -> FloatArray:
+    """Return by which power of the internal step errors fall, from halving to halving."""
+    return np.asarray(-np.diff(np.log2(errors)))
+
+
+def by_scipy(values: Mapping[str, float], duration: float) -> FloatArray:
+    """Return theta1, omega1, i_a after a time with the inputs held: eq. 14-18 written out."""
+    u, theta2, omega2 = values["u"], values["theta2"], values["omega2"]
+
+    def rates(_: float, x: FloatArray) -> list[float]:
+        theta1, omega1, current = x
+        torque = K * (theta1 - theta2) + DAMPING * (omega1 - omega2)
+        return [omega1, (RATIO * C * current - torque) / I1, (u - C * RATIO * omega1 - R * current) / L]
+
+    start = [values["theta1"], values["omega1"], values["i_a"]]
+    found = solve_ivp(rates, (0.0, duration), start, method="DOP853", rtol=1e-12, atol=1e-14)
+    return np.asarray(found.y[:, -1])
+
+
+def test_the_error_against_scipy_falls_with_the_fourth_power_of_the_internal_step() -> None:
+    expected = by_scipy(BEGIN, STEP)
+    size = np.abs(expected).max()
+    errors = []
+    for internal_step in HALVINGS:
+        instance = instance_of(make_unit("dc_drive"), BEGIN | {"internal_step": internal_step})
+        instance.do_step(0.0, STEP)
+        errors.append(float(np.abs(read(instance, "theta1", "omega1", "i_a") - expected).max() / size))
+    assert (orders(errors)[1:] > 3.8).all(), errors
+    assert (orders(errors)[1:] < 4.2).all(), errors
+
+
+def test_with_small_internal_steps_it_agrees_with_scipy_to_one_in_a_billion() -> None:
+    expected = by_scipy(BEGIN, STEP)
+    instance = instance_of(make_unit("dc_drive"), BEGIN | {"internal_step": 2e-5})
+    instance.do_step(0.0, STEP)
+    np.testing.assert_allclose(read(instance, "theta1", "omega1", "i_a"), expected, rtol=1e-9, atol=0.0)
+
+
+def load_motion(t: Any) -> tuple[Any, Any]:
+    """Return angle and rate of a driven element that is moved from outside."""
+    return 0.05 * np.sin(40.0 * t), 2.0 * np.cos(40.0 * t)
+
+
+POWERS = ("electrical", "joule", "shaft", "work")
+
+
+def with_powers(unit: Unit) -> Unit:
+    """Return a drive whose load moves on its own within a step, and that integrates its powers as well."""
+
+    def moving(v: Values) -> Values:
+        theta2, omega2 = load_motion(v.time)
+        names = [one.name for one in unit.given]
+        return Values(
+            v.time, {name: getattr(v, name) for name in names} | {"theta2": theta2, "omega2": omega2}
+        )
+
+    def derivatives(given: Values) -> dict[str, Any]:
+        assert unit.derivatives is not None and unit.outputs is not None
+        v = moving(given)
+        powers = {
+            "electrical": v.u * v.i_a,
+            "joule": v.R * v.i_a**2,
+            "shaft": v.l * (v.omega1 - v.omega2) ** 2,
+            "work": unit.outputs(v)["Mk"] * v.omega2,
+        }
+        return {**unit.derivatives(v), **powers}
+
+    works = tuple(State(name=name, description="Work", unit="J") for name in POWERS)
+    return replace(unit, variables=(*unit.variables, *works), derivatives=derivatives)
+
+
+def stored(instance: Instance, time: float) -> float:
+    """Return the drive's kinetic, elastic and magnetic energy in [J]."""
+    theta1, omega1, current = read(instance, "theta1", "omega1", "i_a")
+    twist = theta1 - load_motion(time)[0]
+    return float(0.5 * I1 * omega1**2 + 0.5 * K * twist**2 + 0.5 * L * current**2)
+
+
+def test_the_energy_balance_closes_with_the_fourth_power_of_the_internal_step() -> None:
+    unit = with_powers(make_unit("dc_drive"))
+    open_by = []
+    for internal_step in HALVINGS:
+        instance = instance_of(unit, BEGIN | {"internal_step": internal_step})
+        before = stored(instance, 0.0)
+        instance.do_step(0.0, STEP)
+        electrical, joule, shaft, work = read(instance, *POWERS)
+        assert min(electrical, joule, shaft, abs(work)) > 0.01  # no term is there for show, of up to 30 J
+        gained = stored(instance, STEP) - before
+        open_by.append(abs(electrical - joule - shaft - work - gained) / electrical)
+    assert open_by[-1] < 1e-7  # at 0.125 ms; the order below says how to get less
+    assert orders(open_by)[1:] == pytest.approx(4.0, abs=0.2), open_by
+
+
+def test_at_its_default_internal_step_a_controllers_period_is_exact_to_parts_in_a_hundred_thousand() -> None:
+    instance = instance_of(make_unit("dc_drive"), BEGIN)
+    instance.do_step(0.0, 5e-3)
+    found, expected = read(instance, "theta1", "omega1", "i_a"), by_scipy(BEGIN, 5e-3)
+    # In a step of 0.5 ms RK4 leaves (h R / L)^5 / 120 = 8e-6 of the current's own mode out.
+    np.testing.assert_allclose(found, expected, rtol=2e-5, atol=0.0)
+
+
+def test_the_torque_follows_the_driven_end_at_once_and_nothing_else_does() -> None:
+    found = Dependencies(make_unit("dc_drive"))
+    inputs = {"u", "theta2", "omega2"}
+    assert found.outputs["Mk"] & inputs == {"theta2", "omega2"}
+    assert found.outputs["alpha1"] & inputs == {"theta2", "omega2"}
+    assert found.derivatives["i_a"] & inputs == {"u"}
+    instance = instance_of(make_unit("dc_drive"), {"theta1": 0.3, "omega1": 2.0})
+    assert read(instance, "Mk")[0] == pytest.approx(K * 0.3 + DAMPING * 2.0, rel=1e-15)
+    instance.set([instance.reference("theta2"), instance.reference("omega2")], [0.1, 1.0])
+    torque, acceleration = read(instance, "Mk", "alpha1")
+    assert torque == pytest.approx(K * 0.2 + DAMPING * 1.0, rel=1e-15)
+    assert acceleration == pytest.approx(-torque / I1, rel=1e-15)
+
+
+def test_over_a_log_the_inputs_are_held_from_sample_to_sample() -> None:
+    t = np.linspace(0.0, 4.0 * STEP, 5)
+    rng = np.random.default_rng(3)
+    inputs = {
+        "u": rng.uniform(-24, 24, 5),
+        "theta2": rng.uniform(-0.1, 0.1, 5),
+        "omega2": rng.uniform(-1, 1, 5),
+    }
+    found = run(make_unit("dc_drive"), t, inputs, {"internal_step": 5e-5})
+    state = np.zeros(3)
+    for k in range(4):
+        held = {name: float(column[k]) for name, column in inputs.items()}
+        state = by_scipy(held | dict(zip(("theta1", "omega1", "i_a"), state, strict=True)), STEP)
+        np.testing.assert_allclose([found[n][k + 1] for n in ("theta1", "omega1", "i_a")], state, rtol=1e-8)
+
+
+@pytest.mark.parametrize("name", ["k", "l", "i_p", "C", "R", "L", "I1"])
+def test_every_constant_must_be_above_0(name: str) -> None:
+    instance = Instance(make_unit("dc_drive"))
+    with pytest.raises(UnitError) as error:
+        instance.set([instance.reference(name)], [0.0])
+    assert str(error.value) == (f"unit dc_drive: {name}: found 0, allowed: 1.0000000000000001e-09 to inf")
+
+
+def test_a_step_that_diverges_is_refused_and_undone() -> None:
+    unit = make_unit("dc_drive")
+    instance = instance_of(unit, BEGIN | {"internal_step": 1.0, "L": 1e-9})
+    before = instance.save()
+    with pytest.raises(UnitError, match=r"unit dc_drive: state .* is not finite"):
+        instance.do_step(0.0, 100.0)
+    assert instance.save()[2] == before[2]
+    assert instance.time == 0.0

@@ -1,0 +1,89 @@
+"""A log and the deviation of a point as units."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from urmpipe_fmus.dependencies import TIME, Dependencies
+from urmpipe_fmus.run import run
+from urmpipe_fmus.table import Table
+from urmpipe_fmus.units.delta_meter import delta_meter
+from urmpipe_fmus.units.log_source import Column, log_source
+from urmpipe_models.errors import UnitError
+
+LOG = Table(
+    np.array([0, 5_000_000, 20_000_000]),
+    np.array([[1.0, -1.0, 10.0], [3.0, -2.0, 20.0], [0.0, 4.0, 50.0]]),
+)
+COLUMNS = (Column("q", "rad", 2, "Angles"), Column("d", "m"))
+
+
+def test_a_held_log_shows_each_row_until_the_next_and_its_ends_beyond_them() -> None:
+    t = np.array([-1.0, 0.0, 0.0049, 0.005, 0.0199, 0.02, 7.0])
+    found = run(log_source(LOG, COLUMNS), t)
+    assert found["d"].tolist() == [10.0, 10.0, 10.0, 20.0, 20.0, 50.0, 50.0]
+    assert found["q"].tolist() == [[1.0, -1.0]] * 3 + [[3.0, -2.0]] * 2 + [[0.0, 4.0]] * 2
+
+
+def test_an_interpolated_log_goes_straight_from_row_to_row_and_meets_each_bit_by_bit() -> None:
+    unit = log_source(LOG, COLUMNS, interpolate=True)
+    found = run(unit, np.array([-1.0, 0.0, 0.0025, 0.005, 0.01, 0.02, 7.0]))
+    assert found["d"].tolist() == [10.0, 10.0, 15.0, 20.0, 20.0 + (5e6 / 15e6) * 30.0, 50.0, 50.0]
+    t = LOG.t_ns / 1e9
+    assert np.array_equal(run(unit, t)["q"], LOG.values[:, :2])
+    inside = np.linspace(0.0, 0.02, 101, dtype=np.float64)
+    straight = np.interp(inside, t, LOG.values[:, 2])
+    np.testing.assert_allclose(run(unit, inside)["d"], straight, rtol=0.0, atol=1e-13)  # rounding of 50
+
+
+def test_the_columns_are_outputs_by_the_callers_names_that_depend_on_time() -> None:
+    unit = log_source(LOG, [["q", "rad", 2, "Angles"], ["d", "m"]])
+    assert [(one.name, one.unit, one.display_unit, one.size, one.description) for one in unit.computed] == [
+        ("q", "rad", "deg", 2, "Angles"),
+        ("d", "m", "", None, "Column d of the log"),
+    ]
+    assert Dependencies(unit).outputs == {"q[1]": {TIME}, "q[2]": {TIME}, "d": {TIME}}
+    assert unit.description == "A log of 3 rows, held"
+
+
+@pytest.mark.parametrize(
+    ("columns", "said"),
+    [
+        ([["q", "rad", 0]], "option columns: q: size: found 0, allowed: an integer, 1 or more"),
+        ([["q", "rad", 2]], "option columns: found 2 columns, allowed: 3 of the table"),
+        (
+            [["q", "rad", 3, "Angles", 5]],
+            "option columns: found ['q', 'rad', 3, 'Angles', 5], allowed: name, unit, size and description",
+        ),
+        ([["q", "rad", 2], ["q", "m"]], "q: found twice, allowed: each name once"),
+    ],
+)
+def test_columns_that_do_not_fit_are_refused(columns: list[list[Any]], said: str) -> None:
+    with pytest.raises(UnitError) as error:
+        log_source(LOG, columns)
+    assert str(error.value) == f"unit log_source: {said}"
+
+
+def test_the_deviation_is_reference_less_actual_and_its_flag_is_of_each_axis() -> None:
+    reference = np.array([[1.0, 2.0, 3.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0], [0.003, 0.003, -0.003]])
+    actual = np.array([[0.5, 3.0, 3.0], [0.0, 0.0035, 0.0], [0.0, 0.0036, 0.0], [0.0, 0.0, 0.0]])
+    t = np.linspace(0.0, 1.0, 4, dtype=np.float64)
+    found = run(delta_meter(), t, {"reference": reference, "actual": actual})
+    assert np.array_equal(found["delta"], reference - actual)
+    np.testing.assert_allclose(found["norm"], np.linalg.norm(reference - actual, axis=1), rtol=1e-15)
+    assert found["out_of_tolerance"].tolist() == [
+        1.0,
+        0.0,
+        1.0,
+        0.0,
+    ]  # 3.5 mm is allowed; the norm is not asked
+    wide = run(delta_meter(), t, {"reference": reference, "actual": actual}, {"tolerance": 1.0})
+    assert wide["out_of_tolerance"].tolist() == [0.0] * 4
+
+
+def test_a_negative_tolerance_is_refused() -> None:
+    with pytest.raises(UnitError, match=r"^unit delta_meter: tolerance: found -0.001, allowed: 0 to inf$"):
+        run(delta_meter(), np.array([0.0]), {}, {"tolerance": -0.001})
