@@ -30,7 +30,7 @@ PACKAGES = ("urmpipe_fmus", "urmpipe_models", "urmpipe_datasets")
 SUFFIXES = (".py", ".c", ".h", ".jinja", ".toml", ".urdf")
 """Files of those packages that may go into an FMU."""
 
-DISTRIBUTIONS = ("urmpipe", "numpy", "casadi", "fmpy", "pythonfmu")
+DISTRIBUTIONS = ("urmpipe", "numpy", "casadi", "fmpy", "pythonfmu", "ziglang")
 
 
 def cache_folder() -> Path:
