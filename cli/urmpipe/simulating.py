@@ -18,6 +18,7 @@ from urmpipe.simulation_result import check_meters, simulation_of
 from urmpipe.system_blocks import Blocks
 from urmpipe_fmus.cosim import load_system, prepare, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
+from urmpipe_fmus.cosim.process import Worker
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.outputs import DRAWING_HEADER, OutputKind, guarded_output
 from urmpipe_pipeline.recording import record
@@ -70,6 +71,7 @@ def simulate(
     running, writing = _halves(progress)
     with ExitStack() as stack:
         drawing = None if draw is None else stack.enter_context(guarded_output(Path(draw), kept, "drawing"))
+        worker = stack.enter_context(Worker())  # it loads what it needs meanwhile
 
         def make() -> Simulation:
             """Return the simulation; draw it before it is run."""
@@ -79,7 +81,7 @@ def simulate(
             svg = system_svg(plan)
             if drawing is not None:
                 _write_drawing(drawing, svg)
-            return simulation_of(plan, run_plan(plan, progress=running), blocks, svg)
+            return simulation_of(plan, run_plan(plan, progress=running, worker=worker), blocks, svg)
 
         return make() if output is None else record(lambda early: make(), Path(output), kept, writing)
 

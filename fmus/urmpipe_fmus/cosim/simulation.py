@@ -8,9 +8,6 @@ import mmap
 import os
 import pickle
 import signal
-import subprocess
-import sys
-import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -33,11 +30,9 @@ from urmpipe_fmus.cosim.job import (
     called,
 )
 from urmpipe_fmus.cosim.plan import Plan
+from urmpipe_fmus.cosim.process import Worker
 from urmpipe_fmus.cosim.system import Port
 from urmpipe_models.errors import CosimulationError, one_line
-
-POLL = 0.02
-"""How often the progress is looked at, in [s]."""
 
 LAST_LINES = 5
 """So many of a block's last log lines are told with an error."""
@@ -82,12 +77,16 @@ class Recorded:
         return self.values[:, self.names.index(port)]
 
 
-def simulate(plan: Plan, *, progress: Callable[[float], None] | None = None) -> Recorded:
+def simulate(
+    plan: Plan, *, progress: Callable[[float], None] | None = None, worker: Worker | None = None
+) -> Recorded:
     """Run a system in a process of its own: an FMU that crashes does not take this one with it.
 
     Args:
         plan: The system.
         progress: Called now and then with the share that is done, 0 to 1.
+        worker: The process, started before the plan was made; by default one that is started now. It does
+            one job.
 
     Returns:
         What was recorded, and why it failed if it did.
@@ -95,19 +94,27 @@ def simulate(plan: Plan, *, progress: Callable[[float], None] | None = None) -> 
     Raises:
         CosimulationError: If there is no room to record, or the run could not be started.
     """
-    with tempfile.TemporaryDirectory(prefix="urmpipe-", ignore_cleanup_errors=True) as name:
-        folder = Path(name)
-        assembly = Assembly(plan)
-        job = assembly.job(_unpacked(plan, folder))
-        _lay_out(job, folder)
-        with (folder / PROGRESS).open("r+b") as file:
-            shared = mmap.mmap(file.fileno(), ctypes.sizeof(Progress))
-        try:
-            code = _work(folder, job, shared, progress)
-            state = Progress.from_buffer_copy(shared)
-        finally:
-            shared.close()
-        return _recorded(plan, assembly, job, folder, state, code)
+    if worker is None:
+        with Worker() as started:
+            return simulate(plan, progress=progress, worker=started)
+    folder = worker.folder
+    assembly = Assembly(plan)
+    job = assembly.job(_unpacked(plan, folder))
+    _lay_out(job, folder)
+    with (folder / PROGRESS).open("r+b") as file:
+        shared = mmap.mmap(file.fileno(), ctypes.sizeof(Progress))
+
+    def tell() -> None:
+        """Tell the share that is done."""
+        if progress is not None:
+            progress(Progress.from_buffer_copy(shared).k / job.count)
+
+    try:
+        code = worker.work(tell)
+        state = Progress.from_buffer_copy(shared)
+    finally:
+        shared.close()
+    return _recorded(plan, assembly, job, folder, state, code)
 
 
 def _unpacked(plan: Plan, folder: Path) -> dict[str, Path]:
@@ -147,28 +154,6 @@ def _lay_out(job: Job, folder: Path) -> None:
             f"found no room for {size / 1e6:.0f} MB of {job.rows} samples in {folder.parent}; a larger"
             " system.record_every records fewer"
         ) from error
-
-
-def _work(folder: Path, job: Job, shared: mmap.mmap, progress: Callable[[float], None] | None) -> int:
-    """Run the job in a process; return its exit code."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
-    command = [sys.executable, "-P", "-m", "urmpipe_fmus.cosim.worker", str(folder)]
-    with (
-        (folder / SAID).open("wb") as said,
-        subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT, env=environment
-        ) as process,
-    ):
-        try:
-            while True:
-                try:
-                    return process.wait(POLL)
-                except subprocess.TimeoutExpired:
-                    if progress is not None:
-                        progress(Progress.from_buffer_copy(shared).k / job.count)
-        except BaseException:
-            process.kill()
-            raise
 
 
 def _recorded(

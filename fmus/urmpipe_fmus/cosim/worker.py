@@ -1,7 +1,7 @@
 """The process in which the FMUs of a system run: `python -m urmpipe_fmus.cosim.worker FOLDER`.
 
-An FMU may end its process, so it has one of its own. The folder holds the job; the run leaves there what it
-recorded, how far it came, what the FMUs logged, and how it ended.
+An FMU may end its process, so it has one of its own. It waits for a line on its input: the folder holds the
+job then, and the run leaves there what it recorded, how far it came, what the FMUs logged, and how it ended.
 """
 
 from __future__ import annotations
@@ -133,6 +133,10 @@ def end_with_parent(folder: Path) -> None:
 
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted too, and ends this process
-    end_with_parent(Path(sys.argv[1]))
-    work(Path(sys.argv[1]))
+    own = Path(sys.argv[1])
+    if not sys.stdin.buffer.readline():  # there is no job, nor will be
+        shutil.rmtree(own, ignore_errors=True)
+        os._exit(0)
+    end_with_parent(own)
+    work(own)
     os._exit(0)  # leaves the FMUs' libraries loaded: what they do when unloaded can no longer spoil the run

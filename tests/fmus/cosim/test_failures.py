@@ -15,6 +15,7 @@ import pytest
 
 from foreign_fmus import TROUBLE, Foreign, Scalar, fmu, gain, planned, ran, system
 from urmpipe_fmus.cosim import prepare, simulate
+from urmpipe_fmus.cosim.process import Worker
 
 WELL = "fmi2OK: trouble: all is well at 0.05 s"
 
@@ -180,3 +181,18 @@ def test_a_crash_at_the_end_does_not_hide_why_the_run_ended() -> None:
         "block a: fmi2FreeInstance at t = 0.2 s: ended the process: Segmentation fault (SIGSEGV); it logged"
         " nothing"
     )
+
+
+def test_a_process_that_waits_for_its_job_ends_without_one() -> None:
+    with Worker() as worker:
+        folder, process = worker.folder, worker._process
+        assert process.poll() is None
+    assert process.poll() is not None
+    assert not folder.exists()
+
+
+def test_a_process_that_ended_before_its_job_tells_by_its_exit_code() -> None:
+    with Worker() as worker:
+        worker._process.kill()
+        worker._process.wait()
+        assert worker.work(lambda: None) == -signal.SIGKILL
