@@ -7,9 +7,7 @@ import json
 import mmap
 import os
 import pickle
-import signal
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -34,6 +32,7 @@ from urmpipe_fmus.cosim.job import (
 )
 from urmpipe_fmus.cosim.plan import Plan
 from urmpipe_fmus.cosim.system import Port
+from urmpipe_fmus.fmu_process import command, ending, environment
 from urmpipe_models.errors import CosimulationError, one_line
 
 POLL = 0.02
@@ -151,12 +150,11 @@ def _lay_out(job: Job, folder: Path) -> None:
 
 def _work(folder: Path, job: Job, shared: mmap.mmap, progress: Callable[[float], None] | None) -> int:
     """Run the job in a process; return its exit code."""
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
-    command = [sys.executable, "-P", "-m", "urmpipe_fmus.cosim.worker", str(folder)]
+    started = command("urmpipe_fmus.cosim.worker", str(folder))
     with (
         (folder / SAID).open("wb") as said,
         subprocess.Popen(
-            command, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT, env=environment
+            started, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT, env=environment()
         ) as process,
     ):
         try:
@@ -218,7 +216,7 @@ def _failure(job: Job, folder: Path, state: Progress, result: dict[str, Any]) ->
 
 def _crash(job: Job, folder: Path, state: Progress, exit_code: int) -> str:
     """Return how a run failed that could not say so itself."""
-    how = _ending(exit_code)
+    how = ending(exit_code)
     if state.call == ELSEWHERE:
         return one_line(f"the process of the co-simulation {how}" + _quoted(_said(folder)[-LAST_LINES:]))
     return _told(job, folder, state, state.call, how)
@@ -231,17 +229,6 @@ def _told(job: Job, folder: Path, state: Progress, code: int, what: str) -> str:
     lines = [f"{status}: {text}" for block, status, text in _log(folder) if block == name]
     words = _quoted([*lines[-LAST_LINES:], *_said(folder)[-LAST_LINES:]])
     return one_line(f"block {name}: {function} at t = {state.k * job.step:.9g} s: {what}{words}")
-
-
-def _ending(exit_code: int) -> str:
-    """Return how a process ended, for people."""
-    if exit_code < 0:
-        try:
-            number = signal.Signals(-exit_code)
-        except ValueError:
-            return f"ended the process by signal {-exit_code}"
-        return f"ended the process: {signal.strsignal(number)} ({number.name})"
-    return f"ended the process with the exit code {exit_code if exit_code < 2**16 else hex(exit_code)}"
 
 
 def _quoted(lines: list[str]) -> str:
