@@ -27,7 +27,8 @@ from urmpipe_fmus.cosim import Plan, load_system, prepare
 from urmpipe_fmus.cosim.assembly import Assembly
 from urmpipe_fmus.cosim.job import ELSEWHERE, Progress
 from urmpipe_fmus.cosim.master import Master
-from urmpipe_fmus.cosim.worker import Log, callbacks_with
+from urmpipe_fmus.cosim.worker import Log
+from urmpipe_fmus.fmu_process import callbacks_with
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_models.catalogue import load_robot
@@ -195,7 +196,7 @@ def loops_of(plan: Plan, folder: Path) -> dict[str, Callable[[], object]]:
     }
     job = Assembly(plan).job(folders)
     progress = Progress(rows=0, k=0, call=ELSEWHERE)
-    callbacks = callbacks_with(Log(folder / "log.txt", job, progress))
+    callbacks = callbacks_with(Log(folder / "log.txt", job, progress).take)
     ours, theirs = np.zeros((job.rows, job.columns)), np.zeros((job.rows, job.columns))
     Master(job, progress, ours, callbacks).run()
     run_bare(job, theirs)

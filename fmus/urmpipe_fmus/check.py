@@ -4,10 +4,7 @@ from __future__ import annotations
 
 import json
 import math
-import os
-import signal
 import subprocess
-import sys
 import tempfile
 import zipfile
 import zlib
@@ -18,6 +15,8 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from urmpipe_fmus.check_run import CALL
+from urmpipe_fmus.fmu_process import command, ending, environment
+from urmpipe_fmus.native import this_platform
 from urmpipe_models.errors import Finding, FmuError
 
 STEPS = 20
@@ -107,11 +106,11 @@ def check_fmu(path: Path) -> Checked:
     problems = _validated(path)
     platforms = _platforms(path)
     start, step, steps = _experiment(described)
-    if _this_platform() in platforms:
+    if this_platform() in platforms:
         run = _run(path, described, (start, step, steps))
     else:
         found = ", ".join(platforms) or "no platform"
-        said = f"found binaries for {found}, allowed for a run here: {_this_platform()}; it was not run"
+        said = f"found binaries for {found}, allowed for a run here: {this_platform()}; it was not run"
         run = {"before": [], "after": [], "problems": [said]}
     return Checked(
         path=path,
@@ -184,13 +183,6 @@ def _platforms(path: Path) -> tuple[str, ...]:
     return tuple(sorted({one[1] for one in parts if len(one) == 3 and one[0] == "binaries"}))
 
 
-def _this_platform() -> str:
-    from fmpy import platform
-
-    name: str = platform
-    return name
-
-
 def _experiment(described: Any) -> tuple[float, float, int]:
     """Return start time and communication step in [s] of the default experiment, and a number of steps."""
     told = described.defaultExperiment
@@ -239,18 +231,16 @@ def _run(path: Path, described: Any, experiment: tuple[float, float, int]) -> di
         if whole:
             result = json.loads((folder / "result.json").read_text(encoding="utf-8"))
     if not whole:
-        ended = ended or "ended its process with exit code 0"
+        ended = ended or ending(0)
     return {**result, "problems": _problems(result, ended, log)}
 
 
 def _process(folder: Path) -> str:
     """Run the job of a folder; return how the process ended, empty if well."""
-    command = [sys.executable, "-m", "urmpipe_fmus.check_run", str(folder / "job.json")]
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
     try:
         done = subprocess.run(
-            command,
-            env=environment,
+            command("urmpipe_fmus.check_run", str(folder / "job.json")),
+            env=environment(),
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             stderr=subprocess.PIPE,
@@ -259,12 +249,8 @@ def _process(folder: Path) -> str:
         )
     except subprocess.TimeoutExpired:
         return f"did not return within {SECONDS:g} s"
-    if done.returncode < 0:
-        return f"ended its process: {signal.strsignal(-done.returncode) or -done.returncode}"
-    if done.returncode > 0:
-        said = done.stderr.decode("utf-8", "replace").strip().splitlines()
-        return ": ".join((f"ended its process with exit code {done.returncode}", *said[-1:]))
-    return ""
+    said = done.stderr.decode("utf-8", "replace").strip().splitlines() if done.returncode > 0 else []
+    return ": ".join((ending(done.returncode), *said[-1:])) if done.returncode else ""
 
 
 def _problems(result: Mapping[str, Any], ended: str, log: Sequence[str]) -> list[str]:

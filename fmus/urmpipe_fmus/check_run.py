@@ -15,6 +15,8 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
+from urmpipe_fmus.fmu_process import callbacks_with
+
 CALL = "call "
 """Begins the line of a call; other lines are what the FMU logged."""
 
@@ -69,18 +71,12 @@ class Checked:
 
     def _loaded(self) -> Any:
         """Load the library."""
-        from fmpy import calloc, fmi2, free
-        from fmpy.logging import addLoggerProxy
+        from fmpy.fmi2 import FMU2Slave
 
-        made = fmi2.fmi2CallbackFunctions()
-        made.logger = fmi2.fmi2CallbackLoggerTYPE(self._take)
-        made.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
-        made.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
-        addLoggerProxy(ctypes.byref(made))
-        self._callbacks = made
+        self._callbacks = callbacks_with(self._take)
         return self._called(
             "loading",
-            lambda: fmi2.FMU2Slave(
+            lambda: FMU2Slave(
                 guid=self._job["guid"],
                 unzipDirectory=self._job["folder"],
                 modelIdentifier=self._job["identifier"],

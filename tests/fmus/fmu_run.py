@@ -12,6 +12,7 @@ from typing import Any, Self
 import numpy as np
 from numpy.typing import NDArray
 
+from loaded_fmu import Loaded
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Variable
 
@@ -33,24 +34,14 @@ class FmuRun:
         self._index = {name: index for index, (name, _) in enumerate(unit.scalars)}
 
     def __enter__(self) -> Self:
-        from fmpy import extract, read_model_description
-        from fmpy.fmi2 import FMU2Slave
-
         self._folder = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
-        extract(str(self.path), self._folder.name)
-        described = read_model_description(self._folder.name)
-        self.fmu = FMU2Slave(
-            guid=described.guid,
-            unzipDirectory=self._folder.name,
-            modelIdentifier=described.coSimulation.modelIdentifier,
-            instanceName=self.unit.name,
-        )
-        self.fmu.instantiate()
-        self.fmu.setupExperiment(startTime=self.time)
-        self.put(self.start)
-        self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
+        self._loaded = Loaded(self.path, self.time, Path(self._folder.name), self._put_start)
         return self
+
+    def _put_start(self, loaded: Loaded) -> None:
+        """Set what is set before the initialization."""
+        self.fmu = loaded.fmu
+        self.put(self.start)
 
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
@@ -87,4 +78,5 @@ class FmuRun:
         return np.array(rows, dtype=np.float64)
 
     def _references(self, one: Variable) -> list[int]:
+        """Return the value references of a variable's elements."""
         return [self._index[name] for name in one.names]

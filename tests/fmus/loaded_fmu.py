@@ -1,8 +1,11 @@
-"""An FMU on FMPy's low-level calls, which writes down its log."""
+"""An FMU on FMPy's low-level calls, which writes down its log.
+
+It imports nothing of urmpipe: it also runs where there is none.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +21,22 @@ from fmpy.fmi2 import (
 
 
 class Loaded:
-    """An instance that is initialized; its variables by name."""
+    """An instance that is initialized; its variables by name.
 
-    def __init__(self, path: Path, start: float = 0.0, folder: Path | None = None) -> None:
+    Args:
+        path: The FMU.
+        start: Where it starts in [s].
+        folder: Where it is unpacked; by default in a folder of FMPy's choice.
+        before: Called with this before the initialization, to set start values.
+    """
+
+    def __init__(
+        self,
+        path: Path,
+        start: float = 0.0,
+        folder: Path | None = None,
+        before: Callable[[Loaded], None] = lambda _: None,
+    ) -> None:
         self.described = read_model_description(str(path))
         self.references = {one.name: one.valueReference for one in self.described.modelVariables}
         self.types = {one.name: one.type for one in self.described.modelVariables}
@@ -29,6 +45,7 @@ class Loaded:
         self.callbacks.logger = fmi2CallbackLoggerTYPE(self._take)
         self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
         self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
+        self._before = before
         self.fmu: Any = FMU2Slave(
             guid=self.described.guid,
             unzipDirectory=extract(str(path), unzipdir=None if folder is None else str(folder)),
@@ -38,28 +55,35 @@ class Loaded:
         self.begin(start)
 
     def begin(self, start: float) -> None:
+        """Make an instance, and initialize it."""
         self.fmu.instantiate(callbacks=self.callbacks, loggingOn=True)
         self.initialize(start)
 
     def initialize(self, start: float) -> None:
+        """Go from a new or reset instance to its first step."""
         self.fmu.setupExperiment(startTime=start)
+        self._before(self)
         self.fmu.enterInitializationMode()
         self.fmu.exitInitializationMode()
 
     def _take(self, _: Any, __: Any, status: int, category: bytes | None, text: bytes) -> None:
+        """Take a message of the FMU."""
         self.log.append((status, (category or b"").decode(), text.decode()))
 
     def get(self, names: Sequence[str]) -> list[Any]:
+        """Return the values of scalars, one call each."""
         return [getattr(self.fmu, f"get{self.types[one]}")([self.references[one]])[0] for one in names]
 
     def set(self, name: str, value: Any) -> None:
+        """Set a scalar."""
         getattr(self.fmu, f"set{self.types[name]}")([self.references[name]], [value])
 
     def do_step(self, time: float, step: float) -> None:
+        """Take a step from a time, both in [s]."""
         self.fmu.doStep(time, step)
 
     def status_of(self, function: str, *arguments: Any) -> int:
-        """The status that a call returns."""
+        """Return the status that a call returns."""
         try:
             getattr(self.fmu, function)(*arguments)
         except FMICallException as error:
@@ -67,5 +91,6 @@ class Loaded:
         return 0
 
     def free(self) -> None:
+        """Free the instance; the library stays, for another."""
         self.fmu.terminate()
         self.fmu.fmi2FreeInstance(self.fmu.component)

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 
 from fmu_run import FmuRun
 from random_units import PATIENT, random_columns, random_starts, random_units
+from sliding_arm import sliding_arm
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_missing
@@ -25,8 +26,6 @@ from urmpipe_fmus.units import make_unit, unit_names
 from urmpipe_fmus.user_unit import load_unit_file
 from urmpipe_fmus.variable import Variable
 from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain, Joint, Mimic
-from urmpipe_models.transform import from_offset
 
 FloatArray = NDArray[np.float64]
 Backend = Literal["native", "python"]
@@ -39,25 +38,6 @@ EXAMPLES = Path(__file__).resolve().parents[2] / "docs" / "examples"
 needs_native = pytest.mark.skipif(
     native_missing([]) is not None, reason=f"needs what builds native FMUs: {native_missing([])}"
 )
-
-
-def sliding_arm() -> Chain:
-    """Joints that turn, slide, follow and stand still, none of them on an axis of its frame."""
-    tilted = (0.6, 0.0, 0.8)
-    return Chain(
-        "slider",
-        (
-            Joint("turn", "revolute", from_offset((0.1, 0.2, 0.3, 0.4, 0.5, 0.6)), tilted),
-            Joint("slide", "prismatic", from_offset((0.0, 0.1, 0.0, -0.3, 0.2, 0.1)), (0.0, 0.8, -0.6)),
-            Joint("camera", "fixed", from_offset((0.1, 0.0, 0.0, 1.0, 0.0, 0.0))),
-            Joint("finger", "prismatic", from_offset((0.0, 0.0, 0.2)), mimic=Mimic("slide", -0.5, 0.1)),
-            Joint("wrist", "revolute", from_offset((0.3, 0.0, 0.0, 0.0, 1.2, 0.0)), (0.0, -1.0, 0.0)),
-        ),
-        tip=from_offset((0.0, 0.1, 0.2, 0.3, 0.0, 0.0)),
-        base=from_offset((1.0, 0.0, 0.5, 0.0, 0.0, 0.7)),
-        tool=from_offset((0.0, 0.0, 0.15, 0.1, 0.0, 0.0)),
-        start=(0.3, 0.2, -0.4),
-    )
 
 
 TABLE = Table(
@@ -216,7 +196,7 @@ CASES = random_units().flatmap(
 T = np.array([0.0, 0.01, 0.02, 0.05, 0.2])
 
 
-@settings(**PATIENT)
+@settings(max_examples=40, **PATIENT)  # most of the time goes into drawing a unit; those of core/ draw more
 @given(CASES)
 def test_a_random_unit_gives_stepped_what_a_run_gives(case: tuple[Unit, tuple[Any, Any]]) -> None:
     unit, (start, columns) = case

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import os
 import subprocess
-import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import suppress
@@ -12,6 +10,7 @@ from pathlib import Path
 from types import TracebackType
 
 from urmpipe_fmus.cosim.job import SAID
+from urmpipe_fmus.fmu_process import command, environment
 
 POLL = 0.02
 """How often it is looked at, in [s]."""
@@ -31,15 +30,13 @@ class Worker:
     def __enter__(self) -> Worker:
         self._folder = tempfile.TemporaryDirectory(prefix="urmpipe-", ignore_cleanup_errors=True)
         self.folder = Path(self._folder.name)
-        command = [sys.executable, "-P", "-m", "urmpipe_fmus.cosim.worker", str(self.folder)]
-        environment = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
         with (self.folder / SAID).open("wb") as said:
             self._process = subprocess.Popen(
-                command,
+                command("urmpipe_fmus.cosim.worker", str(self.folder)),
                 stdin=subprocess.PIPE,
                 stdout=said,
                 stderr=subprocess.STDOUT,
-                env=environment,
+                env=environment(),
                 bufsize=0,  # so that closing its input writes nothing to a process that has ended
             )
         return self

@@ -7,7 +7,6 @@ import json
 import mmap
 import os
 import pickle
-import signal
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,6 +31,7 @@ from urmpipe_fmus.cosim.job import (
 from urmpipe_fmus.cosim.plan import Plan
 from urmpipe_fmus.cosim.process import Worker
 from urmpipe_fmus.cosim.system import Port
+from urmpipe_fmus.fmu_process import ending
 from urmpipe_models.errors import CosimulationError, one_line
 
 LAST_LINES = 5
@@ -203,7 +203,7 @@ def _failure(job: Job, folder: Path, state: Progress, result: dict[str, Any]) ->
 
 def _crash(job: Job, folder: Path, state: Progress, exit_code: int) -> str:
     """Return how a run failed that could not say so itself."""
-    how = _ending(exit_code)
+    how = ending(exit_code)
     if state.call == ELSEWHERE:
         return one_line(f"the process of the co-simulation {how}" + _quoted(_said(folder)[-LAST_LINES:]))
     return _told(job, folder, state, state.call, how)
@@ -216,17 +216,6 @@ def _told(job: Job, folder: Path, state: Progress, code: int, what: str) -> str:
     lines = [f"{status}: {text}" for block, status, text in _log(folder) if block == name]
     words = _quoted([*lines[-LAST_LINES:], *_said(folder)[-LAST_LINES:]])
     return one_line(f"block {name}: {function} at t = {state.k * job.step:.9g} s: {what}{words}")
-
-
-def _ending(exit_code: int) -> str:
-    """Return how a process ended, for people."""
-    if exit_code < 0:
-        try:
-            number = signal.Signals(-exit_code)
-        except ValueError:
-            return f"ended the process by signal {-exit_code}"
-        return f"ended the process: {signal.strsignal(number)} ({number.name})"
-    return f"ended the process with the exit code {exit_code if exit_code < 2**16 else hex(exit_code)}"
 
 
 def _quoted(lines: list[str]) -> str:

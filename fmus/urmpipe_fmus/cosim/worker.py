@@ -18,14 +18,8 @@ import threading
 from pathlib import Path
 from typing import Any
 
+import fmpy.fmi2  # noqa: F401 - loaded while the job is prepared
 import numpy as np
-from fmpy import calloc, free
-from fmpy.fmi2 import (
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
 
 from urmpipe_fmus.cosim.job import (
     ELSEWHERE,
@@ -41,6 +35,7 @@ from urmpipe_fmus.cosim.job import (
 from urmpipe_fmus.cosim.loops import NoConvergence
 from urmpipe_fmus.cosim.master import Ended, Master
 from urmpipe_fmus.cosim.slave import FmuFailed, status_name
+from urmpipe_fmus.fmu_process import callbacks_with
 
 LOG_BYTES = 1_000_000
 """A log that is longer is begun anew; the one before is kept beside it."""
@@ -76,18 +71,6 @@ def _decoded(text: bytes | None) -> str:
     return (text or b"").decode("utf-8", errors="replace")
 
 
-def callbacks_with(log: Log) -> Any:
-    """Return the callbacks that are given to the FMUs."""
-    from fmpy.logging import addLoggerProxy
-
-    made = fmi2CallbackFunctions()
-    made.logger = fmi2CallbackLoggerTYPE(log.take)
-    made.allocateMemory = fmi2CallbackAllocateMemoryTYPE(calloc)
-    made.freeMemory = fmi2CallbackFreeMemoryTYPE(free)
-    addLoggerProxy(ctypes.byref(made))
-    return made
-
-
 def work(folder: Path) -> None:
     """Run the job of a folder, and write how it ended."""
     with (folder / JOB).open("rb") as file:
@@ -97,7 +80,7 @@ def work(folder: Path) -> None:
     with (folder / RECORDED).open("r+b") as file:
         recorded = np.frombuffer(mmap.mmap(file.fileno(), 0), np.float64).reshape(job.rows, -1)
     log = Log(folder / LOG, job, progress)
-    callbacks = callbacks_with(log)
+    callbacks = callbacks_with(log.take)
     master = Master(job, progress, recorded, callbacks)
     result: dict[str, Any] = {"failed": None, "code": ELSEWHERE, "notes": []}
     try:

@@ -80,7 +80,7 @@ def test_loops_are_the_parts_of_the_graph_that_lead_back_to_themselves(wiring: W
 
 
 def test_blocks_in_a_row_are_read_once_each_in_their_order_whatever_that_of_the_system() -> None:
-    names = [f"b{i}" for i in range(2000)]  # more than Python's recursion limit
+    names = [f"b{i}" for i in range(1200)]  # more than Python's recursion limit
     outputs = [Port(name, "y") for name in reversed(names)]
     depends = {port: [Port(port.block, "u")] for port in outputs}
     sources = {Port(b, "u"): Port(a, "y") for a, b in pairwise(names)}

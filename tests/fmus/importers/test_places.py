@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from loaded_fmu import Loaded
 from shipped_units import STEP, sample_times, shipped_unit
 from urmpipe_fmus.run import run
 
@@ -25,28 +26,15 @@ CASES = [(folder, "native") for folder in FOLDERS] + [
 def test_a_log_is_found_in_any_folder(
     folder: str, backend: str, fmu_of: Callable[..., Path], tmp_path: Path
 ) -> None:
-    from fmpy import extract, read_model_description
-    from fmpy.fmi2 import FMU2Slave
-
     place = tmp_path / folder
     place.mkdir()
-    unzipped = extract(str(fmu_of("log_source", backend)), unzipdir=str(place))
-    model = read_model_description(unzipped)
-    slave = FMU2Slave(
-        guid=model.guid, unzipDirectory=unzipped, instanceName="it",
-        modelIdentifier=model.coSimulation.modelIdentifier,
-    )  # fmt: skip
-    slave.instantiate()
-    slave.setupExperiment(startTime=0.0)
-    slave.enterInitializationMode()
-    slave.exitInitializationMode()
-    references = [one.valueReference for one in model.modelVariables if one.causality == "output"]
+    fmu = Loaded(fmu_of("log_source", backend), folder=place)
+    shown = [one.name for one in fmu.described.modelVariables if one.causality == "output"]
     found = []
     for k in range(10):
-        found.append(list(slave.getReal(references)))
-        slave.doStep(currentCommunicationPoint=k * STEP, communicationStepSize=STEP)
-    slave.terminate()
-    slave.freeInstance()
+        found.append(fmu.get(shown))
+        fmu.do_step(k * STEP, STEP)
+    fmu.free()
     expected = run(shipped_unit("log_source"), sample_times(10))
     # The rows of the table are what is read: no arithmetic.
     np.testing.assert_array_equal(found, np.column_stack(list(expected.values())))

@@ -144,10 +144,19 @@ def test_a_step_that_fails_is_told_with_the_last_lines_of_the_log(tmp_path: Path
 @pytest.mark.skipif(sys.platform == "win32", reason="needs signals")
 def test_an_fmu_that_ends_its_process_does_not_end_ours(tmp_path: Path) -> None:
     found = check_fmu(built(failing("os.abort()"), tmp_path))
-    assert found.problems == ("fmi2DoStep at 0.015 s ended its process: Aborted",)
+    assert found.problems == ("fmi2DoStep at 0.015 s ended the process: Aborted (SIGABRT)",)
     assert not found.ran
     found = check_fmu(built(failing("os._exit(3)"), tmp_path))
-    assert found.problems == ("fmi2DoStep at 0.015 s ended its process with exit code 3",)
+    assert found.problems == ("fmi2DoStep at 0.015 s ended the process with the exit code 3",)
+
+
+def test_files_of_the_working_folder_are_no_modules(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    path = built(make("arm"), tmp_path)
+    (tmp_path / "json.py").write_text("raise SystemExit(9)", encoding="ascii")
+    monkeypatch.chdir(tmp_path)
+    assert check_fmu(path).problems == ()
 
 
 def test_an_fmu_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -159,7 +168,7 @@ def test_an_fmu_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_an_fmu_that_ends_well_but_early_is_no_good_one(tmp_path: Path) -> None:
     found = check_fmu(built(failing("os._exit(0)"), tmp_path))
-    assert found.problems == ("fmi2DoStep at 0.015 s ended its process with exit code 0",)
+    assert found.problems == ("fmi2DoStep at 0.015 s ended the process with the exit code 0",)
 
 
 def test_a_wrong_guid_is_told_with_what_the_fmu_logged(make: Make, tmp_path: Path) -> None:

@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from sliding_arm import sliding_arm
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.units.kinematic_chain import kinematic_chain
 from urmpipe_models.catalogue import load_robot, robot_names
-from urmpipe_models.chain import Chain, Joint, Mimic
+from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import point_over_log, points_over_log, positions_over_log
 from urmpipe_models.transform import Transform, from_offset, from_rpy
 from urmpipe_models.urm import urm_chain, urm_geometry
@@ -27,26 +28,8 @@ ROUNDING = 1e-13
 """Some hundred operations on values of up to 20, in another order: each errs by 1e-16 of them."""
 
 
-def sliding() -> Chain:
-    """An arm whose second joint slides and whose fourth follows it."""
-    return Chain(
-        "slider",
-        (
-            Joint("turn", "revolute", from_offset((0.1, 0.2, 0.3, 0.4, 0.5, 0.6)), (0.6, 0.0, 0.8)),
-            Joint("slide", "prismatic", from_offset((0.0, 0.1, 0.0, -0.3, 0.2, 0.1)), (0.0, 0.8, -0.6)),
-            Joint("camera", "fixed", from_offset((0.1, 0.0, 0.0, 1.0, 0.0, 0.0))),
-            Joint("finger", "prismatic", from_offset((0.0, 0.0, 0.2)), mimic=Mimic("slide", -0.5, 0.1)),
-            Joint("wrist", "revolute", from_offset((0.3, 0.0, 0.0, 0.0, 1.2, 0.0)), (0.0, -1.0, 0.0)),
-        ),
-        tip=from_offset((0.0, 0.1, 0.2, 0.3, 0.0, 0.0)),
-        base=from_offset((1.0, 0.0, 0.5, 0.0, 0.0, 0.7)),
-        tool=from_offset((0.0, 0.0, 0.15, 0.1, 0.0, 0.0)),
-        start=(0.3, 0.2, -0.4),
-    )
-
-
 ROBOTS = {name: load_robot(name) for name in robot_names()} | {
-    "slider": sliding(),
+    "slider": sliding_arm(),
     "counter-rotating": urm_chain(
         "c", [0.3, 0.2, 0.1, 0.05], [0.4, 0.0, -0.5], directions=[1, -1, -1], start=[0.1, 0.2, 0.3]
     ).placed(from_offset((1.0, 2.0, 3.0, 0.1, 0.2, 0.3)), from_offset((0.0, 0.1, 0.2, 0.0, 0.0, 1.0))),
@@ -116,7 +99,7 @@ def test_lengths_and_tilts_are_tuned_while_it_runs() -> None:
 
 
 def test_the_frames_of_any_arm_are_tuned() -> None:
-    robot = sliding()
+    robot = sliding_arm()
     frames = {name: np.random.default_rng(k).uniform(-1.0, 1.0, 6) for k, name in enumerate(
         ["origin2", "origin5", "tip", "base", "tool"]
     )}  # fmt: skip
@@ -135,7 +118,7 @@ def test_the_frames_of_any_arm_are_tuned() -> None:
 
 
 def test_joints_that_turn_and_joints_that_slide_are_inputs_in_their_own_units() -> None:
-    unit = kinematic_chain(sliding(), rates=True)
+    unit = kinematic_chain(sliding_arm(), rates=True)
     assert [(one.name, one.unit, one.size, one.starts) for one in unit.inputs] == [
         ("phi", "rad", 2, (0.3, -0.4)),
         ("phid", "rad/s", 2, (0.0, 0.0)),

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Callable
+from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any, get_args
 
@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from same_results import assert_same
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison import Comparison
@@ -26,29 +27,6 @@ from urmpipe_pipeline.trajectory import AlignMode
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
-
-
-def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
-    """Hold two results against each other: arrays by dtype, shape and bits, the rest by value."""
-    if isinstance(wanted, np.ndarray):
-        assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape), place
-        assert found.tobytes() == wanted.tobytes(), place
-    elif is_dataclass(wanted) and not isinstance(wanted, type):
-        assert type(found) is type(wanted), place
-        for field in fields(wanted):
-            if field.name != "recording":  # where it stands: not a part of what is recorded
-                assert_same(getattr(found, field.name), getattr(wanted, field.name), f"{place}.{field.name}")
-    elif isinstance(wanted, Mapping):
-        assert list(found) == list(wanted), place
-        for key, value in wanted.items():
-            assert_same(found[key], value, f"{place}[{key!r}]")
-    elif isinstance(wanted, tuple):
-        assert isinstance(found, tuple), place
-        assert len(found) == len(wanted), place
-        for i, (one, other) in enumerate(zip(found, wanted, strict=True)):
-            assert_same(one, other, f"{place}[{i}]")
-    else:
-        assert found == wanted, place
 
 
 def round_trip(result: Result, folder: Path) -> Result:

@@ -5,10 +5,9 @@ from __future__ import annotations
 import json
 import subprocess
 import sys
-from collections.abc import Callable, Mapping
-from dataclasses import fields, is_dataclass, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
@@ -16,6 +15,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 
+from same_results import assert_same
 from urmpipe_models.errors import RecordingError
 from urmpipe_pipeline.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning, SourceFile
@@ -33,30 +33,6 @@ from urmpipe_pipeline.simulation import Setting, Signal, SimulatedBlock, Simulat
 
 MakeSimulation = Callable[..., Simulation]
 MakeRun = Callable[..., Run]
-
-
-def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
-    """Hold two results against each other: arrays by dtype, shape and bits, the rest by value."""
-    if isinstance(wanted, np.ndarray):
-        assert (found.dtype, found.shape) == (wanted.dtype, wanted.shape), place
-        assert found.tobytes() == wanted.tobytes(), place
-    elif is_dataclass(wanted) and not isinstance(wanted, type):
-        assert type(found) is type(wanted), place
-        for field in fields(wanted):
-            if field.name != "recording":
-                assert_same(getattr(found, field.name), getattr(wanted, field.name), f"{place}.{field.name}")
-    elif isinstance(wanted, Mapping):
-        assert list(found) == list(wanted), place
-        for key, value in wanted.items():
-            assert_same(found[key], value, f"{place}[{key!r}]")
-    elif isinstance(wanted, tuple):
-        assert len(found) == len(wanted), place
-        for i, (one, other) in enumerate(zip(found, wanted, strict=True)):
-            assert_same(one, other, f"{place}[{i}]")
-    elif isinstance(wanted, float) and np.isnan(wanted):
-        assert np.isnan(found), place
-    else:
-        assert found == wanted, place
 
 
 def assert_comes_back(simulation: Simulation, folder: Path) -> None:
