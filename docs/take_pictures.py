@@ -73,15 +73,18 @@ def of_page(source: Path, target: Path, width: int, height: int = 1000) -> list[
 
 
 def of_readme() -> list[str]:
-    """Run the demo and picture what it made, for the README."""
+    """Run the demo and a system of blocks, and picture what they made, for the README."""
     HERE.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         demo = Path(folder) / "demo"
         urmpipe = [sys.executable, "-m", "urmpipe"]
+        drives = Path(folder) / "six-drives.rrd"
         subprocess.run([*urmpipe, "demo", "-q", "-o", str(demo)], check=True)
+        subprocess.run([*urmpipe, "simulate", "six-drives", "-q", "-o", str(drives)], check=True)
         return [
             *of_recording(demo / "demo.rrd", HERE / "recording.png", None),
             *of_page(demo / "report.html", HERE / "report.png", 1280),
+            *of_recording(drives, HERE / "six-drives.png", 1.0),
         ]
 
 
