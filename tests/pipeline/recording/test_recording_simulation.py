@@ -196,6 +196,23 @@ def test_a_simulation_is_nothing_to_compare(make_simulation: MakeSimulation, tmp
     assert load_comparison(path) is None
 
 
+ODD = (
+    "a b", "a ", "a", " a", " ", "", "a/b", "a/", "/", "a%2Fb", "\\", "a\\", "a\\/b", "a\\ ", "..", "/**",
+    "a.b", "x[1]", "<b>", "a\n", "a\tb", "a\0", "a\u00a0", "\u202e", "\ud800", "\ud801", "?", "A", "$",
+)  # fmt: skip
+
+
+def test_odd_names_are_entities_of_their_own(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    """Also those that are one to Rerun, which drops a blank or a backslash at the end."""
+    simulation = make_simulation(3)
+    pairs = [pair for name in ODD for pair in ((name, "v"), ("b", name), (name, f"{name}2"))]
+    signals = [Signal(*pair, np.arange(3.0) + i) for i, pair in enumerate(pairs)]
+    arms = tuple(
+        replace(simulation.arms[0], block=name, q=simulation.arms[0].q + i) for i, name in enumerate(ODD)
+    )
+    assert_comes_back(replace(simulation, signals=tuple(signals), arms=arms, verdicts=()), tmp_path)
+
+
 NAMES = st.text(st.characters(exclude_categories=[]), max_size=8)
 NUMBERS = st.floats(allow_nan=False)
 
