@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -40,7 +41,8 @@ def simulation_plots(result: Simulation) -> View | Container:
     groups = groups_of(result)
     if not groups:
         return rrb.TextDocumentView(origin=SYSTEM_FILE, name="No signal was recorded")
-    views = [_plot(plots, result, group) for group in groups]
+    entities = signal_entities(result)
+    views = [_plot(plots, result, group, entities) for group in groups]
     if len(views) <= SEEN_AT_ONCE:
         return _grid(views)
     paired = list(zip(groups, views, strict=True))
@@ -53,7 +55,7 @@ def simulation_plots(result: Simulation) -> View | Container:
     return rrb.Tabs(*tabs, active_tab=opened)
 
 
-def _plot(plots: Plots, result: Simulation, group: Group) -> View | Container:
+def _plot(plots: Plots, result: Simulation, group: Group, entities: Mapping[str, str]) -> View | Container:
     """Return the plot of a group, with what is allowed where it is judged; of a long one two as tabs."""
     import rerun.blueprint as rrb
 
@@ -64,7 +66,7 @@ def _plot(plots: Plots, result: Simulation, group: Group) -> View | Container:
             f"{verdict_entities(result, 'tolerance')[number]}/**",
             verdict_entities(result, "marks/worst")[number],
         ]
-    views = plots.signals(group, signal_entities(result), len(result.t_ns), *beside)
+    views = plots.signals(group, entities, len(result.t_ns), *beside)
     return rrb.Tabs(*views, active_tab=0) if len(views) > 1 else views[0]
 
 
