@@ -168,7 +168,7 @@ def _document(store: Store) -> dict[str, Any]:
     try:
         document: dict[str, Any] = json.loads(store.metadata)
         version = document["layout_version"]
-        kind = document.get("kind")
+        kind = document.get("kind", "")
         newest, oldest = LAYOUTS.get(kind, max(LAYOUTS.values())), LAYOUTS.get(kind, LAYOUT_VERSION)
         newer, older = version > newest, version < oldest
     except (ValueError, KeyError, TypeError) as error:

@@ -34,7 +34,10 @@ def simulation_words() -> Container:
 
 
 def simulation_plots(result: Simulation) -> View | Container:
-    """Return the plots: all at once if they are few, else a tab a block, that of the worst meter open."""
+    """Return the plots: all at once if they are few, else a tab a block.
+
+    That of the worst meter is open; without one the last, to where the signals of most systems flow.
+    """
     import rerun.blueprint as rrb
 
     plots = Plots(result)
@@ -47,12 +50,13 @@ def simulation_plots(result: Simulation) -> View | Container:
         return _grid(views)
     paired = list(zip(groups, views, strict=True))
     tabs: list[Container] = []
-    opened = 0
+    judged = result.judged_worst
+    opened: int | None = None
     for block, some in groupby(paired, key=lambda pair: pair[0].block):
-        if result.judged_worst is not None and result.judged_worst.block == block:
+        if judged is not None and judged.block == block:
             opened = len(tabs)
         tabs.append(_grid([view for _, view in some], printable(block)))
-    return rrb.Tabs(*tabs, active_tab=opened)
+    return rrb.Tabs(*tabs, active_tab=len(tabs) - 1 if opened is None else opened)
 
 
 def _plot(plots: Plots, result: Simulation, group: Group, entities: Mapping[str, str]) -> View | Container:

@@ -15,6 +15,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from rerun import blueprint as rrb
 
 from urmpipe_models.errors import RecordingError
 from urmpipe_pipeline.delta_verdict import DeltaVerdict
@@ -22,8 +23,9 @@ from urmpipe_pipeline.joint_log import FloatArray, LogWarning, SourceFile
 from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, write_recording
-from urmpipe_pipeline.recording.layout import opening_time
+from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
 from urmpipe_pipeline.recording.scene import scene_of
+from urmpipe_pipeline.recording.simulation_layout import simulation_plots
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.viewer import opening_times
@@ -156,6 +158,28 @@ def test_the_viewer_opens_at_the_worst_sample(make_simulation: MakeSimulation, t
     assert opening_times([path]) == {path: 1_250_000_000}
     assert opening_time(replace(simulation, verdicts=())) == 0
     assert opening_time(make_simulation(0)) == 0
+    assert opening_time(make_simulation(0, failed="gone")) == 0
+    assert opening_time(make_simulation(37, failed="gone")) == 36 * 5_000_000  # where it failed
+
+
+def test_what_decides_is_open_else_what_stands_last(make_simulation: MakeSimulation) -> None:
+    simulation = make_simulation(5)
+    others = tuple(Signal(f"b{i}", f"v{i}", np.arange(5.0)) for i in range(8))
+    judged = simulation_plots(replace(simulation, signals=(*simulation.signals, *others)))
+    plain = simulation_plots(replace(simulation, signals=(*simulation.signals, *others), verdicts=()))
+    assert isinstance(judged, rrb.Tabs) and isinstance(plain, rrb.Tabs)
+    assert [list(tabs.contents)[int(str(tabs.active_tab))].name for tabs in (judged, plain)] == [
+        "meter",
+        "b7",
+    ]
+
+
+def test_words_stand_above_the_arm_and_else_beside_the_plots(make_simulation: MakeSimulation) -> None:
+    simulation = make_simulation(5)
+    for one, left in ((simulation, rrb.Vertical), (replace(simulation, arms=()), rrb.Tabs)):
+        root = viewer_layout(one, scene_of(one)).root_container
+        assert isinstance(root, rrb.Horizontal)
+        assert isinstance(next(iter(root.contents)), left)
 
 
 def test_the_first_arm_moves_and_the_tip_of_each_has_a_path(make_simulation: MakeSimulation) -> None:
