@@ -53,7 +53,8 @@ def report(
     """Write one self-contained HTML file about recordings that ingest, compare or simulate wrote.
 
     It needs no network: verdicts, figures, statistics, the audit of repolarizations, the drawing of a
-    simulated system, warnings and provenance are inside. --figures needs Chromium and: pip install 'urmpipe[figures]'.
+    simulated system, warnings and provenance are inside. --figures needs Chromium and: pip install
+    'urmpipe[figures]'.
 
     \b
     Examples:
