@@ -63,7 +63,7 @@ def refuse_foreign(files: Sequence[Path]) -> None:
     """Raise a `RecordingError` with all files that are there and are no recordings."""
     foreign = [path for path in files if path.exists() and not is_recording(path)]
     if foreign:
-        message = "found no recording of urmpipe, allowed: a .rrd that ingest or compare wrote"
+        message = "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"
         raise RecordingError(*(Finding(message, file=str(path)) for path in foreign))
 
 

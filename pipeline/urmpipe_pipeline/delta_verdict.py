@@ -97,7 +97,8 @@ def delta_verdict(
     _check(block, tolerance)
     if not len(t_ns):
         return None
-    sizes = np.column_stack((np.abs(delta), np.linalg.norm(delta, axis=1)))
+    x, y, z = np.abs(delta).T
+    sizes = np.column_stack((x, y, z, np.sqrt(x * x + y * y + z * z)))  # summed as the model does it
     held = [_allowed(axis, tolerance) for axis in AXES]
     allowed = np.array([math.inf if one is None else one for one in held])
     known = np.isfinite(sizes).all(axis=1)
@@ -120,12 +121,15 @@ def delta_verdict(
 def _worst(sizes: FloatArray, allowed: FloatArray) -> tuple[int, int]:
     """Return the sample and the column of the value that uses up most of what is allowed.
 
-    A sample without a value, whose sizes are infinite, is the worst of all.
+    Each column has its largest value; of several that use up infinitely much the larger one is worse. A
+    sample without a value, whose sizes are infinite, is the worst of all.
     """
     judged = np.flatnonzero(np.isfinite(allowed))
-    shares = _shares(sizes[:, judged], allowed[judged])
-    row, column = np.unravel_index(int(np.argmax(shares)), shares.shape)
-    return int(row), int(judged[column])
+    rows = np.argmax(sizes[:, judged], axis=0)
+    largest = sizes[rows, judged]
+    shares = _shares(largest, allowed[judged])
+    worst = int(np.argmax(np.where(np.isinf(shares), largest, 0.0) if np.isinf(shares).any() else shares))
+    return int(rows[worst]), int(judged[worst])
 
 
 def _shares(sizes: FloatArray, allowed: FloatArray) -> FloatArray:

@@ -296,7 +296,7 @@ def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
     assert run(["ingest", "good.csv", "--robot", "ur5e", "-q"]) == 0
     for baseline, found in (
         ("good.rrd", "found the recording of one log, allowed: that of a comparison (--baseline)"),
-        ("good.csv", "found no recording of urmpipe, allowed: a .rrd that ingest or compare wrote"),
+        ("good.csv", "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"),
         ("missing.rrd", "found no such file, allowed: a recording (.rrd) that urmpipe wrote"),
     ):
         assert compare("good.csv", "--baseline", baseline, "-q") == 2

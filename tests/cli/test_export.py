@@ -111,7 +111,8 @@ def test_a_comparison_leaves_too(urmpipe: RunCommand, comparison: Path, tmp_path
 
 def test_what_is_no_recording_is_refused(urmpipe: RunCommand, recording: Path) -> None:
     assert urmpipe("export", "log.csv", "--to", "csv").err == (
-        "error: log.csv: found no recording of urmpipe, allowed: a .rrd that ingest or compare wrote\n"
+        "error: log.csv: found no recording of urmpipe,"
+        " allowed: a .rrd that ingest, compare or simulate wrote\n"
     )
     assert urmpipe("export", "missing.rrd", "--to", "csv").err.startswith("error: missing.rrd: ")
     assert urmpipe("export", "log.rrd").err == (

@@ -41,6 +41,7 @@ def export(recording: Path, output: Path | None, as_json: bool, quiet: bool, **o
     not in a recording.
 
     A comparison leaves as its deviations; as TUM, reference and actual become two trajectories for evo. A
+    simulation leaves as its signals, each under BLOCK.VARIABLE with its unit; as TUM, the tip of each arm. A
     CSV carries no mark of whose it is, so an existing one is never replaced.
 
     \b
@@ -50,6 +51,7 @@ def export(recording: Path, output: Path | None, as_json: bool, quiet: bool, **o
       urmpipe export log.rrd -o log.mat
       urmpipe export log.rrd --to tum --tcp recorded
       urmpipe export log-against-path.rrd -o deviations.parquet --json
+      urmpipe export one-drive.rrd -o one-drive.csv
     """
     tune_pyarrow()
     from urmpipe import api

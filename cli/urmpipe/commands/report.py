@@ -50,10 +50,11 @@ def report(
     as_json: bool,
     quiet: bool,
 ) -> int:
-    """Write one self-contained HTML file about recordings that ingest or compare wrote.
+    """Write one self-contained HTML file about recordings that ingest, compare or simulate wrote.
 
-    It needs no network: verdicts, figures, statistics, the audit of repolarizations, warnings and
-    provenance are inside. --figures needs Chromium and: pip install 'urmpipe[figures]'.
+    It needs no network: verdicts, figures, statistics, the audit of repolarizations, the drawing of a
+    simulated system, warnings and provenance are inside. --figures needs Chromium and: pip install
+    'urmpipe[figures]'.
 
     \b
     Examples:

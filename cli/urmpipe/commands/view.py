@@ -14,7 +14,7 @@ from urmpipe import __version__
 @click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
 @click.version_option(__version__, prog_name="urmpipe")
 def view(recordings: tuple[Path, ...]) -> int:
-    """Open recordings that ingest or compare wrote in Rerun's viewer, each paused at its worst sample.
+    """Open recordings that urmpipe wrote in Rerun's viewer, each paused at its worst sample.
 
     Each opens in a window of its own; the command ends when all are closed, and Ctrl-C closes them. The
     viewer is the one that was installed with urmpipe; it needs no network and listens on 127.0.0.1 only.

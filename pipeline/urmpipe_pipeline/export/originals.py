@@ -46,11 +46,15 @@ def originals(values: FloatArray, column: LogColumn) -> FloatArray:
 
 
 def _rounded(numbers: FloatArray, size: FloatArray) -> FloatArray:
-    """Round to 15 significant digits of a size, so far as powers of ten are exact."""
+    """Round to 15 significant digits of a size, so far as powers of ten are exact.
+
+    Of 1e15 and more these stand before the point: there the double next to one of them is an integer, too.
+    """
     with np.errstate(divide="ignore", invalid="ignore"):
-        power = np.nan_to_num(DIGITS - 1 - np.floor(np.log10(size)), nan=0.0, posinf=0.0)
-    scale = 10.0 ** np.clip(power, 0, EXACT_POWER)
-    return np.where(numbers == 0.0, numbers, np.rint(numbers * scale) / scale)
+        power = np.nan_to_num(DIGITS - 1 - np.floor(np.log10(size)), nan=0.0, posinf=0.0, neginf=0.0)
+    scale, tens = (10.0 ** np.clip(one, 0, EXACT_POWER) for one in (power, -power))
+    with np.errstate(over="ignore"):
+        return np.where(numbers == 0.0, numbers, np.rint(numbers * scale / tens) * tens / scale)
 
 
 def _shortest(near: FloatArray, values: FloatArray, column: LogColumn) -> FloatArray:

@@ -25,6 +25,7 @@ What is there to be looked at only, and is not read back:
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -172,7 +173,7 @@ def places(names: Sequence[str]) -> list[Place]:
     """Return where the runs with these names stand: the first at the root."""
     keys: list[str] = []
     for name in names:
-        plain = printable(name) or "unnamed"
+        plain = entity_key(name)
         key, number = plain, 2
         while key in keys or key in RESERVED:
             key, number = f"{plain} ({number})", number + 1
@@ -183,6 +184,15 @@ def places(names: Sequence[str]) -> list[Place]:
 def places_of(result: Run | Comparison) -> list[Place]:
     """Return where the runs of a result stand."""
     return places([result.name] if isinstance(result, Run) else [one.name for one in result.runs])
+
+
+def entity_key(name: str) -> str:
+    """Return a name as a part of an entity path that Rerun finds again.
+
+    Its filters, by which arrays are read back and views choose what they show, drop blanks at the end of a
+    path, and take a backslash before a slash for the slash's own, escaped or not: names end before these.
+    """
+    return re.sub(r"[\s\\]+\Z", "", printable(name)) or "unnamed"
 
 
 def printable(text: str) -> str:

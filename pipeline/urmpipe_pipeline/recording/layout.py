@@ -50,7 +50,10 @@ def viewer_layout(result: Result, scene: Scene) -> Blueprint:
     import rerun.blueprint as rrb
 
     if isinstance(result, Simulation):
-        return _blueprint(simulation_words(), simulation_summary(result), simulation_plots(result), scene)
+        plots = simulation_plots(result)
+        if scene.empty:  # there are tables in the words, which are no wider than they must be
+            return _blueprint_of(rrb.Horizontal(simulation_words(), plots, column_shares=[1, 2]))
+        return _blueprint(simulation_words(), simulation_summary(result), plots, scene)
     right = _of_run(result) if isinstance(result, Run) else _of_comparison(result)
     return _blueprint(rrb.TextDocumentView(origin=SUMMARY, name="Summary"), summary(result), right, scene)
 
@@ -74,6 +77,13 @@ def _blueprint(text: View | Container, words: str, right: View | Container, scen
     if not scene.empty:
         left = rrb.Vertical(text, _scene_view(scene), row_shares=shares)
         root = rrb.Horizontal(left, right, column_shares=[1, 1])
+    return _blueprint_of(root)
+
+
+def _blueprint_of(root: Container) -> Blueprint:
+    """Return the views with the panels about them collapsed, on the timeline t."""
+    import rerun.blueprint as rrb
+
     return rrb.Blueprint(
         root,
         rrb.TimePanel(state="collapsed", timeline="t", play_state="paused"),
@@ -85,10 +95,14 @@ def _blueprint(text: View | Container, words: str, right: View | Container, scen
 
 
 def opening_time(result: Result) -> int:
-    """Return where the viewer should stand in [ns]: at the worst sample of what is open, else the first."""
+    """Return where the viewer should stand in [ns]: at the worst sample of what is open, else the first.
+
+    A simulation that failed opens where it ended.
+    """
     if isinstance(result, Simulation):
         worst = result.judged_worst.sample if result.judged_worst is not None else 0
-        return int(result.t_ns[worst]) if len(result.t_ns) else 0
+        shown = worst if result.failed is None else -1
+        return int(result.t_ns[shown]) if len(result.t_ns) else 0
     if isinstance(result, Run):
         return int(result.t_ns[0])
     open_first = result.ranking[-1]

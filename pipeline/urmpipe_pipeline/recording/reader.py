@@ -168,8 +168,9 @@ def _document(store: Store) -> dict[str, Any]:
     try:
         document: dict[str, Any] = json.loads(store.metadata)
         version = document["layout_version"]
-        newest, allowed = max(LAYOUTS.values()), LAYOUTS.get(document.get("kind", ""), LAYOUT_VERSION)
-        newer, older = version > newest, version < allowed
+        kind = document.get("kind", "")
+        newest, oldest = LAYOUTS.get(kind, max(LAYOUTS.values())), LAYOUTS.get(kind, LAYOUT_VERSION)
+        newer, older = version > newest, version < oldest
     except (ValueError, KeyError, TypeError) as error:
         raise _damaged(store, error) from error
     if newer:
@@ -178,7 +179,7 @@ def _document(store: Store) -> dict[str, Any]:
         )
     if older:
         raise store.error(
-            f"found layout version {version}, allowed: {allowed}; an older urmpipe wrote it:"
+            f"found layout version {version}, allowed: {oldest}; an older urmpipe wrote it:"
             " make it again from its log"
         )
     return document

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.recording.entities import Block, entity_path, places, printable
+from urmpipe_pipeline.recording.entities import Block, entity_key, entity_path, places, printable
 from urmpipe_pipeline.signal_groups import groups_of
 from urmpipe_pipeline.simulation import Simulation
 
@@ -29,10 +29,10 @@ def signal_entities(simulation: Simulation) -> dict[str, str]:
     found: dict[str, str] = {}
     taken: set[str] = set()
     for one in simulation.signals:
-        variable, number = _key(one.variable), 2
-        entity = entity_path("signals", _key(one.block), variable)
+        block, variable, number = entity_key(one.block), entity_key(one.variable), 2
+        entity = entity_path("signals", block, variable)
         while entity in taken:
-            entity, number = entity_path("signals", _key(one.block), f"{variable} ({number})"), number + 1
+            entity, number = entity_path("signals", block, f"{variable} ({number})"), number + 1
         taken.add(entity)
         found[one.name] = entity
     return found
@@ -50,7 +50,7 @@ def arm_entities(simulation: Simulation) -> list[str]:
 
 def verdict_entities(simulation: Simulation, root: str) -> list[str]:
     """Return an entity a verdict below a root, such as tolerance or marks/worst."""
-    keys = text.unique([_key(one.block) for one in simulation.verdicts])
+    keys = text.unique([entity_key(one.block) for one in simulation.verdicts])
     return [entity_path(*root.split("/"), key) for key in keys]
 
 
@@ -69,7 +69,3 @@ def simulation_blocks(simulation: Simulation) -> list[Block]:
         names = tuple(printable(name) for name in arm.chain.coordinates)
         found.append(Block(entity, t_ns, arm.q, "joints", names, samples))
     return found
-
-
-def _key(name: str) -> str:
-    return printable(name) or "unnamed"

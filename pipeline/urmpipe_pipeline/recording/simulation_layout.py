@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from itertools import groupby
 from typing import TYPE_CHECKING
 
@@ -33,27 +34,32 @@ def simulation_words() -> Container:
 
 
 def simulation_plots(result: Simulation) -> View | Container:
-    """Return the plots: all at once if they are few, else a tab a block, that of the worst meter open."""
+    """Return the plots: all at once if they are few, else a tab a block.
+
+    That of the worst meter is open; without one the last, to where the signals of most systems flow.
+    """
     import rerun.blueprint as rrb
 
     plots = Plots(result)
     groups = groups_of(result)
     if not groups:
         return rrb.TextDocumentView(origin=SYSTEM_FILE, name="No signal was recorded")
-    views = [_plot(plots, result, group) for group in groups]
+    entities = signal_entities(result)
+    views = [_plot(plots, result, group, entities) for group in groups]
     if len(views) <= SEEN_AT_ONCE:
         return _grid(views)
     paired = list(zip(groups, views, strict=True))
     tabs: list[Container] = []
-    opened = 0
+    judged = result.judged_worst
+    opened: int | None = None
     for block, some in groupby(paired, key=lambda pair: pair[0].block):
-        if result.judged_worst is not None and result.judged_worst.block == block:
+        if judged is not None and judged.block == block:
             opened = len(tabs)
         tabs.append(_grid([view for _, view in some], printable(block)))
-    return rrb.Tabs(*tabs, active_tab=opened)
+    return rrb.Tabs(*tabs, active_tab=len(tabs) - 1 if opened is None else opened)
 
 
-def _plot(plots: Plots, result: Simulation, group: Group) -> View | Container:
+def _plot(plots: Plots, result: Simulation, group: Group, entities: Mapping[str, str]) -> View | Container:
     """Return the plot of a group, with what is allowed where it is judged; of a long one two as tabs."""
     import rerun.blueprint as rrb
 
@@ -64,7 +70,7 @@ def _plot(plots: Plots, result: Simulation, group: Group) -> View | Container:
             f"{verdict_entities(result, 'tolerance')[number]}/**",
             verdict_entities(result, "marks/worst")[number],
         ]
-    views = plots.signals(group, signal_entities(result), len(result.t_ns), *beside)
+    views = plots.signals(group, entities, len(result.t_ns), *beside)
     return rrb.Tabs(*views, active_tab=0) if len(views) > 1 else views[0]
 
 

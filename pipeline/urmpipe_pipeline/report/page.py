@@ -157,11 +157,15 @@ def _signals_part(simulation: Simulation, groups: Sequence[Group], link: str) ->
 
 
 def _simulation_part(simulation: Simulation, ident: str) -> Part:
-    """Return the part of a simulation: the system, its verdicts, then what each block did."""
+    """Return the part of a simulation: the system, its verdicts, then what each block did, meters first."""
     meters = (simulation_tables.meters_table(simulation.verdicts),) if simulation.verdicts else ()
     drawing, file = system_drawing(simulation), system_file(simulation)
-    groups = groupby(groups_of(simulation), key=lambda group: group.block)
-    blocks = [_signals_part(simulation, list(some), ident) for _, some in groups]
+    judged = {one.block for one in simulation.verdicts}
+    groups = sorted(groups_of(simulation), key=lambda group: group.block not in judged)  # what decides first
+    blocks = [
+        _signals_part(simulation, list(some), ident)
+        for _, some in groupby(groups, key=lambda group: group.block)
+    ]
     made = (
         simulation_tables.signals_table(simulation),
         simulation_tables.settings_table(simulation),

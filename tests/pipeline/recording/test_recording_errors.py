@@ -74,11 +74,25 @@ def test_a_recording_that_was_cut_off(make_run: MakeRun, tmp_path: Path, share: 
     )
 
 
-def test_a_recording_of_another_program(tmp_path: Path) -> None:
-    path = foreign(tmp_path / "foreign.rrd", "another")
+@pytest.mark.parametrize("application", ["another", "urmpipeline", "my urmpipe"])
+def test_a_recording_of_another_program(tmp_path: Path, application: str) -> None:
+    path = foreign(tmp_path / "foreign.rrd", application)
     assert is_recording(path)
     assert not is_ours(path)
-    assert trouble(path) == "found a recording of another, allowed: one of urmpipe"
+    assert trouble(path) == f"found a recording of {application}, allowed: one of urmpipe"
+
+
+def test_a_recording_to_replace_is_known_without_rerun(make_run: MakeRun, tmp_path: Path) -> None:
+    """Rerun takes long to import, which is done beside the work: not before it begins."""
+    path = write_recording(make_run(), tmp_path / "run.rrd")
+    script = (
+        "import sys; from pathlib import Path; from urmpipe_pipeline.recording.identity import is_ours;"
+        "print(is_ours(Path(sys.argv[1])), 'rerun' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", script, str(path)], capture_output=True, text=True, check=True, timeout=100
+    )
+    assert done.stdout == "True False\n"
 
 
 def test_a_recording_without_metadata(tmp_path: Path) -> None:
@@ -91,6 +105,16 @@ def test_a_recording_of_a_newer_layout(tmp_path: Path) -> None:
     newer = rr.AnyValues(metadata=json.dumps({"layout_version": 99, "something": "new"}))
     path = foreign(tmp_path / "newer.rrd", "urmpipe", newer)
     assert trouble(path) == "found layout version 99, allowed: up to 5; a newer urmpipe wrote it"
+
+
+@pytest.mark.parametrize(("kind", "known"), [("run", 4), ("comparison", 4), ("simulation", 5)])
+def test_each_kind_has_a_newest_layout_of_its_own(tmp_path: Path, kind: str, known: int) -> None:
+    """A run of layout 5 is of a newer urmpipe, though simulations of layout 5 are known."""
+    newer = rr.AnyValues(metadata=json.dumps({"layout_version": known + 1, "kind": kind}))
+    path = foreign(tmp_path / "newer.rrd", "urmpipe", newer)
+    assert trouble(path) == (
+        f"found layout version {known + 1}, allowed: up to {known}; a newer urmpipe wrote it"
+    )
 
 
 def test_a_recording_of_an_older_layout(tmp_path: Path) -> None:

@@ -14,6 +14,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
+from rerun import blueprint as rrb
 
 from same_results import assert_same
 from urmpipe_models.errors import RecordingError
@@ -22,8 +23,9 @@ from urmpipe_pipeline.joint_log import FloatArray, LogWarning, SourceFile
 from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, write_recording
-from urmpipe_pipeline.recording.layout import opening_time
+from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
 from urmpipe_pipeline.recording.scene import scene_of
+from urmpipe_pipeline.recording.simulation_layout import simulation_plots
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.viewer import opening_times
@@ -132,6 +134,28 @@ def test_the_viewer_opens_at_the_worst_sample(make_simulation: MakeSimulation, t
     assert opening_times([path]) == {path: 1_250_000_000}
     assert opening_time(replace(simulation, verdicts=())) == 0
     assert opening_time(make_simulation(0)) == 0
+    assert opening_time(make_simulation(0, failed="gone")) == 0
+    assert opening_time(make_simulation(37, failed="gone")) == 36 * 5_000_000  # where it failed
+
+
+def test_what_decides_is_open_else_what_stands_last(make_simulation: MakeSimulation) -> None:
+    simulation = make_simulation(5)
+    others = tuple(Signal(f"b{i}", f"v{i}", np.arange(5.0)) for i in range(8))
+    judged = simulation_plots(replace(simulation, signals=(*simulation.signals, *others)))
+    plain = simulation_plots(replace(simulation, signals=(*simulation.signals, *others), verdicts=()))
+    assert isinstance(judged, rrb.Tabs) and isinstance(plain, rrb.Tabs)
+    assert [list(tabs.contents)[int(str(tabs.active_tab))].name for tabs in (judged, plain)] == [
+        "meter",
+        "b7",
+    ]
+
+
+def test_words_stand_above_the_arm_and_else_beside_the_plots(make_simulation: MakeSimulation) -> None:
+    simulation = make_simulation(5)
+    for one, left in ((simulation, rrb.Vertical), (replace(simulation, arms=()), rrb.Tabs)):
+        root = viewer_layout(one, scene_of(one)).root_container
+        assert isinstance(root, rrb.Horizontal)
+        assert isinstance(next(iter(root.contents)), left)
 
 
 def test_the_first_arm_moves_and_the_tip_of_each_has_a_path(make_simulation: MakeSimulation) -> None:
@@ -170,6 +194,23 @@ def test_a_simulation_is_nothing_to_compare(make_simulation: MakeSimulation, tmp
         load_run(path)
     assert str(caught.value) == f"{path}: {SIMULATION}"
     assert load_comparison(path) is None
+
+
+ODD = (
+    "a b", "a ", "a", " a", " ", "", "a/b", "a/", "/", "a%2Fb", "\\", "a\\", "a\\/b", "a\\ ", "..", "/**",
+    "a.b", "x[1]", "<b>", "a\n", "a\tb", "a\0", "a\u00a0", "\u202e", "\ud800", "\ud801", "?", "A", "$",
+)  # fmt: skip
+
+
+def test_odd_names_are_entities_of_their_own(make_simulation: MakeSimulation, tmp_path: Path) -> None:
+    """Also those that are one to Rerun, which drops a blank or a backslash at the end."""
+    simulation = make_simulation(3)
+    pairs = [pair for name in ODD for pair in ((name, "v"), ("b", name), (name, f"{name}2"))]
+    signals = [Signal(*pair, np.arange(3.0) + i) for i, pair in enumerate(pairs)]
+    arms = tuple(
+        replace(simulation.arms[0], block=name, q=simulation.arms[0].q + i) for i, name in enumerate(ODD)
+    )
+    assert_comes_back(replace(simulation, signals=tuple(signals), arms=arms, verdicts=()), tmp_path)
 
 
 NAMES = st.text(st.characters(exclude_categories=[]), max_size=8)

@@ -135,9 +135,10 @@ def test_a_simulation_is_drawn_and_its_drawing_runs_no_script(
         assert image.evaluate("image => [image.complete, image.naturalWidth]") == [True, 640]
         image.click()
         plots = page.locator(".pairs .plot")
-        first, second = (box for box in (plots.nth(k).bounding_box() for k in (2, 3)) if box)
+        first, second, alone = (box for box in (plots.nth(k).bounding_box() for k in range(3)) if box)
         assert first["y"] == second["y"]  # the two plots of the meter, side by side
         assert first["x"] + first["width"] <= second["x"]
+        assert alone["width"] == second["x"] + second["width"] - first["x"]  # the only one of its block
     with opened(browser, path, width=390, phone=True) as page:
         scroll_through(page)
         assert sideways(page) == 0

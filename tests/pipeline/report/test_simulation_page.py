@@ -145,8 +145,8 @@ def test_each_block_and_unit_has_a_plot_in_the_unit_that_people_like(
     simulation = make_simulation()
     found = figures(lay_out([simulation]).parts[0])
     assert list(found) == [
-        "Simulation log-to-delta/Path in space", "Block log/q", "Block chain/p7", "Block meter/delta, norm",
-        "Block meter/out_of_tolerance",
+        "Simulation log-to-delta/Path in space", "Block meter/delta, norm", "Block meter/out_of_tolerance",
+        "Block log/q", "Block chain/p7",
     ]  # fmt: skip
     spec = found["Block meter/delta, norm"].spec
     assert spec["layout"]["yaxis"]["title"]["text"] == "delta, norm [mm]"

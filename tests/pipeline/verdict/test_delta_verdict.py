@@ -6,12 +6,16 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from urmpipe_models.delta import delta as model_delta
 from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.comparison import AXES
 from urmpipe_pipeline.delta_verdict import delta_verdict
 from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.measure import KINDS
+from urmpipe_pipeline.statistics import Measured, describe, overall
 from urmpipe_pipeline.wording import meter_words
 
 T_NS = np.array([0, 5_000_000, 10_000_000])
@@ -54,6 +58,7 @@ def test_nothing_allowed_is_a_tolerance() -> None:
     still = delta_verdict("meter", T_NS, np.zeros((3, 3)), {"axis": 0.0})
     assert found is not None and still is not None
     assert (found.out_of_tolerance, found.verdict, found.used) == (3, "fail", math.inf)
+    assert (found.quantity, found.worst, found.sample) == ("y", 4e-3, 1)  # not the first that is out
     assert (still.out_of_tolerance, still.verdict, still.used) == (0, "pass", 0.0)
 
 
@@ -76,6 +81,11 @@ def test_what_is_no_tolerance_is_refused(tolerance: dict[str, float], message: s
     assert str(caught.value) == message
 
 
+def length(delta: FloatArray) -> FloatArray:
+    """Return the norm as the model computes it."""
+    return np.asarray(model_delta(tuple(delta.T), (0.0, 0.0, 0.0)).norm)
+
+
 ROWS = st.lists(st.tuples(*(st.floats(-1.0, 1.0),) * 3), min_size=1, max_size=8).map(np.array)
 
 
@@ -85,9 +95,34 @@ def test_it_passes_if_and_only_if_every_quantity_of_every_sample_is_allowed(
 ) -> None:
     found = delta_verdict("meter", np.arange(len(delta)), delta, {"axis": axis, "norm": norm})
     assert found is not None
-    out = (np.abs(delta) > axis).any(axis=1) | (np.linalg.norm(delta, axis=1) > norm)
+    out = (np.abs(delta) > axis).any(axis=1) | (length(delta) > norm)
     assert found.out_of_tolerance == np.count_nonzero(out)
     assert (found.verdict == "pass") == (not out.any())
     assert found.used is not None
     # a size above what is allowed by its last bit may have a share that rounds to 1
     assert found.used >= 1.0 if out.any() else found.used <= 1.0
+
+
+@given(
+    delta=ROWS,
+    which=st.lists(st.sampled_from(["axis", *AXES]), min_size=1, unique=True),
+    row=st.integers(0, 7),
+    share=st.sampled_from([0.5, 1.0, 2.0]),
+)
+def test_it_is_the_verdict_of_compare(delta: FloatArray, which: list[str], row: int, share: float) -> None:
+    """Also where a size is exactly what is allowed, to the last bit."""
+    values = np.column_stack((delta, length(delta)))
+    sizes = dict(zip(("x", "y", "z", "norm"), np.abs(values[row % len(values)]).tolist(), strict=True))
+    tolerance = {kind: share * sizes.get(kind, sizes["y"]) for kind in which}
+    assume(min(tolerance.values()) > 0.0)  # compare tells no share of nothing
+    found = delta_verdict("meter", np.arange(len(delta)), delta, tolerance)
+    measured = [Measured(axis, KINDS[i], "m", values[:, i]) for i, axis in enumerate(AXES)]
+    every = [describe(one, np.arange(len(delta)) / 1e9, np.arange(len(delta)), tolerance) for one in measured]
+    assert found is not None
+    assert found.verdict == overall(every)
+    outside = np.any([one.outside(tolerance) for one in measured], axis=0)
+    assert found.out_of_tolerance == np.count_nonzero(outside)
+    worst = max((one for one in every if one.used is not None), key=lambda one: one.used or 0.0)
+    assert found.used == worst.used
+    if math.isfinite(worst.used or 0.0):
+        assert (found.quantity, found.worst, found.sample) == (worst.quantity, worst.max, worst.sample_max)
