@@ -15,6 +15,7 @@ import shutil
 import signal
 import sys
 import threading
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -134,5 +135,13 @@ def end_with_parent(folder: Path) -> None:
 if __name__ == "__main__":
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # the parent is interrupted too, and ends this process
     end_with_parent(Path(sys.argv[1]))
-    work(Path(sys.argv[1]))
-    os._exit(0)  # leaves the FMUs' libraries loaded: what they do when unloaded can no longer spoil the run
+    code = 1
+    try:
+        work(Path(sys.argv[1]))
+        code = 0
+    except Exception:
+        traceback.print_exc()
+    sys.stdout.flush()
+    os._exit(
+        code
+    )  # leaves the FMUs' libraries loaded: what they do when unloaded can no longer spoil the run

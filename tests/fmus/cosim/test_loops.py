@@ -164,3 +164,26 @@ def test_inputs_at_the_end_of_their_range_are_not_moved_out_of_it(fresh: bool) -
     recorded = solved({"a": full}, {"a.u": "a.y"})
     assert np.allclose(recorded.column("a", "y")[1:], 1.0, rtol=0.0, atol=4.0 * TOLERANCE)
     assert not recorded.column("a", "refused").any()
+
+
+def test_values_that_are_not_finite_are_told_and_are_no_fault_of_the_block() -> None:
+    recorded = ran({"a": gain("log", formula="log(u)")}, {"a.u": "a.y"}, iterate=True)
+    assert recorded.failed == (
+        "algebraic loop: a.y -> a.u: found values that are not finite; start values of its inputs, nearer to the"
+        " solution, may help, at t = 0 s"
+    )
+
+
+def test_a_step_to_where_a_block_gives_no_number_is_shortened_and_no_other_block_sees_it() -> None:
+    """y = 2 + 10 log u from u = 9, where Newton steps below 0; the other block counts what is no number."""
+    picky = Foreign(
+        name="picky",
+        scalars=(Scalar("u", 0, "input", start="9"), Scalar("y", 1, on=("u",)), Scalar("refused", 2)),
+        compute="if (!isfinite(v->r[0])) v->r[2] += 1; v->r[1] = v->r[0];",
+        start="m->v.r[0] = 10;",
+    )
+    log = gain("log10", formula="2 + 10 * log(u)")
+    recorded = solved({"p": picky, "log": log}, {"log.u": "p.y", "p.u": "log.y"}, {"log": {"u": 9.0}})
+    u = recorded.column("p", "y")
+    assert np.allclose(u, 2.0 + 10.0 * np.log(u), rtol=0.0, atol=1e-10)  # the tolerance, by the slope
+    assert not recorded.column("p", "refused").any()

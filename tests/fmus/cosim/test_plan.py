@@ -203,9 +203,7 @@ def test_the_last_row_of_a_log_whose_times_are_rounded_to_nanoseconds_is_reached
 def test_a_duration_that_is_no_multiple_of_the_step_ends_with_the_last_whole_one_and_is_told() -> None:
     plan = planned({"a": TROUBLE}, step=0.3)
     assert plan.count == 3
-    assert plan.notes == (
-        "system.duration: found 1 s, no multiple of the step, 0.3 s: it ends at 0.9 s",
-    )
+    assert plan.notes == ("system.duration: found 1 s, no multiple of the step, 0.3 s: it ends at 0.9 s",)
     assert planned({"a": TROUBLE}, step=0.1, duration=0.3).notes == ()
 
 
