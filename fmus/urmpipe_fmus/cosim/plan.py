@@ -198,8 +198,8 @@ def _cut_short(system: System, count: int) -> Iterator[str]:
     end = count * system.step
     if system.duration and system.duration - end > NANOSECOND:
         yield (
-            f"system.duration: found {system.duration:.9g} s, no multiple of the step, {system.step:.9g} s: it"
-            f" ends at {end:.9g} s"
+            f"system.duration: found {system.duration:.9g} s, no multiple of the step, {system.step:.9g} s:"
+            f" it ends at {end:.9g} s"
         )
 
 

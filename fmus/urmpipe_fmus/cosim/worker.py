@@ -142,6 +142,4 @@ if __name__ == "__main__":
     except Exception:
         traceback.print_exc()
     sys.stdout.flush()
-    os._exit(
-        code
-    )  # leaves the FMUs' libraries loaded: what they do when unloaded can no longer spoil the run
+    os._exit(code)  # leaves the FMUs' libraries loaded: what they do when unloaded cannot spoil the run

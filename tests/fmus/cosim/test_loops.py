@@ -112,6 +112,33 @@ def test_blocks_whose_outputs_follow_only_after_a_step_go_back_and_step_again(bo
     assert np.allclose(recorded.column("b", "y")[1:], 6.0 / 13.0, rtol=0.0, atol=1e-10)
 
 
+def rising(port: str) -> LogInput:
+    """Return an input that follows a log from 0 to 1 in 1 s."""
+    return LogInput(destination=Port(*port.split(".")), log="c.csv", column="c", interpolate=True)
+
+
+RISING = LogColumn(np.array([0, 10**9]), np.array([0.0, 1.0]))
+
+
+def test_a_block_whose_outputs_follow_at_once_only_before_the_first_step_is_seen_through() -> None:
+    """y = 1 - 3 u, in a ring with u = 4 y + c(t): y = (1 - 3 c) / 13."""
+    formula = "v->r[1] = 1 - 3 * v->r[0];"
+    early = Foreign(
+        name="early",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1, on=("u",))),
+        compute=f"if (!v->i[0]) {formula}",
+        step=f"v->i[0] = 1; {formula}",
+    )
+    line = Foreign(
+        name="line4",
+        scalars=(Scalar("u", 0, "input"), Scalar("c", 1, "input"), Scalar("y", 2, on=("u", "c"))),
+        compute="v->r[2] = 4 * v->r[0] + v->r[1];",
+    )
+    recorded = solved({"a": early, "b": line}, RING, None, [rising("b.c")], column=lambda one: RISING)
+    c = recorded.column("b", "c")
+    assert np.allclose(recorded.column("a", "y"), (1.0 - 3.0 * c) / 13.0, rtol=0.0, atol=1e-10)
+
+
 def test_going_back_undoes_what_a_block_integrated() -> None:
     """A stale block counts each step once, however often it steps again."""
     counting = Foreign(
@@ -169,8 +196,8 @@ def test_inputs_at_the_end_of_their_range_are_not_moved_out_of_it(fresh: bool) -
 def test_values_that_are_not_finite_are_told_and_are_no_fault_of_the_block() -> None:
     recorded = ran({"a": gain("log", formula="log(u)")}, {"a.u": "a.y"}, iterate=True)
     assert recorded.failed == (
-        "algebraic loop: a.y -> a.u: found values that are not finite; start values of its inputs, nearer to the"
-        " solution, may help, at t = 0 s"
+        "algebraic loop: a.y -> a.u: found values that are not finite; start values of its inputs, nearer to"
+        " the solution, may help, at t = 0 s"
     )
 
 
