@@ -37,6 +37,7 @@ class Variable:
         base: The unit in the base units of SI, if the FMU tells; else what its spelling says, if it is one.
         minimum: The least value allowed.
         maximum: The largest value allowed.
+        nominal: The size of its values; 0 if the FMU does not tell.
         start: Its value at the start, as the FMU spells it; None if it has none.
     """
 
@@ -51,6 +52,7 @@ class Variable:
     base: BaseUnit | None
     minimum: float
     maximum: float
+    nominal: float
     start: str | None
 
     @property
@@ -218,6 +220,7 @@ def _variables(described: Any) -> Iterator[Variable]:
             base=si_base(unit, bases.get(unit)),
             minimum=float(low) if low else -math.inf,
             maximum=float(high) if high else math.inf,
+            nominal=abs(float(one.nominal or (kind and kind.nominal) or 0.0)),
             start=one.start,
         )
 

@@ -46,7 +46,7 @@ class LoopSolver:
         loop: The loop.
         values: The vector of the Reals.
         sweeps: The exchanges of a sweep.
-        tolerance: What may be left of the residual, relative to 1 + |x|.
+        tolerance: What may be left of the residual, relative to nominal + |x|.
     """
 
     def __init__(
@@ -106,7 +106,7 @@ class LoopSolver:
         return self._values[self._sources] - x
 
     def _solved(self, x: FloatArray, r: FloatArray) -> bool:
-        return bool(np.all(np.abs(r) <= self._tolerance * (1.0 + np.abs(x))))
+        return bool(np.all(np.abs(r) <= self._tolerance * (self._loop.nominal + np.abs(x))))
 
     def _differences(self, x: FloatArray, r: FloatArray) -> FloatArray:
         """Return the Jacobian of the residual by differences, to the side where the inputs may be."""
@@ -115,7 +115,7 @@ class LoopSolver:
     def _column(self, i: int, x: FloatArray, r: FloatArray) -> FloatArray:
         """Return a column of the Jacobian; not finite if it is on neither side."""
         column = np.full_like(r, np.nan)
-        h = DIFFERENCE * (1.0 + abs(x[i]))
+        h = DIFFERENCE * (self._loop.nominal[i] + abs(x[i]))
         for each in (x[i] + h, x[i] - h):
             moved = x.copy()
             moved[i] = each

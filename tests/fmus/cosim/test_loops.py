@@ -74,6 +74,21 @@ def test_a_ring_of_many_inputs_is_solved() -> None:
     assert np.allclose(recorded.values, expected, rtol=1e-10, atol=0.0)  # the tolerance, by the condition
 
 
+@pytest.mark.parametrize("whose", ["u", "y"])
+def test_a_loop_of_small_values_is_solved_to_their_nominal_size(whose: str) -> None:
+    """y = 0.99 u + 1e-12 = 1e-10: what is left at the first guess, 0, is within the tolerance for a value of 1."""
+    small = Foreign(
+        name=f"small_{whose}",
+        scalars=(
+            Scalar("u", 0, "input", extra=' nominal="1e-10"' if whose == "u" else ""),
+            Scalar("y", 1, on=("u",), extra=' nominal="1e-10"' if whose == "y" else ""),
+        ),
+        compute="v->r[1] = 0.99 * v->r[0] + 1e-12;",
+    )
+    y = solved({"a": small}, {"a.u": "a.y"}).column("a", "y")
+    assert np.allclose(y, 1e-10, rtol=2e2 * TOLERANCE, atol=0.0)  # twice the residual, magnified by 100
+
+
 def test_inputs_stay_in_their_range() -> None:
     """y = 1 / sqrt(u) of an input that must be above 0.01: u = 1, from a start at 4."""
     root = Foreign(
