@@ -76,7 +76,7 @@ def test_a_ring_of_many_inputs_is_solved() -> None:
 
 @pytest.mark.parametrize("whose", ["u", "y"])
 def test_a_loop_of_small_values_is_solved_to_their_nominal_size(whose: str) -> None:
-    """y = 0.99 u + 1e-12 = 1e-10: what is left at the first guess, 0, is within the tolerance for a value of 1."""
+    """y = 0.99 u + 1e-12 = 1e-10: what the first guess, 0, leaves is within the tolerance of a value of 1."""
     small = Foreign(
         name=f"small_{whose}",
         scalars=(
