@@ -46,6 +46,9 @@ LAST_LINES = 5
 TAIL = 65_536
 """So many of the last bytes that a process printed are looked at."""
 
+SAID_BYTES = 16_000_000
+"""A process that printed more has it forgotten, as its disk is not for that."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Recorded:
@@ -154,7 +157,7 @@ def _work(folder: Path, job: Job, shared: mmap.mmap, progress: Callable[[float],
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
     command = [sys.executable, "-P", "-m", "urmpipe_fmus.cosim.worker", str(folder)]
     with (
-        (folder / SAID).open("wb") as said,
+        (folder / SAID).open("ab") as said,
         subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=said, stderr=subprocess.STDOUT, env=environment
         ) as process,
@@ -164,6 +167,8 @@ def _work(folder: Path, job: Job, shared: mmap.mmap, progress: Callable[[float],
                 try:
                     return process.wait(POLL)
                 except subprocess.TimeoutExpired:
+                    if (folder / SAID).stat().st_size > SAID_BYTES:
+                        os.truncate(folder / SAID, 0)  # what is appended from then on begins there
                     if progress is not None:
                         progress(Progress.from_buffer_copy(shared).k / job.count)
         except BaseException:

@@ -119,6 +119,21 @@ def test_arrays_are_one_port_and_one_wire_and_idle_outputs_are_counted() -> None
     assert arm.hidden == 5
 
 
+def test_a_log_is_called_by_its_file_whole_paths_tell_two_of_one_name_apart() -> None:
+    names = ["far/away/in/a/folder/u.csv", "one/v.csv", "two/v.csv", "a.csv"]
+    blocks = {f"b{i}": gain() for i in range(4)}
+    asks = [LogInput(destination=Port(f"b{i}", "u"), log=log, column="u") for i, log in enumerate(names)]
+    column = LogColumn(np.array([0, 10**9]), np.zeros(2))
+    shown = diagram(planned(blocks, None, None, asks, column=lambda one: column))
+    assert [name for name in shown.boxes if name not in blocks] == [
+        "u.csv",
+        "one/v.csv",
+        "two/v.csv",
+        "a.csv",
+    ]
+    assert [wire.source for wire in shown.wires] == ["u.csv", "one/v.csv", "two/v.csv", "a.csv"]
+
+
 def test_a_drawing_holds_names_units_and_connections_and_nothing_from_elsewhere() -> None:
     plan = arm_plan()
     svg = system_svg(plan)
