@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foreign_fmus import INTEGRATOR, Foreign, Scalar, gain, planned
@@ -40,6 +40,7 @@ def diagrams(draw: st.DrawFn) -> Diagram:
     return Diagram(boxes, tuple(wires))
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(diagrams())
 def test_boxes_stand_apart(shown: Diagram) -> None:
     route(Layout(shown))
@@ -48,6 +49,7 @@ def test_boxes_stand_apart(shown: Diagram) -> None:
         assert beside or a.y + a.height <= b.y or b.y + b.height <= a.y
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(diagrams())
 def test_wires_go_upright_or_level_from_port_to_port_around_the_boxes(shown: Diagram) -> None:
     layout = Layout(shown)
@@ -66,6 +68,7 @@ def test_wires_go_upright_or_level_from_port_to_port_around_the_boxes(shown: Dia
                 assert not (through and (upright if x0 == x1 else level))
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(diagrams())
 def test_all_is_inside_the_drawing(shown: Diagram) -> None:
     routes = route(Layout(shown))

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
@@ -55,11 +55,13 @@ def assert_fresh(steps: Sequence[Exchange | Loop], wiring: Wired) -> None:
     assert current == set(sources)
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(wired())
 def test_every_input_is_that_of_the_instant(wiring: Wired) -> None:
     assert_fresh(Order(*wiring).steps(), wiring)
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(wired())
 def test_loops_are_the_parts_of_the_graph_that_lead_back_to_themselves(wiring: Wired) -> None:
     outputs, depends, sources = wiring
