@@ -149,6 +149,17 @@ def test_a_drawing_holds_names_units_and_connections_and_nothing_from_elsewhere(
     assert svg.count("http") == 1  # the name space
 
 
+def test_a_long_name_is_broken_into_lines_that_the_drawing_has_room_for() -> None:
+    plan = planned({"i": INTEGRATOR}, {"i.u": "i.y"})
+    plain = ET.fromstring(system_svg(plan))
+    object.__setattr__(plan.system, "name", "N" * 120)
+    drawn = ET.fromstring(system_svg(plan))
+    titles = [one.text or "" for one in drawn.iter(f"{SVG}text") if one.get("class") == "title"]
+    assert "".join(titles) == "N" * 120
+    assert max(len(one) for one in titles) * 9.7 <= float(drawn.attrib["width"])  # 0.6 em of 16 px
+    assert float(drawn.attrib["height"]) == float(plain.attrib["height"]) + 22.0 * (len(titles) - 1)
+
+
 @pytest.mark.slow
 def test_texts_fit_into_their_boxes_in_a_browser(tmp_path: Path) -> None:
     chromium = Path("/usr/bin/chromium")

@@ -80,6 +80,19 @@ def test_what_a_process_prints_is_among_its_last_words() -> None:
     )
 
 
+def test_a_state_that_cannot_be_freed_spoils_no_run_that_is_over() -> None:
+    stingy = Foreign(
+        name="stingy",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1, on=("u",))),
+        compute="v->r[1] = cos(v->r[0]);",
+        step="v->i[15] = 1;",
+        fresh=False,
+    )
+    recorded = ran({"a": stingy}, {"a.u": "a.y"}, iterate=True)
+    assert recorded.failed is None
+    assert len(recorded.t_ns) == 11
+
+
 def test_an_fmu_that_prints_without_end_does_not_fill_the_disk(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

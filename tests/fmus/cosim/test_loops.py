@@ -168,6 +168,25 @@ def test_going_back_undoes_what_a_block_integrated() -> None:
     assert np.allclose(recorded.column("a", "y")[1:], 0.7390851332151607, rtol=0.0, atol=2.0 * TOLERANCE)
 
 
+def test_looking_whether_outputs_follow_leaves_no_trace_where_they_do_not() -> None:
+    """y = max(u, 0) with u = y / 2 + c(t) below 0: what the block integrates is u, held over each step."""
+    limited = Foreign(
+        name="limited",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1, on=("u",)), Scalar("x", 2)),
+        compute="v->r[1] = v->r[0] > 0 ? v->r[0] : 0;",
+        step="v->r[2] += h * v->r[0];",
+    )
+    plus = Foreign(
+        name="plus",
+        scalars=(Scalar("u", 0, "input"), Scalar("c", 1, "input"), Scalar("y", 2, on=("u", "c"))),
+        compute="v->r[2] = 0.5 * v->r[0] + v->r[1];",
+    )
+    falling = LogColumn(RISING.t_ns, np.array([-1.0, -3.0]))
+    recorded = solved({"a": limited, "b": plus}, RING, None, [rising("b.c")], column=lambda one: falling)
+    held = np.concatenate([[0.0], np.cumsum(0.1 * recorded.column("b", "c")[:-1])])
+    assert np.allclose(recorded.column("a", "x"), held, rtol=0.0, atol=1e-12)  # rounding
+
+
 def test_what_has_no_solution_is_told_with_the_loop_and_what_is_left() -> None:
     recorded = ran({"a": gain(), "b": gain()}, RING, {"a": {"c": 1.0}}, iterate=True)
     assert recorded.failed == (
