@@ -168,6 +168,25 @@ def test_going_back_undoes_what_a_block_integrated() -> None:
     assert np.allclose(recorded.column("a", "y")[1:], 0.7390851332151607, rtol=0.0, atol=2.0 * TOLERANCE)
 
 
+def test_a_block_that_goes_back_is_told_again_what_was_set_before_the_loop() -> None:
+    """y = 1 - 3 u + v after a step, in a ring with u = 4 y: y = (1 + v) / 13; z = v is read before the loop."""
+    late = Foreign(
+        name="late",
+        scalars=(
+            Scalar("u", 0, "input"),
+            Scalar("v", 1, "input"),
+            Scalar("z", 2, on=("v",)),
+            Scalar("y", 3, on=("u", "v")),
+        ),
+        compute="v->r[2] = v->r[1]; v->r[3] = 1 - 3 * v->r[0] + v->r[1];",
+        fresh=False,
+    )
+    start = {"b": {"k": 4.0}}
+    recorded = solved({"a": late, "b": gain()}, RING, start, [rising("a.v")], column=lambda one: RISING)
+    expected = (1.0 + recorded.column("a", "v")) / 13.0
+    assert np.allclose(recorded.column("a", "y")[1:], expected[1:], rtol=0.0, atol=1e-10)
+
+
 def test_looking_whether_outputs_follow_leaves_no_trace_where_they_do_not() -> None:
     """y = max(u, 0) with u = y / 2 + c(t) below 0: what the block integrates is u, held over each step."""
     limited = Foreign(
