@@ -83,6 +83,7 @@ class Interface:
         guid: What binds description and binaries.
         variables: All of them by name, in order.
         dependencies: Of each output, the inputs that its value depends on at once.
+        silent: Outputs that do not tell what they depend on: on all inputs, as far as one knows.
         can_save: Whether its state can be saved and restored.
         variable_step: Whether its communication step may change.
         alone: Whether it can be instantiated only once per process.
@@ -93,6 +94,7 @@ class Interface:
     guid: str
     variables: Mapping[str, Variable]
     dependencies: Mapping[str, frozenset[str]]
+    silent: frozenset[str]
     can_save: bool
     variable_step: bool
     alone: bool
@@ -172,12 +174,14 @@ def _interface(path: Path, described: Any) -> Interface | None:
     can = described.coSimulation
     if described.fmiVersion != "2.0" or can is None:
         return None
+    told = {one.variable.name for one in described.outputs if one.dependencies is not None}
     return Interface(
         path=path,
         identifier=can.modelIdentifier,
         guid=described.guid,
         variables={one.name: one for one in _variables(described)},
         dependencies=_dependencies(described),
+        silent=frozenset(v.name for v in described.modelVariables if v.causality == "output") - told,
         can_save=can.canGetAndSetFMUstate,
         variable_step=can.canHandleVariableCommunicationStepSize,
         alone=can.canBeInstantiatedOnlyOncePerProcess,

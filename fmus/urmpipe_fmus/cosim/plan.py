@@ -245,11 +245,18 @@ def _order(
             continue
         if not system.iterate:
             faults.append(
-                f"algebraic loop: {loop.ring}: each depends on the one before at the same instant; allowed:"
-                " none, or [loops] iterate = true"
+                f"algebraic loop: {loop.ring}: each depends on the one before at the same instant"
+                f"{_assumed(loop, interfaces)}; allowed: none, or [loops] iterate = true"
             )
         for port in loop.torn:
             kind = interfaces[port.block].variables[port.variable].type
             if kind != "Real":
                 faults.append(f"algebraic loop: {loop.ring}: found {port}, an {kind}; allowed: Reals alone")
     return tuple(found)
+
+
+def _assumed(loop: Loop, interfaces: Mapping[str, Interface]) -> str:
+    """Return which outputs of a loop are only assumed to depend on its inputs; empty if none."""
+    outputs = [Port(one.block, name) for one in loop.exchanges for name in one.outputs]
+    silent = [str(port) for port in outputs if port.variable in interfaces[port.block].silent]
+    return f" ({', '.join(silent)}: on all inputs, as the FMU does not tell on which)" if silent else ""

@@ -169,7 +169,7 @@ def test_going_back_undoes_what_a_block_integrated() -> None:
 
 
 def test_a_block_that_goes_back_is_told_again_what_was_set_before_the_loop() -> None:
-    """y = 1 - 3 u + v after a step, in a ring with u = 4 y: y = (1 + v) / 13; z = v is read before the loop."""
+    """y = 1 - 3 u + v after a step, in a ring with u = 4 y: y = (1 + v) / 13; z = v is read before it."""
     late = Foreign(
         name="late",
         scalars=(
