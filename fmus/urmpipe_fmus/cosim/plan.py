@@ -185,6 +185,9 @@ def _count(system: System, duration: float | None, ends: Iterable[float], faults
     if not (length > 0.0 and math.isfinite(length)):
         faults.append("system.duration: not found, and no log tells it; allowed: a number above 0, in s")
         return 0
+    if system.step < NANOSECOND:
+        faults.append(f"system.step: found {system.step:g} s, allowed: from 1e-09 s, as times are in ns")
+        return 0
     count = math.floor((length + NANOSECOND) / system.step)
     if count < 1:
         faults.append(

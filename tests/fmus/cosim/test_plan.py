@@ -188,6 +188,9 @@ def test_the_duration_is_told_by_the_system_or_by_the_caller_or_by_the_longest_l
     assert told({"a": TROUBLE}, duration=None) == [
         "system.duration: not found, and no log tells it; allowed: a number above 0, in s"
     ]
+    assert told({"a": TROUBLE}, step=1e-10) == [
+        "system.step: found 1e-10 s, allowed: from 1e-09 s, as times are in ns"
+    ]
     assert told({"a": TROUBLE}, duration=0.05) == [
         "system.step: found 0.1 s, allowed: no more than the duration, 0.05 s"
     ]
