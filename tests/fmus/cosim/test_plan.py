@@ -200,7 +200,7 @@ def test_the_duration_is_told_by_the_system_or_by_the_caller_or_by_the_longest_l
 def test_the_last_row_of_a_log_whose_times_are_rounded_to_nanoseconds_is_reached(rate: int) -> None:
     ask = LogInput(destination=Port("a", "u"), log="run.csv", column="u")
     k = np.arange(7383)
-    column = LogColumn(np.round(k / rate * 1e9).astype(np.int64), 1.0 * k)
+    column = LogColumn(np.round(k / rate * 1e9).astype(np.int64), k.astype(np.float64))
     blocks = system({"a": gain()}, inputs=[ask], step=1.0 / rate, duration=None)
     plan = prepare(blocks, fmu_of, column=lambda one: column)
     assert plan.logged[0].values.tolist() == k.tolist()
