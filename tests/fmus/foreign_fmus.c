@@ -75,7 +75,11 @@ fmi2Status fmi2GetFMUstate(fmi2Component c, fmi2FMUstate *s) {
     return fmi2OK;
 }
 fmi2Status fmi2SetFMUstate(fmi2Component c, fmi2FMUstate s) { memcpy(&((Model *)c)->v, s, sizeof(Values)); return fmi2OK; }
-fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *s) { free(*s); *s = NULL; return fmi2OK; }
+fmi2Status fmi2FreeFMUstate(fmi2Component c, fmi2FMUstate *s) {
+    free(*s);
+    *s = NULL;
+    return ((Model *)c)->v.i[15] ? fmi2Error : fmi2OK;
+}
 fmi2Status fmi2SerializedFMUstateSize(fmi2Component c, fmi2FMUstate s, size_t *n) { return fmi2Error; }
 fmi2Status fmi2SerializeFMUstate(fmi2Component c, fmi2FMUstate s, fmi2Byte b[], size_t n) { return fmi2Error; }
 fmi2Status fmi2DeSerializeFMUstate(fmi2Component c, const fmi2Byte b[], size_t n, fmi2FMUstate *s) { return fmi2Error; }
@@ -88,7 +92,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no) {
     Model *m = c;
-    if (m->v.time != t) {
+    if (VARIABLE_STEP ? m->v.time != t : fabs(m->v.time - t) > 1e-9) {
         LOG(m, fmi2Error, "asked to step from %.17g s, but stands at %.17g s", t, m->v.time);
         return fmi2Error;
     }

@@ -58,6 +58,7 @@ class Foreign:
     fresh: bool = True
     can_save: bool = True
     once: bool = False
+    variable_step: bool = True
     units: str = ""
     guid: str = field(default="{f0e1d2c3}")
 
@@ -73,6 +74,7 @@ class Foreign:
         work.mkdir()
         (work / "model.h").write_text(
             f'#define GUID "{self.guid}"\n#define FRESH {int(self.fresh)}\n'
+            f"#define VARIABLE_STEP {int(self.variable_step)}\n"
             f"#define START {self.start}\n#define FREE {self.free}\n"
             f"static void compute(Model *m) {{ Values *v = &m->v; (void)v; {self.compute} }}\n"
             "static fmi2Status step(Model *m, double t, double h) {\n"
@@ -113,7 +115,8 @@ class Foreign:
         return (
             '<?xml version="1.0" encoding="UTF-8"?>'
             f'<fmiModelDescription fmiVersion="2.0" modelName="{self.name}" guid="{self.guid}">'
-            f'<CoSimulation modelIdentifier="{self.name}" canHandleVariableCommunicationStepSize="true"'
+            f'<CoSimulation modelIdentifier="{self.name}"'
+            f' canHandleVariableCommunicationStepSize="{str(self.variable_step).lower()}"'
             f' canGetAndSetFMUstate="{str(self.can_save).lower()}"'
             f' canBeInstantiatedOnlyOncePerProcess="{str(self.once).lower()}"/>'
             + (f"<UnitDefinitions>{self.units}</UnitDefinitions>" if self.units else "")

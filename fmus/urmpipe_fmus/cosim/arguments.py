@@ -8,12 +8,17 @@ from typing import Any
 
 from urmpipe_fmus.cosim.names import not_among
 
+NAMES = ("unit", "column")
+"""Keys whose texts are names, also where a file beside is called so."""
+
 
 def beside(folder: Path, value: Any) -> Any:
     """Return a value in which each text that names a file of a folder is that file's path."""
     if isinstance(value, str) and value and not value.startswith("$"):
         path = folder / value
         return str(path) if "\0" not in value and path.is_file() else value
+    if isinstance(value, Mapping):
+        return {key: one if key in NAMES else beside(folder, one) for key, one in value.items()}
     return _mapped(lambda one: beside(folder, one), value)
 
 

@@ -94,8 +94,14 @@ class Assembly:
             sources=tuple(self._places[self._sources[port]] for port in loop.torn),
             minimum=minimum,
             maximum=maximum,
+            nominal=np.array([self._nominal(port) for port in loop.torn]),
             ring=loop.ring,
         )
+
+    def _nominal(self, port: Port) -> float:
+        """Return the size of an input's values: as it tells, or else its source; 1 if neither does."""
+        told = (self._plan.variable(one).nominal for one in (port, self._sources[port]))
+        return next(filter(None, told), 1.0)
 
     def _limits(self, loop: Loop) -> tuple[np.ndarray, np.ndarray]:
         """Return the least and the largest value that each place may have for the loop's inputs."""

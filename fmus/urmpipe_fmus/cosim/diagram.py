@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 
 from urmpipe_fmus.cosim.interface import ELEMENT, Interface
 from urmpipe_fmus.cosim.plan import Plan
@@ -136,10 +137,17 @@ def diagram(plan: Plan) -> Diagram:
         outputs = list(_pins(shown, "output", used))
         idle = [pin for pin in outputs if pin.name not in used][IDLE:]
         box.right, box.hidden = [pin for pin in outputs if pin not in idle], len(idle)
-    renamed = {name: f"{name} (log)" if name in boxes else name for name in logs}
+    renamed = _log_names(logs, boxes)
     sources = {renamed[name]: box for name, box in logs.items()}
     wires = [_renamed(wire, renamed) if i >= len(plan.links) else wire for i, wire in enumerate(wires)]
     return Diagram({**sources, **boxes}, tuple(wires))
+
+
+def _log_names(logs: Collection[str], blocks: Collection[str]) -> dict[str, str]:
+    """Return what each log is called: its file's name, its whole path where two files have the same."""
+    files = [Path(log).name for log in logs]
+    names = {log: name if files.count(name) == 1 else log for log, name in zip(logs, files, strict=True)}
+    return {log: f"{name} (log)" if name in blocks else name for log, name in names.items()}
 
 
 def _renamed(wire: Wire, names: dict[str, str]) -> Wire:

@@ -14,8 +14,11 @@ from urmpipe_fmus.cosim.routing import route
 MARGIN = 24.0
 """Around the drawing in [px]."""
 
-LINE = 17.0
-"""Height of a line of the description in [px]."""
+LINE, TITLE = 17.0, 22.0
+"""Height of a line of the description, and of the title, in [px]."""
+
+LARGER = 16.0 / 12.0
+"""The title's letters for one of the rest."""
 
 NARROWEST = 420.0
 """Least width of the drawing in [px]: room for its title."""
@@ -41,19 +44,24 @@ def system_svg(plan: Plan) -> str:
     layout = Layout(shown)
     routes = route(layout)
     width = max(routes.width, NARROWEST)
+    titles = wrap(plan.system.name, int(width / (LARGER * CHARACTER)))
     lines = wrap(plan.system.description, int(width / CHARACTER))
-    top = MARGIN + 2.0 * LINE + LINE * len(lines)
+    below = MARGIN + TITLE * (len(titles) - 1)
+    top = below + 2.0 * LINE + LINE * len(lines)
     full = (width + 2.0 * MARGIN, top + routes.height + MARGIN)
     body = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{full[0]:.0f}" height="{full[1]:.0f}"'
         f' viewBox="0 0 {full[0]:.0f} {full[1]:.0f}" role="img">',
         f"<title>{_text(plan.system.name)}</title><style>{STYLE}</style>",
         f'<rect class="paper" width="{full[0]:.0f}" height="{full[1]:.0f}"/>',
-        f'<text class="title" x="{MARGIN:g}" y="{MARGIN + 12:g}">{_text(plan.system.name)}</text>',
     ]
+    for i, line in enumerate(titles):
+        body.append(
+            f'<text class="title" x="{MARGIN:g}" y="{MARGIN + 12 + TITLE * i:g}">{_text(line)}</text>'
+        )
     for i, line in enumerate(lines):
         body.append(
-            f'<text class="quiet" x="{MARGIN:g}" y="{MARGIN + 14 + LINE * (i + 1):g}">{_text(line)}</text>'
+            f'<text class="quiet" x="{MARGIN:g}" y="{below + 14 + LINE * (i + 1):g}">{_text(line)}</text>'
         )
     body.append(f'<g transform="translate({MARGIN:g} {top:.1f})">')
     for wire, points in routes.points.items():

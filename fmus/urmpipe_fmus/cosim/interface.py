@@ -37,6 +37,7 @@ class Variable:
         base: The unit in the base units of SI, if the FMU tells; else what its spelling says, if it is one.
         minimum: The least value allowed.
         maximum: The largest value allowed.
+        nominal: The size of its values; 0 if the FMU does not tell.
         start: Its value at the start, as the FMU spells it; None if it has none.
     """
 
@@ -51,6 +52,7 @@ class Variable:
     base: BaseUnit | None
     minimum: float
     maximum: float
+    nominal: float
     start: str | None
 
     @property
@@ -81,6 +83,7 @@ class Interface:
         guid: What binds description and binaries.
         variables: All of them by name, in order.
         dependencies: Of each output, the inputs that its value depends on at once.
+        silent: Outputs that do not tell what they depend on: on all inputs, as far as one knows.
         can_save: Whether its state can be saved and restored.
         variable_step: Whether its communication step may change.
         alone: Whether it can be instantiated only once per process.
@@ -91,6 +94,7 @@ class Interface:
     guid: str
     variables: Mapping[str, Variable]
     dependencies: Mapping[str, frozenset[str]]
+    silent: frozenset[str]
     can_save: bool
     variable_step: bool
     alone: bool
@@ -170,12 +174,14 @@ def _interface(path: Path, described: Any) -> Interface | None:
     can = described.coSimulation
     if described.fmiVersion != "2.0" or can is None:
         return None
+    told = {one.variable.name for one in described.outputs if one.dependencies is not None}
     return Interface(
         path=path,
         identifier=can.modelIdentifier,
         guid=described.guid,
         variables={one.name: one for one in _variables(described)},
         dependencies=_dependencies(described),
+        silent=frozenset(v.name for v in described.modelVariables if v.causality == "output") - told,
         can_save=can.canGetAndSetFMUstate,
         variable_step=can.canHandleVariableCommunicationStepSize,
         alone=can.canBeInstantiatedOnlyOncePerProcess,
@@ -218,6 +224,7 @@ def _variables(described: Any) -> Iterator[Variable]:
             base=si_base(unit, bases.get(unit)),
             minimum=float(low) if low else -math.inf,
             maximum=float(high) if high else math.inf,
+            nominal=abs(float(one.nominal or (kind and kind.nominal) or 0.0)),
             start=one.start,
         )
 

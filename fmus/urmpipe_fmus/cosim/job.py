@@ -111,6 +111,7 @@ class LoopJob:
         sources: Places of their sources.
         minimum: The least value that an input of the loop may have, at the place that it follows.
         maximum: The largest.
+        nominal: Of each torn input, the size of its values.
         ring: The loop, for people.
     """
 
@@ -119,6 +120,7 @@ class LoopJob:
     sources: tuple[int, ...]
     minimum: NDArray[np.float64]
     maximum: NDArray[np.float64]
+    nominal: NDArray[np.float64]
     ring: str
 
 

@@ -28,6 +28,9 @@ DIFFERENCE = 1e-7
 SHRINKS = 6
 """A step that makes the residual larger is halved so often at most."""
 
+DEEPEST = 40
+"""A step to where the values are not finite is halved until they are, but not more often."""
+
 USEFUL = 0.25
 """A step that leaves more of the residual than this is a reason to find the Jacobian anew."""
 
@@ -43,7 +46,7 @@ class LoopSolver:
         loop: The loop.
         values: The vector of the Reals.
         sweeps: The exchanges of a sweep.
-        tolerance: What may be left of the residual, relative to 1 + |x|.
+        tolerance: What may be left of the residual, relative to nominal + |x|.
     """
 
     def __init__(
@@ -51,6 +54,8 @@ class LoopSolver:
     ) -> None:
         self._loop, self._values, self._sweeps, self._tolerance = loop, values, sweeps, tolerance
         self._torn, self._sources = np.array(loop.torn, np.intp), np.array(loop.sources, np.intp)
+        read = [p for one in loop.exchanges for t in one.gets if t.type == "Real" for p in t.places]
+        self._read = np.array(read, np.intp)
         self._minimum, self._maximum = loop.minimum[self._torn], loop.maximum[self._torn]
         self._jacobian: FloatArray | None = None
 
@@ -68,6 +73,11 @@ class LoopSolver:
             fresh = self._jacobian is None
             if self._jacobian is None:
                 self._jacobian = self._differences(x, r)
+            if not (np.isfinite(r).all() and np.isfinite(self._jacobian).all()):
+                raise NoConvergence(
+                    f"algebraic loop: {self._loop.ring}: found values that are not finite; start values of"
+                    " its inputs, nearer to the solution, may help"
+                )
             newton = -np.linalg.lstsq(self._jacobian, r, rcond=None)[0].astype(np.float64)
             following, left = self._line(x, r, newton)
             step = following - x
@@ -90,28 +100,35 @@ class LoopSolver:
         self._values[self._torn] = x
         for sweep in self._sweeps:
             sweep()
+            if not np.isfinite(self._values[self._read]).all():
+                self._values[self._read] = 0.0  # all are read again by the next sweep
+                return np.full_like(x, np.nan)  # no block of the sweep is given what is not finite
         return self._values[self._sources] - x
 
     def _solved(self, x: FloatArray, r: FloatArray) -> bool:
-        return bool(np.all(np.abs(r) <= self._tolerance * (1.0 + np.abs(x))))
+        return bool(np.all(np.abs(r) <= self._tolerance * (self._loop.nominal + np.abs(x))))
 
     def _differences(self, x: FloatArray, r: FloatArray) -> FloatArray:
         """Return the Jacobian of the residual by differences, to the side where the inputs may be."""
-        columns = []
-        for i, each in enumerate(x):
-            h = DIFFERENCE * (1.0 + abs(each))
-            h = -h if each + h > self._maximum[i] else h
+        return np.column_stack([self._column(i, x, r) for i in range(len(x))])
+
+    def _column(self, i: int, x: FloatArray, r: FloatArray) -> FloatArray:
+        """Return a column of the Jacobian; not finite if it is on neither side."""
+        column = np.full_like(r, np.nan)
+        h = DIFFERENCE * (self._loop.nominal[i] + abs(x[i]))
+        for each in (x[i] + h, x[i] - h):
             moved = x.copy()
-            moved[i] += h
-            columns.append((self._residual(moved) - r) / (moved[i] - each))
-        return np.column_stack(columns)
+            moved[i] = each
+            if self._minimum[i] <= each <= self._maximum[i] and not np.isfinite(column).all():
+                column = (self._residual(moved) - r) / (moved[i] - x[i])
+        return column
 
     def _line(self, x: FloatArray, r: FloatArray, step: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return a point along a step, in the range of the inputs, that leaves less, and what it leaves."""
-        for _ in range(SHRINKS):
+        for halved in range(DEEPEST):
             following = np.clip(x + step, self._minimum, self._maximum)
             left = self._residual(following)
-            if np.isfinite(left).all() and _size(left) < _size(r):
+            if np.isfinite(left).all() and (_size(left) < _size(r) or halved >= SHRINKS - 1):
                 break
             step = 0.5 * step
         return following, left

@@ -174,6 +174,9 @@ class Master:
                 self._record(k // job.record_every)
             if k == job.count:
                 break
+            if k == 0:
+                for _, _, exchange in self._looped:
+                    exchange.begin()
             following = (k + 1) * job.step
             exact.value = following - here
             for member in self._members.values():

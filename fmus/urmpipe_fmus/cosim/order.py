@@ -9,7 +9,7 @@ found by iteration.
 from __future__ import annotations
 
 from collections import deque
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from urmpipe_fmus.cosim.system import Port
@@ -65,7 +65,9 @@ class Order:
         self._outputs = list(outputs)
         self._sources = sources
         self._depends = {one: [i for i in depends[one] if i in sources] for one in outputs}
-        self._inputs = [*sources, *given]
+        self._inputs: dict[str, list[Port]] = {}
+        for port in (*sources, *given):
+            self._inputs.setdefault(port.block, []).append(port)
         self._given = set(given)
         self._known: set[Port] = set()
         self._set: set[Port] = set()
@@ -85,8 +87,7 @@ class Order:
                 part = next(part for part in loops if self._reachable(part))
                 loops.remove(part)
                 found.append(self._loop(part))
-        blocks = dict.fromkeys(port.block for port in self._inputs)
-        rest = [(name, self._settable(name, self._set)) for name in blocks]
+        rest = [(name, self._settable(name, self._set)) for name in self._inputs]
         return found + [Exchange(name, inputs, ()) for name, inputs in rest if inputs]
 
     def _before(self, output: Port) -> list[Port]:
@@ -112,15 +113,12 @@ class Order:
         whole = (ports for name, ports in ready.items() if len(ports) == len(by_block[name]))
         return next(whole, None) or next((ports for ports in ready.values() if ports), [])
 
-    def _settable(self, block: str, but: Iterable[Port]) -> tuple[str, ...]:
+    def _settable(self, block: str, but: Collection[Port]) -> tuple[str, ...]:
         """Return the inputs of a block that are known."""
-        left = set(but)
         return tuple(
             port.variable
-            for port in self._inputs
-            if port.block == block
-            and port not in left
-            and (port in self._given or self._sources[port] in self._known)
+            for port in self._inputs.get(block, ())
+            if port not in but and (port in self._given or self._sources[port] in self._known)
         )
 
     def _exchange(self, outputs: Sequence[Port]) -> Exchange:
@@ -148,7 +146,7 @@ class Order:
             torn.update(dict.fromkeys(unknown(first)))
             ready = [port for port in left if port.block == first.block and not unknown(port)]
             known = {*self._settable(first.block, ()), *(i.variable for i in torn if i.block == first.block)}
-            inputs = tuple(i.variable for i in self._inputs if i.block == first.block and i.variable in known)
+            inputs = tuple(i.variable for i in self._inputs.get(first.block, ()) if i.variable in known)
             exchanges.append(Exchange(first.block, inputs, tuple(port.variable for port in ready)))
             self._set.update(Port(first.block, name) for name in inputs)
             self._known.update(ready)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,8 +20,8 @@ from urmpipe_models.errors import CosimulationError, Finding, UrmpipeError
 
 Make = Callable[[Block], Unit | Path]
 
-STEP_SLACK = 1e-9
-"""Of a step: so little may be missing from the last of a duration."""
+NANOSECOND = 1e-9
+"""So much may be missing from a duration's last step: a log's times are rounded to nanoseconds."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -125,6 +125,7 @@ def prepare(
     ends += [float(one.t_ns[-1]) * 1e-9 for one in columns.values() if len(one.t_ns)]
     faults += wiring.faults
     count = _count(system, duration, ends, faults)
+    wiring.notes += _cut_short(system, count)
     logged = tuple(_logged(system, one, columns, wiring, count, faults) for one in wiring.logged)
     order = _order(system, interfaces, wiring, faults)
     if faults:
@@ -184,12 +185,25 @@ def _count(system: System, duration: float | None, ends: Iterable[float], faults
     if not (length > 0.0 and math.isfinite(length)):
         faults.append("system.duration: not found, and no log tells it; allowed: a number above 0, in s")
         return 0
-    count = math.floor(length / system.step + STEP_SLACK)
+    if system.step < NANOSECOND:
+        faults.append(f"system.step: found {system.step:g} s, allowed: from 1e-09 s, as times are in ns")
+        return 0
+    count = math.floor((length + NANOSECOND) / system.step)
     if count < 1:
         faults.append(
             f"system.step: found {system.step:g} s, allowed: no more than the duration, {length:g} s"
         )
     return count
+
+
+def _cut_short(system: System, count: int) -> Iterator[str]:
+    """Yield what should be seen of a duration that is no whole number of steps."""
+    end = count * system.step
+    if system.duration and system.duration - end > NANOSECOND:
+        yield (
+            f"system.duration: found {system.duration:.9g} s, no multiple of the step, {system.step:.9g} s:"
+            f" it ends at {end:.9g} s"
+        )
 
 
 def _logged(
@@ -210,9 +224,9 @@ def _logged(
     except UrmpipeError as error:
         faults += [f"inputs.{port}: {finding}" for finding in error.findings]
         return Logged(port, np.zeros(count + 1))
-    for value in (table.values.min(), table.values.max()):
-        if fault := variable.refusal(float(value)):
-            faults.append(f"inputs.{port}: {asked.log}, column {asked.column}: {fault}")
+    refused = map(variable.refusal, np.unique(table.values).tolist())
+    if fault := next(filter(None, refused), ""):
+        faults.append(f"inputs.{port}: {asked.log}, column {asked.column}: {fault}")
     before, after, fraction = table.rows_at(np.arange(count + 1) * system.step)
     values = before[0] + fraction * (after[0] - before[0]) if asked.interpolate else before[0]
     return Logged(port, np.ascontiguousarray(values))
@@ -234,11 +248,18 @@ def _order(
             continue
         if not system.iterate:
             faults.append(
-                f"algebraic loop: {loop.ring}: each depends on the one before at the same instant; allowed:"
-                " none, or [loops] iterate = true"
+                f"algebraic loop: {loop.ring}: each depends on the one before at the same instant"
+                f"{_assumed(loop, interfaces)}; allowed: none, or [loops] iterate = true"
             )
         for port in loop.torn:
             kind = interfaces[port.block].variables[port.variable].type
             if kind != "Real":
                 faults.append(f"algebraic loop: {loop.ring}: found {port}, an {kind}; allowed: Reals alone")
     return tuple(found)
+
+
+def _assumed(loop: Loop, interfaces: Mapping[str, Interface]) -> str:
+    """Return which outputs of a loop are only assumed to depend on its inputs; empty if none."""
+    outputs = [Port(one.block, name) for one in loop.exchanges for name in one.outputs]
+    silent = [str(port) for port in outputs if port.variable in interfaces[port.block].silent]
+    return f" ({', '.join(silent)}: on all inputs, as the FMU does not tell on which)" if silent else ""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import subprocess
 import tempfile
 from collections.abc import Callable
@@ -14,6 +15,9 @@ from urmpipe_fmus.fmu_process import command, environment
 
 POLL = 0.02
 """How often it is looked at, in [s]."""
+
+SAID_BYTES = 16_000_000
+"""A process that printed more has it forgotten, as its disk is not for that."""
 
 
 class Worker:
@@ -30,7 +34,7 @@ class Worker:
     def __enter__(self) -> Worker:
         self._folder = tempfile.TemporaryDirectory(prefix="urmpipe-", ignore_cleanup_errors=True)
         self.folder = Path(self._folder.name)
-        with (self.folder / SAID).open("wb") as said:
+        with (self.folder / SAID).open("ab") as said:
             self._process = subprocess.Popen(
                 command("urmpipe_fmus.cosim.worker", str(self.folder)),
                 stdin=subprocess.PIPE,
@@ -63,6 +67,8 @@ class Worker:
             try:
                 return self._process.wait(POLL)
             except subprocess.TimeoutExpired:
+                if (self.folder / SAID).stat().st_size > SAID_BYTES:
+                    os.truncate(self.folder / SAID, 0)  # what is appended from then on begins there
                 poll()
 
     def _begin(self) -> None:

@@ -132,6 +132,12 @@ class Exchange:
             self._sets()
         self._gets()
 
+    def begin(self) -> None:
+        """Forget what was seen before the first step: an FMU may compute its outputs at once until then."""
+        self.followed = not len(self._moved.places)
+        if self._member is not None:
+            self._member.stale = None
+
     def _decide(self) -> None:
         """See whether the outputs follow the inputs at once, or only after a step.
 

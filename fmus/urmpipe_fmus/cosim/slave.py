@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from functools import partial
 from itertools import pairwise
 from typing import Any
@@ -189,16 +190,19 @@ class Slave:
         if self.fatal or not self._fmu.component:
             return
         if self.running and not self.failed:
-            try:
-                self.once("fmi2Terminate")
-            except FmuFailed:
-                if self.fatal:
-                    return
+            self._try("fmi2Terminate")
         for state in self._states:
-            if state.value:
-                self.once("fmi2FreeFMUstate", ctypes.byref(state))
+            if state.value and not self.fatal:
+                self._try("fmi2FreeFMUstate", ctypes.byref(state))
+        if self.fatal:
+            return
         self._progress.call = call_code(self.number, "fmi2FreeInstance")
         self._fmu.fmi2FreeInstance(self._component)
+
+    def _try(self, function: str, *arguments: Any) -> None:
+        """Call a function whose failure changes nothing any more."""
+        with suppress(FmuFailed):
+            self.once(function, *arguments)
 
 
 def status_name(status: int) -> str:

@@ -12,7 +12,7 @@ STEP = 0.005
 """Communication step in [s] of a system that names none."""
 
 TOLERANCE = 1e-9
-"""What is left of an algebraic loop, relative to its values, unless the system says otherwise."""
+"""What is left of an algebraic loop, relative to nominal + |value|, unless the system says otherwise."""
 
 
 class Port(NamedTuple):
@@ -98,7 +98,7 @@ class System:
         connections: In the order of the file.
         inputs: Inputs from logs.
         iterate: Whether algebraic loops are iterated; else they are errors.
-        tolerance: What may be left of an iterated loop, relative to its values.
+        tolerance: What may be left of an iterated loop, relative to nominal + |value|.
     """
 
     name: str

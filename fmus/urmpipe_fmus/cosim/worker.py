@@ -15,6 +15,7 @@ import shutil
 import signal
 import sys
 import threading
+import traceback
 from pathlib import Path
 from typing import Any
 
@@ -121,5 +122,11 @@ if __name__ == "__main__":
         shutil.rmtree(own, ignore_errors=True)
         os._exit(0)
     end_with_parent(own)
-    work(own)
-    os._exit(0)  # leaves the FMUs' libraries loaded: what they do when unloaded can no longer spoil the run
+    code = 1
+    try:
+        work(own)
+        code = 0
+    except Exception:
+        traceback.print_exc()
+    sys.stdout.flush()
+    os._exit(code)  # leaves the FMUs' libraries loaded: what they do when unloaded cannot spoil the run

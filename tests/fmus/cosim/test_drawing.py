@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from foreign_fmus import INTEGRATOR, Foreign, Scalar, gain, planned
@@ -40,6 +40,7 @@ def diagrams(draw: st.DrawFn) -> Diagram:
     return Diagram(boxes, tuple(wires))
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(diagrams())
 def test_boxes_stand_apart(shown: Diagram) -> None:
     route(Layout(shown))
@@ -48,6 +49,7 @@ def test_boxes_stand_apart(shown: Diagram) -> None:
         assert beside or a.y + a.height <= b.y or b.y + b.height <= a.y
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(diagrams())
 def test_wires_go_upright_or_level_from_port_to_port_around_the_boxes(shown: Diagram) -> None:
     layout = Layout(shown)
@@ -66,6 +68,7 @@ def test_wires_go_upright_or_level_from_port_to_port_around_the_boxes(shown: Dia
                 assert not (through and (upright if x0 == x1 else level))
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(diagrams())
 def test_all_is_inside_the_drawing(shown: Diagram) -> None:
     routes = route(Layout(shown))
@@ -119,6 +122,21 @@ def test_arrays_are_one_port_and_one_wire_and_idle_outputs_are_counted() -> None
     assert arm.hidden == 5
 
 
+def test_a_log_is_called_by_its_file_whole_paths_tell_two_of_one_name_apart() -> None:
+    names = ["far/away/in/a/folder/u.csv", "one/v.csv", "two/v.csv", "a.csv"]
+    blocks = {f"b{i}": gain() for i in range(4)}
+    asks = [LogInput(destination=Port(f"b{i}", "u"), log=log, column="u") for i, log in enumerate(names)]
+    column = LogColumn(np.array([0, 10**9]), np.zeros(2))
+    shown = diagram(planned(blocks, None, None, asks, column=lambda one: column))
+    assert [name for name in shown.boxes if name not in blocks] == [
+        "u.csv",
+        "one/v.csv",
+        "two/v.csv",
+        "a.csv",
+    ]
+    assert [wire.source for wire in shown.wires] == ["u.csv", "one/v.csv", "two/v.csv", "a.csv"]
+
+
 def test_a_drawing_holds_names_units_and_connections_and_nothing_from_elsewhere() -> None:
     plan = arm_plan()
     svg = system_svg(plan)
@@ -129,6 +147,17 @@ def test_a_drawing_holds_names_units_and_connections_and_nothing_from_elsewhere(
     ways = [one.text for one in ET.fromstring(svg).iter(f"{SVG}title")]
     assert ways == ["test", "source.q → arm.phi", "g.y → i.u", "a<b>&.csv.u → g.u"]
     assert svg.count("http") == 1  # the name space
+
+
+def test_a_long_name_is_broken_into_lines_that_the_drawing_has_room_for() -> None:
+    plan = planned({"i": INTEGRATOR}, {"i.u": "i.y"})
+    plain = ET.fromstring(system_svg(plan))
+    object.__setattr__(plan.system, "name", "N" * 120)
+    drawn = ET.fromstring(system_svg(plan))
+    titles = [one.text or "" for one in drawn.iter(f"{SVG}text") if one.get("class") == "title"]
+    assert "".join(titles) == "N" * 120
+    assert max(len(one) for one in titles) * 9.7 <= float(drawn.attrib["width"])  # 0.6 em of 16 px
+    assert float(drawn.attrib["height"]) == float(plain.attrib["height"]) + 22.0 * (len(titles) - 1)
 
 
 @pytest.mark.slow

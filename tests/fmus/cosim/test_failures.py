@@ -81,6 +81,45 @@ def test_what_a_process_prints_is_among_its_last_words() -> None:
     )
 
 
+def test_a_state_that_cannot_be_freed_spoils_no_run_that_is_over() -> None:
+    stingy = Foreign(
+        name="stingy",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1, on=("u",))),
+        compute="v->r[1] = cos(v->r[0]);",
+        step="v->i[15] = 1;",
+        fresh=False,
+    )
+    recorded = ran({"a": stingy}, {"a.u": "a.y"}, iterate=True)
+    assert recorded.failed is None
+    assert len(recorded.t_ns) == 11
+
+
+def test_an_fmu_that_prints_without_end_does_not_fill_the_disk(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    flood = Foreign(
+        name="flood",
+        scalars=(Scalar("y", 0),),
+        step="""
+        static char text[1000000]; memset(text, '.', sizeof text); text[sizeof text - 1] = '\\n';
+        write(1, text, sizeof text); usleep(50000);
+        if (t > 0.85) { write(2, "no more\\n", 8); abort(); }
+        """,
+    )
+    plan = planned({"f": flood}, step=0.05)
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
+    monkeypatch.setattr("urmpipe_fmus.cosim.process.SAID_BYTES", 10_000)
+    sizes: list[int] = []
+
+    def look(_: float) -> None:
+        sizes.extend(one.stat().st_size for one in tmp_path.glob("urmpipe-*/said.txt"))
+
+    recorded = simulate(plan, progress=look)
+    assert max(sizes) < 9_000_000  # of 18 MB; it is looked at between two of them
+    assert recorded.failed is not None
+    assert recorded.failed.endswith("no more")
+
+
 def test_an_fmu_that_gives_no_instance_is_told() -> None:
     other = Foreign(name="other", scalars=(Scalar("y", 0),), start="free(m); return NULL;")
     recorded = ran({"a": other})

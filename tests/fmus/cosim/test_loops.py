@@ -74,6 +74,21 @@ def test_a_ring_of_many_inputs_is_solved() -> None:
     assert np.allclose(recorded.values, expected, rtol=1e-10, atol=0.0)  # the tolerance, by the condition
 
 
+@pytest.mark.parametrize("whose", ["u", "y"])
+def test_a_loop_of_small_values_is_solved_to_their_nominal_size(whose: str) -> None:
+    """y = 0.99 u + 1e-12 = 1e-10: what the first guess, 0, leaves is within the tolerance of a value of 1."""
+    small = Foreign(
+        name=f"small_{whose}",
+        scalars=(
+            Scalar("u", 0, "input", extra=' nominal="1e-10"' if whose == "u" else ""),
+            Scalar("y", 1, on=("u",), extra=' nominal="1e-10"' if whose == "y" else ""),
+        ),
+        compute="v->r[1] = 0.99 * v->r[0] + 1e-12;",
+    )
+    y = solved({"a": small}, {"a.u": "a.y"}).column("a", "y")
+    assert np.allclose(y, 1e-10, rtol=2e2 * TOLERANCE, atol=0.0)  # twice the residual, magnified by 100
+
+
 def test_inputs_stay_in_their_range() -> None:
     """y = 1 / sqrt(u) of an input that must be above 0.01: u = 1, from a start at 4."""
     root = Foreign(
@@ -112,6 +127,33 @@ def test_blocks_whose_outputs_follow_only_after_a_step_go_back_and_step_again(bo
     assert np.allclose(recorded.column("b", "y")[1:], 6.0 / 13.0, rtol=0.0, atol=1e-10)
 
 
+def rising(port: str) -> LogInput:
+    """Return an input that follows a log from 0 to 1 in 1 s."""
+    return LogInput(destination=Port(*port.split(".")), log="c.csv", column="c", interpolate=True)
+
+
+RISING = LogColumn(np.array([0, 10**9]), np.array([0.0, 1.0]))
+
+
+def test_a_block_whose_outputs_follow_at_once_only_before_the_first_step_is_seen_through() -> None:
+    """y = 1 - 3 u, in a ring with u = 4 y + c(t): y = (1 - 3 c) / 13."""
+    formula = "v->r[1] = 1 - 3 * v->r[0];"
+    early = Foreign(
+        name="early",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1, on=("u",))),
+        compute=f"if (!v->i[0]) {formula}",
+        step=f"v->i[0] = 1; {formula}",
+    )
+    line = Foreign(
+        name="line4",
+        scalars=(Scalar("u", 0, "input"), Scalar("c", 1, "input"), Scalar("y", 2, on=("u", "c"))),
+        compute="v->r[2] = 4 * v->r[0] + v->r[1];",
+    )
+    recorded = solved({"a": early, "b": line}, RING, None, [rising("b.c")], column=lambda one: RISING)
+    c = recorded.column("b", "c")
+    assert np.allclose(recorded.column("a", "y"), (1.0 - 3.0 * c) / 13.0, rtol=0.0, atol=1e-10)
+
+
 def test_going_back_undoes_what_a_block_integrated() -> None:
     """A stale block counts each step once, however often it steps again."""
     counting = Foreign(
@@ -124,6 +166,44 @@ def test_going_back_undoes_what_a_block_integrated() -> None:
     recorded = solved({"a": counting}, {"a.u": "a.y"})
     assert recorded.column("a", "steps").tolist() == list(range(11))
     assert np.allclose(recorded.column("a", "y")[1:], 0.7390851332151607, rtol=0.0, atol=2.0 * TOLERANCE)
+
+
+def test_a_block_that_goes_back_is_told_again_what_was_set_before_the_loop() -> None:
+    """y = 1 - 3 u + v after a step, in a ring with u = 4 y: y = (1 + v) / 13; z = v is read before it."""
+    late = Foreign(
+        name="late",
+        scalars=(
+            Scalar("u", 0, "input"),
+            Scalar("v", 1, "input"),
+            Scalar("z", 2, on=("v",)),
+            Scalar("y", 3, on=("u", "v")),
+        ),
+        compute="v->r[2] = v->r[1]; v->r[3] = 1 - 3 * v->r[0] + v->r[1];",
+        fresh=False,
+    )
+    start = {"b": {"k": 4.0}}
+    recorded = solved({"a": late, "b": gain()}, RING, start, [rising("a.v")], column=lambda one: RISING)
+    expected = (1.0 + recorded.column("a", "v")) / 13.0
+    assert np.allclose(recorded.column("a", "y")[1:], expected[1:], rtol=0.0, atol=1e-10)
+
+
+def test_looking_whether_outputs_follow_leaves_no_trace_where_they_do_not() -> None:
+    """y = max(u, 0) with u = y / 2 + c(t) below 0: what the block integrates is u, held over each step."""
+    limited = Foreign(
+        name="limited",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1, on=("u",)), Scalar("x", 2)),
+        compute="v->r[1] = v->r[0] > 0 ? v->r[0] : 0;",
+        step="v->r[2] += h * v->r[0];",
+    )
+    plus = Foreign(
+        name="plus",
+        scalars=(Scalar("u", 0, "input"), Scalar("c", 1, "input"), Scalar("y", 2, on=("u", "c"))),
+        compute="v->r[2] = 0.5 * v->r[0] + v->r[1];",
+    )
+    falling = LogColumn(RISING.t_ns, np.array([-1.0, -3.0]))
+    recorded = solved({"a": limited, "b": plus}, RING, None, [rising("b.c")], column=lambda one: falling)
+    held = np.concatenate([[0.0], np.cumsum(0.1 * recorded.column("b", "c")[:-1])])
+    assert np.allclose(recorded.column("a", "x"), held, rtol=0.0, atol=1e-12)  # rounding
 
 
 def test_what_has_no_solution_is_told_with_the_loop_and_what_is_left() -> None:
@@ -164,3 +244,26 @@ def test_inputs_at_the_end_of_their_range_are_not_moved_out_of_it(fresh: bool) -
     recorded = solved({"a": full}, {"a.u": "a.y"})
     assert np.allclose(recorded.column("a", "y")[1:], 1.0, rtol=0.0, atol=4.0 * TOLERANCE)
     assert not recorded.column("a", "refused").any()
+
+
+def test_values_that_are_not_finite_are_told_and_are_no_fault_of_the_block() -> None:
+    recorded = ran({"a": gain("log", formula="log(u)")}, {"a.u": "a.y"}, iterate=True)
+    assert recorded.failed == (
+        "algebraic loop: a.y -> a.u: found values that are not finite; start values of its inputs, nearer to"
+        " the solution, may help, at t = 0 s"
+    )
+
+
+def test_a_step_to_where_a_block_gives_no_number_is_shortened_and_no_other_block_sees_it() -> None:
+    """y = 2 + 10 log u from u = 9, where Newton steps below 0; the other block counts what is no number."""
+    picky = Foreign(
+        name="picky",
+        scalars=(Scalar("u", 0, "input", start="9"), Scalar("y", 1, on=("u",)), Scalar("refused", 2)),
+        compute="if (!isfinite(v->r[0])) v->r[2] += 1; v->r[1] = v->r[0];",
+        start="m->v.r[0] = 10;",
+    )
+    log = gain("log10", formula="2 + 10 * log(u)")
+    recorded = solved({"p": picky, "log": log}, {"log.u": "p.y", "p.u": "log.y"}, {"log": {"u": 9.0}})
+    u = recorded.column("p", "y")
+    assert np.allclose(u, 2.0 + 10.0 * np.log(u), rtol=0.0, atol=1e-10)  # the tolerance, by the slope
+    assert not recorded.column("p", "refused").any()

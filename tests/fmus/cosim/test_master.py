@@ -66,6 +66,20 @@ def test_time_is_k_steps_and_an_fmus_own_time_meets_it(step: float, count: int) 
     assert len(recorded.t_ns) == count + 1
 
 
+def test_an_fmu_of_one_step_size_is_always_given_the_same() -> None:
+    """t_k+1 - t_k differs from step to step in its last bits; such an FMU refuses any step but its first."""
+    fixed = Foreign(
+        name="fixed",
+        scalars=(Scalar("y", 1),),
+        step="if (!v->r[0]) v->r[0] = h; if (h != v->r[0]) return fmi2Error; v->r[1] += 1;",
+        variable_step=False,
+    )
+    assert len({(k + 1) * 0.1 - k * 0.1 for k in range(10)}) > 1
+    recorded = ran({"a": fixed})
+    assert recorded.failed is None
+    assert recorded.column("a", "y").tolist() == list(range(11))
+
+
 @pytest.mark.parametrize("every", [1, 3, 10, 11])
 def test_every_so_many_points_are_recorded(every: int) -> None:
     recorded = ran({"ramp": RAMP}, record_every=every)
@@ -89,6 +103,26 @@ def test_arrays_and_elements_are_connected_one_by_one(order: tuple[int, int, int
         *(Port("ramp", f"y[{i}]") for i in (1, 2, 3)),
     )
     assert recorded.units == ("m",) * 4
+
+
+def test_blocks_are_initialized_with_what_their_inputs_are_at_the_start() -> None:
+    """A block that remembers its input when its initialization ends, behind one that doubles a log."""
+    remembers = Foreign(
+        name="remembers",
+        scalars=(Scalar("u", 0, "input"), Scalar("y", 1)),
+        compute="if (!v->i[0]) { v->r[1] = v->r[0]; v->i[0] = 1; }",
+        fresh=False,
+    )
+    ask = LogInput(destination=Port("double", "u"), log="run.csv", column="u")
+    column = LogColumn(np.array([0, 10**8]), np.array([3.0, 4.0]))
+    recorded = ran(
+        {"first": remembers, "double": gain()},
+        {"first.u": "double.y"},
+        {"double": {"k": 2.0}},
+        [ask],
+        column=lambda one: column,
+    )
+    assert recorded.column("first", "y").tolist() == [6.0] * 11
 
 
 def test_integers_and_booleans_are_exchanged_and_recorded() -> None:

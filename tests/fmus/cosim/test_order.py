@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
@@ -55,11 +55,13 @@ def assert_fresh(steps: Sequence[Exchange | Loop], wiring: Wired) -> None:
     assert current == set(sources)
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(wired())
 def test_every_input_is_that_of_the_instant(wiring: Wired) -> None:
     assert_fresh(Order(*wiring).steps(), wiring)
 
 
+@settings(deadline=None)  # a slow computer is no fault
 @given(wired())
 def test_loops_are_the_parts_of_the_graph_that_lead_back_to_themselves(wiring: Wired) -> None:
     outputs, depends, sources = wiring
@@ -80,12 +82,18 @@ def test_loops_are_the_parts_of_the_graph_that_lead_back_to_themselves(wiring: W
 
 
 def test_blocks_in_a_row_are_read_once_each_in_their_order_whatever_that_of_the_system() -> None:
-    names = [f"b{i}" for i in range(1200)]  # more than Python's recursion limit
+    names = [f"b{i}" for i in range(200)]
     outputs = [Port(name, "y") for name in reversed(names)]
     depends = {port: [Port(port.block, "u")] for port in outputs}
     sources = {Port(b, "u"): Port(a, "y") for a, b in pairwise(names)}
     steps = Order(outputs, depends, sources).steps()
     assert [step.block for step in steps if isinstance(step, Exchange)] == names
+
+
+def test_a_row_may_be_longer_than_pythons_recursion_limit() -> None:
+    row = [Port(f"b{i}", "y") for i in range(2000)]
+    before = {port: row[max(i - 1, 0) : i] for i, port in enumerate(row)}
+    assert components(row[::-1], lambda port: before[port]) == [[port] for port in row]
 
 
 def test_a_block_is_called_twice_only_where_it_must() -> None:

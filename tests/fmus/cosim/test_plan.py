@@ -162,7 +162,10 @@ def test_a_loop_is_told_by_its_members() -> None:
 
 def test_an_output_that_does_not_say_depends_on_all_inputs() -> None:
     silent = gain("silent", on=None)
-    assert told({"a": silent}, {"a.u": "a.y"})[0].startswith("algebraic loop: a.y -> a.u: ")
+    assert told({"a": silent}, {"a.u": "a.y"}) == [
+        "algebraic loop: a.y -> a.u: each depends on the one before at the same instant (a.y: on all inputs,"
+        " as the FMU does not tell on which); allowed: none, or [loops] iterate = true"
+    ]
     assert planned({"a": gain("deaf", on=())}, {"a.u": "a.y"}).loops == ()
 
 
@@ -185,8 +188,42 @@ def test_the_duration_is_told_by_the_system_or_by_the_caller_or_by_the_longest_l
     assert told({"a": TROUBLE}, duration=None) == [
         "system.duration: not found, and no log tells it; allowed: a number above 0, in s"
     ]
+    assert told({"a": TROUBLE}, step=1e-10) == [
+        "system.step: found 1e-10 s, allowed: from 1e-09 s, as times are in ns"
+    ]
     assert told({"a": TROUBLE}, duration=0.05) == [
         "system.step: found 0.1 s, allowed: no more than the duration, 0.05 s"
+    ]
+
+
+@pytest.mark.parametrize("rate", [30, 60, 90, 300])
+def test_the_last_row_of_a_log_whose_times_are_rounded_to_nanoseconds_is_reached(rate: int) -> None:
+    ask = LogInput(destination=Port("a", "u"), log="run.csv", column="u")
+    k = np.arange(7383)
+    column = LogColumn(np.round(k / rate * 1e9).astype(np.int64), k.astype(np.float64))
+    blocks = system({"a": gain()}, inputs=[ask], step=1.0 / rate, duration=None)
+    plan = prepare(blocks, fmu_of, column=lambda one: column)
+    assert plan.logged[0].values.tolist() == k.tolist()
+
+
+def test_a_duration_that_is_no_multiple_of_the_step_ends_with_the_last_whole_one_and_is_told() -> None:
+    plan = planned({"a": TROUBLE}, step=0.3)
+    assert plan.count == 3
+    assert plan.notes == ("system.duration: found 1 s, no multiple of the step, 0.3 s: it ends at 0.9 s",)
+    assert planned({"a": TROUBLE}, step=0.1, duration=0.3).notes == ()
+
+
+@pytest.mark.parametrize(
+    ("port", "told_as"),
+    [("by", "found 1.5, allowed: an integer of 32 bits"), ("on", "found 0.5, allowed: true, false")],
+)
+def test_every_value_of_a_log_is_held_to_the_type_of_its_input(port: str, told_as: str) -> None:
+    ask = LogInput(destination=Port("n", port), log="run.csv", column="x")
+    column = LogColumn(np.array([0, 1, 2]) * 10**8, np.array([0.0, 0.5, 1.0]) + (port == "by"))
+    start = {"by": 1, "on": True}
+    del start[port]
+    assert told({"n": COUNTER}, None, {"n": start}, [ask], column=lambda one: column) == [
+        f"inputs.n.{port}: run.csv, column x: {told_as}"
     ]
 
 

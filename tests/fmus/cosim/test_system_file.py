@@ -93,6 +93,14 @@ def test_files_are_those_beside_the_system_file(folder: Path) -> None:
     assert source.options == {"log": str(folder / "run.csv"), "columns": [str(folder / "run.csv"), "u"]}
 
 
+def test_names_of_units_and_columns_are_no_files(folder: Path) -> None:
+    for name in ("log_source", "u"):
+        (folder / name).touch()
+    system = load_system(folder / "two.toml")
+    assert system.by_name["source"].unit == "log_source"
+    assert system.inputs[0].column == "u"
+
+
 def test_an_argument_is_left_as_it_is_given_and_of_its_defaults_type(folder: Path) -> None:
     system = load_system(folder / "two.toml", {"log": "run.csv", "k": "3", "joints": "4", "held": "true"})
     source, plant, _ = system.blocks
