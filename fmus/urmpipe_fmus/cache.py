@@ -10,7 +10,6 @@ import hashlib
 import json
 import os
 import platform
-import shlex
 import shutil
 import sys
 import uuid
@@ -145,14 +144,15 @@ def _versions() -> list[str]:
 
 def _compiler() -> list[Any]:
     """Return what tells one C compiler from another without running it: command, file, size and time."""
-    command = os.environ.get("CC") or "cc"
-    words = shlex.split(command, posix=os.name == "posix")
-    found = shutil.which(words[0]) if words else None
-    if found is None:
-        return [command]
+    from urmpipe_fmus.native.compile import system_compiler
+
+    command = system_compiler()
+    found = shutil.which(command[0]) if command else None
+    if command is None or found is None:
+        return []
     file = Path(found).resolve()
     status = file.stat()
-    return [command, str(file), status.st_size, status.st_mtime_ns]
+    return [*command, str(file), status.st_size, status.st_mtime_ns]
 
 
 @cache

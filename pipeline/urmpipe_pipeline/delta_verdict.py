@@ -76,11 +76,7 @@ class DeltaVerdict:
 
 
 def delta_verdict(
-    block: str,
-    t_ns: IntArray,
-    delta: FloatArray,
-    tolerance: Mapping[str, float],
-    variables: tuple[str, ...] = ("delta", "norm"),
+    block: str, t_ns: IntArray, delta: FloatArray, tolerance: Mapping[str, float]
 ) -> DeltaVerdict | None:
     """Hold the deviation of a delta meter against a tolerance; None without a sample.
 
@@ -89,7 +85,6 @@ def delta_verdict(
         t_ns: Times in integer [ns], shape (n,).
         delta: reference - actual in [m], shape (n, 3).
         tolerance: Largest absolute deviation allowed in [m]: axis, norm, or x, y, z.
-        variables: Its signals that hold what is judged.
 
     Raises:
         OptionError: If a tolerance is none of those, or negative.
@@ -106,7 +101,7 @@ def delta_verdict(
     row, axis = _worst(np.where(known[:, np.newaxis], sizes, math.inf), allowed)
     return DeltaVerdict(
         block=block,
-        variables=variables,
+        variables=("delta", "norm"),
         tolerance=dict(tolerance),
         quantity=AXES[axis],
         worst=float(sizes[row, axis]) if known[row] else math.nan,

@@ -77,6 +77,7 @@ def test_joints_that_slide_are_apart_from_those_that_turn(tmp_path: Path) -> Non
     path.write_text("t,q1 [deg],q2 [mm],q3 [deg]\n0,180,1000,90\n1,170,2000,80\n", encoding="utf-8")
     found = read_table(path)
     assert found.columns == (("q", "rad", 2), ("s", "m", 1))
+    # one product of two doubles: a unit in the last place
     np.testing.assert_allclose(found.table.values[0], [np.pi, np.pi / 2, 1.0], rtol=2.3e-16)
 
 

@@ -83,6 +83,7 @@ def test_log_to_delta_is_what_compare_says(log: str) -> None:
     out = np.abs(run.delta[:, :3]).max(axis=1) > 0.0035
     np.testing.assert_array_equal(result.signal("delta.out_of_tolerance").values, out)
     assert judged.out_of_tolerance == int(out.sum())
+    assert judged.worst == pytest.approx(np.abs(run.delta[:, :3]).max(), rel=0.0, abs=1e-12)  # as above
     assert judged.verdict == result.verdict == compared.verdict
     turns = result.signal("repolarizer.turns").values
     assert int(np.abs(np.diff(turns, axis=0)).sum()) == len(run.run.repolarizations)

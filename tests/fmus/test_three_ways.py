@@ -17,6 +17,7 @@ from fmu_run import FmuRun
 from random_units import PATIENT, random_columns, random_starts, random_units
 from sliding_arm import sliding_arm
 from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.run import run
@@ -156,11 +157,35 @@ def test_a_run_gives_what_steps_give(what: str) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
 @pytest.mark.parametrize("what", UNITS)
-def test_an_fmu_gives_what_a_run_gives(what: str, backend: Backend, tmp_path: Path) -> None:
+def test_an_fmu_gives_what_a_run_gives(what: str, backend: Backend) -> None:
     unit, t = unit_of(what), np.linspace(0.0, 0.2, 41, dtype=np.float64)
-    path = build_fmu(unit, tmp_path, backend=backend).path
+    path = cached_fmu(unit, backend)
     for seed in range(3):
         assert_fmu_gives(unit, path, random_case(unit, seed, len(t)), t)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("backend", [pytest.param("native", marks=needs_native), "python"])
+@pytest.mark.parametrize("what", UNITS)
+def test_an_fmu_goes_on_bit_by_bit_from_a_saved_state(what: str, backend: Backend) -> None:
+    unit, t = unit_of(what), np.linspace(0.0, 0.2, 41, dtype=np.float64)
+    start, columns = random_case(unit, 0, len(t))
+    before, after = (
+        {name: rows[part] for name, rows in columns.items()} for part in (slice(20), slice(20, 41))
+    )
+    with FmuRun(cached_fmu(unit, backend), unit, start) as fmu:
+        fmu.over(t[:20], before)
+        state = fmu.fmu.getFMUstate()
+        kept = fmu.fmu.serializeFMUstate(state)
+        first = fmu.over(t[19:40], after)
+        fmu.fmu.setFMUstate(state)
+        again = fmu.over(t[19:40], after)
+        fmu.over(t[:20] + 0.4, before)  # somewhere else
+        fmu.fmu.setFMUstate(fmu.fmu.deSerializeFMUstate(kept))
+        last = fmu.over(t[19:40], after)
+    np.testing.assert_array_equal(again, first)
+    np.testing.assert_array_equal(last, first)
+    assert (np.ptp(first, axis=0) > 0.0).any()
 
 
 @pytest.mark.slow

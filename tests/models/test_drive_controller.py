@@ -19,7 +19,7 @@ motions = st.builds(JointMotion, values, values, values)
 
 def test_eq_20_adds_the_weighted_errors_to_the_last_voltage() -> None:
     voltage = next_voltage(10.0, GAINS, JointMotion(1.0, 2.0, 30.0), JointMotion(0.5, 3.0, 10.0), 48.0)
-    assert voltage == pytest.approx(10.0 + 7.5 * 0.5 - 0.75 * 1.0 + 0.01 * 20.0, rel=1e-15)
+    assert voltage == pytest.approx(10.0 + 7.5 * 0.5 - 0.75 * 1.0 + 0.01 * 20.0, rel=1e-15)  # rounding
 
 
 @given(values, motions, motions)

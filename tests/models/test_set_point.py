@@ -41,7 +41,9 @@ def test_the_trapezoid_at_its_corners_and_midway() -> None:
     np.testing.assert_allclose(
         found.position, [-1.0, -1.0, -0.875, -0.5, 1.0, 2.5, 2.875, 3.0, 3.0], rtol=0.0, atol=1e-15
     )
-    np.testing.assert_allclose(found.velocity, [0.0, 0.0, 1.0, 2.0, 2.0, 2.0, 1.0, 0.0, 0.0], atol=1e-15)
+    np.testing.assert_allclose(
+        found.velocity, [0.0, 0.0, 1.0, 2.0, 2.0, 2.0, 1.0, 0.0, 0.0], rtol=0.0, atol=1e-15
+    )
     np.testing.assert_array_equal(found.acceleration, [0.0, 4.0, 4.0, 0.0, 0.0, -4.0, -4.0, 0.0, 0.0])
 
 

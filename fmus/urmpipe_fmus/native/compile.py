@@ -41,7 +41,7 @@ def native_missing(platforms: Sequence[str] = ()) -> str | None:
         return "casadi is not installed (pip install 'urmpipe[native]')"
     wanted = list(platforms) or [this_platform()]
     local = wanted == [this_platform()]
-    if local and _system_compiler():
+    if local and system_compiler():
         return None
     reasons = ["no C compiler is found (cc, or what the variable CC names)"] if local else []
     unknown = [one for one in wanted if one not in TARGETS]
@@ -87,7 +87,7 @@ def native_binaries(
     }
 
 
-def _system_compiler() -> list[str] | None:
+def system_compiler() -> list[str] | None:
     """Return the command of the system's compiler: what CC names, else cc."""
     command = shlex.split(os.environ.get("CC") or "cc", posix=os.name == "posix")
     return command if command and shutil.which(command[0]) else None
@@ -96,7 +96,7 @@ def _system_compiler() -> list[str] | None:
 def _command(platforms: Sequence[str], one: str) -> list[str]:
     """Return the compiler and flags for one of some platforms."""
     position = [] if one.startswith("win") else ["-fPIC"]
-    local = _system_compiler()
+    local = system_compiler()
     if local and list(platforms) == [this_platform()]:
         linked = ["-Wl,--build-id=none"] if one.startswith("linux") else []
         return [*local, *FLAGS, *position, *linked]

@@ -1,4 +1,4 @@
-"""What the tests of this folder share: every shipped unit, built once a session."""
+"""What the tests of this folder share: every shipped unit as an FMU."""
 
 from __future__ import annotations
 
@@ -10,24 +10,22 @@ import pytest
 from peers import need_builds_for
 from shipped_units import CROSS_BUILT, shipped_unit
 from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.description import Backend
 from urmpipe_fmus.native import this_platform
 
 Fmu = Callable[..., Path]
 
 
 @pytest.fixture(scope="session")
-def fmu_of(tmp_path_factory: pytest.TempPathFactory) -> Fmu:
-    """Return a function that builds a shipped unit by name and backend, and builds it once."""
-    built: dict[tuple[str, str], Path] = {}
+def fmu_of() -> Fmu:
+    """Return a function that gives a shipped unit's FMU by name and backend, built once a session."""
 
-    def build(name: str, backend: str = "native") -> Path:
+    def build(name: str, backend: Backend = "native") -> Path:
+        """Return the FMU out of the session's cache."""
         if backend == "native":
             need_builds_for(this_platform())
-        if (name, backend) not in built:
-            folder = tmp_path_factory.mktemp(f"{name}_{backend}")
-            made = build_fmu(shipped_unit(name), folder / f"{name}.fmu", backend=backend)  # type: ignore[arg-type]
-            built[name, backend] = made.path
-        return built[name, backend]
+        return cached_fmu(shipped_unit(name), backend)
 
     return build
 

@@ -1,4 +1,4 @@
-"""A thousand instances of a native FMU, one after the other, leave no memory behind."""
+"""Thousands of instances of a native FMU, one after the other, leave no memory behind."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def cycle():
 for _ in range(200):
     cycle()
 before = resident()
-for _ in range(1000):
+for _ in range(5000):
     cycle()
 print(resident() - before)
 """
@@ -56,8 +56,9 @@ print(resident() - before)
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", shipped())
-def test_a_thousand_instances_leave_resident_memory_flat(name: str, fmu_of: Callable[..., Path]) -> None:
+def test_thousands_of_instances_leave_resident_memory_flat(name: str, fmu_of: Callable[..., Path]) -> None:
     said = said_by(sys.executable, "-c", CYCLES, str(fmu_of(name)))
     assert said.stdout.strip().lstrip("-").isdecimal(), said.stdout
-    # 64 bytes a cycle: the smallest instance, and the smallest saved state, are larger.
-    assert int(said.stdout) < 64 * 1024, f"{int(said.stdout)} bytes more after 1000 instances"
+    # 13 bytes a cycle: any instance or saved state is larger. What the heap had free before can hide a block
+    # as small as a name: the native backend's test of its callbacks counts each.
+    assert int(said.stdout) < 64 * 1024, f"{int(said.stdout)} bytes more after 5000 instances"

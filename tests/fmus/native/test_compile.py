@@ -97,7 +97,7 @@ def only_casadi(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_what_is_missing_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
     assert native_missing(["amiga", "linux64"]) == ("platform amiga: zig is asked for linux64 and win64 only")
     monkeypatch.setattr("urmpipe_fmus.native.compile.this_platform", lambda: "amiga")
-    monkeypatch.setattr("urmpipe_fmus.native.compile._system_compiler", lambda: None)
+    monkeypatch.setattr("urmpipe_fmus.native.compile.system_compiler", lambda: None)
     assert native_missing() == (
         "no C compiler is found (cc, or what the variable CC names),"
         " and platform amiga: zig is asked for linux64 and win64 only"

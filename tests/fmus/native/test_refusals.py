@@ -44,6 +44,7 @@ def test_values_are_refused_as_the_instance_refuses_them(
             assert fmu.fmu.getReal([K, DAMPING, GOAL, X, FORCE]) == before
         fmu.step(0.0, 0.01)
         instance.do_step(0.0, 0.01)
+    # a step of RK4: some ten roundings, and a sine of another library
     assert fmu.fmu.getReal([FORCE]) == pytest.approx(instance.get([FORCE]), rel=1e-14)
 
 

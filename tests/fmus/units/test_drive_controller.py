@@ -81,6 +81,7 @@ def test_eq_20_weighs_the_three_errors_and_keeps_within_the_limit() -> None:
         put(instance, name, value)
     for name, value in (("real_theta", 0.5), ("real_omega", 3.0), ("real_alpha", 10.0)):
         put(instance, name, value)
+    # the same sum in another order: the rounding of the last place
     assert voltage(instance) == pytest.approx(10.0 + 7.5 * 0.5 - 0.75 * 1.0 + 0.01 * 20.0, rel=1e-15)
     put(instance, "set_theta", 1e6)
     assert voltage(instance) == 48.0

@@ -79,6 +79,7 @@ def test_the_deviation_is_reference_less_actual_and_its_flag_is_of_each_axis() -
     t = np.linspace(0.0, 1.0, 4, dtype=np.float64)
     found = run(delta_meter(), t, {"reference": reference, "actual": actual})
     assert np.array_equal(found["delta"], reference - actual)
+    # two ways to add up three squares: the rounding of the last place
     np.testing.assert_allclose(found["norm"], np.linalg.norm(reference - actual, axis=1), rtol=1e-15)
     assert found["out_of_tolerance"].tolist() == [
         1.0,

@@ -152,7 +152,9 @@ def test_each_block_and_unit_has_a_plot_in_the_unit_that_people_like(
     assert spec["layout"]["yaxis"]["title"]["text"] == "delta, norm [mm]"
     assert [trace["name"] for trace in spec["data"]] == ["delta[1]", "delta[2]", "delta[3]", "norm"]
     delta = simulation.signal("meter.delta").values
-    np.testing.assert_allclose(array(spec["data"][1]["y"]), 1e3 * delta[:, 1], atol=1e-5)  # drawn digits
+    np.testing.assert_allclose(
+        array(spec["data"][1]["y"]), 1e3 * delta[:, 1], rtol=0.0, atol=1e-5
+    )  # drawn digits
     levels = [shape["y0"] for shape in spec["layout"]["shapes"] if shape["type"] == "line"]
     assert levels == [3.5, -3.5]
     assert found["Block log/q"].spec["layout"]["yaxis"]["title"]["text"] == "q [deg]"
