@@ -93,6 +93,7 @@ def tool_over(fmu: Path, q: FloatArray) -> Callable[[], FloatArray]:
     get_p7 = it.exchange("fmi2GetReal", [references[f"p7[{i}]"] for i in range(1, 4)], p7)
 
     def job() -> FloatArray:
+        """Set, get and step; return the tool's places in [m], shape (n, 3)."""
         for k, row in enumerate(q):
             phi[:] = row
             set_phi()
@@ -235,6 +236,7 @@ def cross_part(count: int, folder: Path) -> Part:
     """Measure the build by zig for two platforms, zig's own cache being warm, and its size."""
 
     def build(number: int) -> Path:
+        """Build into a file of its own."""
         target = folder / f"cross{number}.fmu"
         return build_fmu(chain_unit(), target, platforms=["linux64", "win64"]).path
 
