@@ -1,4 +1,4 @@
-"""The runtime's own elementary functions against those of NumPy, in more digits where the computer has them."""
+"""The runtime's own elementary functions against those of NumPy, in more digits where there are some."""
 
 from __future__ import annotations
 
