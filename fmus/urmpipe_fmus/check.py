@@ -18,6 +18,7 @@ from typing import Any
 from xml.etree import ElementTree as ET
 
 from urmpipe_fmus.check_run import CALL
+from urmpipe_fmus.platforms import platforms_here
 from urmpipe_models.errors import Finding, FmuError
 
 STEPS = 20
@@ -107,11 +108,12 @@ def check_fmu(path: Path) -> Checked:
     problems = _validated(path)
     platforms = _platforms(path)
     start, step, steps = _experiment(described)
-    if _this_platform() in platforms:
+    here = platforms_here()
+    if set(here) & set(platforms):
         run = _run(path, described, (start, step, steps))
     else:
         found = ", ".join(platforms) or "no platform"
-        said = f"found binaries for {found}, allowed for a run here: {_this_platform()}; it was not run"
+        said = f"found binaries for {found}, allowed for a run here: {' or '.join(here)}; it was not run"
         run = {"before": [], "after": [], "problems": [said]}
     return Checked(
         path=path,
@@ -182,13 +184,6 @@ def _platforms(path: Path) -> tuple[str, ...]:
     with zipfile.ZipFile(path) as archive:
         parts = [Path(name).parts for name in archive.namelist() if name.endswith(PLATFORM_SUFFIXES)]
     return tuple(sorted({one[1] for one in parts if len(one) == 3 and one[0] == "binaries"}))
-
-
-def _this_platform() -> str:
-    from fmpy import platform
-
-    name: str = platform
-    return name
 
 
 def _experiment(described: Any) -> tuple[float, float, int]:
