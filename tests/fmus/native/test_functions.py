@@ -135,9 +135,7 @@ def test_what_cannot_be_traced_is_refused_by_name() -> None:
         "unit one: outputs: an array of shape (2,): found in a unit's function,"
         " allowed: floats and what the variables give"
     )
-    assert refused(lambda _: 1j) == (
-        "unit one: outputs: complex: found in a unit's function, allowed: floats and what the variables give"
-    )
+    assert refused(lambda _: 1j) == ("unit one: outputs: z: found complex, allowed: one element")
 
 
 def test_casadi_is_left_as_it_was() -> None:
