@@ -155,6 +155,23 @@ def test_a_step_that_fails_leaves_all_as_it_was() -> None:
     assert shown(instance, "m", "x") == [2.0, -1.5]
 
 
+def test_a_step_past_the_stop_time_is_refused() -> None:
+    instance = Instance(mixed())
+    instance.begin(0.0, 0.5)
+    instance.do_step(0.0, 0.4)
+    instance.do_step(0.4, 0.1001)  # what rounding may add
+    before = everything(instance)
+    with pytest.raises(UnitError) as error:
+        instance.do_step(0.5, 0.25)
+    assert str(error.value) == "unit mixed: found a step to 0.75 s, allowed: to the stop time, 0.5 s"
+    assert everything(instance) == before
+    instance.begin(0.5)
+    instance.do_step(0.5, 0.25)
+    with pytest.raises(UnitError) as error:
+        instance.begin(1.0, 0.5)
+    assert str(error.value) == "unit mixed: stopTime: found 0.5, allowed: from the start time 1 on"
+
+
 def test_an_error_of_the_functions_undoes_the_step_too() -> None:
     def rates(v: Any) -> dict[str, Any]:
         return {"x": {0.0: 1.0}[float(v.x)]}  # fails once x has moved

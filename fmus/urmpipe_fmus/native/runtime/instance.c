@@ -2,6 +2,7 @@
 /* Making and freeing an instance, and what it says to the tool that runs it. */
 #include "instance.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,6 +15,7 @@
 void set_start_values(Instance *me) {
     memset(&me->state, 0, sizeof me->state); /* also the padding: equal states have equal bytes */
     for (int k = 0; k < MODEL_VARIABLES; k++) me->state.value[k] = model_variables[k].start;
+    me->stop = INFINITY;
     me->state.phase = INSTANTIATED;
     me->stale = 1;
 }
