@@ -104,7 +104,7 @@ class Instance:
                 steps, or a state is not finite after it; then nothing changed, but that what is fixed from
                 the first step on stays fixed.
         """
-        if not (math.isfinite(time) and math.isfinite(step) and step > 0.0):
+        if not (math.isfinite(time + step) and step > 0.0):
             raise UnitError(
                 f"unit {self.unit.name}: found a step of {step:g} s at {time:g} s, allowed: finite, above 0"
             )

@@ -136,6 +136,7 @@ def test_a_step_that_fails_leaves_all_as_it_was() -> None:
         (instance, 0.5, 0.0, "found a step of 0 s at 0.5 s, allowed: finite, above 0"),
         (instance, 0.5, -1.0, "found a step of -1 s at 0.5 s, allowed: finite, above 0"),
         (instance, math.nan, 1.0, "found a step of 1 s at nan s, allowed: finite, above 0"),
+        (instance, 1e308, 1e308, "found a step of 1e+308 s at 1e+308 s, allowed: finite, above 0"),
         (
             instance,
             0.5,

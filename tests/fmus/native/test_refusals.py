@@ -77,7 +77,7 @@ def test_a_step_that_cannot_be_taken_changes_nothing(native: Callable[..., Any],
     fmu = native(oscillator)
     fmu.step(0.0, 0.01)
     before = fmu.fmu.getReal([X, X + 1, FORCE])
-    for time, size in ((0.01, 0.0), (0.01, -1.0), (math.nan, 0.1), (0.01, math.inf)):
+    for time, size in ((0.01, 0.0), (0.01, -1.0), (math.nan, 0.1), (0.01, math.inf), (1e308, 1e308)):
         said = fmu.refused(lambda t=time, s=size: fmu.step(t, s))
         assert said == [
             f"unit oscillator: found a step of {size:g} s at {time:g} s, allowed: finite, above 0"

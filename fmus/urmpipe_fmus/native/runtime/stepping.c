@@ -60,7 +60,7 @@ static fmi2Status integrate(Instance *me, double time, double step) {
 }
 
 fmi2Status take_step(Instance *me, double time, double step) {
-    if (!isfinite(time) || !isfinite(step) || step <= 0.0)
+    if (!isfinite(time + step) || step <= 0.0)
         return report(me, "found a step of %g s at %g s, allowed: finite, above 0", step, time);
     if (time + step - me->stop > STOP_SLACK * step)
         return report(me, "found a step to %g s, allowed: to the stop time, %g s", time + step, me->stop);
