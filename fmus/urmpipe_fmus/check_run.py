@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_fmus.fmu_process import callbacks_with
+from urmpipe_fmus.platforms import binary_in
 
 CALL = "call "
 """Begins the line of a call; other lines are what the FMU logged."""
@@ -80,6 +81,7 @@ class Checked:
                 guid=self._job["guid"],
                 unzipDirectory=self._job["folder"],
                 modelIdentifier=self._job["identifier"],
+                libraryPath=str(binary_in(Path(self._job["folder"]), self._job["identifier"])),
                 instanceName=self._job["identifier"],
             ),
         )

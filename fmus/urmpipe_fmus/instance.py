@@ -18,6 +18,9 @@ from urmpipe_models.errors import UnitError
 STEP_SLACK = 1e-9
 """A step of n internal steps but for this share of one takes n of them: k h - (k-1) h is not quite h."""
 
+STOP_SLACK = 0.1
+"""This share of a step past the stop time is what adding up steps may bring."""
+
 
 class Instance:
     """A unit that is stepped through time.
@@ -28,12 +31,14 @@ class Instance:
     Attributes:
         unit: The unit.
         time: Where it stands in [s].
+        stop: Where the simulation ends in [s]; infinite if that is not said.
         running: Whether fixed parameters are fixed: from the first step on.
     """
 
     def __init__(self, unit: Unit, time: Element = 0.0) -> None:
         self.unit = unit
         self.time: Element = np.float64(time)
+        self.stop = math.inf
         self.running = False
         self._equations = Equations(unit)
         self._owner = [variable for _, variable in unit.scalars]
@@ -95,12 +100,18 @@ class Instance:
             step: To the next one in [s], above 0.
 
         Raises:
-            UnitError: If the step is not above 0 or too long for its internal steps, or a state is not finite
-                after it; then nothing changed, but that what is fixed from the first step on stays fixed.
+            UnitError: If the step is not above 0, goes past the stop time or is too long for its internal
+                steps, or a state is not finite after it; then nothing changed, but that what is fixed from
+                the first step on stays fixed.
         """
-        if not (math.isfinite(time) and math.isfinite(step) and step > 0.0):
+        if not (math.isfinite(time + step) and step > 0.0):
             raise UnitError(
                 f"unit {self.unit.name}: found a step of {step:g} s at {time:g} s, allowed: finite, above 0"
+            )
+        if time + step - self.stop > STOP_SLACK * step:
+            raise UnitError(
+                f"unit {self.unit.name}: found a step to {time + step:g} s,"
+                f" allowed: to the stop time, {self.stop:g} s"
             )
         before = (self.time, list(self._values), self._stale)
         self.running = True
@@ -113,15 +124,20 @@ class Instance:
             raise
         self.time, self._stale = np.float64(time) + step, True
 
-    def begin(self, time: float) -> None:
-        """Put the instance at its start time in [s], before the first step.
+    def begin(self, time: float, stop: float | None = None) -> None:
+        """Put the instance at its start time in [s], before the first step; no step may go past `stop`.
 
         Raises:
-            UnitError: If the time is not finite.
+            UnitError: If the time is not finite, or the stop time before it.
         """
         if not math.isfinite(time):
             raise UnitError(f"unit {self.unit.name}: startTime: found {time:g}, allowed: a finite number")
+        if stop is not None and not stop >= time:
+            raise UnitError(
+                f"unit {self.unit.name}: stopTime: found {stop:g}, allowed: from the start time {time:g} on"
+            )
         self.time, self._stale = np.float64(time), True
+        self.stop = math.inf if stop is None else stop
 
     def save(self) -> Any:
         """Return all that the instance remembers, to be given to `restore`."""

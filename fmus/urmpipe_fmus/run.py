@@ -48,8 +48,7 @@ def run(
     instance = Instance(unit, t[0] if len(t) else 0.0)
     for name, value in (start or {}).items():
         owner = _variable(unit, name)
-        values = [float(one) for one in np.broadcast_to(np.asarray(value, dtype=np.float64), (owner.width,))]
-        instance.set([instance.reference(scalar) for scalar in owner.names], values)
+        instance.set([instance.reference(scalar) for scalar in owner.names], _starts(unit, owner, value))
     columns = _columns(unit, inputs or {}, len(t))
     shown = [one for one in unit.variables if one.causality == "output"]
     over = _stepped if unit.states or unit.memories else _at_once
@@ -66,6 +65,16 @@ def _variable(unit: Unit, name: str) -> Variable:
     if name not in allowed:
         raise UnitError(f"unit {unit.name}: no variable {name}; allowed: {', '.join(allowed)}")
     return unit.variables[allowed.index(name)]
+
+
+def _starts(unit: Unit, owner: Variable, value: Any) -> list[float]:
+    """Return the start value of every scalar of a variable: one for all of them, or one each."""
+    values: list[float] = np.ravel(np.asarray(value, dtype=np.float64)).tolist()
+    counts = sorted({1, owner.width})
+    if len(values) not in counts:
+        allowed = " or ".join(map(str, counts))
+        raise UnitError(f"unit {unit.name}: {owner.name}: found {len(values)} values, allowed: {allowed}")
+    return values * (owner.width // len(values))
 
 
 def _columns(unit: Unit, inputs: Mapping[str, Any], count: int) -> dict[str, FloatArray]:

@@ -15,6 +15,9 @@ from urmpipe_models.errors import UnitError
 
 FloatArray = NDArray[np.float64]
 
+LAST_NS = 2**63 - 1
+"""The last time that 64 bits hold."""
+
 
 class Rows(NamedTuple):
     """The rows of a table about an instant.
@@ -49,6 +52,8 @@ class Table:
         given = np.asarray(self.t_ns)
         if given.dtype.kind not in "iu":
             raise UnitError(f"table: found times of type {given.dtype}, allowed: integers, in ns")
+        if given.size and given.max() > LAST_NS:
+            raise UnitError(f"table: found a time of {given.max()} ns, allowed: {LAST_NS} ns")
         for name, value in (
             ("t_ns", np.array(given, dtype=np.int64)),
             ("values", np.array(self.values, dtype=np.float64, order="C")),
@@ -69,8 +74,9 @@ class Table:
             return
         if len(self.t_ns) > LARGEST_INTEGER:
             yield f"table: found {len(self.t_ns)} rows, allowed: {LARGEST_INTEGER}"
-        if (np.diff(self.t_ns) <= 0).any():
-            row = int(np.argmax(np.diff(self.t_ns) <= 0)) + 2
+        falls = self.t_ns[1:] <= self.t_ns[:-1]  # their differences may have more than 64 bits
+        if falls.any():
+            row = int(np.argmax(falls)) + 2
             yield f"table: the time of row {row} is not after the one before; allowed: rising times"
         if not np.isfinite(self.values).all():
             row, column = (int(i) + 1 for i in np.argwhere(~np.isfinite(self.values))[0])

@@ -131,6 +131,8 @@ class Unit:
     def _faults(self) -> Iterator[str]:
         if not self.name.isidentifier() or not self.name.isascii():
             yield f"found {self.name!r} as its name, allowed: a letter, then letters, digits and _"
+        if not self.variables:
+            yield "found no variables, allowed: one or more (FMI has no FMU without them)"
         names = [one.name for one in self.variables]
         for name in sorted({name for name in names if names.count(name) > 1}):
             yield f"{name}: found twice, allowed: each name once"
@@ -138,8 +140,8 @@ class Unit:
             yield f"{name}: found as a variable, allowed: another name (v.{name} is given to all units)"
         for one in self.variables:
             yield from one.faults()
-            if one.name == INTERNAL_STEP and not (isinstance(one, Parameter) and one.minimum > 0.0):
-                yield f"{one.name}: found as a variable, allowed: a parameter with a min above 0"
+            if one.name == INTERNAL_STEP and not _is_internal_step(one):
+                yield f"{one.name}: found as a variable, allowed: one Real parameter with a min above 0"
         for variables, function, said in (
             (self.computed, self.outputs, "outputs"),
             (self.states, self.derivatives, "derivatives"),
@@ -148,3 +150,7 @@ class Unit:
             if bool(variables) != (function is not None):
                 found = "without variables for it" if function else f"missing, of {variables[0].name}"
                 yield f"{said}: found {found}, allowed: a function where there are variables, else none"
+
+
+def _is_internal_step(one: Variable) -> bool:
+    return isinstance(one, Parameter) and one.type == "Real" and one.size is None and one.minimum > 0.0

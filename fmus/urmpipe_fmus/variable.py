@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
+from numbers import Real
 from typing import Literal
 
 from urmpipe_fmus.si_units import display_conversion
@@ -77,6 +78,10 @@ class Variable:
         """Yield what is wrong with the variable."""
         if not (self.name.isidentifier() and self.name.isascii()) or self.name.startswith("_"):
             yield f"{self.name!r}: found as a name, allowed: a letter, then letters, digits and _"
+        starts = self.start if isinstance(self.start, tuple) else (self.start,)
+        if not all(isinstance(one, Real) for one in starts):
+            yield f"{self.name}: start value {self.start!r}, allowed: a number, or a tuple of numbers"
+            return
         if self.size is not None and self.size < 1:
             yield f"{self.name}: size {self.size}, allowed: 1 or more"
         elif len(self.starts) != self.width:
@@ -168,6 +173,12 @@ class State(Variable):
     def causality(self) -> Causality:
         """Output or local."""
         return "output" if self.output else "local"
+
+    def faults(self) -> Iterator[str]:
+        """Yield what is wrong with the variable."""
+        if self.type != "Real":
+            yield f"{self.name}: found {self.type} as a state, allowed: Real (a Memory may be {self.type})"
+        yield from super(State, self).faults()
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

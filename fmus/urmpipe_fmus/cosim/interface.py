@@ -11,6 +11,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
+from urmpipe_fmus.platforms import binaries_here
 from urmpipe_fmus.si_units import BASE_NAMES, BaseUnit, base_unit, same_unit
 from urmpipe_models.errors import CosimulationError, UnitError
 
@@ -160,11 +161,12 @@ def read_interface(path: Path) -> Interface:
         kinds = [kind for kind in ("coSimulation", "modelExchange") if getattr(described, kind)]
         found = f"FMI {described.fmiVersion} for {' and '.join(kinds) or 'nothing'}"
         raise CosimulationError(f"{path}: found {found}, allowed: FMI 2.0 for coSimulation")
-    binary = f"binaries/{fmpy.platform}/{shown.identifier}{fmpy.sharedLibraryExtension}"
-    if binary not in names:
+    binaries = binaries_here(shown.identifier)
+    if not names & set(binaries):
         platforms = sorted({name.split("/")[1] for name in names if re.match(r"binaries/[^/]+/.", name)})
         raise CosimulationError(
-            f"{path}: found binaries for {', '.join(platforms) or 'no platform'}, allowed: {binary}"
+            f"{path}: found binaries for {', '.join(platforms) or 'no platform'},"
+            f" allowed: {' or '.join(binaries)}"
         )
     return shown
 

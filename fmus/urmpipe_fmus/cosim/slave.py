@@ -15,6 +15,7 @@ from fmpy.fmi2 import FMU2Slave
 from numpy.typing import NDArray
 
 from urmpipe_fmus.cosim.job import BlockJob, Progress, Transfer, call_code
+from urmpipe_fmus.platforms import binary_in
 
 Call = Callable[[], int]
 """A prepared call: returns FMI's status."""
@@ -70,6 +71,7 @@ class Slave:
                 guid=block.guid,
                 unzipDirectory=str(block.folder),
                 modelIdentifier=block.identifier,
+                libraryPath=str(binary_in(block.folder, block.identifier)),
                 instanceName=block.name,
             )
         except Exception as error:  # FMPy raises Exception itself, ctypes OSError and AttributeError

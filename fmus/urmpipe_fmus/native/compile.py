@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import os
-import platform
 import shlex
 import shutil
 import subprocess
@@ -14,25 +13,17 @@ from importlib.util import find_spec
 from pathlib import Path
 
 from urmpipe_fmus.native.sources import GUID_HEADER, guid_header
+from urmpipe_fmus.platforms import is_windows, suffix_of, this_platform
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.errors import FmuError
 
 TARGETS = {"linux64": "x86_64-linux-gnu.2.17", "win64": "x86_64-windows-gnu"}
 """zig's name of the platforms, by FMI's."""
 
-SUFFIXES = {"win64": ".dll", "win32": ".dll", "darwin64": ".dylib"}
-"""How a binary's name ends, where it is not .so."""
-
 FLAGS = ("-shared", "-std=c99", "-O2", "-ffp-contract=off", "-fvisibility=hidden", "-Wall", "-Wextra", "-s")
 """No fused multiply-add: a product is rounded before it is added, as NumPy does. No symbols but FMI's."""
 
 LINES_OF_AN_ERROR = 12
-
-
-def this_platform() -> str:
-    """Return FMI's name of the platform that this runs on, such as linux64."""
-    system = {"Windows": "win", "Darwin": "darwin"}.get(platform.system(), "linux")
-    return f"{system}{'64' if sys.maxsize > 2**32 else '32'}"
 
 
 def native_missing(platforms: Sequence[str] = ()) -> str | None:
@@ -80,9 +71,7 @@ def native_binaries(
         raise FmuError(f"unit {unit.name}: no native FMU can be built: {missing}")
     files = {**sources, GUID_HEADER: guid_header(guid)}
     return {
-        f"binaries/{one}/{unit.name}{SUFFIXES.get(one, '.so')}": _compiled(
-            unit, files, one, _command(platforms, one)
-        )
+        f"binaries/{one}/{unit.name}{suffix_of(one)}": _compiled(unit, files, one, _command(platforms, one))
         for one in platforms
     }
 
@@ -95,10 +84,10 @@ def system_compiler() -> list[str] | None:
 
 def _command(platforms: Sequence[str], one: str) -> list[str]:
     """Return the compiler and flags for one of some platforms."""
-    position = [] if one.startswith("win") else ["-fPIC"]
+    position = [] if is_windows(one) else ["-fPIC"]
     local = system_compiler()
     if local and list(platforms) == [this_platform()]:
-        linked = ["-Wl,--build-id=none"] if one.startswith("linux") else []
+        linked = ["-Wl,--build-id=none"] if suffix_of(one) == ".so" else []
         return [*local, *FLAGS, *position, *linked]
     return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[one], *FLAGS, *position]
 
@@ -111,8 +100,8 @@ def _compiled(unit: Unit, files: Mapping[str, bytes], target: str, command: Sequ
             path.parent.mkdir(exist_ok=True)
             path.write_bytes(content)
         c_files = sorted(name for name in files if name.endswith(".c"))
-        binary = f"binary{SUFFIXES.get(target, '.so')}"
-        libraries = [] if target.startswith("win") else ["-lm"]
+        binary = f"binary{suffix_of(target)}"
+        libraries = [] if is_windows(target) else ["-lm"]
         _run(unit, target, [*command, "-o", binary, *c_files, *libraries], folder)
         return Path(folder, binary).read_bytes()
 

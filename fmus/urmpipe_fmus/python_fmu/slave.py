@@ -84,9 +84,9 @@ class Fmi2Slave:
         return text.encode("utf-8", "backslashreplace").decode().replace("%", "%%")
 
     @guarded
-    def setup_experiment(self, start_time: float, *_: Any) -> None:
-        """Put it at the start time in [s]."""
-        self.instance.begin(start_time)
+    def setup_experiment(self, start_time: float, stop_time: float | None = None, *_: Any) -> None:
+        """Put it at the start time, and say where the simulation ends, in [s]."""
+        self.instance.begin(start_time, stop_time)
 
     def enter_initialization_mode(self) -> None:
         """Nothing is to be computed: getters do."""

@@ -136,6 +136,7 @@ def test_a_step_that_fails_leaves_all_as_it_was() -> None:
         (instance, 0.5, 0.0, "found a step of 0 s at 0.5 s, allowed: finite, above 0"),
         (instance, 0.5, -1.0, "found a step of -1 s at 0.5 s, allowed: finite, above 0"),
         (instance, math.nan, 1.0, "found a step of 1 s at nan s, allowed: finite, above 0"),
+        (instance, 1e308, 1e308, "found a step of 1e+308 s at 1e+308 s, allowed: finite, above 0"),
         (
             instance,
             0.5,
@@ -153,6 +154,23 @@ def test_a_step_that_fails_leaves_all_as_it_was() -> None:
     assert shown(broken, "m") == [0.0]  # the sample that was taken before the states failed is undone
     instance.do_step(0.5, 0.5)
     assert shown(instance, "m", "x") == [2.0, -1.5]
+
+
+def test_a_step_past_the_stop_time_is_refused() -> None:
+    instance = Instance(mixed())
+    instance.begin(0.0, 0.5)
+    instance.do_step(0.0, 0.4)
+    instance.do_step(0.4, 0.1001)  # what rounding may add
+    before = everything(instance)
+    with pytest.raises(UnitError) as error:
+        instance.do_step(0.5, 0.25)
+    assert str(error.value) == "unit mixed: found a step to 0.75 s, allowed: to the stop time, 0.5 s"
+    assert everything(instance) == before
+    instance.begin(0.5)
+    instance.do_step(0.5, 0.25)
+    with pytest.raises(UnitError) as error:
+        instance.begin(1.0, 0.5)
+    assert str(error.value) == "unit mixed: stopTime: found 0.5, allowed: from the start time 1 on"
 
 
 def test_an_error_of_the_functions_undoes_the_step_too() -> None:

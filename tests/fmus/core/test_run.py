@@ -66,6 +66,8 @@ def test_outputs_are_columns_and_inputs_that_are_not_given_stay_at_their_start()
             "u: found input with values of shape (1,), allowed: an input, shape (1, 2)",
         ),
         ([0.0], {}, {"w": 1.0}, "no variable w; allowed: k, u, y, t, one"),
+        ([0.0], {}, {"u": [1.0, 2.0, 3.0]}, "u: found 3 values, allowed: 1 or 2"),
+        ([0.0], {}, {"k": [1.0, 2.0]}, "k: found 2 values, allowed: 1"),
         ([0.0], {}, {"k": -1.0}, "k: found -1, allowed: 0 to inf"),
         ([0.0], {"u": [[1.0, np.nan]]}, {}, "u[2]: found nan, allowed: a finite number"),
         ([0.0, 0.5], {"u": [[1.0, 0.0], [1.0, 1e10]]}, {"k": 1e300}, "output y[2] is not finite at 0.5 s"),

@@ -5,6 +5,7 @@ from __future__ import annotations
 import copy
 import math
 import pickle
+from typing import Any
 
 import pytest
 
@@ -84,12 +85,49 @@ def test_all_that_is_wrong_with_a_unit_is_told_at_once() -> None:
         f"'_p': found as a name, {name}",
         "_p: size 0, allowed: 1 or more",
         "time: start value found nan, allowed: a finite number",
-        "internal_step: found as a variable, allowed: a parameter with a min above 0",
+        "internal_step: found as a variable, allowed: one Real parameter with a min above 0",
         "outputs: found missing, of y, allowed: a function where there are variables, else none",
         "derivatives: found without variables for it, allowed: a function where there are variables, else"
         " none",
         "update: found missing, of internal_step, allowed: a function where there are variables, else none",
     ]
+
+
+def test_a_unit_that_no_fmu_can_be_of_is_refused() -> None:
+    with pytest.raises(UnitError) as error:
+        Unit(name="u", description="", variables=())
+    assert str(error.value) == (
+        "unit u: found no variables, allowed: one or more (FMI has no FMU without them)"
+    )
+    step: dict[str, Any] = {"name": INTERNAL_STEP, "description": "", "start": 1.0, "minimum": 0.5}
+    for wrong in (Parameter(**step, size=2), Parameter(**step, type="Integer"), Input(**step)):
+        with pytest.raises(UnitError) as error:
+            Unit(
+                name="u",
+                description="",
+                variables=(State(name="x", description=""), wrong),
+                derivatives=lambda v: {"x": 1.0},
+            )
+        assert str(error.value) == (
+            "unit u: internal_step: found as a variable, allowed: one Real parameter with a min above 0"
+        )
+
+
+@pytest.mark.parametrize(
+    ("variable", "said"),
+    [
+        (Input(name="x", description="", start=[1.0, 2.0], size=2),  # type: ignore[arg-type]
+         "x: start value [1.0, 2.0], allowed: a number, or a tuple of numbers"),
+        (Input(name="x", description="", start="3"),  # type: ignore[arg-type]
+         "x: start value '3', allowed: a number, or a tuple of numbers"),
+        (Input(name="x", description="", start=(1.0, None), size=2),  # type: ignore[arg-type]
+         "x: start value (1.0, None), allowed: a number, or a tuple of numbers"),
+        (State(name="x", description="", type="Integer"),
+         "x: found Integer as a state, allowed: Real (a Memory may be Integer)"),
+    ],
+)  # fmt: skip
+def test_what_cannot_be_a_variable_is_told(variable: Variable, said: str) -> None:
+    assert list(variable.faults()) == [said]
 
 
 def test_a_unit_with_states_has_the_integrators_step_as_a_fixed_parameter() -> None:

@@ -17,7 +17,8 @@ import pytest
 
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import guid_header, native_binaries, native_missing, native_sources, this_platform
-from urmpipe_fmus.native.compile import SUFFIXES, TARGETS
+from urmpipe_fmus.native.compile import TARGETS
+from urmpipe_fmus.platforms import suffix_of
 from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
@@ -257,7 +258,7 @@ def test_zig_compiles_for_this_platform_where_there_is_no_other_compiler(
     monkeypatch.delenv("CC")
     assert (
         native_binaries(player, sources, GUID, sorted(TARGETS))[
-            f"binaries/{this_platform()}/player{SUFFIXES.get(this_platform(), '.so')}"
+            f"binaries/{this_platform()}/player{suffix_of(this_platform())}"
         ]
         == one
     )

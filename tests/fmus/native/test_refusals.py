@@ -78,7 +78,7 @@ def test_a_step_that_cannot_be_taken_changes_nothing(native: Callable[..., Any],
     fmu = native(oscillator)
     fmu.step(0.0, 0.01)
     before = fmu.fmu.getReal([X, X + 1, FORCE])
-    for time, size in ((0.01, 0.0), (0.01, -1.0), (math.nan, 0.1), (0.01, math.inf)):
+    for time, size in ((0.01, 0.0), (0.01, -1.0), (math.nan, 0.1), (0.01, math.inf), (1e308, 1e308)):
         said = fmu.refused(lambda t=time, s=size: fmu.step(t, s))
         assert said == [
             f"unit oscillator: found a step of {size:g} s at {time:g} s, allowed: finite, above 0"
@@ -151,6 +151,31 @@ def test_calls_out_of_their_sequence_are_refused(native: Callable[..., Any], osc
     fmu.setupExperiment(startTime=1.0)
 
 
+def test_a_step_past_the_stop_time_is_refused(native: Callable[..., Any], oscillator: Unit) -> None:
+    one = native(oscillator)
+
+    def begin(**experiment: float) -> None:
+        one.fmu.reset()
+        if experiment:
+            one.fmu.setupExperiment(**experiment)
+        one.fmu.enterInitializationMode()
+        one.fmu.exitInitializationMode()
+
+    begin(startTime=0.0, stopTime=0.5)
+    one.step(0.0, 0.4)
+    one.step(0.4, 0.1001)  # what rounding may add
+    before = one.fmu.getReal([X, FORCE])
+    assert one.refused(lambda: one.step(0.5, 0.25)) == [
+        "unit oscillator: found a step to 0.75 s, allowed: to the stop time, 0.5 s"
+    ]
+    assert one.fmu.getReal([X, FORCE]) == before
+    begin()
+    one.step(0.5, 0.25)
+    begin(startTime=0.0, stopTime=0.5)
+    begin(startTime=0.5)
+    one.step(0.5, 0.25)
+
+
 def test_what_it_cannot_do_is_said(native: Callable[..., Any], oscillator: Unit) -> None:
     one = native(oscillator)
     fmu = one.fmu
@@ -174,19 +199,61 @@ def test_what_it_cannot_do_is_said(native: Callable[..., Any], oscillator: Unit)
     assert (fmu.getTypesPlatform(), fmu.getVersion()) == ("default", "2.0")
 
 
-def failed_instance(folder: Path, name: str, **options: Any) -> list[str]:
-    """What is told when an instance cannot be made."""
+def failed_instance(folder: Path, name: str, blocks: int | None = None, **options: Any) -> list[str]:
+    """What is told when an instance cannot be made: where there is memory for some blocks only, or at all."""
     from fmpy import fmi2
 
     said: list[str] = []
+    held: set[int] = set()
+
+    def take(_environment: Any, instance: bytes, _status: int, _category: bytes, message: bytes) -> None:
+        assert instance == b"one"
+        said.append(message.decode())
+
+    def allocate(count: int, size: int) -> int | None:
+        if blocks is not None and len(held) >= blocks:
+            return None
+        block: int = fmi2.calloc(count, size)
+        held.add(block)
+        return block
+
+    def free(block: int) -> None:
+        held.remove(block)
+        fmi2.free(block)
+
     callbacks = fmi2.fmi2CallbackFunctions()
-    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda *words: said.append(words[4].decode()))
+    callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(take)
+    callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(allocate)
+    callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
     given = {"guid": "{12345678-0000-0000-0000-000000000000}", "unzipDirectory": str(folder)} | options
     fmu = fmi2.FMU2Slave(modelIdentifier=name, instanceName="one", **given)
     with pytest.raises(Exception, match="Failed to instantiate model"):
         fmu.instantiate(callbacks=callbacks)
     fmu.freeLibrary()
+    assert not held
     return said
+
+
+def test_where_there_is_no_memory_there_is_no_instance_and_nothing_is_kept(
+    built: Callable[..., Path], player: Unit
+) -> None:
+    folder = built(player)
+    (said,) = failed_instance(folder, "player", blocks=0)
+    assert said.startswith("unit player: found no memory for an instance, allowed: ")
+    assert failed_instance(folder, "player", blocks=1) == [
+        "unit player: found no memory for the name of an instance"
+    ]
+    assert failed_instance(folder, "player", blocks=2) == [
+        f"unit player: table.bin in {(folder / 'resources').as_uri()}: found no memory for its rows"
+    ]
+
+
+def test_a_long_message_ends_with_a_whole_character(built: Callable[..., Path], oscillator: Unit) -> None:
+    for start in ("{", "{a"):
+        (said,) = failed_instance(built(oscillator), "oscillator", guid=start + "\u00fc" * 5000)
+        assert said.startswith(f"unit oscillator: GUID: found {start}\u00fc")
+        assert len(said.encode()) in (1997, 1998)
+        assert said.endswith("\u00fc")
 
 
 def test_another_guid_is_refused(built: Callable[..., Path], oscillator: Unit) -> None:

@@ -12,7 +12,7 @@ import pytest
 
 from urmpipe_fmus.unit import Unit
 
-GOAL, X, FORCE, COUNT = 2, 5, 9, 7
+DAMPING, GOAL, X, FORCE, COUNT = 1, 2, 5, 9, 7
 EVERYTHING = [0, 1, 2, 5, 6, 8, 9, 12, 13]
 """All Reals of the oscillator."""
 
@@ -35,6 +35,47 @@ def test_a_saved_state_continues_bit_by_bit(native: Callable[..., Any], oscillat
     fmu.fmu.setFMUstate(state)
     assert wander(fmu, 20, 20) == after
     fmu.fmu.freeFMUstate(state)
+
+
+def test_outputs_are_those_of_the_state_that_is_set(native: Callable[..., Any], oscillator: Unit) -> None:
+    fmu = native(oscillator).fmu
+    before = fmu.getReal([FORCE])
+    fmu.setReal([GOAL], [4.0])
+    state = fmu.getFMUstate()  # in which nobody has asked for the force of this goal yet
+    (force,) = fmu.getReal([FORCE])
+    assert force != before[0]
+    for goal in (7.0, 1.0):
+        fmu.setReal([GOAL], [goal])
+        assert fmu.getReal([FORCE]) != [force]
+        fmu.setFMUstate(state)
+        assert fmu.getReal([FORCE]) == [force]
+    fmu.freeFMUstate(state)
+
+
+def test_outputs_are_those_of_the_start_time_that_is_set(native: Callable[..., Any], player: Unit) -> None:
+    fmu = native(player).fmu
+    fmu.reset()
+    assert fmu.getReal([0]) == [2.0]
+    fmu.setupExperiment(startTime=0.01)
+    assert fmu.getReal([0]) == [4.0]
+
+
+def test_a_state_of_before_the_initialization_goes_back_to_it(
+    native: Callable[..., Any], oscillator: Unit
+) -> None:
+    fmu = native(oscillator).fmu
+    fmu.reset()
+    state = fmu.getFMUstate()
+    for damping in (1.0, 2.0):  # a fixed parameter, which the first step fixes
+        fmu.setReal([DAMPING], [damping])
+        fmu.setupExperiment(startTime=0.0)
+        fmu.enterInitializationMode()
+        fmu.setReal([X], [damping])
+        fmu.exitInitializationMode()
+        assert fmu.getReal([X, DAMPING]) == [damping, damping]
+        fmu.doStep(0.0, 0.1)
+        fmu.setFMUstate(state)
+    fmu.freeFMUstate(state)
 
 
 def test_a_serialized_state_continues_in_another_instance(

@@ -109,6 +109,18 @@ def test_a_state_that_is_restored_goes_on_bit_by_bit(unit: Unit, tmp_path: Path,
     fmu.free()
 
 
+def test_no_step_goes_past_the_stop_time(make: Make, tmp_path: Path) -> None:
+    fmu = Loaded(built(make("counter"), tmp_path))
+    fmu.fmu.reset()
+    fmu.fmu.setupExperiment(startTime=0.0, stopTime=0.5)
+    fmu.fmu.enterInitializationMode()
+    fmu.fmu.exitInitializationMode()
+    fmu.do_step(0.0, 0.5)
+    assert fmu.status_of("doStep", 0.5, 0.5) == DISCARD
+    assert fmu.log[-1][2] == "unit counter: found a step to 1 s, allowed: to the stop time, 0.5 s"
+    fmu.free()
+
+
 def test_a_restored_state_knows_that_it_runs(make: Make, tmp_path: Path) -> None:
     fmu = Loaded(built(make("spring"), tmp_path))
     fmu.do_step(0.0, 0.01)

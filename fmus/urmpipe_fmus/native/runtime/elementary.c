@@ -26,7 +26,8 @@ static double series(double z, const double c[], int count) {
     return sum;
 }
 
-#define SERIES(z, c) series(z, c, (int)(sizeof c / sizeof c[0]))
+#define COUNT(c) ((int)(sizeof c / sizeof c[0]))
+#define SERIES(z, c) series(z, c, COUNT(c))
 
 /* ---- angles ---- */
 
@@ -227,6 +228,7 @@ double asinh_of(double x) {
 
 double acosh_of(double x) {
     double more = x - 1.0;
+    if (x < 1.0) return NAN; /* the root below is of a product, which is above 0 again for x < -1 */
     return x > HUGE_ARGUMENT ? log_of(x) + LN2 : log1p_of(more + sqrt(more * (2.0 + more)));
 }
 
@@ -253,22 +255,39 @@ static Pair product(double a, double b) {
     return found;
 }
 
-/* ln(x) of a finite x > 0, to some more places than a double has: as log_of, with s in two parts. */
+/* a + b + below, where a is 0 or larger than b, and b than `below`. */
+static Pair sum_of(double a, double b, double below) {
+    double sum = a + b, lost = (a - sum) + b;
+    double low = lost + below;
+    Pair found = {sum + low, 0.0};
+    found.low = (sum - found.high) + low;
+    return found;
+}
+
+/* 2/3 s^3 of a pair. */
+static Pair two_thirds_of_cube(Pair s) {
+    static const double two_thirds = 0.6666666666666666, rest = 3.700743415417188e-17;
+    Pair square = product(s.high, s.high);
+    Pair cube = product(s.high, square.high);
+    Pair found = product(two_thirds, cube.high);
+    cube.low += s.high * (square.low + 2.0 * s.high * s.low) + s.low * square.high;
+    found.low += two_thirds * cube.low + rest * cube.high;
+    return found;
+}
+
+/* ln(x) of a finite x > 0, to some more places than a double has: as log_of, the first two terms in pairs. */
 static Pair log_pair(double x) {
     int n;
     double f = split_log(x, &n);
     double below = 2.0 + f, below_low = (2.0 - below) + f;
-    double s = f / below;
-    Pair whole = product(s, below);
-    double s_low = ((f - whole.high) - whole.low - s * below_low) / below;
-    double first = n * LN2_1, second = 2.0 * s, sum = first + second;
-    double taken = sum - first; /* second, but for what the sum was rounded by */
-    double lost = (first - (sum - taken)) + (second - taken);
-    double z = s * s;
-    double low = lost + (2.0 * s_low + s * z * SERIES(z, LOG_SERIES) + n * LN2_2);
-    Pair found = {sum + low, 0.0};
-    found.low = (sum - found.high) + low;
-    return found;
+    Pair s = {f / below, 0.0};
+    Pair whole = product(s.high, below);
+    s.low = ((f - whole.high) - whole.low - s.high * below_low) / below;
+    Pair third = two_thirds_of_cube(s);
+    double z = s.high * s.high;
+    double fifth = s.high * z * z * series(z, LOG_SERIES + 1, COUNT(LOG_SERIES) - 1);
+    Pair first = sum_of(n * LN2_1, 2.0 * s.high, 0.0);
+    return sum_of(first.high, third.high, third.low + (2.0 * s.low + (first.low + (fifth + n * LN2_2))));
 }
 
 double pow_of(double x, double y) {

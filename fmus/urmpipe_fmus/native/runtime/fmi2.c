@@ -71,6 +71,7 @@ fmi2Status fmi2SetupExperiment(fmi2Component c, fmi2Boolean toleranceDefined, fm
     if (stopTimeDefined && !(stopTime >= startTime))
         return report(me, "stopTime: found %g, allowed: from the start time %g on", stopTime, startTime);
     me->state.time = startTime;
+    me->stop = stopTimeDefined ? stopTime : INFINITY;
     me->stale = 1;
     return fmi2OK;
 }

@@ -2,6 +2,7 @@
 /* Making and freeing an instance, and what it says to the tool that runs it. */
 #include "instance.h"
 
+#include <math.h>
 #include <stdarg.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -14,8 +15,16 @@
 void set_start_values(Instance *me) {
     memset(&me->state, 0, sizeof me->state); /* also the padding: equal states have equal bytes */
     for (int k = 0; k < MODEL_VARIABLES; k++) me->state.value[k] = model_variables[k].start;
+    me->stop = INFINITY;
     me->state.phase = INSTANTIATED;
     me->stale = 1;
+}
+
+/* Take the last character of a text in UTF-8 away, of which there may be a part only. */
+static void drop_last(char text[]) {
+    size_t end = strlen(text);
+    while (end && (text[end - 1] & 0xC0) == 0x80) end--;
+    if (end) text[end - 1] = '\0';
 }
 
 /* Say what happened. The message stands where the logger expects a format, with its percent signs doubled and
@@ -25,7 +34,8 @@ static void log_error(const Instance *me, const char *format, va_list arguments)
     if (!me->logger) return;
     int used = snprintf(message, sizeof message, "unit %s: ", MODEL_NAME);
     if (used < 0 || used >= (int)sizeof message) used = 0;
-    vsnprintf(message + used, sizeof message - (size_t)used, format, arguments);
+    int room = (int)sizeof message - used;
+    if (vsnprintf(message + used, (size_t)room, format, arguments) >= room) drop_last(message);
     char *to = escaped;
     for (const char *from = message; *from; from++) {
         if (*from == '%') *to++ = '%';
@@ -80,6 +90,7 @@ Instance *make_instance(const char *name, const char *guid, const char *resource
         blank.logger = callbacks->logger;
         blank.environment = callbacks->componentEnvironment;
     }
+    blank.name = (char *)name; /* to be told only */
     if (!is_ours(&blank, guid, type)) return NULL;
     Instance *me = blank.allocate(1, sizeof *me);
     if (!me) {
@@ -89,6 +100,7 @@ Instance *make_instance(const char *name, const char *guid, const char *resource
     *me = blank;
     me->name = copied_name(me, name ? name : "");
     set_start_values(me);
+    if (!me->name) report(&blank, "found no memory for the name of an instance");
     if (me->name && fetch_table(me, resources)) return me;
     free_instance(me);
     return NULL;

@@ -20,6 +20,7 @@ typedef struct {
 typedef struct {
     State state;
     int stale; /* whether the outputs in state.value are older than what they are computed from */
+    double stop; /* where the simulation ends, s; infinite if that is not said */
     Table table;
     char *name;
     fmi2CallbackLogger logger;

@@ -8,6 +8,7 @@
 #include "variables.h"
 
 #define STEP_SLACK 1e-9         /* a step of n internal steps but for this share of one takes n of them */
+#define STOP_SLACK 0.1          /* this share of a step past the stop time is what adding up steps may bring */
 #define MOST_STEPS 2147483647.0 /* internal steps in a step */
 
 /* Room for as many states; C has no empty arrays. */
@@ -59,8 +60,10 @@ static fmi2Status integrate(Instance *me, double time, double step) {
 }
 
 fmi2Status take_step(Instance *me, double time, double step) {
-    if (!isfinite(time) || !isfinite(step) || step <= 0.0)
+    if (!isfinite(time + step) || step <= 0.0)
         return report(me, "found a step of %g s at %g s, allowed: finite, above 0", step, time);
+    if (time + step - me->stop > STOP_SLACK * step)
+        return report(me, "found a step to %g s, allowed: to the stop time, %g s", time + step, me->stop);
     me->state.running = 1;
     State before = me->state;
     if (sample(me, time) != fmi2OK || integrate(me, time, step) != fmi2OK) {
