@@ -1,7 +1,8 @@
 """FMUs that were built before, found again by the hash of all that they are made from.
 
-The hash takes milliseconds: it reads the unit's recipe and table and urmpipe's own sources, and neither runs
-the unit nor imports what would trace it.
+Of a unit of urmpipe the hash takes milliseconds: it reads the unit's recipe and table and urmpipe's own
+sources, and neither runs the unit nor imports what would trace it. A user's file may read other files and
+import other packages, which end up in the machine code as numbers: of its native FMU the traced C is hashed too.
 """
 
 from __future__ import annotations
@@ -21,9 +22,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from urmpipe_fmus.archive import content_guid
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.description import Backend
-from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_models.errors import Finding, FmuError
 
 PACKAGES = ("urmpipe_fmus", "urmpipe_models", "urmpipe_datasets")
@@ -47,8 +49,8 @@ def cached_fmu(
 ) -> Path:
     """Return the FMU of a unit for this platform, built if it is not in the cache, or damaged there.
 
-    A unit without a recipe is built each time, as nothing tells what its functions do; its place is named by
-    what was built.
+    A unit without a recipe of urmpipe or of a file is built each time, as nothing tells what its functions
+    do; its place is named by what was built. Nothing is ever removed: the folder may be, at any time.
 
     Args:
         unit: The unit.
@@ -66,7 +68,7 @@ def cached_fmu(
     folder = cache_folder() / "fmus"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if not unit.recipe.module:
+        if not _is_told(unit.recipe):
             tell(unit.name)
             return _built_anew(unit, chosen, this_platform(), folder)
         folder /= _key(unit, chosen, this_platform())
@@ -80,6 +82,11 @@ def cached_fmu(
         said = f"cannot be written: {error.strerror or error}; the variable URMPIPE_CACHE names another place"
         raise FmuError(Finding(said, file=str(folder))) from error
     return path
+
+
+def _is_told(recipe: Recipe) -> bool:
+    """Tell whether a recipe says all that a unit is made from: with the text of a file, or urmpipe's own."""
+    return bool(recipe.source) or recipe.module.partition(".")[0] in PACKAGES
 
 
 def _built_anew(unit: Unit, backend: Backend, target: str, folder: Path) -> Path:
@@ -124,6 +131,10 @@ def _key(unit: Unit, backend: Backend, target: str) -> str:
         _sources(),
     ]
     digest = hashlib.sha256(json.dumps(made_of, sort_keys=True, default=repr).encode())
+    if recipe.source and backend == "native":
+        from urmpipe_fmus.native import native_sources
+
+        digest.update(content_guid(native_sources(unit)).encode())
     if unit.table is not None:
         digest.update(repr(unit.table.values.shape).encode())
         digest.update(unit.table.t_ns.tobytes())
@@ -144,15 +155,15 @@ def _versions() -> list[str]:
 
 
 def _compiler() -> list[Any]:
-    """Return what tells one C compiler from another without running it: command, file, size and time."""
+    """Return what tells one C compiler from another without running it: command, files, sizes and times."""
     command = os.environ.get("CC") or "cc"
     words = shlex.split(command, posix=os.name == "posix")
-    found = shutil.which(words[0]) if words else None
-    if found is None:
-        return [command]
-    file = Path(found).resolve()
-    status = file.stat()
-    return [command, str(file), status.st_size, status.st_mtime_ns]
+    told: list[Any] = [command]
+    for found in filter(None, map(shutil.which, words)):  # of `ccache gcc` both
+        file = Path(found).resolve()
+        status = file.stat()
+        told += [str(file), status.st_size, status.st_mtime_ns]
+    return told
 
 
 @cache
