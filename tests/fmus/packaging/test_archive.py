@@ -34,11 +34,24 @@ def test_a_file_is_replaced_and_nothing_is_left_beside_it(tmp_path: Path) -> Non
     assert list(tmp_path.iterdir()) == [path]
 
 
-def test_where_nothing_can_be_written_an_error_names_the_file_and_the_cause(tmp_path: Path) -> None:
-    path = tmp_path / "missing" / "one.fmu"
+@pytest.mark.parametrize(
+    ("place", "why"),
+    [
+        ("missing/one.fmu", "No such file or directory"),
+        ("file/one.fmu", "Not a directory"),
+        (f"{'n' * 300}/one.fmu", "File name too long"),
+        (f"{'n' * 300}.fmu", "File name too long"),
+    ],
+)
+def test_where_nothing_can_be_written_an_error_names_the_file_and_the_cause(
+    tmp_path: Path, place: str, why: str
+) -> None:
+    (tmp_path / "file").write_text("")
+    path = tmp_path / place
     with pytest.raises(FmuError) as caught:
         write_fmu(path, FILES)
-    assert str(caught.value) == f"{path}: cannot be written: No such file or directory"
+    assert str(caught.value) == f"{path}: cannot be written: {why}"
+    assert [one.name for one in tmp_path.iterdir()] == ["file"]
 
 
 def test_a_guid_stays_the_same_from_version_to_version() -> None:
