@@ -2,7 +2,8 @@
 
 Of a unit of urmpipe the hash takes milliseconds: it reads the unit's recipe and table and urmpipe's own
 sources, and neither runs the unit nor imports what would trace it. A user's file may read other files and
-import other packages, which end up in the machine code as numbers: of its native FMU the traced C is hashed too.
+import other packages, which end up in the machine code as numbers: so the traced C of its native FMU is
+hashed too.
 """
 
 from __future__ import annotations
