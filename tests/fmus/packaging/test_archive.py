@@ -29,7 +29,9 @@ def test_the_same_files_in_any_order_are_the_same_bytes(tmp_path: Path) -> None:
 def test_a_file_is_replaced_and_nothing_is_left_beside_it(tmp_path: Path) -> None:
     path = tmp_path / "one.fmu"
     path.write_text("old")
-    write_fmu(path, FILES)
+    with path.open() as read:  # who reads it meanwhile reads one or the other, and no mixture
+        write_fmu(path, FILES)
+        assert read.read() == "old"
     assert zipfile.is_zipfile(path)
     assert list(tmp_path.iterdir()) == [path]
 

@@ -109,10 +109,13 @@ def test_a_state_that_is_restored_goes_on_bit_by_bit(unit: Unit, tmp_path: Path,
     fmu.free()
 
 
-def test_a_restored_state_knows_that_it_runs(make: Make, tmp_path: Path) -> None:
+@pytest.mark.parametrize("serialized", [False, True])
+def test_a_restored_state_knows_that_it_runs(make: Make, tmp_path: Path, serialized: bool) -> None:
     fmu = Loaded(built(make("spring"), tmp_path))
     fmu.do_step(0.0, 0.01)
     state = fmu.fmu.getFMUstate()
+    if serialized:
+        state = fmu.fmu.deSerializeFMUstate(fmu.fmu.serializeFMUstate(state))
     fmu.fmu.reset()
     fmu.initialize(0.0)
     fmu.set("d", 0.75)
