@@ -37,12 +37,20 @@ DISTRIBUTIONS = ("urmpipe", "numpy", "casadi", "fmpy", "pythonfmu", "ziglang")
 
 
 def cache_folder() -> Path:
-    """Return the folder of the cache: what URMPIPE_CACHE says, else urmpipe's in the user's cache folder."""
+    """Return the folder of the cache: what URMPIPE_CACHE says, else urmpipe's in the user's cache folder.
+
+    Raises:
+        FmuError: If neither is known.
+    """
     told = os.environ.get("URMPIPE_CACHE")
     if told:
         return Path(told)
     home = os.environ.get("LOCALAPPDATA") if os.name == "nt" else os.environ.get("XDG_CACHE_HOME")
-    return (Path(home) if home else Path.home() / ".cache") / "urmpipe"
+    try:
+        return (Path(home) if home else Path.home() / ".cache") / "urmpipe"
+    except RuntimeError as error:  # a user without a home, in a container
+        said = "cache of FMUs: found no home folder, allowed: a folder that the variable URMPIPE_CACHE names"
+        raise FmuError(said) from error
 
 
 def cached_fmu(

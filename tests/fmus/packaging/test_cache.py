@@ -146,6 +146,22 @@ def test_the_folder_is_the_users_and_can_be_told(monkeypatch: pytest.MonkeyPatch
     assert cache_folder() == Path.home() / ".cache" / "urmpipe"
 
 
+@pytest.mark.skipif(os.name == "nt", reason="needs POSIX's users")
+def test_a_user_without_a_home_is_told_to_name_a_folder(
+    make: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    import pwd
+
+    for name in ("URMPIPE_CACHE", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)  # raises KeyError, as for a user of no entry
+    with pytest.raises(FmuError) as caught:
+        cached_fmu(make("arm"), "python")
+    assert str(caught.value) == (
+        "cache of FMUs: found no home folder, allowed: a folder that the variable URMPIPE_CACHE names"
+    )
+
+
 def test_a_cache_that_cannot_be_written_is_an_error_that_names_the_variable(
     make: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
