@@ -100,7 +100,7 @@ def test_what_is_of_a_wrong_kind_is_told() -> None:
             variables=(
                 Input(name="x", description="", type="String", size=2.0),  # type: ignore[arg-type]
                 Input(name="y", description=5, unit=None),  # type: ignore[arg-type]
-                "z",  # type: ignore[arg-type]
+                "z",
             ),
             equations="y = x",  # type: ignore[arg-type]
         )

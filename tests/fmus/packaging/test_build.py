@@ -153,7 +153,7 @@ def test_a_log_source_as_python_fmu_plays_the_table_in_its_resources(make: Make,
 def test_numbers_of_numpy_are_numbers_in_c_and_in_the_description(tmp_path: Path) -> None:
     angles = tuple(np.deg2rad([30.0, 45.0]))
     phi = Input(
-        name="phi", description="", size=2, start=angles, minimum=np.deg2rad(-90), maximum=np.float32(1.5)
+        name="phi", description="", size=2, start=angles, minimum=np.deg2rad(-90), maximum=np.float64(1.5)
     )
     unit = Unit(
         name="angles",
