@@ -6,6 +6,7 @@ import hashlib
 import uuid
 import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, FmuError
@@ -45,7 +46,8 @@ def write_fmu(path: Path, files: Mapping[str, bytes]) -> None:
     except OSError as error:
         raise FmuError(Finding(f"cannot be written: {error.strerror or error}", str(path))) from error
     finally:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):  # why it cannot be written has been told
+            part.unlink()
 
 
 def _entry(name: str) -> zipfile.ZipInfo:

@@ -1,7 +1,9 @@
 """FMUs that were built before, found again by the hash of all that they are made from.
 
-The hash takes milliseconds: it reads the unit's recipe and table and urmpipe's own sources, and neither runs
-the unit nor imports what would trace it.
+Of a unit of urmpipe the hash takes milliseconds: it reads the unit's recipe and table and urmpipe's own
+sources, and neither runs the unit nor imports what would trace it. A user's file may read other files and
+import other packages, which end up in the machine code as numbers: so the traced C of its native FMU is
+hashed too.
 """
 
 from __future__ import annotations
@@ -20,9 +22,10 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
+from urmpipe_fmus.archive import content_guid
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.description import Backend
-from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_models.errors import Finding, FmuError
 
 PACKAGES = ("urmpipe_fmus", "urmpipe_models", "urmpipe_datasets")
@@ -33,12 +36,20 @@ DISTRIBUTIONS = ("urmpipe", "numpy", "casadi", "fmpy", "pythonfmu", "ziglang")
 
 
 def cache_folder() -> Path:
-    """Return the folder of the cache: what URMPIPE_CACHE says, else urmpipe's in the user's cache folder."""
+    """Return the folder of the cache: what URMPIPE_CACHE says, else urmpipe's in the user's cache folder.
+
+    Raises:
+        FmuError: If neither is known.
+    """
     told = os.environ.get("URMPIPE_CACHE")
     if told:
         return Path(told)
     home = os.environ.get("LOCALAPPDATA") if os.name == "nt" else os.environ.get("XDG_CACHE_HOME")
-    return (Path(home) if home else Path.home() / ".cache") / "urmpipe"
+    try:
+        return (Path(home) if home else Path.home() / ".cache") / "urmpipe"
+    except RuntimeError as error:  # a user without a home, in a container
+        said = "cache of FMUs: found no home folder, allowed: a folder that the variable URMPIPE_CACHE names"
+        raise FmuError(said) from error
 
 
 def cached_fmu(
@@ -46,8 +57,8 @@ def cached_fmu(
 ) -> Path:
     """Return the FMU of a unit for this platform, built if it is not in the cache, or damaged there.
 
-    A unit without a recipe is built each time, as nothing tells what its functions do; its place is named by
-    what was built.
+    A unit without a recipe of urmpipe or of a file is built each time, as nothing tells what its functions
+    do; its place is named by what was built. Nothing is ever removed: the folder may be, at any time.
 
     Args:
         unit: The unit.
@@ -65,7 +76,7 @@ def cached_fmu(
     folder = cache_folder() / "fmus"
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        if not unit.recipe.module:
+        if not _is_told(unit.recipe):
             tell(unit.name)
             return _built_anew(unit, chosen, this_platform(), folder)
         folder /= _key(unit, chosen, this_platform())
@@ -79,6 +90,11 @@ def cached_fmu(
         said = f"cannot be written: {error.strerror or error}; the variable URMPIPE_CACHE names another place"
         raise FmuError(Finding(said, file=str(folder))) from error
     return path
+
+
+def _is_told(recipe: Recipe) -> bool:
+    """Tell whether a recipe says all that a unit is made from: with the text of a file, or urmpipe's own."""
+    return bool(recipe.source) or recipe.module.partition(".")[0] in PACKAGES
 
 
 def _built_anew(unit: Unit, backend: Backend, target: str, folder: Path) -> Path:
@@ -123,6 +139,10 @@ def _key(unit: Unit, backend: Backend, target: str) -> str:
         _sources(),
     ]
     digest = hashlib.sha256(json.dumps(made_of, sort_keys=True, default=repr).encode())
+    if recipe.source and backend == "native":
+        from urmpipe_fmus.native import native_sources
+
+        digest.update(content_guid(native_sources(unit)).encode())
     if unit.table is not None:
         digest.update(repr(unit.table.values.shape).encode())
         digest.update(unit.table.t_ns.tobytes())
@@ -143,16 +163,15 @@ def _versions() -> list[str]:
 
 
 def _compiler() -> list[Any]:
-    """Return what tells one C compiler from another without running it: command, file, size and time."""
+    """Return what tells one C compiler from another without running it: command, files, sizes and times."""
     from urmpipe_fmus.native.compile import system_compiler
 
-    command = system_compiler()
-    found = shutil.which(command[0]) if command else None
-    if command is None or found is None:
-        return []
-    file = Path(found).resolve()
-    status = file.stat()
-    return [*command, str(file), status.st_size, status.st_mtime_ns]
+    told: list[Any] = list(command := system_compiler() or [])
+    for found in filter(None, map(shutil.which, command)):  # of `ccache gcc` both
+        file = Path(found).resolve()
+        status = file.stat()
+        told += [str(file), status.st_size, status.st_mtime_ns]
+    return told
 
 
 @cache

@@ -17,6 +17,7 @@ from xml.etree import ElementTree as ET
 from urmpipe_fmus.check_run import CALL
 from urmpipe_fmus.fmu_process import command, ending, environment
 from urmpipe_fmus.platforms import platforms_here
+from urmpipe_fmus.python_fmu.place import why_not_in
 from urmpipe_models.errors import Finding, FmuError
 
 STEPS = 20
@@ -215,6 +216,9 @@ def _run(path: Path, described: Any, experiment: tuple[float, float, int]) -> di
             extract(str(path), unzipdir=str(folder / "fmu"))
         except Exception as error:  # FMPy raises Exception itself, zlib its own
             raise _refused(path, f"cannot be extracted: {error}") from error
+        misplaced = why_not_in(folder / "fmu")
+        if misplaced:
+            return {"before": [], "after": [], "problems": [misplaced]}
         job = {
             "folder": str(folder / "fmu"),
             "guid": described.guid,

@@ -11,11 +11,11 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any
+from typing import Any, get_args
 
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.values import Values
-from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State, Variable
+from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State, ValueType, Variable
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError
 
@@ -128,7 +128,28 @@ class Unit:
         """Name and variable of every scalar, in order: the index is FMI's value reference."""
         return tuple((name, one) for one in self.variables for name in one.names)
 
+    def _wrong_kinds(self) -> Iterator[str]:
+        """Yield what is of a kind that Python takes and FMI does not know."""
+        for one in self.variables:
+            if not isinstance(one, (Parameter, Input, Output, State, Memory)):
+                yield f"found {one!r} as a variable, allowed: a Parameter, Input, Output, State or Memory"
+                continue
+            for key in ("name", "description", "unit", "display_unit"):
+                yield from _no_text(f"{one.name}: {key}", getattr(one, key))
+            if one.type not in get_args(ValueType):
+                yield f"{one.name}: found type {one.type!r}, allowed: {', '.join(get_args(ValueType))}"
+            if one.size is not None and type(one.size) is not int:
+                yield f"{one.name}: found size {one.size!r}, allowed: an integer; None for a scalar"
+        for key in ("name", "description", "source"):
+            yield from _no_text(key, getattr(self, key))
+        if isinstance(self.equations, str):
+            yield f"equations: found {self.equations!r}, allowed: a tuple of texts, a line each"
+
     def _faults(self) -> Iterator[str]:
+        wrong = list(self._wrong_kinds())
+        if wrong:
+            yield from wrong
+            return
         if not self.name.isidentifier() or not self.name.isascii():
             yield f"found {self.name!r} as its name, allowed: a letter, then letters, digits and _"
         if not self.variables:
@@ -154,3 +175,8 @@ class Unit:
 
 def _is_internal_step(one: Variable) -> bool:
     return isinstance(one, Parameter) and one.type == "Real" and one.size is None and one.minimum > 0.0
+
+
+def _no_text(what: str, value: Any) -> Iterator[str]:
+    if not isinstance(value, str):
+        yield f"{what}: found {value!r}, allowed: a text"

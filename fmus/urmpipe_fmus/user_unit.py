@@ -92,10 +92,12 @@ def _neighbours(path: Path, source: str) -> Iterator[Finding]:
     """Yield the imports of files that stand beside a file, and would not be there where its FMU runs."""
     try:
         tree = ast.parse(source)
-    except (SyntaxError, ValueError):
+    except (SyntaxError, ValueError, RecursionError, MemoryError):
         return  # running it tells what is wrong
     for name, line in _imports(tree):
         top = name.split(".")[0]
+        if top in sys.stdlib_module_names:
+            continue  # a file time.py, or the unit's own of that name, is not what `import time` finds
         beside = (path.parent / f"{top}.py", path.parent / top / "__init__.py")
         if not top or any(one.exists() for one in beside):
             fault = (

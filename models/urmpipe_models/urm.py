@@ -98,7 +98,9 @@ def urm_geometry(chain: Chain) -> UrmGeometry | None:
         return None
     again = urm_chain(chain.name, found.lengths, found.tilts, directions=found.directions)
     same = _near(chain.tip, again.tip) and all(
-        (joint.kind, joint.mimic) == (other.kind, other.mimic) and _near(joint.origin, other.origin)
+        (joint.kind, joint.mimic) == (other.kind, other.mimic)
+        and (joint.kind == "fixed" or joint.axis == other.axis)
+        and _near(joint.origin, other.origin)
         for joint, other in zip(chain.joints, again.joints, strict=True)
     )
     return found if same else None

@@ -32,6 +32,7 @@ from urmpipe_fmus.cosim.plan import Plan
 from urmpipe_fmus.cosim.process import Worker
 from urmpipe_fmus.cosim.system import Port
 from urmpipe_fmus.fmu_process import ending
+from urmpipe_fmus.python_fmu.place import why_not_in
 from urmpipe_models.errors import CosimulationError, one_line
 
 LAST_LINES = 5
@@ -131,6 +132,9 @@ def _unpacked(plan: Plan, folder: Path) -> dict[str, Path]:
                 )
             except Exception as error:  # fmpy raises Exception itself
                 raise CosimulationError(f"{shown.path}: cannot be unpacked: {error}") from error
+            misplaced = why_not_in(places[shown.path])
+            if misplaced:
+                raise CosimulationError(f"{shown.path}: {misplaced}")
             (places[shown.path] / "resources").mkdir(exist_ok=True)
     return {name: places[shown.path] for name, shown in plan.interfaces.items()}
 

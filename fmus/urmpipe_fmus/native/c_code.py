@@ -53,6 +53,7 @@ def c_function(declaration: str, function: Any, arguments: Sequence[str], result
 
 def c_number(value: float) -> str:
     """Return a number as C reads it, to the last bit."""
+    value = float(value)  # NumPy's floats too, which Python writes as np.float64(1.0)
     if math.isnan(value):
         return "NAN"
     if math.isinf(value):

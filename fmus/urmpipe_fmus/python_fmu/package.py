@@ -14,7 +14,7 @@ from urmpipe_fmus.python_fmu.closure import check_imports, imports_of, renamed, 
 from urmpipe_fmus.python_fmu.entry import RECIPE_FILE
 from urmpipe_fmus.python_fmu.remake import remake
 from urmpipe_fmus.unit import Recipe, Unit
-from urmpipe_models.errors import FmuError, UnitError
+from urmpipe_models.errors import FmuError, UnitError, UrmpipeError
 
 PLATFORMS = ("linux64", "win64")
 """Those that pythonfmu has binaries for."""
@@ -84,13 +84,26 @@ def _checked_recipe(unit: Unit) -> Recipe:
     if recipe.source:
         check_imports(unit.name, recipe.module, recipe.source)
     name = f"urmpipe_unit_{_hash({'source': recipe.source.encode()})}"
-    again = remake(recipe, unit.name, unit.table, name)
+    again = _remade(recipe, unit, name)
     if again.variables != unit.variables:
         raise UnitError(
             f"unit {unit.name}: found other variables when made again from its recipe, allowed in a Python"
             " FMU: the same ones"
         )
     return recipe
+
+
+def _remade(recipe: Recipe, unit: Unit, module_name: str) -> Unit:
+    """Return the unit made again, as the FMU will."""
+    try:
+        return remake(recipe, unit.name, unit.table, module_name)
+    except UrmpipeError:
+        raise
+    except (Exception, SystemExit) as error:  # a file that reads another one may not find it
+        raise UnitError(
+            f"unit {unit.name}: found {type(error).__name__}: {error} when made again from its recipe,"
+            " allowed in a Python FMU: a recipe that needs nothing else; a native FMU holds what was read"
+        ) from error
 
 
 def _hash(contents: Mapping[str, bytes]) -> str:

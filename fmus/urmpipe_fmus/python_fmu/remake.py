@@ -45,7 +45,9 @@ def remake(recipe: Recipe, name: str, table: Table | None, module_name: str) -> 
 def _ran(recipe: Recipe, module_name: str) -> ModuleType:
     """Return the module of a user's file, run from its text."""
     module = ModuleType(module_name)
-    module.__file__ = recipe.module
+    module.__file__ = (
+        f"<FMU>/{recipe.module}"  # a place with nothing beside it: only the file goes into an FMU
+    )
     sys.modules[module_name] = module  # dataclasses look their module up there
     exec(compile(recipe.source, recipe.module, "exec"), vars(module))
     return module

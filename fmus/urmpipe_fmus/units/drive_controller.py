@@ -15,6 +15,9 @@ from urmpipe_models.set_point import JointMotion
 
 OPTIONS: Mapping[str, str] = {}
 
+NO_SAMPLE = -(2.0**53)
+"""Below the number of every sample: a run may begin before 0 s."""
+
 
 def drive_controller() -> Unit:
     """Return the unit: set and real position, velocity and acceleration in; voltage out.
@@ -68,7 +71,9 @@ def _inputs(prefix: str, word: str) -> tuple[Input, ...]:
 def _memories() -> tuple[Memory, ...]:
     return (
         Memory(name="last", description="Voltage of the sample before", unit="V"),
-        Memory(name="sample", description="Number of the last sample; -1 before the first", start=-1.0),
+        Memory(
+            name="sample", description="Number of the last sample; before the first -2^53", start=NO_SAMPLE
+        ),
     )
 
 

@@ -59,6 +59,8 @@ def kinematic_chain(
     shown = some_of("kinematic_chain", "points", names if points is None else points, names)
     sensed = some_of("kinematic_chain", "sensors", names[-1:] if sensors is None else sensors, names)
     yes_or_no("kinematic_chain", "rates", rates)
+    if not (shown or sensed):
+        raise UnitError("unit kinematic_chain: options points, sensors: found none, allowed: one of either")
     geometry = geometry_of(robot)
 
     def outputs(v: Values) -> Mapping[str, Any]:

@@ -130,6 +130,29 @@ def test_what_cannot_be_a_variable_is_told(variable: Variable, said: str) -> Non
     assert list(variable.faults()) == [said]
 
 
+def test_what_is_of_a_wrong_kind_is_told() -> None:
+    with pytest.raises(UnitError) as error:
+        Unit(
+            name="u",
+            description=None,  # type: ignore[arg-type]
+            variables=(
+                Input(name="x", description="", type="String", size=2.0),  # type: ignore[arg-type]
+                Input(name="y", description=5, unit=None),  # type: ignore[arg-type]
+                "z",
+            ),
+            equations="y = x",  # type: ignore[arg-type]
+        )
+    assert str(error.value).splitlines() == [
+        "unit u: x: found type 'String', allowed: Real, Integer, Boolean",
+        "unit u: x: found size 2.0, allowed: an integer; None for a scalar",
+        "unit u: y: description: found 5, allowed: a text",
+        "unit u: y: unit: found None, allowed: a text",
+        "unit u: found 'z' as a variable, allowed: a Parameter, Input, Output, State or Memory",
+        "unit u: description: found None, allowed: a text",
+        "unit u: equations: found 'y = x', allowed: a tuple of texts, a line each",
+    ]
+
+
 def test_a_unit_with_states_has_the_integrators_step_as_a_fixed_parameter() -> None:
     unit = Unit(
         name="u",

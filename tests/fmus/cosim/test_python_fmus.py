@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import tempfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from urmpipe_fmus.cosim import Block, Connection, Port, System, prepare, simulate
+from urmpipe_models.errors import CosimulationError
 
 SCRIPT = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -86,3 +88,13 @@ def test_an_exception_is_told_with_its_words(tmp_path: Path) -> None:
     )
     assert "u is too large" in recorded.failed
     assert len(recorded.t_ns) == 2
+
+
+def test_a_folder_that_pythonfmu_cannot_read_is_told_before_it_crashes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fmus = {"a": python_fmu(tmp_path, "First", "self.u"), "b": python_fmu(tmp_path, "Second", "self.u")}
+    (tmp_path / "größer").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "größer"))
+    with pytest.raises(CosimulationError, match=r"First\.fmu: a Python FMU cannot run in .*größer/urmpipe-"):
+        simulate(prepare(system(fmus, {"b.u": "a.y"}), fmu_of))

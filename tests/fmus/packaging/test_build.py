@@ -21,6 +21,7 @@ from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_names
 from urmpipe_fmus.units.log_source import log_source
+from urmpipe_fmus.variable import Input, Output
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import FmuError
 
@@ -145,4 +146,27 @@ def test_a_log_source_as_python_fmu_plays_the_table_in_its_resources(make: Make,
     for k in range(8):
         assert fmu.get(["q", "x"]) == [played["q"][k], played["x"][k]]
         fmu.do_step(k * 0.05, 0.05)
+    fmu.free()
+
+
+@needs_native
+def test_numbers_of_numpy_are_numbers_in_c_and_in_the_description(tmp_path: Path) -> None:
+    angles = tuple(np.deg2rad([30.0, 45.0]))
+    phi = Input(
+        name="phi", description="", size=2, start=angles, minimum=np.deg2rad(-90), maximum=np.float64(1.5)
+    )
+    unit = Unit(
+        name="angles",
+        description="",
+        variables=(phi, Output(name="y", description="")),
+        outputs=lambda v: {"y": v.phi[0] + v.phi[1]},
+    )
+    fmu = Loaded(build_fmu(unit, tmp_path, backend="native").path)
+    described = {one.name: one for one in fmu.described.modelVariables}["phi[1]"]
+    assert [float(one) for one in (described.start, described.min, described.max)] == [
+        np.pi / 6.0,
+        -np.pi / 2.0,
+        1.5,
+    ]
+    assert fmu.get(["phi[1]", "phi[2]"]) == list(angles)
     fmu.free()

@@ -12,9 +12,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_fmus.cache import cache_folder, cached_fmu
+from loaded_fmu import Loaded
+from urmpipe_fmus.cache import _key, cache_folder, cached_fmu
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Recipe, Unit
+from urmpipe_fmus.units import make_unit
+from urmpipe_fmus.user_unit import load_unit_file
 from urmpipe_models.errors import FmuError
 
 Make = Callable[..., Unit]
@@ -78,19 +81,60 @@ def test_a_unit_without_a_recipe_is_never_taken_for_another(make: Make, folder: 
     assert len(list((folder / "fmus").iterdir())) == 2
 
 
-def test_a_hit_imports_nothing_that_traces_and_runs_no_function(make: Make) -> None:
-    cached_fmu(make("spring"))
+READING = """from pathlib import Path
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.variable import Input, Output
+gain = float(Path(__file__).with_name("gain.txt").read_text())
+unit = Unit(name="reading", description="", outputs=lambda v: {"y": gain * v.u},
+    variables=(Input(name="u", description="", start=1.0), Output(name="y", description="")))
+"""
+
+
+def test_a_file_that_reads_another_is_built_again_when_that_one_changed(tmp_path: Path) -> None:
+    (tmp_path / "reading.py").write_text(READING, encoding="utf-8")
+    starts = []
+    for gain in ("2.0", "3.0", "2.0"):
+        (tmp_path / "gain.txt").write_text(gain, encoding="ascii")
+        path = cached_fmu(load_unit_file(tmp_path / "reading.py"), "native")
+        fmu = Loaded(path)
+        starts.append((path, fmu.get(["y"])))
+        fmu.free()
+    assert [value for _, value in starts] == [[2.0], [3.0], [2.0]]
+    assert starts[0] == starts[2]
+
+
+def test_a_recipe_of_somebody_elses_module_is_never_taken_for_another(make: Make) -> None:
+    spring = make("spring")
+    one = replace(spring, recipe=Recipe("somebody.elses", "spring"))
+    other = replace(one, derivatives=lambda v: {"x": v.v, "v": -v.x})
+    assert cached_fmu(one, "native") != cached_fmu(other, "native")
+
+
+def test_another_file_behind_the_command_of_the_compiler_is_another_fmu(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    compiler = tmp_path / "compiler"
+    keys = []
+    for text in ("one", "another"):
+        compiler.write_text(text, encoding="ascii")
+        compiler.chmod(0o755)
+        monkeypatch.setenv("CC", f"env {compiler}")
+        keys.append(_key(make_unit("inertia"), "native", "linux64"))
+    assert keys[0] != keys[1]
+
+
+def test_a_hit_imports_nothing_that_traces_and_runs_no_function() -> None:
+    cached_fmu(make_unit("inertia"))
     code = (
-        "import sys; sys.path.insert(0, sys.argv[1])\n"
-        "from conftest import unit_of\n"
         "from urmpipe_fmus.cache import cached_fmu\n"
-        "print(cached_fmu(unit_of('spring')))\n"
+        "from urmpipe_fmus.units import make_unit\n"
+        "import sys; print(cached_fmu(make_unit('inertia')))\n"
         "print(*sorted({'casadi', 'fmpy', 'pythonfmu', 'jinja2', 'lxml', 'scipy'} & set(sys.modules)))\n"
     )
     said = subprocess.run(
-        [sys.executable, "-c", code, str(Path(__file__).parent)], capture_output=True, text=True, check=True
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
     ).stdout.splitlines()
-    assert said == [str(cached_fmu(make("spring"))), ""]
+    assert said == [str(cached_fmu(make_unit("inertia"))), ""]
 
 
 def test_the_folder_is_the_users_and_can_be_told(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -100,6 +144,22 @@ def test_the_folder_is_the_users_and_can_be_told(monkeypatch: pytest.MonkeyPatch
     assert cache_folder() == tmp_path / "x" / "urmpipe"
     monkeypatch.delenv("LOCALAPPDATA" if os.name == "nt" else "XDG_CACHE_HOME")
     assert cache_folder() == Path.home() / ".cache" / "urmpipe"
+
+
+@pytest.mark.skipif(os.name == "nt", reason="needs POSIX's users")
+def test_a_user_without_a_home_is_told_to_name_a_folder(
+    make: Make, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    import pwd
+
+    for name in ("URMPIPE_CACHE", "XDG_CACHE_HOME", "HOME"):
+        monkeypatch.delenv(name, raising=False)
+    monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)  # raises KeyError, as for a user of no entry
+    with pytest.raises(FmuError) as caught:
+        cached_fmu(make("arm"), "python")
+    assert str(caught.value) == (
+        "cache of FMUs: found no home folder, allowed: a folder that the variable URMPIPE_CACHE names"
+    )
 
 
 def test_a_cache_that_cannot_be_written_is_an_error_that_names_the_variable(

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import json
+import re
 import subprocess
 import sys
+import tempfile
 import zipfile
 from collections.abc import Callable
 from dataclasses import replace
@@ -169,6 +171,34 @@ def test_an_fmu_that_hangs_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 def test_an_fmu_that_ends_well_but_early_is_no_good_one(tmp_path: Path) -> None:
     found = check_fmu(built(failing("os._exit(0)"), tmp_path))
     assert found.problems == ("fmi2DoStep at 0.015 s ended the process with the exit code 0",)
+
+
+@pytest.mark.parametrize("folder", ["Jürgen", "100% sure", "a#b", "a%20b"])
+def test_a_python_fmu_is_not_run_where_its_binary_would_crash(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, folder: str
+) -> None:
+    path = build_fmu(make("arm"), tmp_path, backend="python").path
+    (tmp_path / folder).mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / folder))
+    found = check_fmu(path)
+    [problem] = found.problems
+    run_in = rf"{re.escape(str(tmp_path / folder))}/urmpipe-check-\w+"
+    assert re.fullmatch(
+        rf"a Python FMU cannot run in {run_in}: pythonfmu reads of its address plain letters, digits,"
+        r" - \. _ ~ and spaces only; allowed: another folder for temporary files \(TMPDIR, on Windows TEMP\),"
+        r" or a native FMU",
+        problem,
+    )
+    assert not found.ran
+    assert [one.before for one in found.variables] == [None] * len(found.variables)
+
+
+def test_a_python_fmu_runs_in_a_folder_with_spaces(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "with a space").mkdir()
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path / "with a space"))
+    assert check_fmu(build_fmu(make("arm"), tmp_path, backend="python").path).problems == ()
 
 
 def test_a_wrong_guid_is_told_with_what_the_fmu_logged(make: Make, tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from fmpy import read_model_description
 from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urmpipe_fmus.description import model_description
@@ -133,6 +133,7 @@ def test_bounds_are_told_where_they_are_some(tmp_path: Path) -> None:
     assert [(one.min, one.max) for one in found] == [("-0.5", None), ("-1", None), (None, None)]
 
 
+@settings(deadline=None)
 @given(text=st.text(st.characters(exclude_categories=[])))
 def test_any_description_is_valid_and_what_xml_can_hold_of_it_comes_back(text: str) -> None:
     unit = Unit(

@@ -8,7 +8,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from lxml import html  # type: ignore[import-untyped]
 
@@ -102,6 +102,7 @@ NOT_MARKUP = re.compile("[^\t\n\r -\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 """What XML 1.0 cannot hold."""
 
 
+@settings(deadline=None)
 @given(text=st.text(st.characters(exclude_categories=[], exclude_characters="\r")))  # \r is read as \n
 def test_any_text_is_shown_as_it_is(text: str) -> None:
     unit = Unit(

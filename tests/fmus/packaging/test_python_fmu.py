@@ -18,7 +18,7 @@ from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.units import make_unit
-from urmpipe_fmus.user_unit import unit_of_source
+from urmpipe_fmus.user_unit import load_unit_file, unit_of_source
 from urmpipe_fmus.variable import Input, Parameter
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import FmuError, UnitError
@@ -121,10 +121,13 @@ def test_no_step_goes_past_the_stop_time(make: Make, tmp_path: Path) -> None:
     fmu.free()
 
 
-def test_a_restored_state_knows_that_it_runs(make: Make, tmp_path: Path) -> None:
+@pytest.mark.parametrize("serialized", [False, True])
+def test_a_restored_state_knows_that_it_runs(make: Make, tmp_path: Path, serialized: bool) -> None:
     fmu = Loaded(built(make("spring"), tmp_path))
     fmu.do_step(0.0, 0.01)
     state = fmu.fmu.getFMUstate()
+    if serialized:
+        state = fmu.fmu.deSerializeFMUstate(fmu.fmu.serializeFMUstate(state))
     fmu.fmu.reset()
     fmu.initialize(0.0)
     fmu.set("d", 0.75)
@@ -411,6 +414,23 @@ def test_a_file_that_imports_what_an_fmu_does_not_bring_is_refused(make: Make, t
     assert str(caught.value) == (
         "unit spring: found imports of helper, helper.x, scipy.signal in spring.py, allowed in a Python FMU:"
         " the standard library, numpy, urmpipe_datasets, urmpipe_fmus, urmpipe_models"
+    )
+
+
+def test_a_file_that_reads_another_beside_it_is_refused(
+    make: Make, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    unit = make("spring")
+    text = f"from pathlib import Path\nPath(__file__).with_name('gain.txt').read_text()\n{unit.recipe.source}"
+    (tmp_path / "gain.txt").write_text("2.0", encoding="ascii")
+    (tmp_path / "spring.py").write_text(text, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(UnitError) as caught:
+        built(load_unit_file("spring.py"), tmp_path)
+    assert str(caught.value) == (
+        "unit spring: found FileNotFoundError: [Errno 2] No such file or directory: '<FMU>/gain.txt' when"
+        " made again from its recipe, allowed in a Python FMU: a recipe that needs nothing else; a native FMU"
+        " holds what was read"
     )
 
 

@@ -75,6 +75,12 @@ def test_a_run_that_begins_late_takes_one_sample_a_period_from_there() -> None:
     np.testing.assert_array_equal(found, np.repeat([1.0, 2.0, 3.0], [5, 5, 1]))
 
 
+def test_a_run_that_begins_before_0_takes_one_sample_a_period_from_there() -> None:
+    t = times(11, 1e-3, begin=-0.02)
+    found = run(make_unit("drive_controller"), t, {"set_theta": np.ones(11)}, GAINS)["u"]
+    np.testing.assert_array_equal(found, np.repeat([1.0, 2.0, 3.0], [5, 5, 1]))
+
+
 def test_eq_20_weighs_the_three_errors_and_keeps_within_the_limit() -> None:
     instance = controller(last=10.0)
     for name, value in (("set_theta", 1.0), ("set_omega", 2.0), ("set_alpha", 30.0)):

@@ -195,4 +195,6 @@ def test_lengths_and_tilts_are_told_of_urm_arms_only() -> None:
     assert urm_geometry(bent) is None
     assert urm_geometry(replace(arm, joints=(arm.joints[0], twisted, *arm.joints[2:]))) is None
     assert urm_geometry(replace(arm, joints=(sliding_joint, *arm.joints[1:]))) is None
+    leaning = replace(arm.joints[0], axis=(1e-5, 0.0, 1.0))  # of length 1 to the tolerance of a chain
+    assert urm_geometry(replace(arm, joints=(leaning, *arm.joints[1:]))) is None
     assert urm_geometry(load_robot("ur5e")) is None

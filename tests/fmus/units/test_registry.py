@@ -99,6 +99,11 @@ def test_unknown_and_missing_options_are_all_told_at_once() -> None:
         ),
         (
             "kinematic_chain",
+            {"robot": load_robot("urm4"), "points": [], "sensors": ()},
+            "options points, sensors: found none, allowed: one of either",
+        ),
+        (
+            "kinematic_chain",
             {"robot": load_robot("urm4"), "rates": 1},
             "option rates: found 1, allowed: true or false",
         ),

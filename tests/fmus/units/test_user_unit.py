@@ -208,6 +208,17 @@ def test_an_import_from_beside_the_file_is_refused(tmp_path: Path, monkeypatch: 
     ]
 
 
+def test_a_file_may_bear_a_name_of_the_standard_library(tmp_path: Path) -> None:
+    path = tmp_path / "random.py"
+    path.write_text("import random\n" + UNIT.replace("OUT", "v.u"), encoding="utf-8")
+    assert load_unit_file(path).name == "own"
+
+
+def test_a_file_that_is_nested_too_deeply_is_told(tmp_path: Path) -> None:
+    [fault] = said(written(tmp_path, f"x = {'-' * 100_000}1\n"))
+    assert fault.startswith("own.py: cannot be run: ")
+
+
 def test_a_file_that_cannot_be_read_is_told(tmp_path: Path) -> None:
     assert said(tmp_path / "own.py") == ["own.py: cannot be read: No such file or directory"]
     (tmp_path / "own.py").write_bytes(b"# \xff\n")
