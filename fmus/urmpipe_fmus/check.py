@@ -245,7 +245,7 @@ def _run(path: Path, described: Any, experiment: tuple[float, float, int]) -> di
 
 def _process(folder: Path) -> str:
     """Run the job of a folder; return how the process ended, empty if well."""
-    command = [sys.executable, "-m", "urmpipe_fmus.check_run", str(folder / "job.json")]
+    command = [sys.executable, "-P", "-m", "urmpipe_fmus.check_run", str(folder / "job.json")]
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(one for one in sys.path if one)}
     try:
         done = subprocess.run(

@@ -181,3 +181,11 @@ def test_without_casadi_it_is_python_and_says_why(
     out, err = capsys.readouterr()
     assert out.startswith("FMU: delta_meter.fmu  (python, ")
     assert err.startswith("note: delta_meter.fmu runs on Python, as no native one can be built here: casadi")
+
+
+def test_no_file_of_the_working_folder_is_taken_for_a_module(
+    meter: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (meter.parent / "json.py").write_text("raise RuntimeError('run by mistake')\n", encoding="utf-8")
+    monkeypatch.chdir(meter.parent)
+    assert check_fmu(meter).problems == ()
