@@ -121,7 +121,7 @@ def build(
     from urmpipe.fmu_printing import built_dict, print_built
     from urmpipe.guards import place_robot
     from urmpipe.log_tables import read_table
-    from urmpipe.printing import print_json, print_warnings
+    from urmpipe.printing import print_json, print_warnings, prints_apart
     from urmpipe_pipeline.sources import read_map
 
     if log_map and not log:
@@ -132,9 +132,10 @@ def build(
     table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm, read=read)
     if table and not quiet:
         print_warnings(table.warnings)
-    made = build_fmu(
-        unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
-    )
+    with prints_apart():
+        made = build_fmu(
+            unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
+        )
     if as_json:
         print_json(built_dict(made))
     elif not quiet:

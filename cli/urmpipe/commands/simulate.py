@@ -76,7 +76,14 @@ def simulate(
     tune_pyarrow()
     from time import perf_counter
 
-    from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar, say
+    from urmpipe.printing import (
+        print_json,
+        print_recording,
+        print_warnings,
+        prints_apart,
+        progress_bar,
+        say,
+    )
     from urmpipe.simulating import simulate as run
     from urmpipe.simulation_printing import print_simulation
 
@@ -88,7 +95,7 @@ def simulate(
         if not quiet:
             say(f"note: {line}", err=True)
 
-    with progress_bar(f"Simulating {system}", quiet=quiet) as progress:
+    with prints_apart(), progress_bar(f"Simulating {system}", quiet=quiet) as progress:
         result = run(
             system,
             arguments=arguments,
