@@ -115,7 +115,8 @@ def test_a_unit_refuses_what_it_does_not_take() -> None:
         "unit delta_meter: found a log (log.csv), allowed: none, it has no such option",
     ]
     assert refusal("repolarizer", options={"joints": 6, "turns": 2}) == [
-        "unit repolarizer: option turns: found, allowed: joints"
+        "unit repolarizer: option turns: found, allowed: joints; a parameter is set where the unit runs, in a"
+        " system by start = { turns = ... }"
     ]
     assert refusal(unit_of("delta_meter"), options={"joints": 6}) == [
         "unit delta_meter: found joints, allowed: no options, it is complete"
@@ -131,7 +132,7 @@ def test_a_chain_is_taken_as_a_robot() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("kinematic_chan",), "unit kinematic_chan: found, allowed: kinematic_chain, repolarizer"),
+        (("kinematic_chan",), "unit kinematic_chan: found (did you mean kinematic_chain?), allowed: kine"),
         (("kinematic_chain", "--robot", "urm7"), "unknown robot 'urm7' (did you mean urm8?)"),
         (
             ("repolarizer", "-s", "joints=nan"),

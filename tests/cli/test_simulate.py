@@ -215,7 +215,7 @@ def test_all_that_is_wrong_with_the_parts_is_told_at_once(following: Path) -> No
     told = "\n".join(refusal(following))
     assert "found no column 'w', allowed: t, u (V)" in told
     assert "block arm: robot: found 6, allowed: a name or a file" in told
-    assert "block meter: unit delta_meter: option joints: found, allowed: none, it has no options" in told
+    assert "block meter: unit delta_meter: option joints: found, allowed: none, it has no options;" in told
 
 
 def test_a_start_value_that_is_no_number_is_refused(following: Path) -> None:
