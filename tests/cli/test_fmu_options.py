@@ -154,3 +154,18 @@ def test_what_is_wrong_is_one_line_and_nothing_is_written(
     assert said in ran.err
     assert "Traceback" not in ran.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_options_of_ingest_are_told_with_the_way_to_a_unit(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,q1,q2\n0,1,2\n1,1.1,2.1\n", encoding="utf-8")
+    warning = next(one for one in read_table(path).warnings if "--unit" in one.message)
+    way = (
+        "(an option of urmpipe ingest, kept by its --write-map FILE for --map FILE, in a system for"
+        ' map = "FILE")'
+    )
+    assert warning.message.endswith(f"; --unit says otherwise {way}")
+    path.write_text("t,q1,q2\n01/02/2024 10:00:00,1,2\n01/02/2024 10:00:01,1,2\n", encoding="utf-8")
+    (said,) = refusal("log_source", log=path)
+    assert "--unit t=" in said
+    assert said.endswith(way)
