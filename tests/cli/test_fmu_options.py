@@ -165,7 +165,7 @@ def test_options_of_ingest_are_told_with_the_way_to_a_unit(tmp_path: Path) -> No
         ' map = "FILE")'
     )
     assert warning.message.endswith(f"; --unit says otherwise {way}")
-    path.write_text("t,q1,q2\n01/02/2024 10:00:00,1,2\n01/02/2024 10:00:01,1,2\n", encoding="utf-8")
+    path.write_text("time,q1,q2\n0,1,2\n1000,1,2\n2000,1,2\n", encoding="utf-8")
     (said,) = refusal("log_source", log=path)
-    assert "--unit t=" in said
+    assert "say which with --unit" in said
     assert said.endswith(way)
