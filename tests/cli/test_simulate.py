@@ -154,8 +154,22 @@ def test_the_command_prints_system_verdict_and_signals(urmpipe: RunCommand, tmp_
     assert lines[0].startswith("log-to-delta: 21 samples over 0.100 s, communication step 5 ms; in ")
     assert lines[1].startswith("PASS  delta: |Δy| = 0.4174 mm of 3.5 mm allowed at t = 0.085 s;")
     assert any(line.startswith("delta.norm [m]") for line in lines)
+    assert sum(line.startswith(("delta.", "repolarizer.", "chain.")) for line in lines) == 12
+    assert lines[-2] == "... and 39 more; --json has all, and the recording"
     assert lines[-1].startswith("Recording: log-to-delta.rrd")
     assert ran.err.splitlines()[-1].startswith("warning: path: no unit is given for x, y, z")
+
+
+def test_signals_that_stand_still_come_last(urmpipe: RunCommand, tmp_path: Path) -> None:
+    text = FOLLOWING.replace("step = 0.01", "step = 0.01\nrecord_every = 5\nduration = 0.1")
+    extra = '[blocks.still]\nfile = "follower.py"\nstart = { u = 0.0 }\n[blocks.lag]'
+    (tmp_path / "still.toml").write_text(text.replace("[blocks.lag]", extra), encoding="utf-8")
+    (tmp_path / "follower.py").write_text(FOLLOWER, encoding="utf-8")
+    (tmp_path / "voltage.csv").write_text("t,u (V)\n0,1\n1,1\n", encoding="utf-8")
+    lines = urmpipe("simulate", "still.toml").out.splitlines()
+    assert "communication step 10 ms, a sample every 50 ms; in " in lines[0]
+    named = [line.split()[0] for line in lines if line.startswith(("lag.", "still."))]
+    assert named == ["lag.x", "lag.error", "lag.u", "still.x", "still.error"]
 
 
 def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> None:
