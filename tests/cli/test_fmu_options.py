@@ -140,6 +140,10 @@ def test_a_chain_is_taken_as_a_robot() -> None:
         ),
         (("repolarizer", "-s", "joints"), "found 'joints', allowed: NAME=VALUE, each name once"),
         (("repolarizer", "-s", "joints=6", "-s", "joints=7"), "found 'joints=7', allowed: NAME=VALUE"),
+        (
+            ("delta_meter", "--platforms", "amiga", "--platforms", "linux64"),
+            "found amiga, allowed: linux64, win64",
+        ),
         (("delta_meter", "--platforms", "linux64,amiga"), "found amiga, allowed: linux64, win64"),
         (("log_source", "--log", "missing.csv"), "missing.csv: found no such file"),
         (("missing.py",), "missing.py"),

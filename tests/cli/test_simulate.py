@@ -13,9 +13,11 @@ from typing import Any
 import click
 import numpy as np
 import pytest
+from click.shell_completion import ShellComplete
 
 import urmpipe
 from urmpipe.commands.simulate import simulate as command
+from urmpipe.main import cli
 from urmpipe.simulating import simulate
 from urmpipe.unit_options import UnitType
 from urmpipe_datasets import LOGS
@@ -169,7 +171,7 @@ def test_signals_that_stand_still_come_last(urmpipe: RunCommand, tmp_path: Path)
     lines = urmpipe("simulate", "still.toml").out.splitlines()
     assert "communication step 10 ms, a sample every 50 ms; in " in lines[0]
     named = [line.split()[0] for line in lines if line.startswith(("lag.", "still."))]
-    assert named == ["lag.x", "lag.error", "lag.u", "still.x", "still.error"]
+    assert named == ["lag.x", "lag.error", "still.x", "still.error", "lag.u"]
 
 
 def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> None:
@@ -279,6 +281,21 @@ def test_names_complete_in_the_shell() -> None:
     assert argument.type.shell_complete(context, argument, "six")[0].value == "six-drives"
     units = UnitType().shell_complete(context, argument, "dc")
     assert [(one.value, one.type) for one in units] == [("dc_drive", "plain"), ("dc", "file")]
+
+
+@pytest.mark.parametrize(
+    ("line", "begun", "offered"),
+    [
+        (["simulate", "log-to-delta", "--set"], "r", ["reference=", "robot="]),
+        (["simulate", "--set"], "", []),
+        (["simulate", "nosuch", "--set"], "", []),
+        (["fmu", "build", "kinematic_chain", "-s"], "", ["points=", "sensors=", "rates="]),
+        (["fmu", "build", "log_source", "--option"], "c", ["columns="]),
+    ],
+)
+def test_what_is_set_completes_in_the_shell(line: list[str], begun: str, offered: list[str]) -> None:
+    complete = ShellComplete(cli, {}, "urmpipe", "_URMPIPE_COMPLETE")
+    assert [one.value for one in complete.get_completions(line, begun)] == offered
 
 
 def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:

@@ -9,7 +9,7 @@ import click
 
 from urmpipe.options import DURATION, output_options
 from urmpipe.process import tune_pyarrow
-from urmpipe.unit_options import SystemType, named_values
+from urmpipe.unit_options import NamedType, SystemType, argument_names, named_values
 
 
 @click.command(short_help="Run a system of blocks.")
@@ -21,6 +21,7 @@ from urmpipe.unit_options import SystemType, named_values
 @click.option(
     "--set",
     "arguments",
+    type=NamedType(argument_names),
     multiple=True,
     callback=named_values,
     metavar="NAME=VALUE",
