@@ -19,13 +19,13 @@ from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.sources import ReadOptions, read_log
 from urmpipe_pipeline.text import counted
 
-
-OPTION = re.compile(r"--(unit|time|period|joints|decimal|delimiter|rotation|interval|repair|skip-bad|source)\b")
+OPTION = re.compile(
+    r"--(unit|time|period|joints|decimal|delimiter|rotation|interval|repair|skip-bad|source)\b"
+)
 """Options of `urmpipe ingest`: what is said of a log offers them."""
 
 BY_MAP = (
-    "an option of urmpipe ingest, kept by its --write-map FILE for --map FILE, in a system for"
-    ' map = "FILE"'
+    'an option of urmpipe ingest, kept by its --write-map FILE for --map FILE, in a system for map = "FILE"'
 )
 """How such an option reaches a unit."""
 

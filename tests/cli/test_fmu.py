@@ -128,7 +128,7 @@ def test_the_unit_of_the_page_is_built_and_runs(urmpipe: RunCommand, tmp_path: P
 
 def test_what_a_unit_prints_is_no_part_of_the_json(urmpipe: RunCommand, tmp_path: Path) -> None:
     talking = example().replace("spring = Unit(", "print('hello')\nspring = Unit(")
-    talking = talking.replace("lambda v: {\"stopped\"", "lambda v: print('called') or {\"stopped\"")
+    talking = talking.replace('lambda v: {"stopped"', "lambda v: print('called') or {\"stopped\"")
     (tmp_path / "my_unit.py").write_text(talking, encoding="utf-8")
     ran = urmpipe("fmu", "build", "my_unit.py", "--backend", "python", "--json")
     assert (ran.code, json.loads(ran.out)["fmu"]) == (0, "spring.fmu")
