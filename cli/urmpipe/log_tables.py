@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import NamedTuple
 
@@ -16,6 +18,16 @@ from urmpipe_pipeline.joint_log import FloatArray, JointLog, LogWarning
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.sources import ReadOptions, read_log
 from urmpipe_pipeline.text import counted
+
+OPTION = re.compile(
+    r"--(unit|time|period|joints|decimal|delimiter|rotation|interval|repair|skip-bad|source)\b"
+)
+"""Options of `urmpipe ingest`: what is said of a log offers them."""
+
+BY_MAP = (
+    'an option of urmpipe ingest, kept by its --write-map FILE for --map FILE, in a system for map = "FILE"'
+)
+"""How such an option reaches a unit."""
 
 
 class Quantity(NamedTuple):
@@ -70,7 +82,18 @@ def read_table(
     Raises:
         LogError: With everything that is wrong with the files, or if a row lacks a value.
     """
-    return _motion(Path(log), robot, read) if names is None else _columns(Path(log), names, read)
+    try:
+        found = _motion(Path(log), robot, read) if names is None else _columns(Path(log), names, read)
+    except LogError as error:
+        findings = [replace(one, message=_by_map(one.message)) for one in error.findings]
+        raise LogError(*findings) from error
+    warnings = (replace(one, message=_by_map(one.message)) for one in found.warnings)
+    return found._replace(warnings=tuple(warnings))
+
+
+def _by_map(message: str) -> str:
+    """Return what is said of a log with how the options that it offers reach a unit."""
+    return f"{message} ({BY_MAP})" if OPTION.search(message) else message
 
 
 def _motion(path: Path, robot: Chain | None, read: ReadOptions | None) -> LogTable:

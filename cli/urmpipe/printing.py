@@ -6,7 +6,7 @@ import json
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, redirect_stdout
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -133,6 +133,13 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
     with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
         task = bar.add_task(one_line(title), total=1.0)
         yield lambda share: bar.update(task, completed=share)
+
+
+@contextmanager
+def prints_apart() -> Iterator[None]:
+    """Have what a user's unit prints on standard error: standard output is for results, such as JSON."""
+    with redirect_stdout(sys.stderr):
+        yield
 
 
 def judged(verdict: str | None) -> Text:

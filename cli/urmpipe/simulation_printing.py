@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from urmpipe.columns import Column, print_columns
-from urmpipe.printing import LISTED, judged_line, new_console, new_table, say
+from urmpipe.printing import judged_line, new_console, new_table, say
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.simulation import Signal, Simulation, extremes
@@ -16,6 +18,10 @@ if TYPE_CHECKING:
     from rich.console import Console
 
     from urmpipe_fmus.cosim.system import System
+
+
+SHOWN = 12
+"""Signals whose extremes are printed; the others are counted."""
 
 
 def print_simulation(result: Simulation, wall: float) -> None:
@@ -37,18 +43,20 @@ def _head(result: Simulation, wall: float) -> str:
     step = f"communication step {1e3 * result.step:.6g} ms"
     faster = f", {result.duration / wall:.3g} times faster than real time" if result.duration > wall else ""
     samples = text.counted(len(result.t_ns), "sample")
+    if len(result.t_ns) > 1 and (period := result.duration / (len(result.t_ns) - 1)) > 1.5 * result.step:
+        step += f", a sample every {1e3 * period:.6g} ms"
     return f"{result.name}: {samples} over {text.seconds(result.duration)} s, {step}; in {wall:.2g} s{faster}"
 
 
 def _print_extremes(console: Console, result: Simulation) -> None:
-    """Print the least and the largest value of each scalar signal, as many as are listed."""
+    """Print the least and the largest value of the first scalar signals; those that stand still come last."""
     rows = [row for signal in _last_first(result) for row in _scalars(signal)]
     if not rows or not len(result.t_ns):
         return
-    shown = rows[:LISTED]
+    shown = sorted(rows, key=lambda row: bool(np.ptp(row[2]) == 0.0))[:SHOWN]
     print_columns(console, "Signals", list(_columns(shown, result.t)))
-    if len(rows) > LISTED:
-        console.print(f"... and {len(rows) - LISTED} more; --json has all")
+    if len(rows) > SHOWN:
+        console.print(f"... and {len(rows) - SHOWN} more; --json has all, and the recording")
 
 
 def _last_first(result: Simulation) -> list[Signal]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tomllib
+from collections.abc import Callable, Iterable
 from typing import Any
 
 import click
@@ -37,6 +38,51 @@ class SystemType(click.ParamType[str]):
 
         names = [CompletionItem(name) for name in system_names() if name.startswith(incomplete)]
         return [*names, CompletionItem(incomplete, type="file")]
+
+
+class NamedType(click.ParamType[str]):
+    """NAME=VALUE; the names complete in the shell.
+
+    Args:
+        names: Gives the names, from what stands on the line already.
+    """
+
+    name = "NAME=VALUE"
+
+    def __init__(self, names: Callable[[click.Context], Iterable[str]]) -> None:
+        self._names = names
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Offer the names with their sign; nothing where the line is wrong."""
+        from urmpipe_models.errors import UrmpipeError
+
+        try:
+            return [CompletionItem(f"{name}=") for name in self._names(ctx) if name.startswith(incomplete)]
+        except UrmpipeError:
+            return []
+
+
+def argument_names(ctx: click.Context) -> Iterable[str]:
+    """Return the arguments of the system on the line."""
+    from urmpipe_fmus.cosim import load_system
+
+    system = _operand(ctx, "system")
+    return load_system(system, {}).arguments if system else ()
+
+
+def option_names(ctx: click.Context) -> Iterable[str]:
+    """Return the options of the unit on the line that -s gives: not its robot or log."""
+    from urmpipe.fmu_printing import options_of
+
+    unit = _operand(ctx, "unit")
+    return [name for name in options_of(unit) if name not in ("robot", "log")] if unit else ()
+
+
+def _operand(ctx: click.Context, name: str) -> str | None:
+    """Return an argument of a line that is not finished: click leaves it unnamed then."""
+    return ctx.params.get(name) or next(iter(ctx.args), None)
 
 
 def option_value(text: str) -> Any:

@@ -126,6 +126,19 @@ def test_the_unit_of_the_page_is_built_and_runs(urmpipe: RunCommand, tmp_path: P
     assert [one.name for one in checked.variables if one.causality == "output"] == ["x", "stopped"]
 
 
+def test_what_a_unit_prints_is_no_part_of_the_json(urmpipe: RunCommand, tmp_path: Path) -> None:
+    talking = example().replace("spring = Unit(", "print('hello')\nspring = Unit(")
+    talking = talking.replace('lambda v: {"stopped"', "lambda v: print('called') or {\"stopped\"")
+    (tmp_path / "my_unit.py").write_text(talking, encoding="utf-8")
+    ran = urmpipe("fmu", "build", "my_unit.py", "--backend", "python", "--json")
+    assert (ran.code, json.loads(ran.out)["fmu"]) == (0, "spring.fmu")
+    assert {"hello", "called"} <= set(ran.err.splitlines())
+    system = '[system]\nduration = 0.1\n[blocks.spring]\nfile = "my_unit.py"\nstart = { F = 1.0 }\n'
+    (tmp_path / "system.toml").write_text(system, encoding="utf-8")
+    ran = urmpipe("simulate", "system.toml", "--backend", "python", "--json")
+    assert (ran.code, json.loads(ran.out)["name"]) == (0, "system")
+
+
 def test_check_of_a_sound_fmu_is_0(urmpipe: RunCommand, meter: Path) -> None:
     ran = urmpipe("fmu", "check", meter.name)
     assert (ran.code, ran.err) == (0, "")
@@ -181,3 +194,11 @@ def test_without_casadi_it_is_python_and_says_why(
     out, err = capsys.readouterr()
     assert out.startswith("FMU: delta_meter.fmu  (python, ")
     assert err.startswith("note: delta_meter.fmu runs on Python, as no native one can be built here: casadi")
+
+
+def test_no_file_of_the_working_folder_is_taken_for_a_module(
+    meter: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (meter.parent / "json.py").write_text("raise RuntimeError('run by mistake')\n", encoding="utf-8")
+    monkeypatch.chdir(meter.parent)
+    assert check_fmu(meter).problems == ()

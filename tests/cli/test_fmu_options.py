@@ -116,7 +116,8 @@ def test_a_unit_refuses_what_it_does_not_take() -> None:
         "unit delta_meter: found a log (log.csv), allowed: none, it has no such option",
     ]
     assert refusal("repolarizer", options={"joints": 6, "turns": 2}) == [
-        "unit repolarizer: option turns: found, allowed: joints"
+        "unit repolarizer: option turns: found, allowed: joints; a parameter is set where the unit runs, in a"
+        " system by start = { turns = ... }"
     ]
     assert refusal(unit_of("delta_meter"), options={"joints": 6}) == [
         "unit delta_meter: found joints, allowed: no options, it is complete"
@@ -132,7 +133,7 @@ def test_a_chain_is_taken_as_a_robot() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("kinematic_chan",), "unit kinematic_chan: found, allowed: kinematic_chain, repolarizer"),
+        (("kinematic_chan",), "unit kinematic_chan: found (did you mean kinematic_chain?), allowed: kine"),
         (("kinematic_chain", "--robot", "urm7"), "unknown robot 'urm7' (did you mean urm8?)"),
         (
             ("repolarizer", "-s", "joints=nan"),
@@ -140,6 +141,10 @@ def test_a_chain_is_taken_as_a_robot() -> None:
         ),
         (("repolarizer", "-s", "joints"), "found 'joints', allowed: NAME=VALUE, each name once"),
         (("repolarizer", "-s", "joints=6", "-s", "joints=7"), "found 'joints=7', allowed: NAME=VALUE"),
+        (
+            ("delta_meter", "--platforms", "amiga", "--platforms", "linux64"),
+            "found amiga, allowed: linux64, win64",
+        ),
         (("delta_meter", "--platforms", "linux64,amiga"), "found amiga, allowed: linux64, win64"),
         (("log_source", "--log", "missing.csv"), "missing.csv: found no such file"),
         (("missing.py",), "missing.py"),
@@ -154,3 +159,18 @@ def test_what_is_wrong_is_one_line_and_nothing_is_written(
     assert said in ran.err
     assert "Traceback" not in ran.err
     assert list(tmp_path.iterdir()) == []
+
+
+def test_options_of_ingest_are_told_with_the_way_to_a_unit(tmp_path: Path) -> None:
+    path = tmp_path / "log.csv"
+    path.write_text("t,q1,q2\n0,1,2\n1,1.1,2.1\n", encoding="utf-8")
+    warning = next(one for one in read_table(path).warnings if "--unit" in one.message)
+    way = (
+        "(an option of urmpipe ingest, kept by its --write-map FILE for --map FILE, in a system for"
+        ' map = "FILE")'
+    )
+    assert warning.message.endswith(f"; --unit says otherwise {way}")
+    path.write_text("time,q1,q2\n0,1,2\n1000,1,2\n2000,1,2\n", encoding="utf-8")
+    (said,) = refusal("log_source", log=path)
+    assert "say which with --unit" in said
+    assert said.endswith(way)

@@ -13,9 +13,11 @@ from typing import Any
 import click
 import numpy as np
 import pytest
+from click.shell_completion import ShellComplete
 
 import urmpipe
 from urmpipe.commands.simulate import simulate as command
+from urmpipe.main import cli
 from urmpipe.simulating import simulate
 from urmpipe.unit_options import UnitType
 from urmpipe_datasets import LOGS
@@ -155,8 +157,22 @@ def test_the_command_prints_system_verdict_and_signals(urmpipe: RunCommand, tmp_
     assert lines[0].startswith("log-to-delta: 21 samples over 0.100 s, communication step 5 ms; in ")
     assert lines[1].startswith("PASS  delta: |Δy| = 0.4174 mm of 3.5 mm allowed at t = 0.085 s;")
     assert any(line.startswith("delta.norm [m]") for line in lines)
+    assert sum(line.startswith(("delta.", "repolarizer.", "chain.")) for line in lines) == 12
+    assert lines[-2] == "... and 39 more; --json has all, and the recording"
     assert lines[-1].startswith("Recording: log-to-delta.rrd")
     assert ran.err.splitlines()[-1].startswith("warning: path: no unit is given for x, y, z")
+
+
+def test_signals_that_stand_still_come_last(urmpipe: RunCommand, tmp_path: Path) -> None:
+    text = FOLLOWING.replace("step = 0.01", "step = 0.01\nrecord_every = 5\nduration = 0.1")
+    extra = '[blocks.still]\nfile = "follower.py"\nstart = { u = 0.0 }\n[blocks.lag]'
+    (tmp_path / "still.toml").write_text(text.replace("[blocks.lag]", extra), encoding="utf-8")
+    (tmp_path / "follower.py").write_text(FOLLOWER, encoding="utf-8")
+    (tmp_path / "voltage.csv").write_text("t,u (V)\n0,1\n1,1\n", encoding="utf-8")
+    lines = urmpipe("simulate", "still.toml").out.splitlines()
+    assert "communication step 10 ms, a sample every 50 ms; in " in lines[0]
+    named = [line.split()[0] for line in lines if line.startswith(("lag.", "still."))]
+    assert named == ["lag.x", "lag.error", "still.x", "still.error", "lag.u"]
 
 
 def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> None:
@@ -216,7 +232,7 @@ def test_all_that_is_wrong_with_the_parts_is_told_at_once(following: Path) -> No
     told = "\n".join(refusal(following))
     assert "found no column 'w', allowed: t, u (V)" in told
     assert "block arm: robot: found 6, allowed: a name or a file" in told
-    assert "block meter: unit delta_meter: option joints: found, allowed: none, it has no options" in told
+    assert "block meter: unit delta_meter: option joints: found, allowed: none, it has no options;" in told
 
 
 def test_a_start_value_that_is_no_number_is_refused(following: Path) -> None:
@@ -266,6 +282,21 @@ def test_names_complete_in_the_shell() -> None:
     assert argument.type.shell_complete(context, argument, "six")[0].value == "six-drives"
     units = UnitType().shell_complete(context, argument, "dc")
     assert [(one.value, one.type) for one in units] == [("dc_drive", "plain"), ("dc", "file")]
+
+
+@pytest.mark.parametrize(
+    ("line", "begun", "offered"),
+    [
+        (["simulate", "log-to-delta", "--set"], "r", ["reference=", "robot="]),
+        (["simulate", "--set"], "", []),
+        (["simulate", "nosuch", "--set"], "", []),
+        (["fmu", "build", "kinematic_chain", "-s"], "", ["points=", "sensors=", "rates="]),
+        (["fmu", "build", "log_source", "--option"], "c", ["columns="]),
+    ],
+)
+def test_what_is_set_completes_in_the_shell(line: list[str], begun: str, offered: list[str]) -> None:
+    complete = ShellComplete(cli, {}, "urmpipe", "_URMPIPE_COMPLETE")
+    assert [one.value for one in complete.get_completions(line, begun)] == offered
 
 
 def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:

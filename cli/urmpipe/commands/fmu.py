@@ -8,17 +8,20 @@ from typing import Literal
 import click
 
 from urmpipe.options import NamesType, RobotType, output_options
-from urmpipe.unit_options import UnitType, named_values, option_value
+from urmpipe.unit_options import NamedType, UnitType, named_values, option_names, option_value
 
 PLATFORMS = ("linux64", "win64")
 
 
-def _platforms(ctx: click.Context, param: click.Parameter, value: tuple[str, ...] | None) -> tuple[str, ...]:
-    """Return the platforms, each known."""
-    wrong = [one for one in value or () if one not in PLATFORMS]
+def _platforms(
+    ctx: click.Context, param: click.Parameter, values: tuple[tuple[str, ...], ...]
+) -> tuple[str, ...]:
+    """Return the platforms, each known and once."""
+    named = tuple(dict.fromkeys(one for value in values for one in value))
+    wrong = [one for one in named if one not in PLATFORMS]
     if wrong:
         raise click.BadParameter(f"found {', '.join(wrong)}, allowed: {', '.join(PLATFORMS)}")
-    return value or ()
+    return named
 
 
 @click.group(short_help="List units, build and check FMUs.")
@@ -66,6 +69,7 @@ def list_(as_json: bool, quiet: bool) -> int:
     "-s",
     "--option",
     "given",
+    type=NamedType(option_names),
     multiple=True,
     callback=named_values,
     metavar="NAME=VALUE",
@@ -80,6 +84,7 @@ def list_(as_json: bool, quiet: bool) -> int:
 @click.option(
     "--platforms",
     type=NamesType(),
+    multiple=True,
     callback=_platforms,
     metavar="A,B",
     help="linux64, win64, or both, with the extra `cross` [default: this one].",
@@ -121,7 +126,8 @@ def build(
     from urmpipe.fmu_printing import built_dict, print_built
     from urmpipe.guards import place_robot
     from urmpipe.log_tables import read_table
-    from urmpipe.printing import print_json, print_warnings
+    from urmpipe.printing import print_json, print_warnings, prints_apart, say
+    from urmpipe_fmus.native import this_platform
     from urmpipe_pipeline.sources import read_map
 
     if log_map and not log:
@@ -132,9 +138,13 @@ def build(
     table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm, read=read)
     if table and not quiet:
         print_warnings(table.warnings)
-    made = build_fmu(
-        unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
-    )
+    if backend != "python" and not quiet and {*platforms} - {this_platform()}:
+        said = f"compiling for {', '.join(platforms)}; the first time on this computer takes minutes"
+        say(f"note: {said}", err=True)
+    with prints_apart():
+        made = build_fmu(
+            unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
+        )
     if as_json:
         print_json(built_dict(made))
     elif not quiet:

@@ -9,7 +9,7 @@ import click
 
 from urmpipe.options import DURATION, output_options
 from urmpipe.process import tune_pyarrow
-from urmpipe.unit_options import SystemType, named_values
+from urmpipe.unit_options import NamedType, SystemType, argument_names, named_values
 
 
 @click.command(short_help="Run a system of blocks.")
@@ -21,6 +21,7 @@ from urmpipe.unit_options import SystemType, named_values
 @click.option(
     "--set",
     "arguments",
+    type=NamedType(argument_names),
     multiple=True,
     callback=named_values,
     metavar="NAME=VALUE",
@@ -76,7 +77,14 @@ def simulate(
     tune_pyarrow()
     from time import perf_counter
 
-    from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar, say
+    from urmpipe.printing import (
+        print_json,
+        print_recording,
+        print_warnings,
+        prints_apart,
+        progress_bar,
+        say,
+    )
     from urmpipe.simulating import simulate as run
     from urmpipe.simulation_printing import print_simulation
 
@@ -88,7 +96,7 @@ def simulate(
         if not quiet:
             say(f"note: {line}", err=True)
 
-    with progress_bar(f"Simulating {system}", quiet=quiet) as progress:
+    with prints_apart(), progress_bar(f"Simulating {system}", quiet=quiet) as progress:
         result = run(
             system,
             arguments=arguments,

@@ -183,7 +183,9 @@ def _count(system: System, duration: float | None, ends: Iterable[float], faults
     """Return the number of communication steps."""
     length = system.duration or duration or max(ends, default=0.0)
     if not (length > 0.0 and math.isfinite(length)):
-        faults.append("system.duration: not found, and no log tells it; allowed: a number above 0, in s")
+        faults.append(
+            "system.duration: not found, and no log tells it; allowed: a number above 0, in s, or --duration"
+        )
         return 0
     if system.step < NANOSECOND:
         faults.append(f"system.step: found {system.step:g} s, allowed: from 1e-09 s, as times are in ns")

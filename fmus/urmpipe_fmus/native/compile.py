@@ -89,7 +89,7 @@ def _command(platforms: Sequence[str], one: str) -> list[str]:
     if local and list(platforms) == [this_platform()]:
         linked = ["-Wl,--build-id=none"] if suffix_of(one) == ".so" else []
         return [*local, *FLAGS, *position, *linked]
-    return [sys.executable, "-m", "ziglang", "cc", "-target", TARGETS[one], *FLAGS, *position]
+    return [sys.executable, "-P", "-m", "ziglang", "cc", "-target", TARGETS[one], *FLAGS, *position]
 
 
 def _compiled(unit: Unit, files: Mapping[str, bytes], target: str, command: Sequence[str]) -> bytes:

@@ -6,7 +6,8 @@ has a line of help for each of the function's arguments. A new unit is such a mo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
+from difflib import get_close_matches
 from importlib import import_module
 from inspect import Parameter, signature
 from typing import Any, cast
@@ -66,7 +67,12 @@ def make_unit(name: str, /, **options: Any) -> Unit:
     make = cast("Callable[..., Unit]", getattr(import_module(f"{__name__}.{name}"), name))
     needed = [one.name for one in signature(make).parameters.values() if one.default is Parameter.empty]
     allowed = ", ".join(known) or "none, it has no options"
-    faults = [f"option {one}: found, allowed: {allowed}" for one in options if one not in known]
+    faults = [
+        f"option {one}: found{_near(one, known)}, allowed: {allowed}; a parameter is set where the unit runs,"
+        f" in a system by start = {{ {one} = ... }}"
+        for one in options
+        if one not in known
+    ]
     faults += [f"option {one}: not found, it needs {known[one]}" for one in needed if one not in options]
     if faults:
         raise UnitError(*(f"unit {name}: {fault}" for fault in faults))
@@ -75,4 +81,11 @@ def make_unit(name: str, /, **options: Any) -> Unit:
 
 def _check(name: str) -> None:
     if name not in _UNITS:
-        raise UnitError(f"unit {name}: found, allowed: {', '.join(_UNITS)}, or a .py file with a unit in it")
+        allowed = f"{', '.join(_UNITS)}, or a .py file with a unit in it"
+        raise UnitError(f"unit {name}: found{_near(name, _UNITS)}, allowed: {allowed}")
+
+
+def _near(name: str, known: Iterable[str]) -> str:
+    """Return the name that may have been meant, as a question."""
+    near = get_close_matches(name.lower(), known, 1)
+    return f" (did you mean {near[0]}?)" if near else ""

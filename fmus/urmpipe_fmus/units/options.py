@@ -30,12 +30,14 @@ def yes_or_no(unit: str, option: str, value: Any) -> bool:
 
 
 def some_of(unit: str, option: str, value: Any, allowed: tuple[str, ...]) -> tuple[str, ...]:
-    """Return an option that names some of what there is, in the order in which that stands.
+    """Return an option that names one or some of what there is, in the order in which that stands.
 
     Raises:
-        UnitError: If it is no list, or with every name that there is not.
+        UnitError: If it is neither a name nor a list, or with every name that there is not.
     """
-    if isinstance(value, str) or not isinstance(value, (list, tuple)):
+    if isinstance(value, str):
+        value = [value]
+    if not isinstance(value, (list, tuple)):
         raise UnitError(
             f"unit {unit}: option {option}: found {value!r}, allowed: a list of {', '.join(allowed)}"
         )

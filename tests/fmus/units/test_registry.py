@@ -11,6 +11,7 @@ import pytest
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_help, unit_names, unit_options
+from urmpipe_fmus.variable import Output
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import UnitError
 
@@ -65,19 +66,41 @@ def test_an_unknown_unit_is_told_what_there_is() -> None:
             ask("gearbox")
 
 
+@pytest.mark.parametrize("name", ["dc-drive", "DC_Drive", "dcdrive"])
+def test_the_unit_that_was_meant_is_told(name: str) -> None:
+    with pytest.raises(UnitError, match=rf"^unit {name}: found \(did you mean dc_drive\?\), allowed: "):
+        make_unit(name)
+
+
+def test_one_point_needs_no_list() -> None:
+    arm = load_robot("urm4")
+    one = make_unit("kinematic_chain", robot=arm, points="p5", sensors="p4")
+    listed = make_unit("kinematic_chain", robot=arm, points=["p5"], sensors=["p4"])
+    assert one.variables == listed.variables
+    found = [var.name for var in one.variables if isinstance(var, Output)]
+    assert found == ["p5", "rz4", "ry4", "rx4", "singular4"]
+
+
 def test_unknown_and_missing_options_are_all_told_at_once() -> None:
     with pytest.raises(UnitError) as error:
         make_unit("repolarizer", axes=6, period=1.0)
     assert str(error.value).splitlines() == [
-        "unit repolarizer: option axes: found, allowed: joints",
-        "unit repolarizer: option period: found, allowed: joints",
+        "unit repolarizer: option axes: found, allowed: joints; a parameter is set where the unit runs, in"
+        " a system by start = { axes = ... }",
+        "unit repolarizer: option period: found, allowed: joints; a parameter is set where the unit runs, in"
+        " a system by start = { period = ... }",
         "unit repolarizer: option joints: not found, it needs the number of joints, such as 6",
     ]
     with pytest.raises(UnitError, match=r"^unit delta_meter: option name: found, allowed: none"):
         make_unit("delta_meter", name="mine")
     with pytest.raises(UnitError) as error:
         make_unit("delta_meter", tolerance=0.001)
-    assert str(error.value) == ("unit delta_meter: option tolerance: found, allowed: none, it has no options")
+    assert str(error.value) == (
+        "unit delta_meter: option tolerance: found, allowed: none, it has no options; a parameter is set"
+        " where the unit runs, in a system by start = { tolerance = ... }"
+    )
+    with pytest.raises(UnitError, match=r"option joint: found \(did you mean joints\?\), allowed: joints;"):
+        make_unit("repolarizer", joint=6)
 
 
 @pytest.mark.parametrize(
@@ -89,8 +112,8 @@ def test_unknown_and_missing_options_are_all_told_at_once() -> None:
         ("kinematic_chain", {"robot": "urm4"}, "option robot: found 'urm4', allowed: a robot (Chain)"),
         (
             "kinematic_chain",
-            {"robot": load_robot("urm4"), "points": "p5"},
-            "option points: found 'p5', allowed: a list of p1, p2, p3, p4, p5",
+            {"robot": load_robot("urm4"), "points": 5},
+            "option points: found 5, allowed: a list of p1, p2, p3, p4, p5",
         ),
         (
             "kinematic_chain",
