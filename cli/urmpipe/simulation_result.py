@@ -41,7 +41,7 @@ def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> S
         svg: The system as a drawing.
     """
     system = plan.system
-    notes = (LogWarning("co-simulation", note) for note in recorded.notes)
+    notes = (LogWarning("co-simulation", note) for note in (*recorded.notes, *_unjudged(system)))
     given = {
         "system": system.name,
         "arguments": dict(system.arguments),
@@ -64,6 +64,13 @@ def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> S
         arms=tuple(_arms(plan, recorded, blocks)),
         verdicts=tuple(_verdicts(plan, recorded)),
     )
+
+
+def _unjudged(system: System) -> Iterator[str]:
+    """Yield what a verdict does not see: a delta meter is judged by what is recorded of it."""
+    if system.record_every > 1:
+        every = f"one communication point of {system.record_every}, as system.record_every says"
+        yield from (f"block {name}: the verdict is that of {every}" for name in _meters(system))
 
 
 def _inputs(paths: list[Path]) -> list[SourceFile]:

@@ -160,8 +160,8 @@ class Output(Variable):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class State(Variable):
-    """A continuous state: the unit's `derivatives` gives its derivative in [unit/s].
+class Remembered(Variable):
+    """A quantity that the unit remembers from step to step: a `State` or a `Memory`.
 
     Attributes:
         output: Whether it is an output itself; else it is local, to be looked at.
@@ -173,6 +173,11 @@ class State(Variable):
     def causality(self) -> Causality:
         """Output or local."""
         return "output" if self.output else "local"
+
+
+@dataclass(frozen=True, slots=True, kw_only=True)
+class State(Remembered):
+    """A continuous state: the unit's `derivatives` gives its derivative in [unit/s]."""
 
     def faults(self) -> Iterator[str]:
         """Yield what is wrong with the variable."""
@@ -182,19 +187,8 @@ class State(Variable):
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Memory(Variable):
-    """A discrete state: it keeps its value between communication points, where `update` gives the next.
-
-    Attributes:
-        output: Whether it is an output itself; else it is local, to be looked at.
-    """
-
-    output: bool = False
-
-    @property
-    def causality(self) -> Causality:
-        """Output or local."""
-        return "output" if self.output else "local"
+class Memory(Remembered):
+    """A discrete state: it keeps its value between communication points, where `update` gives the next."""
 
     @property
     def variability(self) -> Variability:

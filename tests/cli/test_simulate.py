@@ -183,6 +183,18 @@ def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> 
     assert (result["verdict"], result["verdicts"][0]["block"]) == ("fail", "delta")
 
 
+def test_a_verdict_of_few_samples_says_so(urmpipe: RunCommand, tmp_path: Path) -> None:
+    inputs = ", ".join(f'"{name}[{i}]" = 0.001' for name in ("reference", "actual") for i in (1, 2, 3))
+    meter = f"[blocks.m]\nunit = 'delta_meter'\nstart = {{ {inputs} }}\n"
+    (tmp_path / "few.toml").write_text(f"[system]\nduration = 0.1\nrecord_every = 3\n{meter}")
+    ran = urmpipe("simulate", "few.toml")
+    assert ran.code == 0
+    said = (
+        "warning: block m: the verdict is that of one communication point of 3, as system.record_every says"
+    )
+    assert said in ran.err.splitlines()
+
+
 def test_quiet_says_nothing(urmpipe: RunCommand) -> None:
     ran = urmpipe("simulate", "log-to-delta", "--duration", "0.01", "-q")
     assert (ran.code, ran.out, ran.err) == (0, "", "")

@@ -145,19 +145,12 @@ def _inputs(robot: Chain, rates: bool) -> Iterator[Input]:
             start=start,
             size=len(at),
         )
-        if rates:
+        for dots, rate in (("d", "/s"), ("dd", "/s2")) if rates else ():
             yield Input(
-                name=f"{name}d",
-                description=f"Velocities {of}",
-                unit=f"{unit}/s",
-                display_unit=f"{shown}/s",
-                size=len(at),
-            )
-            yield Input(
-                name=f"{name}dd",
-                description=f"Accelerations {of}",
-                unit=f"{unit}/s2",
-                display_unit=f"{shown}/s2",
+                name=f"{name}{dots}",
+                description=f"{'Velocities' if dots == 'd' else 'Accelerations'} {of}",
+                unit=f"{unit}{rate}",
+                display_unit=f"{shown}{rate}",
                 size=len(at),
             )
 
