@@ -137,6 +137,7 @@ def ingest(
         }
 
         def make(early: Callable[[JointLog | Run], None] | None) -> Run:
+            """Return the run; write its audit and its map."""
             run = ingest_log(
                 files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name, early=early
             )

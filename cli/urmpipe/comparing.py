@@ -103,6 +103,7 @@ def compare(
     arm = place_robot(robot, base, tool)
 
     def run_of(operand: Operand) -> Run:
+        """Return the run that an operand is, or is read as."""
         if isinstance(operand, Run):
             return operand
         return load_run(Path(operand), robot=arm, read=read, tsp=tsp, derivative=derivative)

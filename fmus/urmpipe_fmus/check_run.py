@@ -126,6 +126,7 @@ def main(path: Path) -> None:
     log = os.open(path.with_name("log"), os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o600)
 
     def write(line: str) -> None:
+        """Write a line of the log at once: the FMU may end this process next."""
         os.write(log, line.encode("utf-8", "replace") + b"\n")
 
     checked = Checked(job, write)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from abc import ABC, abstractmethod
 from collections.abc import Iterator
 from dataclasses import dataclass
 from numbers import Real
@@ -20,7 +21,7 @@ LARGEST_INTEGER = 2**31 - 1
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
-class Variable:
+class Variable(ABC):
     """A quantity of a unit; an array of them, `name[1]` .. `name[size]`, if it has a size.
 
     Attributes:
@@ -46,9 +47,9 @@ class Variable:
     type: ValueType = "Real"
 
     @property
+    @abstractmethod
     def causality(self) -> Causality:
         """What FMI calls the variable's part."""
-        raise NotImplementedError
 
     @property
     def variability(self) -> Variability:

@@ -103,7 +103,7 @@ def is_fmu(path: Path) -> bool:
         with ZipFile(path) as archive, archive.open("modelDescription.xml") as file:
             return GENERATION_TOOL.search(file.read(HEAD)) is not None
     except (BadZipFile, KeyError, NotImplementedError, RuntimeError, zlib.error):
-        return False  # no archive, none with a model description, or one that cannot be read
+        return False  # no archive, none with a model description, or packed in a way that zipfile cannot read
 
 
 def _refuse(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:

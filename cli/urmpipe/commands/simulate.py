@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import click
 
 from urmpipe.options import DURATION, output_options
 from urmpipe.process import tune_pyarrow
 from urmpipe.unit_options import NamedType, SystemType, argument_names, named_values
+
+if TYPE_CHECKING:
+    from urmpipe_pipeline.simulation import Simulation
 
 
 @click.command(short_help="Run a system of blocks.")
@@ -77,16 +80,8 @@ def simulate(
     tune_pyarrow()
     from time import perf_counter
 
-    from urmpipe.printing import (
-        print_json,
-        print_recording,
-        print_warnings,
-        prints_apart,
-        progress_bar,
-        say,
-    )
+    from urmpipe.printing import prints_apart, progress_bar, say
     from urmpipe.simulating import simulate as run
-    from urmpipe.simulation_printing import print_simulation
 
     started = perf_counter()
     target = output or Path(default_name(system))
@@ -108,7 +103,15 @@ def simulate(
             told=told,
             progress=progress,
         )
-    wall = perf_counter() - started
+    _print(result, perf_counter() - started, draw, as_json, quiet)
+    return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0
+
+
+def _print(result: Simulation, wall: float, draw: Path | None, as_json: bool, quiet: bool) -> None:
+    """Print what a simulation, which took `wall` seconds, came to."""
+    from urmpipe.printing import print_json, print_recording, print_warnings, say
+    from urmpipe.simulation_printing import print_simulation
+
     if not quiet:
         print_warnings(result.warnings)
     if as_json:
@@ -120,8 +123,6 @@ def simulate(
         print_recording(result.recording)
     if result.failed is not None:
         say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
-        return 2
-    return 1 if result.verdict == "fail" else 0
 
 
 def _list(as_json: bool, quiet: bool) -> int:

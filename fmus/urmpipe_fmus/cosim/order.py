@@ -139,6 +139,7 @@ class Order:
         left = list(part)
 
         def unknown(port: Port) -> list[Port]:
+            """Return the inputs of an output that are neither torn nor fed by what is known."""
             return [i for i in self._depends[port] if i not in torn and self._sources[i] not in self._known]
 
         while left:

@@ -25,8 +25,8 @@ OK, WARNING, DISCARD, ERROR, FATAL, PENDING = range(6)
 
 STATUS_NAMES = ("fmi2OK", "fmi2Warning", "fmi2Discard", "fmi2Error", "fmi2Fatal", "fmi2Pending")
 
-LAST_SUCCESSFUL_TIME, TERMINATED = 2, 3
-"""fmi2StatusKind (FMI 2.0.4, section 4.2.3)."""
+TERMINATED = 3
+"""Of fmi2StatusKind (FMI 2.0.4, section 4.2.3)."""
 
 EXCHANGE = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p)
 DO_STEP = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int)
@@ -137,6 +137,7 @@ class Slave:
         gather = partial(vector.take, np.array(places), None, gathered, "clip")
 
         def gather_and_call() -> int:
+            """Bring the values together from their places, then set them; return the status."""
             gather()
             return call()
 

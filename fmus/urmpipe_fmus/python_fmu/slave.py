@@ -50,6 +50,7 @@ def guarded(method: Callable[..., Any]) -> Callable[..., Any]:
 
     @wraps(method)
     def call(self: Fmi2Slave, *arguments: Any) -> Any:
+        """Call the method; give back the references that the binary drops when a call is refused."""
         try:
             return method(self, *arguments)
         except BaseException as error:  # an interrupt too must not pass the binary unguarded

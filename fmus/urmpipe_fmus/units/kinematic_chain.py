@@ -73,7 +73,6 @@ def kinematic_chain(
             found |= _sensed(name[1:], places[name], motions[names.index(name)] if rates else None)
         return found
 
-    described = replace(robot, visuals=())  # an arm's looks are no part of where it is, and name files
     return Unit(
         name="kinematic_chain",
         description=f"Points of {robot.name or 'an arm'} from its joints",
@@ -86,12 +85,14 @@ def kinematic_chain(
         outputs=outputs,
         equations=_equations(rates),
         source="UrmArm2021, eq. 1-14, with atan2 in eq. 10 and 13",
-        recipe=Recipe(
-            __name__,
-            "from_robot_toml",
-            {"robot": robot_toml(described), "points": list(shown), "sensors": list(sensed), "rates": rates},
-        ),
+        recipe=_recipe(robot, points=list(shown), sensors=list(sensed), rates=rates),
     )
+
+
+def _recipe(robot: Chain, **options: Any) -> Recipe:
+    """Return how to make the unit again: by the arm as text, without its looks, which name files."""
+    described = replace(robot, visuals=())
+    return Recipe(__name__, "from_robot_toml", {"robot": robot_toml(described), **options})
 
 
 def from_robot_toml(robot: str, **options: Any) -> Unit:

@@ -62,6 +62,7 @@ def log_source(table: Table, columns: Sequence[Column | Sequence[Any]], interpol
         )
 
     def outputs(v: Values) -> Mapping[str, Element | Sequence[Element]]:
+        """Return the columns at the instant, those of an array together."""
         before, after, fraction = v.table
         values = iter(
             [a + fraction * (b - a) for a, b in zip(before, after, strict=True)] if interpolate else before

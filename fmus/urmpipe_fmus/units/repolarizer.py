@@ -87,6 +87,7 @@ def _signals(joints: int) -> tuple[Variable, ...]:
 
 def _memories(joints: int) -> tuple[Memory, ...]:
     def memory(name: str, description: str, unit: str = "", kind: ValueType = "Real") -> Memory:
+        """Return a memory of every joint."""
         return Memory(name=name, description=description, unit=unit, type=kind, size=joints)
 
     return (
