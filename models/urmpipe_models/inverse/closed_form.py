@@ -1,0 +1,43 @@
+"""Arms whose inverse can be written down: what they have in common, and how one is recognised."""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.inverse.solutions import FloatArray, Solutions
+from urmpipe_models.inverse.targets import Targets
+
+
+class ClosedForm(Protocol):
+    """The inverse of one arm, written down.
+
+    Attributes:
+        name: What makes it possible: "spherical wrist" or "three parallel axes".
+        branches: What its solutions are called, in their order.
+    """
+
+    @property
+    def name(self) -> str:
+        """What makes it possible."""
+        ...
+
+    @property
+    def branches(self) -> tuple[str, ...]:
+        """What its solutions are called, in their order."""
+        ...
+
+    def solve(self, targets: Targets, near: FloatArray | None = None) -> Solutions:
+        """Return every solution of every target, joints in (-pi, pi], limits of the joints not asked.
+
+        Args:
+            targets: Poses; positions alone have no closed form.
+            near: Joint values in [rad] or [m], shape (joints,) or (n, joints): where a singular pose leaves
+                a joint free, it is taken from here; without it by the convention of `Singular.chosen`.
+        """
+        ...
+
+
+def closed_form(chain: Chain) -> ClosedForm | None:
+    """Return the closed form of an arm, recognised from its geometry alone; None if it has none."""
+    return None
