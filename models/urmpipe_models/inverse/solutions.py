@@ -59,7 +59,7 @@ class Solutions:
     @property
     def reached(self) -> BoolArray:
         """True where there is a solution, shape (n, k)."""
-        return np.isfinite(self.q).all(axis=2)
+        return np.asarray(np.isfinite(self.q).all(axis=2))
 
     def reason(self, target: int) -> str | None:
         """Return why a target has no solution at all, each reason once; None if it has one."""
