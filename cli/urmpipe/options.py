@@ -58,6 +58,26 @@ class NamesType(click.ParamType[Any]):
         return tuple(part.strip() for part in value.split(",")) if isinstance(value, str) else value
 
 
+class JointValuesType(click.ParamType[tuple[float, ...]]):
+    """Joint values as Q1,Q2,... in rad and m, one for each joint in the robot's order."""
+
+    name = "Q1,Q2,..."
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, ...]:
+        """Return the values."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            values = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            values = ()
+        if not values or not all(map(math.isfinite, values)):
+            self.fail(f"found {value!r}, allowed: numbers in rad and m, such as 0,3.14,0.5", param, ctx)
+        return values
+
+
 class QuantityType(click.ParamType[float]):
     """A positive number in the SI unit, or with its unit behind it: 0.005 or 5ms."""
 

@@ -2,30 +2,16 @@
 
 from __future__ import annotations
 
-import math
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from urmpipe.options import RobotType, output_options, placing_options
+from urmpipe.options import JointValuesType, RobotType, output_options, placing_options
 
 if TYPE_CHECKING:
     from urmpipe_models.chain import Chain
     from urmpipe_models.transform import Transform
-
-
-def _joint_values(ctx: click.Context, param: click.Parameter, value: str | None) -> tuple[float, ...] | None:
-    """Return joint values written as Q1,Q2,... in rad and m."""
-    if value is None:
-        return None
-    try:
-        values = tuple(float(part) for part in value.split(","))
-    except ValueError:
-        values = ()
-    if not values or not all(map(math.isfinite, values)):
-        raise click.BadParameter(f"found {value!r}, allowed: numbers in rad and m, such as 0,3.14,0.5")
-    return values
 
 
 @click.group(short_help="List, show and export robots.")
@@ -71,8 +57,7 @@ def list_(as_json: bool, quiet: bool) -> int:
 @click.argument("name", metavar="NAME|FILE", type=RobotType())
 @click.option(
     "--q",
-    metavar="Q1,Q2,...",
-    callback=_joint_values,
+    type=JointValuesType(),
     help="Pose to draw, in rad and m [default: the start pose].",
 )
 @click.option("--picture", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw into a file, too.")
