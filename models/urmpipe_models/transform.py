@@ -212,8 +212,8 @@ def euler_zxz(rotation: tuple[Vector, Vector, Vector]) -> tuple[Element, Element
     (a11, _, a13), (a21, _, a23), (a31, a32, a33) = rotation
     sine = np.hypot(a13, a23)
     singular = sine < SINGULAR_SINE
-    # + 0.0: see `euler_zyx`
-    z1 = np.arctan2(np.where(singular, a21, a13) + 0.0, np.where(singular, a11, -a23))
+    across: Element = np.where(singular, a21, a13)
+    z1 = np.arctan2(across + 0.0, np.where(singular, a11, -a23))  # + 0.0: see `euler_zyx`
     x = np.arctan2(sine, a33)
     z2 = np.arctan2(np.where(singular, 0.0, a31) + 0.0, np.where(singular, 1.0, a32))
     return z1, x, z2, singular

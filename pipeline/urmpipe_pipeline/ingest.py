@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -78,6 +78,44 @@ def ingest_log(
         log = replace(log, inferences=(*log.inferences, because))
     if early:
         early(log)
+    given = {
+        "robot": robot.name if robot else None,
+        "tsp": tsp,
+        "derivative": derivative,
+        "read": _given(options),
+    }
+    return run_of(
+        log, robot, options, tsp=tsp, derivative=derivative, name=name, early=early, made=("ingest", given)
+    )
+
+
+def run_of(
+    log: JointLog,
+    robot: Chain | None,
+    options: ReadOptions,
+    *,
+    made: tuple[str, Mapping[str, Any]],
+    tsp: float | None = None,
+    derivative: Method | None = None,
+    name: str | None = None,
+    early: Callable[[JointLog | Run], None] | None = None,
+) -> Run:
+    """Return the run of a log that is there: what `ingest_log` does once it has read it.
+
+    Args:
+        log: The log, its times strictly increasing.
+        robot: The arm, with base and tool; None for no kinematics.
+        options: How it was read: `interval`, `repair` and `period` matter here.
+        made: Which command makes the run, and the options it was given.
+        tsp: Period of the grid in [s]; default: the log's own.
+        derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
+        name: What to call it; default: the log's name.
+        early: Told the run before its kinematics are computed, so that it can be written meanwhile.
+
+    Raises:
+        LogError: If the log's joints are not the robot's, or its times need a grid without end.
+        OptionError: If an interval makes no sense.
+    """
     found = audit_log(log, robot, interval=options.interval, repaired=options.repair)
     log = replace(log, inferences=(*log.inferences, *found.inferences))
     clocked = any(column.role == "time" for column in log.columns)
@@ -89,12 +127,6 @@ def ingest_log(
     warnings += [*grid.warnings, *left_open, *([UNUSED_PERIOD] if clocked and options.period else [])]
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
-    given = {
-        "robot": robot.name if robot else None,
-        "tsp": tsp,
-        "derivative": derivative,
-        "read": _given(options),
-    }
     run = Run(
         name=name or log.name,
         log=log,
@@ -108,7 +140,7 @@ def ingest_log(
         tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
         audit=found.entries,
         warnings=tuple(warnings),
-        provenance=provenance("ingest", given, log.files),
+        provenance=provenance(*made, log.files),
     )
     if early:
         early(run)

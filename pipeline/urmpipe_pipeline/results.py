@@ -14,6 +14,7 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import PointLog
 from urmpipe_models.orientation import NAMES, angles
 from urmpipe_pipeline.audit_entry import AuditEntry
+from urmpipe_pipeline.ghosts import Ghost, Goals
 from urmpipe_pipeline.grid import interpolate
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogWarning, seconds
 from urmpipe_pipeline.provenance import Provenance
@@ -43,6 +44,8 @@ class Run:
         warnings: What a person should know.
         provenance: How to repeat it.
         recording: Where it was written.
+        ghosts: The other branches of what inverse kinematics solved, times from the log's first row.
+        goals: What it was solved for, times from the log's first row; None for a run of anything else.
     """
 
     name: str
@@ -59,6 +62,8 @@ class Run:
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
     recording: Path | None = None
+    ghosts: tuple[Ghost, ...] = ()
+    goals: Goals | None = None
 
     @property
     def t(self) -> FloatArray:

@@ -121,11 +121,10 @@ def test_redundant_arms_are_those_of_urdfs_that_others_wrote(shared: Path, which
         np.testing.assert_allclose(got, expected, rtol=0.0, atol=rounding)
     if cut is None:  # it gives other limits than the maker
         return
-    for joint, expected in zip(chain.moving, other.moving, strict=True):
-        got_limits = (joint.lower, joint.upper, joint.velocity)
-        np.testing.assert_allclose(
-            got_limits, (expected.lower, expected.upper, expected.velocity), rtol=0.0, atol=cut
-        )
+    ours, theirs = (
+        [(joint.lower, joint.upper, joint.velocity) for joint in arm.moving] for arm in (chain, other)
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=cut)
 
 
 @pytest.mark.parametrize("name", NAMES)

@@ -274,8 +274,8 @@ def test_faults_in_rows_name_the_row(robot: Any) -> None:
         ),
         (
             'kind = "dh_modified"',
-            "arm.toml: key kind: found 'dh_modified', allowed: one of urm, dh, modified_dh, articulated6r, joints,"
-            " urdf (did you mean modified_dh?)",
+            "arm.toml: key kind: found 'dh_modified', allowed: one of urm, dh, modified_dh,"
+            " articulated6r, joints, urdf (did you mean modified_dh?)",
         ),
         ('kind = "dh"\njoints = 5', "arm.toml: key joints: found 5, allowed: a list of tables"),
         ('kind = "dh"\njoints = []', "arm.toml: robot arm: has no moving joint; at least one is needed"),

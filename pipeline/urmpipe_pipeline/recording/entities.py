@@ -7,6 +7,8 @@ simulation `signal_entities` tells.
     tcp/raw_position, raw_rotation
     joints/repolarized, velocity, acceleration                  the grid: timelines t and sample
     tcp/recorded, position, velocity, acceleration, euler_zyx, singular
+    branches/<branch>/q                                         of solved targets: t and row
+    targets/position, quat_xyzw
     delta/<key>                                                 the compared samples: t and sample
     matched/<key>/reference, actual, path, speed, angle, joints, outside
     reference/position, quat_xyzw, joints                       the reference on its own times: t
@@ -26,7 +28,7 @@ What is there to be looked at only, and is not read back:
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Literal
 
@@ -37,6 +39,7 @@ from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.text import unique
 from urmpipe_pipeline.trajectory import Trajectory
 
 LAYOUTS = {"run": 4, "comparison": 4, "simulation": 5}
@@ -75,6 +78,12 @@ TCP_ARRAYS: dict[str, tuple[str, Series]] = {
     "tcp/euler_zyx": ("euler_zyx", "euler"),
 }
 """Entity: attribute of `PointLog`."""
+
+GOAL_ARRAYS: dict[str, tuple[str, Series]] = {
+    "targets/position": ("position", "xyz"),
+    "targets/quat_xyzw": ("quat_xyzw", "rotation"),
+}
+"""Entity: attribute of `Goals`."""
 
 MATCHED_ARRAYS: dict[str, tuple[str, Series]] = {
     "reference": ("reference", "xyz"),
@@ -229,11 +238,36 @@ def _run_blocks(run: Run, place: Place) -> Iterator[Block]:
     for entity, (attribute, series) in GRID_ARRAYS.items():
         if (values := getattr(run, attribute)) is not None:
             yield Block(place.prefix + entity, run.t_ns, values, series, names[series], samples)
+    yield from _solved_blocks(run, place, names)
     if run.tcp is not None:
         for entity, (attribute, series) in TCP_ARRAYS.items():
             values = getattr(run.tcp, attribute)
             yield Block(place.prefix + entity, run.t_ns, values, series, names[series], samples)
         yield from _flags(place.prefix + SINGULAR, run.tcp.singular, run.t_ns, samples[1])
+
+
+def _solved_blocks(run: Run, place: Place, names: Mapping[Series, tuple[str, ...]]) -> Iterator[Block]:
+    """Yield the other branches and the targets of solved joint values, by the rows of the log."""
+    for ghost, key in zip(run.ghosts, branch_keys(run), strict=True):
+        rows = ("row", np.searchsorted(run.log.t_ns, ghost.t_ns) + 1)
+        yield Block(branch_entity(place, key), ghost.t_ns, ghost.q, "joints", names["joints"], rows)
+    if run.goals is None:
+        return
+    rows = ("row", np.arange(1, len(run.goals.t_ns) + 1))
+    rotation = {"xyz": AXES[:3], "rotation": NAMES["quat_xyzw"]}
+    for entity, (attribute, series) in GOAL_ARRAYS.items():
+        if (values := getattr(run.goals, attribute)) is not None:
+            yield Block(place.prefix + entity, run.goals.t_ns, values, series, rotation[series], rows)
+
+
+def branch_keys(run: Run) -> list[str]:
+    """Return the names of the ghosts of a run as parts of entity paths, all different."""
+    return unique([entity_key(ghost.name) for ghost in run.ghosts])
+
+
+def branch_entity(place: Place, key: str, leaf: str = "q") -> str:
+    """Return an entity of a branch of a run."""
+    return place.prefix.rstrip("/") + entity_path("branches", key, leaf)
 
 
 def _deviation_blocks(one: Deviation, place: Place) -> Iterator[Block]:

@@ -17,7 +17,14 @@ from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.comparison import Comparison, Deviation, Statistics
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.recording.entities import LAYOUTS, Block, Place, places_of
+from urmpipe_pipeline.recording.entities import (
+    LAYOUTS,
+    Block,
+    Place,
+    branch_entity,
+    branch_keys,
+    places_of,
+)
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.trajectory import Alignment, Sync, Trajectory
 
@@ -122,6 +129,19 @@ def _run(run: Run, place: Place) -> dict[str, Any]:
         "warnings": [flat(one) for one in run.warnings],
         "provenance": provenance_data(run.provenance),
         "log": _log(run.log),
+        **_solved(run, place),
+    }
+
+
+def _solved(run: Run, place: Place) -> dict[str, Any]:
+    """Return what solved joint values have beside those of a log; nothing of a log."""
+    if run.goals is None and not run.ghosts:
+        return {}
+    keys = zip(run.ghosts, branch_keys(run), strict=True)
+    reasons = run.goals.reasons if run.goals else ()
+    return {
+        "ghosts": [{"name": ghost.name, "entity": branch_entity(place, key)} for ghost, key in keys],
+        "missed": {row: reason for row, reason in enumerate(reasons, start=1) if reason},
     }
 
 

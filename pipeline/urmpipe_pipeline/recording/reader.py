@@ -13,9 +13,11 @@ from numpy.typing import NDArray
 from urmpipe_models.errors import CosimulationError, RecordingError
 from urmpipe_models.kinematics import PointLog
 from urmpipe_pipeline.comparison import Comparison, Deviation
+from urmpipe_pipeline.ghosts import Ghost, Goals
 from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
 from urmpipe_pipeline.recording import metadata
 from urmpipe_pipeline.recording.entities import (
+    GOAL_ARRAYS,
     GRID_ARRAYS,
     LAYOUT_VERSION,
     LAYOUTS,
@@ -105,7 +107,24 @@ def _run(arrays: _Arrays, data: Data, path: Path | None) -> Run:
         t_ns=grid.t_ns,
         tcp=None if tcp["position"] is None else PointLog(**tcp, singular=singular),
         recording=path,
+        ghosts=tuple(_ghost(arrays, one) for one in data.get("ghosts", [])),
+        goals=_goals(arrays, data, place),
     )
+
+
+def _ghost(arrays: _Arrays, data: Data) -> Ghost:
+    chunk = arrays.chunk(data["entity"])
+    return Ghost(data["name"], chunk.t_ns, chunk.values)
+
+
+def _goals(arrays: _Arrays, data: Data, place: Place) -> Goals | None:
+    """Return the targets of solved joint values; None of a log."""
+    found: dict[str, Any] = arrays.table(place.prefix, GOAL_ARRAYS)
+    if found["position"] is None:
+        return None
+    t_ns = arrays.chunk(f"{place.prefix}targets/position").t_ns
+    reasons = tuple(data["missed"].get(str(row), "") for row in range(1, len(t_ns) + 1))
+    return Goals(t_ns, **found, reasons=reasons)
 
 
 def _comparison(arrays: _Arrays, data: Data, path: Path) -> Comparison:
