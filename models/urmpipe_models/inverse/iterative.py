@@ -17,7 +17,7 @@ Sources: [UrmArm2021]_ section 1; [Wampler1986]_; [NakamuraHanafusa1986]_; [FanY
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
