@@ -17,6 +17,9 @@ TextArray: TypeAlias = NDArray[np.object_]
 SingularFamily = Literal["wrist on axis 1", "wrist aligned", "arm stretched", "arm withdrawn"]
 """The families in which an arm loses a freedom; two can meet in one pose."""
 
+NEAREST_POINT = "nearest point"
+"""What a solution is called that comes as near as it can to a target out of reach."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Singular:
