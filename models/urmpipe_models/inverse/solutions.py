@@ -28,6 +28,9 @@ SingularFamily = Literal[
 left arm are one (UR arms). "branches meet": two branches of any other kind are one.
 """
 
+NEAREST_POINT = "nearest point"
+"""What a solution is called that comes as near as it can to a target out of reach."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Singular:
