@@ -103,7 +103,8 @@ def _curvature(k: FloatArray, x: FloatArray) -> FloatArray:
 def _largest(k: FloatArray) -> FloatArray:
     """Return of some angles around the circle the one where the left side is largest."""
     angles: FloatArray = np.arange(12.0) * (np.pi / 6) + 0.1
-    return angles[np.argmax(np.abs(_value(k, angles[:, None])), axis=0)]
+    largest: FloatArray = angles[np.argmax(np.abs(_value(k, angles[:, None])), axis=0)]
+    return largest
 
 
 def _shifted(k: FloatArray, by: FloatArray) -> tuple[FloatArray, ...]:
