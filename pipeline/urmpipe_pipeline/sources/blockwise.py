@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_pipeline.joint_log import IntArray
-from urmpipe_pipeline.sources.diagnose import CarefulReader
+from urmpipe_pipeline.sources.diagnose import MAY_BE_MISSING, CarefulReader
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.stream import byte_encoding, end_of_rows, row_blocks
 from urmpipe_pipeline.sources.table import ClockColumn, Numbers, read_fast
@@ -18,7 +18,9 @@ READ_WITH_CARE = 1 << 16
 """Bytes that are read row by row if there is something wrong in them."""
 
 
-def read_blockwise(layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn]) -> Numbers:
+def read_blockwise(
+    layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn], allowed: str = MAY_BE_MISSING
+) -> Numbers:
     """Return the numbers of some columns, with a finding for each row and cell that holds none.
 
     Also reads what the fast parser refuses though it is sound: blanks as missing samples, 1.5d0, comments.
@@ -27,8 +29,9 @@ def read_blockwise(layout: Layout, columns: Sequence[int], clock: Sequence[Clock
         layout: How the table is written.
         columns: Which columns hold numbers.
         clock: The columns of its clock.
+        allowed: What a cell may hold, for the findings.
     """
-    reader = CarefulReader(layout, columns, clock)
+    reader = CarefulReader(layout, columns, clock, allowed)
     parts = [part for block in row_blocks(layout) for part in _parts(reader, block)]
     values = [part.values for part in parts] or [np.empty((0, len(columns)))]
     times = [_times(part) for part in parts] or [np.empty(0, dtype=np.int64)]

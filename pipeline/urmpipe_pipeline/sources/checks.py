@@ -182,11 +182,7 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
     yield from _folds(times, clock)
     if times.min() > UNREADABLE and (np.diff(times) > 0).all():
         return
-    for index in np.flatnonzero(times == NO_TIME).tolist():
-        yield index + 1, name, "found no time, allowed: a time in every row"
-    for index in np.flatnonzero(times == UNREADABLE).tolist():
-        text = " ".join(cells.text(index).strip() for cells in numbers.texts)
-        yield index + 1, name, f"found {text[:LONGEST_CELL]!r}, allowed: times as in the other rows"
+    yield from unknown_times(numbers, clock)
     valid = np.flatnonzero(times > UNREADABLE)
     steps = np.diff(times[valid])
     begins = _second_logs(times[valid], steps)
@@ -203,6 +199,23 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
         found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
         again = ": a second log begins here, from about the same time" if k in begins else ""
         yield int(valid[k + 1]) + 1, name, f"{found}, allowed: times that increase from row to row{again}"
+
+
+def unknown_times(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, str]]:
+    """Yield row, column and message where a row has no time, or one that cannot be read.
+
+    Args:
+        numbers: What was read of a table, its times that of the file.
+        clock: Its clock.
+    """
+    if numbers.clock is None or not clock.columns:
+        return
+    name = clock.columns[0].header
+    for index in np.flatnonzero(numbers.clock == NO_TIME).tolist():
+        yield index + 1, name, "found no time, allowed: a time in every row"
+    for index in np.flatnonzero(numbers.clock == UNREADABLE).tolist():
+        text = " ".join(cells.text(index).strip() for cells in numbers.texts)
+        yield index + 1, name, f"found {text[:LONGEST_CELL]!r}, allowed: times as in the other rows"
 
 
 def _folds(times: IntArray, clock: Clock) -> Iterable[tuple[int, str, str]]:

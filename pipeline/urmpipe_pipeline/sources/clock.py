@@ -171,22 +171,25 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
             )
 
 
-def even_clock(rows: int, period: float | None) -> tuple[IntArray, tuple[Inference, ...], list[LogWarning]]:
+def even_clock(
+    rows: int, period: float | None, option: str = "--period"
+) -> tuple[IntArray, tuple[Inference, ...], list[LogWarning]]:
     """Return the times in [ns] of a log without a clock, what that rests on, and a warning if it is assumed.
 
     Args:
         rows: Number of rows.
         period: Time between rows in [s], if the user gave it.
+        option: How it was given, for errors.
 
     Raises:
         OptionError: If the period is not a positive time of 1 ns or more.
     """
     if period is not None and not (math.isfinite(period) and period >= 1e-9):
-        raise OptionError(f"--period: found {period:g} s, allowed: a positive time of 1e-9 s or more")
+        raise OptionError(f"{option}: found {period:g} s, allowed: a positive time of 1e-9 s or more")
     step = PAPER_PERIOD if period is None else period
     if rows * step * 1e9 >= LONGEST_NS:
         longest = LONGEST_NS / 1e9 / rows
-        raise OptionError(f"--period: found {step:g} s, allowed: less than {longest:g} s for {rows} rows")
+        raise OptionError(f"{option}: found {step:g} s, allowed: less than {longest:g} s for {rows} rows")
     times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
     if period is not None:
         return times, (Inference("period", f"{step:g} s", "given as an option"),), []

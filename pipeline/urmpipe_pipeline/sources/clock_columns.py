@@ -40,9 +40,10 @@ def time_columns(
         column = find_column(columns, options.time, "--time")
         return _with_other_half(column, columns, layout), "given as an option"
     if layout.header is None:
+        if options.source == PATH and len(columns) == 3:
+            return (), "three columns are x, y, z"
         found = _without_header(columns, layout, joints) or _texts(columns, layout)
-        xyz = options.source == PATH and len(columns) == 3
-        if not (found or xyz or options.joints or len(columns) in (1, joints)):
+        if not (found or options.joints or len(columns) in (1, joints)):
             _refuse_unclear(columns, layout, joints)
         return found or ((), "there is no header")
     return (

@@ -28,6 +28,9 @@ SHOWN_FINDINGS = 20
 
 _SHOWN_TEXT = 60
 
+MAY_BE_MISSING = "a number, or an empty, Null or NaN cell where a sample is missing"
+"""What a cell of a log may hold."""
+
 
 def lines_of_rows(layout: Layout, rows: Sequence[int]) -> dict[int, int]:
     """Return the line of the file of some data rows, both counted from 1."""
@@ -79,12 +82,20 @@ class CarefulReader:
         layout: How the table is written.
         columns: Which columns hold numbers.
         clock: The columns of its clock.
+        allowed: What a cell may hold, for messages.
     """
 
-    def __init__(self, layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn]) -> None:
+    def __init__(
+        self,
+        layout: Layout,
+        columns: Sequence[int],
+        clock: Sequence[ClockColumn],
+        allowed: str = MAY_BE_MISSING,
+    ) -> None:
         self.layout = layout
         self.columns = columns
         self.clock = clock
+        self.allowed = allowed
         self._faults: list[_Fault] = []
         self._lasting: list[_Fault] = []
         self._wrong = 0
@@ -237,8 +248,7 @@ class CarefulReader:
         value = to_float(cells[column], self.layout.decimal)
         if value is not None:
             return value
-        allowed = "a number, or an empty, Null or NaN cell where a sample is missing"
-        self._report(f"found {_shown(cells[column])}, allowed: {allowed}", self.layout.names[column])
+        self._report(f"found {_shown(cells[column])}, allowed: {self.allowed}", self.layout.names[column])
         return math.nan
 
     def _report(self, message: str, column: str | None = None, *, lasting: bool = False) -> None:
@@ -250,7 +260,9 @@ class CarefulReader:
             lasting: Whether it stays wrong if the row is left out.
         """
         if not lasting:
-            self._unread.setdefault(self._row - 1, f"column {column}: {message}" if column else message)
+            earlier = self._unread.get(self._row - 1)
+            said = f"column {column}: {message}" if column else message
+            self._unread[self._row - 1] = f"{earlier}; {said}" if earlier else said
         last = self._last
         if last and (last.message, last.column, last.row + last.more + 1) == (message, column, self._row):
             last.more += 1

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.orientation import width
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -30,7 +31,7 @@ def without_header(
         layout: The table.
         options: What the user says: joint columns, position, orientation.
         robot: The arm; without one every column is a joint.
-        path: The user says that it is a path: the columns are x, y, z.
+        path: The user says that it is a path: the columns are x, y, z, and an orientation behind them.
 
     Raises:
         LogError: If there are too few columns, or one of them holds text.
@@ -48,10 +49,7 @@ def without_header(
             message = f"found {shown!r} in a table without a header, allowed: numbers; {OPTION}"
             raise LogError(Finding(message, file, layout.first_line, 1, column.name))
     if path:
-        if len(columns) < 3:
-            raise LogError(Finding(f"found {len(columns)} columns, allowed: x, y, z", file=file))
-        said = Inference("path", "the first three columns", "there is no header")
-        return Roles(position=tuple(columns[:3]), inferences=(said,))
+        return _path_by_place(columns, layout, options, pose)
     if not columns:
         raise LogError(Finding("found no column beside the time, allowed: the joints", file=file))
     behind = None if pose else _trailing_pose(columns, layout, robot)
@@ -63,6 +61,27 @@ def without_header(
     check_count(joints, file, robot)
     many = ", as many as the robot has" if robot else ""
     return _by_place(joints, columns, robot, f"no header: joints in order{many}", pose)
+
+
+def _path_by_place(
+    columns: Sequence[Column], layout: Layout, options: ReadOptions, pose: Pose | None
+) -> Roles:
+    """Return x, y, z and the orientation behind them: of the form told, or by what its numbers are."""
+    if pose is None and len(columns) < 3:
+        raise LogError(
+            Finding(f"found {len(columns)} columns, allowed: x, y, z", file=str(layout.segment.path))
+        )
+    form = options.rotation
+    if pose is None and form is not None and len(columns) == 3 + width(form):
+        pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), "given as an option")
+    exact = len(columns) in (7, 12, 16)
+    behind = _trailing_pose(columns, layout, None) if pose is None and exact else None
+    pose = with_form(pose or behind or Pose(tuple(columns[:3]), evidence="there is no header"), form)
+    rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
+    said = [Inference("path", listed(pose.position), pose.evidence), *about_pose(pose)[1:]]
+    if rest:
+        said.append(Inference("columns not used", listed(rest, most=8), "no header tells what they are"))
+    return Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms, inferences=tuple(said))
 
 
 def _trailing_pose(columns: Sequence[Column], layout: Layout, robot: Chain | None) -> Pose | None:

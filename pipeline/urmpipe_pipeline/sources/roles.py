@@ -77,7 +77,7 @@ def assign(
         LogError: If the joints cannot be told, or are too few or too many for the robot.
     """
     file = str(layouts[0].segment.path)
-    numeric = [column for column in columns if not column.text and not column.counts_rows]
+    numeric = [column for column in columns if (path or not column.text) and not column.counts_rows]
     if options.joints:
         joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
         found = _Joints(joints, "given as an option", *_family_of(joints))
@@ -89,7 +89,7 @@ def assign(
         found = _Joints(()) if path else _find_joints(free, file, robot, half_pose=half)
     pose = with_form(pose, options.rotation)
     if not found.columns:
-        return _path(columns, numeric, pose, layouts, robot)
+        return _path(columns, numeric, pose, layouts, robot, path=path)
     check_count(found.columns, file, robot)
     rates = _derivative("rate", numeric, found)
     accelerations = _derivative("acceleration", numeric, found)
@@ -279,6 +279,8 @@ def _path(
     pose: Pose,
     layouts: Sequence[Layout],
     robot: Chain | None,
+    *,
+    path: bool,
 ) -> Roles:
     """Return the roles of a path; raise if it is none either."""
     file = str(layouts[0].segment.path)
@@ -288,6 +290,9 @@ def _path(
         said = [Inference("path", names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms)
         return _with_rest(roles, said, numeric)
+    if path:
+        need = 'x, y, z; name them so in the header, or in a map (--map): [tcp] position = ["A", "B", "C"]'
+        raise LogError(Finding(f"found no position in {listed(columns)}, allowed: {need}", file=file))
     need = (
         f"{len(robot.coordinates)} for robot {robot.name}" if robot else "such as q1, q2, ... or J1, J2, ..."
     )

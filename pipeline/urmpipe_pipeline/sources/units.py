@@ -186,19 +186,19 @@ class UnitFinder:
             return self.given[column.number], GIVEN
         if 0 in self.given and kind != "prismatic":
             return self.given[0], GIVEN
-        own = self._own(column)
+        own = self._own(column, "mm" if kind == "prismatic" else "deg")
         if own is not None and own.quantity != "time":
             return own, "its name"
         default = (self.source.units if self.source else {}).get("length" if kind == "prismatic" else "angle")
         return default, f"{self.source.name} writes {default.name}" if self.source and default else ""
 
-    def _own(self, column: Column) -> Unit | None:
+    def _own(self, column: Column, likely: str = "deg") -> Unit | None:
         """Return the unit that the user or the name gives this very column; raise if it is not known."""
         if column.number in self.given:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
             message = f"found the unit {column.unit_text!r}, allowed: rad, deg, m, mm, cm"
-            hint = f"say which with --unit {column.name}=deg"
+            hint = f"say which with --unit {column.name}={likely}"
             raise LogError(Finding(f"{message}; {hint}", self.file, column=column.header))
         return column.unit
 
