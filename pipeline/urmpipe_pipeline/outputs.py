@@ -1,6 +1,6 @@
 """Writing a file so that it is whole or not there: beside its place first, then renamed.
 
-An output replaces only a recording, a report or an export that urmpipe wrote, and never an input.
+An output replaces only one of its own kind that urmpipe wrote, and never an input.
 """
 
 from __future__ import annotations
@@ -17,10 +17,25 @@ from typing import Literal
 from urmpipe_models.errors import Finding, OutputError
 
 OutputKind = Literal[
-    "recording", "report", "map", "export", "audit", "junit", "statistics", "figure", "drawing", "fmu"
+    "recording",
+    "report",
+    "map",
+    "export",
+    "audit",
+    "junit",
+    "statistics",
+    "figure",
+    "drawing",
+    "fmu",
+    "joints",
 ]
 
-NOUNS: dict[str, str] = {"junit": "JUnit file", "statistics": "table of statistics", "fmu": "FMU"}
+NOUNS: dict[str, str] = {
+    "junit": "JUnit file",
+    "statistics": "table of statistics",
+    "fmu": "FMU",
+    "joints": "joint log",
+}
 """What people call a kind, where that is not its name."""
 
 AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")
@@ -53,8 +68,18 @@ FIRST_LINES: dict[str, str] = {
 FIGURE = re.compile(rb"\A<!-- Generator: urmpipe |\A\x89PNG.{29}.{4}tEXtSoftware\0urmpipe ", re.DOTALL)
 """How a figure of ours (SVG, PNG) tells where it comes from."""
 
+TARGET_ROW = "urmpipe_target_row"
+"""The last column of a joint log of ours: the data row of each target. A log of anybody else has none of this
+name; a remark above the header would tell as well, but not every reader of CSV passes over it."""
+
+JOINTS = re.compile(rb"\A[^\n]*," + TARGET_ROW.encode() + rb"\r?\n")
+"""How the header of a joint log of ours ends."""
+
 GENERATION_TOOL = re.compile(rb"<fmiModelDescription\s[^>]*\sgenerationTool=\"urmpipe\b")
 """How the model description of an FMU of ours tells where it comes from."""
+
+_MARKS = {"figure": FIGURE, "joints": JOINTS}
+"""How the head of an output of ours matches, by kind."""
 
 HEAD = 4096
 """The mark of an output stands within so many bytes of its start."""
@@ -150,9 +175,9 @@ def _is_ours(path: Path, kind: OutputKind) -> bool:
         return is_report(path)
     if kind == "fmu":
         return is_fmu(path)
-    if kind == "figure":
+    if kind in _MARKS:
         with path.open("rb") as file:
-            return FIGURE.match(file.read(HEAD)) is not None
+            return _MARKS[kind].match(file.read(HEAD)) is not None
     if kind == "export":
         from urmpipe_pipeline.export.identity import is_export
 
