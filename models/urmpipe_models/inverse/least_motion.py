@@ -19,7 +19,7 @@ Sources: [NakamuraHanafusa1986]_ (redundancy resolved in the null space); [Barzi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -28,11 +28,14 @@ from urmpipe_models.inverse.descent import Progress, Settings, descend
 from urmpipe_models.inverse.small_systems import dot_product, factor, gram
 from urmpipe_models.inverse.task import BoolArray, FloatArray, Task
 
-LEAST_MOTION = 1e-7
+LEAST_MOTION = 1e-6
 """A tangent t of at most this in every joint, in [rad] or [m], is none: |q - home|^2 has no digits for less."""
 
 RANK_DAMPING = 1e-13
 """Of J J^T, relative to its trace: singular values below 3e-7 of the norm count as the null space's."""
+
+EXACT = 1e-13
+"""What moves come back to, in [m] and [rad]: 1e-10 off the target feigns motion that the last moves do not have."""
 
 CORRECTIONS = 8
 """Steps to come back onto the target; a move from which more are needed was too long."""
@@ -140,9 +143,11 @@ def _moved(
     """Return joint values a step along t, back on the target, and where they are nearer to home."""
     there = np.clip(q + length * t, settings.lower[:, None], settings.upper[:, None])
     progress = Progress.at(there.T)
-    descend(progress, task, np.arange(len(length)), settings, CORRECTIONS)
+    exact = replace(settings, metres=EXACT, radians=EXACT)
+    descend(progress, task, np.arange(len(length)), exact, CORRECTIONS)
+    met = (progress.distance <= settings.metres) & (progress.angle <= settings.radians)
     gain = np.square(q - home).sum(axis=0) - np.square(progress.q - home).sum(axis=0)
-    return progress.q, progress.arrived & (gain > 0.0)
+    return progress.q, met & (gain > 0.0)
 
 
 def _spectral(moved: FloatArray, turned: FloatArray) -> FloatArray:
