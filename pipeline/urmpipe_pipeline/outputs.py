@@ -103,7 +103,7 @@ def guarded_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> Iter
     Raises:
         OutputError: If it may not be written there, or could not be.
     """
-    _refuse(path, inputs, kind)
+    refuse_output(path, inputs, kind)
     part = path.with_name(f"{path.stem[:40]}.{uuid.uuid4().hex[:12]}.part")
     try:
         yield part
@@ -131,8 +131,14 @@ def is_fmu(path: Path) -> bool:
         return False  # no archive, none with a model description, or packed in a way that zipfile cannot read
 
 
-def _refuse(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
-    """Raise an `OutputError` if the output may not be written there."""
+def refuse_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
+    """Raise an `OutputError` if an output may not be written there: for who works long before it writes.
+
+    Args:
+        path: Where the output should stand.
+        inputs: The files it is made from; those that are no files are passed over.
+        kind: What it is: only another one of the same kind is replaced.
+    """
     if kind == "recording" and not _is_text(path):
         said = "found a name that is no UTF-8 text, which Rerun cannot open, allowed: one that is"
         raise OutputError(Finding(said, str(path)))
