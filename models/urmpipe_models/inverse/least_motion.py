@@ -17,8 +17,9 @@ Sweeps repeated are Newton's method in all samples at once: what they converge t
     q_k - q_{k-1} = J_k^T y_k,    y_k = (x_k - FK(q_k)) / lambda^2,
 
 the condition for least |q - q_{k-1}|^2 + |x_k - FK(q)|^2 / lambda^2. This is least motion with a miss of
-lambda^2 d / sigma for a step of d along a direction of singular value sigma: 1e-9 m or less where d < sigma,
-and defined on singular poses, where least motion alone is not. Metres and radians of q weigh alike.
+lambda^2 d / sigma for a step of d along a direction of singular value sigma, and defined on singular poses,
+where least motion alone is not: there a path written to the nanometre would ask for steps of its rounding
+divided by sigma. Metres and radians of q weigh alike.
 
 A joint held on a limit has no column in J; J_h^T y_k then says which way it would move if it were free.
 """
@@ -32,7 +33,7 @@ import numpy as np
 from urmpipe_models.inverse.small_systems import Factor, factor, gram
 from urmpipe_models.inverse.task import FloatArray, Miss, Task
 
-DAMPING = 1e-9
+DAMPING = 1e-8
 """lambda^2 in [m2/rad2]."""
 
 

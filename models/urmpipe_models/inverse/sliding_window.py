@@ -5,7 +5,7 @@ near. Samples whose correction is so large that the linearisation says nothing a
 at the back again, so its length finds itself. A sample at the front that does not converge goes to `rescue`.
 
 A joint whose least motion would leave its limits is held on the limit from that sample on, until least
-motion would take it inwards.
+motion would take it inwards (see `holding`).
 """
 
 from __future__ import annotations
@@ -15,16 +15,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from urmpipe_models.chain import Chain
+from urmpipe_models.inverse import holding
 from urmpipe_models.inverse.least_motion import DAMPING, sweep
-from urmpipe_models.inverse.limits import LIMIT_ROUNDING
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray
-from urmpipe_models.inverse.task import Task
+from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.inverse.task import task_of
 
 LONGEST = 256
 """Samples of a window: NumPy outweighs Python, and the samples at the back are still worth their sweeps."""
 
-MET = 1e-9
-"""A target is met within this, in [m]; rotations as arcs of the characteristic length."""
+MET = 9e-10
+"""A target is met within this, in [m]; rotations as arcs of the characteristic length. A nanometre less what a
+converged sample may still move."""
 
 STILL = 1e-10
 """A sample has converged once a sweep moves no joint by more, in [rad] or [m]: errors fall as their square."""
@@ -32,7 +35,7 @@ STILL = 1e-10
 NEARLY_STILL = 1e-6
 """Here a miss that is left is one of the damping, not of the sweeps."""
 
-LESS_DAMPING = 0.01
+LESS_DAMPING = 0.1
 """What the damping of a sample is multiplied with where it alone keeps the tool from its target ..."""
 
 LEAST_DAMPING = 1e-15
@@ -45,92 +48,118 @@ PATIENCE = 25
 """Sweeps that the sample at the front may take."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Rescue:
-    """What became of samples, from the front of the window on, that did not converge: one or more.
-
-    Attributes:
-        q: Joint values in [rad] or [m], shape (m, joints); NaN where there are none.
-    """
-
-    q: FloatArray
-
-
 @dataclass(eq=False)
 class SlidingWindow:
     """Least motion along the samples of a path.
 
     Attributes:
-        task: Where the tool shall be, a row a sample.
-        lower: Limits of the joints in [rad] or [m], shape (joints,).
-        upper: Limits of the joints in [rad] or [m], shape (joints,).
-        start: Joint values that the first sample moves least from, shape (joints,).
-        rescue: Called with the sample at the front and the joint values before it; see `Rescue`.
+        chain: The arm.
+        targets: Where the tool shall be, one a sample.
+        start: Joint values in [rad] or [m] that the first sample moves least from, shape (joints,).
+        rescue: Given the index of a sample at the front that does not converge and the joint values before
+            it, returns those of this sample and of as many more as it likes, shape (m, joints); NaN where
+            there are none.
         q: Joint values found, shape (n, joints); NaN where there are none.
     """
 
-    task: Task
-    lower: FloatArray
-    upper: FloatArray
+    chain: Chain
+    targets: Targets
     start: FloatArray
-    rescue: Callable[[int, FloatArray], Rescue]
+    rescue: Callable[[int, FloatArray], FloatArray]
     q: FloatArray = field(init=False)
 
     def __post_init__(self) -> None:
-        count = len(self.task.position[0])
-        self.q = np.full((count, len(self.start)), np.nan)
+        self.q = np.full((len(self.targets), len(self.start)), np.nan)
+        self._lower = np.array([joint.lower for joint in self.chain.moving])
+        self._upper = np.array([joint.upper for joint in self.chain.moving])
+        self._held = np.full_like(self.start, np.nan)
         self._at = 0
         self._last = self.start
         self._rate = np.zeros_like(self.start)
-        self._held = np.full_like(self.start, np.nan)
-        self._begin_anew(LONGEST)
+        self._reach = LONGEST
+        self._empty()
 
     def slide(self) -> FloatArray:
         """Go along the whole path and return the joint values, shape (n, joints)."""
         while self._at < len(self.q):
-            self._enlarge()
-            if self._sweeps > PATIENCE:
-                self._accept_rescue(self.rescue(self._at, self._last))
-            elif not self._sweep():
-                self._sweeps += 1
+            if self._sweeps == PATIENCE:
+                self._take_rescue(self.rescue(self._at, self._last))
+            else:
+                self._enlarge()
+                self._advance()
         return self.q
 
-    def _begin_anew(self, reach: int) -> None:
-        """Empty the window, to be filled with up to `reach` samples."""
+    def _empty(self) -> None:
+        """Let all samples out of the window."""
         self._guess = np.empty((0, len(self.start)))
         self._damping = np.empty(0)
-        self._reach = reach
         self._sweeps = 0
 
     def _enlarge(self) -> None:
         """Let samples in at the back, guessed on the line through the two before."""
-        size = min(self._reach, len(self.q) - self._at)
-        new = size - len(self._guess)
+        new = min(self._reach, len(self.q) - self._at) - len(self._guess)
         if new <= 0:
             return
         ends = np.vstack((self._last - self._rate, self._last, self._guess))[-2:]
         line = ends[1] + np.arange(1, new + 1)[:, None] * (ends[1] - ends[0])
-        line = np.where(np.isnan(self._held), line, self._held)
-        self._guess = np.vstack((self._guess, line))
+        self._guess = np.vstack((self._guess, np.where(np.isnan(self._held), line, self._held)))
         self._damping = np.concatenate((self._damping, np.full(new, DAMPING)))
 
-    def _sweep(self) -> bool:
-        """Correct the window once; true if samples left it at the front."""
-        window = slice(self._at, self._at + len(self._guess))
-        swept = sweep(_rows(self.task, window), self._guess, self._last, self._held, self._damping)
-        size = np.abs(swept.q - self._guess).max(axis=1)
+    def _advance(self) -> None:
+        """Correct the window once, let out at the front what has converged, at the back what is far off."""
+        window = self.targets.rows(slice(self._at, self._at + len(self._guess)))
+        swept = sweep(task_of(self.chain, window), self._guess, self._last, self._held, self._damping)
+        correction = swept.q - self._guess
+        size = np.abs(correction).max(axis=1)
+        self._sweeps += 1
+        self._lower_damping((size <= NEARLY_STILL) & (swept.miss > MET))
         converged = _leading((size <= STILL) & (swept.miss <= MET))
-        damped = (size <= NEARLY_STILL) & (swept.miss > MET)
-        self._damping[damped] = np.maximum(self._damping[damped] * LESS_DAMPING, LEAST_DAMPING)
-        done, changed = self._limits_allow(swept.q[:converged], None if swept.pull is None else swept.pull[:converged])
-        self._leave(swept.q[:done])
-        if changed:
-            self._begin_anew(self._reach)
-        elif converged == 0 and size[0] > FAR:
-            self._guess = self._guess[:1] + (swept.q[:1] - self._guess[:1]) * FAR / size[0]
-            self._shorten(1)
+        trusted = max(1, _leading(size <= FAR))
+        self._reach = min(LONGEST, 2 * trusted)
+        self._guess = self._guess[:trusted] + correction[:trusted] * min(1.0, FAR / max(size[0], FAR))
+        self._damping = self._damping[:trusted]
+        self._let_out(converged, swept.pull)
+
+    def _lower_damping(self, where: BoolArray) -> None:
+        """Damp less where the damping alone keeps the tool from its target."""
+        self._damping[where] = np.maximum(LESS_DAMPING * self._damping[where], LEAST_DAMPING)
+
+    def _let_out(self, count: int, pull: FloatArray | None) -> None:
+        """Take what is in front of the window as found, up to where a joint meets or leaves a limit."""
+        found = self._guess[:count]
+        at, held = holding.change(
+            found, None if pull is None else pull[:count], self._held, self._lower, self._upper
+        )
+        self._take(np.clip(found[:at], self._lower, self._upper))
+        if at < count:
+            sweeps = self._sweeps
+            self._held = held
+            self._empty()
+            self._sweeps = sweeps
         else:
-            trusted = _leading(size <= FAR)
-            self._guess = swept.q[done:trusted]
-            self._shorten
-        return done > 0
+            self._guess, self._damping = self._guess[at:], self._damping[at:]
+
+    def _take(self, found: FloatArray) -> None:
+        """Take joint values as those of the next samples."""
+        if not len(found):
+            return
+        self.q[self._at : self._at + len(found)] = found
+        self._rate = found[-1] - (found[-2] if len(found) > 1 else self._last)
+        self._last = found[-1]
+        self._at += len(found)
+        self._sweeps = 0
+
+    def _take_rescue(self, found: FloatArray) -> None:
+        """Take what the rescue found, and begin anew after it: at rest, with no joint held."""
+        self.q[self._at : self._at + len(found)] = found
+        self._at += len(found)
+        reached = found[np.isfinite(found).all(axis=1)]
+        self._last = reached[-1] if len(reached) else self._last
+        self._rate = np.zeros_like(self.start)
+        self._held = np.full_like(self.start, np.nan)
+        self._empty()
+
+
+def _leading(true: BoolArray) -> int:
+    """Return how many are true before the first that is not."""
+    return int(np.argmin(np.append(true, False)))
