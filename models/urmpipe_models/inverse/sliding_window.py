@@ -1,6 +1,6 @@
-"""A window that slides along a path: what has converged leaves it at the front, new samples enter at the back.
+"""A window that slides along a path: what converged leaves it at the front, new samples enter at the back.
 
-The samples at the front converge in a few sweeps (see `least_motion`), and meanwhile those behind them come
+The samples at the front converge in a few sweeps (see `path_newton`), and meanwhile those behind them come
 near. Samples whose correction is so large that the linearisation says nothing about them leave the window
 at the back again, so its length finds itself. A sample at the front that does not converge goes to `rescue`.
 
@@ -17,7 +17,8 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.inverse import holding
-from urmpipe_models.inverse.least_motion import DAMPING, sweep
+from urmpipe_models.inverse.iterative import limits_of
+from urmpipe_models.inverse.path_newton import DAMPING, sweep
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.task import task_of
@@ -26,11 +27,11 @@ LONGEST = 256
 """Samples of a window: NumPy outweighs Python, and the samples at the back are still worth their sweeps."""
 
 MET = 9e-10
-"""A target is met within this, in [m]; rotations as arcs of the characteristic length. A nanometre less what a
-converged sample may still move."""
+"""A target is met within this, in [m]; rotations as arcs of the characteristic length: a nanometre less what
+a converged sample may still move."""
 
 STILL = 1e-10
-"""A sample has converged once a sweep moves no joint by more, in [rad] or [m]: errors fall as their square."""
+"""A sample has converged once a sweep moves no joint by more, in [rad] or [m]."""
 
 NEARLY_STILL = 1e-6
 """Here a miss that is left is one of the damping, not of the sweeps."""
@@ -70,8 +71,7 @@ class SlidingWindow:
 
     def __post_init__(self) -> None:
         self.q = np.full((len(self.targets), len(self.start)), np.nan)
-        self._lower = np.array([joint.lower for joint in self.chain.moving])
-        self._upper = np.array([joint.upper for joint in self.chain.moving])
+        self._lower, self._upper = limits_of(self.chain)
         self._held = np.full_like(self.start, np.nan)
         self._at = 0
         self._last = self.start

@@ -26,10 +26,12 @@ A joint held on a limit has no column in J; J_h^T y_k then says which way it wou
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from urmpipe_models.elementwise import Element
 from urmpipe_models.inverse.small_systems import Factor, factor, gram
 from urmpipe_models.inverse.task import FloatArray, Miss, Task
 
@@ -101,7 +103,7 @@ def _pull(system: Factor, miss: Miss, J: FloatArray, s: FloatArray) -> FloatArra
     return np.asarray(np.einsum("wij,wi->wj", whole, np.array(y).T))
 
 
-def _stacked(rows: list[list[FloatArray | float]], count: int) -> FloatArray:
+def _stacked(rows: Sequence[Sequence[Element]], count: int) -> FloatArray:
     """Return rows of elements as matrices, shape (count, rows, columns)."""
     stacked = np.empty((count, len(rows), len(rows[0])))
     for i, row in enumerate(rows):
