@@ -15,6 +15,7 @@ from urmpipe_models.inverse.checks import checked
 from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
 from urmpipe_models.inverse.limits import periods, within_limits
 from urmpipe_models.inverse.solutions import (
+    NEAREST_POINT,
     BoolArray,
     FloatArray,
     Singular,
@@ -28,9 +29,6 @@ METHODS: tuple[Method, ...] = ("auto", "closed", "iterative")
 
 NEAREST = "nearest"
 """What the one column of solutions is called that were picked of the branches of a closed form."""
-
-NEAREST_POINT = "nearest point"
-"""What a solution is called that comes as near as it can to a target out of reach."""
 
 
 def solve(
