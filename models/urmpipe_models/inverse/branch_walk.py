@@ -10,10 +10,10 @@ the branch of before goes on if there is one of its name, else the nearest.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.inverse.closed_form import ClosedForm
@@ -29,7 +29,7 @@ class Walked:
     """The solutions taken along a path.
 
     Attributes:
-        q: In [rad] or [m], shape (n, joints); NaN where there is none.
+        q: In [rad], shape (n, joints); NaN where there is none.
         branch: Their names, shape (n,); empty where there is none.
         reasons: Why there is none, shape (n,); empty where there is one.
         singular: Where they lie in each family of singular poses, shape (n,).
@@ -41,30 +41,101 @@ class Walked:
     singular: dict[SingularFamily, BoolArray]
 
 
-class BranchWalk:
-    """One way along the solutions of a path."""
+def walk(chain: Chain, form: ClosedForm, targets: Targets, start: FloatArray) -> Walked:
+    """Return the solutions that are taken along a path, limits kept.
 
-    def __init__(self, chain: Chain, form: ClosedForm, targets: Targets, start: FloatArray) -> None:
-        """Solve every sample.
+    Args:
+        chain: The arm, all its joints revolute as those of every closed form.
+        form: Its closed form.
+        targets: Poses, one a sample.
+        start: Joint values in [rad] that the first sample shall be near to, shape (joints,).
+    """
+    found = within_limits(chain, form.solve(targets))
+    reached = np.asarray(found.reached.any(axis=1))
+    q, column = np.full((len(targets), len(start)), np.nan), np.zeros(len(targets), dtype=np.intp)
+    free_until = dict(stretches(_left_free(found) & reached))
+    choices, last, before = _Choices.of(chain, found), start, -1
+    for sample in np.flatnonzero(reached).tolist():
+        if sample in free_until:
+            rows = slice(sample, free_until[sample] + 1)
+            near = within_limits(chain, form.solve(targets.rows(rows), last), last)
+            choices.put(rows, _Choices.of(chain, near))
+        label = column[before] if 0 <= before < sample - 1 else None
+        column[sample], last = choices.nearest(sample, last, label)
+        q[sample], before = last, sample
+    return Walked(q, *_told(found, column, reached))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Choices:
+    """The solutions of samples, and the whole turns that each joint may be off them.
+
+    Attributes:
+        q: In [rad], shape (n, k, joints); 0 where there is none.
+        lost: Infinity where there is none, 0 elsewhere, shape (n, k).
+        least: Whole turns that a joint may turn less, shape (n, k, joints).
+        most: Whole turns that a joint may turn more, shape (n, k, joints).
+    """
+
+    q: FloatArray
+    lost: FloatArray
+    least: FloatArray
+    most: FloatArray
+
+    @classmethod
+    def of(cls, chain: Chain, found: Solutions) -> _Choices:
+        """Return the choices that solutions within limits leave."""
+        lower, upper = limits_of(chain)
+        q = np.where(found.reached[..., None], found.q, 0.0)
+        least = np.ceil((lower - LIMIT_ROUNDING - q) / TURN)
+        most = np.floor((upper + LIMIT_ROUNDING - q) / TURN)
+        return cls(q, np.where(found.reached, 0.0, np.inf), least, most)
+
+    def put(self, rows: slice, other: _Choices) -> None:
+        """Put in the place of some samples what was found for them anew."""
+        for mine, others in (
+            (self.q, other.q),
+            (self.lost, other.lost),
+            (self.least, other.least),
+            (self.most, other.most),
+        ):
+            mine[rows] = others
+
+    def nearest(self, sample: int, last: FloatArray, column: int | None) -> tuple[int, FloatArray]:
+        """Return the column and the joint values that are nearest to the last ones.
 
         Args:
-            chain: The arm.
-            form: Its closed form.
-            targets: Poses, one a sample.
-            start: Joint values in [rad] or [m] that the first sample shall be near to, shape (joints,).
+            sample: Its index.
+            last: Joint values before, shape (joints,).
+            column: Taken whatever its distance, if it has a solution; None to take the nearest.
         """
-        self._chain, self._form, self._targets = chain, form, targets
-        self._last, self._label = start, -1
-        self._lower, self._upper = limits_of(chain)
-        self._found = within_limits(chain, form.solve(targets))
-        self._q = np.where(self._found.reached[..., None], self._found.q, 0.0)
+        turns = np.rint((last - self.q[sample]) / TURN)
+        near = self.q[sample] + TURN * np.minimum(np.maximum(turns, self.least[sample]), self.most[sample])
+        away = near - last
+        if column is None or self.lost[sample, column] > 0.0:
+            column = int(np.argmin(np.einsum("kj,kj->k", away, away) + self.lost[sample]))
+        return column, near[column]
 
-    def walk(self) -> Walked:
-        """Go from sample to sample and return what was taken."""
-        found = self._found
-        count, _, joints = found.q.shape
-        q, column = np.full((count, joints), np.nan), np.zeros(count, dtype=np.intp)
-        least = np.ceil((self._lower - LIMIT_ROUNDING - self._q) / TURN)
-        most = np.floor((self._upper + LIMIT_ROUNDING - self._q) / TURN)
-        for sample in range(count):
-            ...
+
+def _left_free(found: Solutions) -> BoolArray:
+    """Return the samples at which a family of singular poses leaves joints undetermined, shape (n,)."""
+    free = np.zeros(len(found), dtype=bool)
+    for family in found.singular:
+        if family.free:
+            free |= family.where.any(axis=1)
+    return free
+
+
+def _told(
+    found: Solutions, column: NDArray[np.intp], reached: BoolArray
+) -> tuple[TextArray, TextArray, dict[SingularFamily, BoolArray]]:
+    """Return names, reasons and families of the solutions that were taken."""
+    rows = np.arange(len(found))
+    branch = np.where(reached, found.labels[rows, column], "")
+    reasons = np.full(len(found), "", dtype=np.object_)
+    reasons[~reached] = [found.reason(sample) for sample in np.flatnonzero(~reached).tolist()]
+    singular: dict[SingularFamily, BoolArray] = {}
+    for family in found.singular:
+        where = family.where[rows, column] & reached
+        singular[family.family] = singular.get(family.family, False) | where
+    return branch, reasons, singular

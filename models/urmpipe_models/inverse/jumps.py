@@ -110,9 +110,7 @@ def jumps_at(
         large = [int(k) for k in np.argsort(-np.abs(steps), kind="stable") if abs(steps[k]) >= SMALL_STEP]
         joints = tuple(JointStep(chain.coordinates[k], float(steps[k]), units[k]) for k in large)
         x, y, z = position[sample].tolist()
-        found.append(
-            Jump(sample, float(seconds[sample]), (x, y, z), branch[last], branch[sample], joints)
-        )
+        found.append(Jump(sample, float(seconds[sample]), (x, y, z), branch[last], branch[sample], joints))
     return tuple(found)
 
 
