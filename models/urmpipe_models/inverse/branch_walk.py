@@ -1,8 +1,8 @@
 """Along a path with a closed form: every branch of every sample at once, then from sample to sample.
 
-Of the solutions of a sample, each joint in that of its allowed turns that is nearest, the one is taken that is
-nearest to the sample before, sum (q_k - q_{k-1})^2. So a solution goes on continuously even where its name
-changes: through an aligned wrist theta5 changes its sign, and a flipped wrist is one that is not.
+Of the solutions of a sample, each joint in the nearest of its allowed turns, the one is taken that is nearest
+to the sample before, sum (q_k - q_{k-1})^2. So a solution goes on continuously even where its name changes:
+through an aligned wrist theta5 changes its sign, and a flipped wrist becomes one that is not.
 
 Where a pose leaves a joint free (a singular family) it stays where it was. After samples without a solution
 the branch of before goes on if there is one of its name, else the nearest.

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
-from urmpipe_models.inverse.solutions import BoolArray, FloatArray, TextArray
+from urmpipe_models.inverse.solutions import FloatArray, TextArray
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.inverse.task import characteristic_length
 
