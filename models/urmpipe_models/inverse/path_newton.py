@@ -1,0 +1,112 @@
+"""Least motion from sample to sample: one Newton sweep over a window of samples at once.
+
+Of a path x_1, x_2, ... an arm with more freedoms than the path asks for takes
+
+    q_k = argmin |q - q_{k-1}|^2   subject to   FK(q) = x_k,
+
+each sample after the one before. Solved one after the other every sample would wait for its forward
+kinematics and Jacobian, which cost about as much for one row as for hundreds. A sweep does these for all
+samples of the window in one pass, each at its own guess p_k, and only then goes through the samples, by the
+exact solution of the linearised problem with e_k = x_k - FK(p_k):
+
+    q_k = p_k + N_k s_k + J_k^# e_k,    s_k = q_{k-1} - p_k,    N_k = 1 - J_k^# J_k,
+    J^# = J^T (J J^T + lambda^2 1)^-1.
+
+Sweeps repeated are Newton's method in all samples at once: what they converge to solves
+
+    q_k - q_{k-1} = J_k^T y_k,    y_k = (x_k - FK(q_k)) / lambda^2,
+
+the condition for least |q - q_{k-1}|^2 + |x_k - FK(q)|^2 / lambda^2. This is least motion with a miss of
+lambda^2 d / sigma for a step of d along a direction of singular value sigma, and defined on singular poses,
+where least motion alone is not: there a path written to the nanometre would ask for steps of its rounding
+divided by sigma. Metres and radians of q weigh alike.
+
+A joint held on a limit has no column in J; J_h^T y_k then says which way it would move if it were free.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.elementwise import Element
+from urmpipe_models.inverse.small_systems import Factor, factor, gram
+from urmpipe_models.inverse.task import FloatArray, Miss, Task
+
+DAMPING = 1e-8
+"""lambda^2 in [m2/rad2]."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Swept:
+    """What a sweep found for the samples of a window.
+
+    Attributes:
+        q: Joint values in [rad] or [m], shape (w, joints).
+        miss: |x - FK| at the guess that it was linearised at, in [m], rotations as arcs of the
+            characteristic length, shape (w,).
+        pull: J^T y: where each joint would move if it were free, in [rad] or [m], shape (w, joints); None
+            where all are.
+    """
+
+    q: FloatArray
+    miss: FloatArray
+    pull: FloatArray | None
+
+
+def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, damping: FloatArray) -> Swept:
+    """Return the next guess at the joint values of a window of samples.
+
+    Args:
+        task: Targets of the window.
+        guess: Joint values in [rad] or [m], shape (w, joints), of joints that are held where they are held.
+        last: Of the sample before the window, shape (joints,).
+        held: Where a joint is held in [rad] or [m], NaN of one that is free, shape (joints,).
+        damping: lambda^2 of each sample in [m2/rad2], shape (w,).
+    """
+    miss = task.miss(list(np.ascontiguousarray(guess.T)))
+    free = np.isnan(held)
+    rows = [[entry if free[i] else 0.0 for i, entry in enumerate(row)] for row in miss.jacobian]
+    system = factor(gram(rows), damping)
+    J = _stacked(rows, len(guess))
+    inverse = _stacked([system.solve(column) for column in zip(*rows, strict=True)], len(guess))
+    error = _stacked([miss.error], len(guess))[:, 0]
+    before = np.vstack((np.where(free, last, held), guess[:-1])) - guess
+    q = guess + _in_turn(np.eye(len(held)) - inverse @ J, before, np.einsum("wij,wj->wi", inverse, error))
+    pull = None if free.all() else _pull(system, miss, J, np.vstack((before[:1], q[:-1] - guess[1:])))
+    return Swept(q, np.sqrt(miss.square), pull)
+
+
+def _in_turn(null: FloatArray, before: FloatArray, towards: FloatArray) -> FloatArray:
+    """Return c_k = N_k (c_{k-1} + p_{k-1} - p_k) + J_k^# e_k, the corrections q_k - p_k, shape (w, joints).
+
+    Args:
+        null: N_k, shape (w, joints, joints).
+        before: p_{k-1} - p_k, of the first sample q_0 - p_1, shape (w, joints).
+        towards: J_k^# e_k, shape (w, joints).
+    """
+    corrections = []
+    correction = np.zeros(null.shape[1])
+    for matrix, step, toward in zip(null, before, towards, strict=True):
+        correction = matrix.dot(correction + step) + toward
+        corrections.append(correction)
+    return np.array(corrections)
+
+
+def _pull(system: Factor, miss: Miss, J: FloatArray, s: FloatArray) -> FloatArray:
+    """Return J^T y of every joint, held ones too: y = (J J^T + lambda^2 1)^-1 (e - J s)."""
+    moved = np.einsum("wij,wj->wi", J, s)
+    y = system.solve([error - moved[:, k] for k, error in enumerate(miss.error)])
+    whole = _stacked(miss.jacobian, len(s))
+    return np.asarray(np.einsum("wij,wi->wj", whole, np.array(y).T))
+
+
+def _stacked(rows: Sequence[Sequence[Element]], count: int) -> FloatArray:
+    """Return rows of elements as matrices, shape (count, rows, columns)."""
+    stacked = np.empty((count, len(rows), len(rows[0])))
+    for i, row in enumerate(rows):
+        for j, entry in enumerate(row):
+            stacked[:, i, j] = entry
+    return stacked
