@@ -19,6 +19,7 @@ from urmpipe_models.transform import Transform
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
+RowChoice: TypeAlias = NDArray[np.bool_] | NDArray[np.intp]
 
 HALF_TURN_SINE = 1e-6
 """Below this sine an angle near pi takes its axis from the symmetric part of the rotation matrix."""
@@ -60,7 +61,7 @@ class Miss:
         """|e|^2 in [m2]."""
         return np.asarray(self.distance2 + self.turn2)
 
-    def kept(self, rows: BoolArray) -> Miss:
+    def kept(self, rows: RowChoice) -> Miss:
         """Return some of the rows."""
         return Miss(
             picked(self.error, rows),
@@ -100,7 +101,7 @@ class Task:
         """The characteristic length in [m]."""
         return characteristic_length(self.chain)
 
-    def kept(self, rows: BoolArray) -> Task:
+    def kept(self, rows: RowChoice) -> Task:
         """Return some of the rows."""
         x, y, z = picked(self.position, rows)
         if self.columns is None:
@@ -167,7 +168,7 @@ def redundancy(chain: Chain, targets: Targets) -> int:
     return len(chain.coordinates) - int(np.linalg.matrix_rank(J, rtol=1e-9).max())
 
 
-def picked(elements: Sequence[Element], rows: BoolArray) -> list[Element]:
+def picked(elements: Sequence[Element], rows: RowChoice) -> list[Element]:
     """Return some of the rows of each element; a constant holds for any."""
     return [value[rows] if isinstance(value, np.ndarray) else value for value in elements]
 
