@@ -21,7 +21,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.elementwise import Element, Vector, add, cross, dot, scale, subtract
+from urmpipe_models.elementwise import Element, Vector, cross, dot, scale, subtract
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.outer_joints import (
     EDGE,
@@ -37,6 +37,9 @@ from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.trigonometric import wrapped
 from urmpipe_models.screws import Screws
 from urmpipe_models.transform import Transform, rotation_about
+
+NEARLY_ALIGNED = 1e-5
+"""Axis 6 nearer to parallel to axis 4 than this, in [rad], leaves q6 too uncertain for the reach of p4."""
 
 ELBOWS = ("elbow up", "elbow down")
 
@@ -136,18 +139,23 @@ def _wrist(arm: ParallelGeometry, outer: OuterJoints, motion: Transform, near: F
 
     R6 takes R_M^T z to R5^T z with M = exp(-xi_1 q1) G. Where axis 6 is along z, both are along axis 6 and
     q6 is free: `near` (0, and pi where flipped, by default), or the value nearest to it with p4 in reach.
+    Where it is nearly along z, rounding leaves q6 uncertain, and within that p4 is kept in reach too.
     """
     rest = _about_line(arm.k1, arm.p1, -outer.q1) @ motion
     turn5 = _about_line(arm.k5, arm.p5, outer.q5)
-    goal, now = turn5.rotation[2], rest.rotation[2]
-    along = dot(arm.k6, goal) * dot(arm.k6, now)
-    q6 = np.arctan2(dot(arm.k6, cross(now, goal)), dot(now, goal) - along)
+    # only the parts across axis 6 count; first taken, they keep their digits where they are small
+    goal, now = _across(arm.k6, turn5.rotation[2]), _across(arm.k6, rest.rotation[2])
+    q6 = np.arctan2(dot(arm.k6, cross(now, goal)), dot(now, goal))
     axis6 = rest.rotate(arm.k6)
-    free = _like(np.hypot(axis6[0], axis6[1]) <= REACH, q6)
+    sine = _like(np.hypot(axis6[0], axis6[1]), q6)
     held = turn5.inverse().point(arm.p4)
-    if free.any():
+    free = sine <= REACH
+    if (sine <= NEARLY_ALIGNED).any():
         wish = np.where(outer.flip, np.pi, 0.0)[:, None] + (0.0 if near is None else near)
-        q6 = np.where(free, _in_reach(arm, rest, held, _like(wish, q6)), q6)
+        wish = np.where(free, wish, q6)
+        reaching = _in_reach(arm, rest, held, wish)
+        loose = (sine <= NEARLY_ALIGNED) & (sine * np.abs(reaching - wish) <= np.where(free, np.inf, REACH))
+        q6 = np.where(loose, reaching, wish)
     turn6 = _about_line(arm.k6, arm.p6, -q6)
     x, y, _ = rest.rotate(turn6.rotate(turn5.rotation[0]))
     place = rest.point(turn6.point(held))
@@ -159,11 +167,11 @@ def _in_reach(arm: ParallelGeometry, rest: Transform, held: Vector, wish: FloatA
 
     p4 then runs on a circle: |o + u cos q6 + w sin q6|^2 = o^2 + u^2 + 2 o (u cos q6 + w sin q6).
     """
-    arm_length = subtract(held, arm.p6)
-    on_axis = scale(dot(arm.k6, arm_length), arm.k6)
-    o = rest.point(add(arm.p6, on_axis))[:2]
-    u = rest.rotate(subtract(arm_length, on_axis))[:2]
-    w = rest.rotate(cross(arm_length, arm.k6))[:2]
+    lever = subtract(held, arm.p6)
+    across = _across(arm.k6, lever)
+    o = rest.point(subtract(held, across))[:2]
+    u = rest.rotate(across)[:2]
+    w = rest.rotate(cross(lever, arm.k6))[:2]
     a, b = (2.0 * (o[0] * one[0] + o[1] * one[1]) for one in (u, w))
     mean = o[0] ** 2 + o[1] ** 2 + u[0] ** 2 + u[1] ** 2
     swing, middle = np.hypot(a, b), np.arctan2(b, a)
@@ -172,7 +180,7 @@ def _in_reach(arm: ParallelGeometry, rest: Transform, held: Vector, wish: FloatA
     away = wrapped(wish - middle)
     cosine = np.cos(away)
     allowed = np.clip(cosine, least, most)
-    moved = middle + np.copysign(np.arccos(np.clip(allowed, -1.0, 1.0)), away)
+    moved = wish + np.copysign(np.arccos(np.clip(allowed, -1.0, 1.0)), away) - away
     return np.where((allowed == cosine) | (np.abs(allowed) > 1.0), wish, moved)
 
 
@@ -265,6 +273,11 @@ def _about_line(k: Vector, p: Vector, angle: Element) -> Transform:
     """Return the rotation by an angle in [rad] about the line along k through p."""
     turned = rotation_about(k, angle)
     return Transform(turned.rotation, subtract(p, turned.rotate(p)))
+
+
+def _across(k: Vector, v: Vector) -> Vector:
+    """Return the part of a vector across a unit vector k: v - k (k . v)."""
+    return subtract(v, scale(dot(k, v), k))
 
 
 def _like(values: NDArray[Any], other: FloatArray) -> NDArray[Any]:
