@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import accumulate
+from operator import matmul
 from typing import Literal, TypeAlias
 
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.elementwise import ZERO, Element, Vector, add, scale
-from urmpipe_models.transform import Transform, euler_zxz, translation
+from urmpipe_models.transform import Transform, euler_zxz, rotation_about, translation
 
 Rows: TypeAlias = tuple[Vector, Vector, Vector]
 """The rows of a rotation matrix [-]."""
@@ -43,6 +45,7 @@ class GeometricModel:
     """The direct geometric model at joint values q: what the equations call by name, elementwise.
 
     Attributes:
+        turns: [R]_k^{k-1} for k = 1..n, eq. 1.
         rotations: [R]_k^0 for k = 1..n, eq. 8.
         steps: p_{k,k-1} in [m] for k = 1..n+1, eq. 10: from O_{k-1} to O_k, seen from the base.
         positions: p_k in [m] for k = 1..n+1, eq. 11-13; the last is the gripper's characteristic point P.
@@ -50,9 +53,23 @@ class GeometricModel:
     Source: [Geometric6R]_ eq. 1-14.
     """
 
+    turns: tuple[Rows, ...]
     rotations: tuple[Rows, ...]
     steps: tuple[Vector, ...]
     positions: tuple[Vector, ...]
+
+    def seen(self, vector: Vector) -> tuple[Vector, ...]:
+        """Return a vector of the last system as every system sees it: p^0, p^1, ..., p^n, eq. 5-7.
+
+        p^{k-1} = [R]_k^{k-1} p^k, so that p^0 = [R]_1^0 [R]_2^1 ... [R]_n^{n-1} p^n = [R]_n^0 p^n.
+
+        Args:
+            vector: p^n, a vector from O_n, in system T_n [m].
+        """
+        outwards = [vector]
+        for turn in reversed(self.turns):
+            outwards.append(Transform(turn).rotate(outwards[-1]))
+        return tuple(reversed(outwards))
 
     @property
     def equations(self) -> tuple[Element, ...]:
@@ -126,27 +143,21 @@ def geometric_model(rows: Sequence[GeometricRow], q: Sequence[Element], tip: Vec
 
     Source: [Geometric6R]_ eq. 1, 2, 8, 10-13.
     """
-    turned, rotations, steps = Transform(), [], []
-    for row, value in zip(rows, q, strict=True):
-        axis = _AXES[row.axis]
-        slides = row.kind == "T"
-        steps.append(turned.rotate(add(row.r, scale(value, axis)) if slides else row.r))
-        turned = turned if slides else turned.turned(axis, value)
-        rotations.append(turned.rotation)
-    steps.append(turned.rotate(tip))
-    positions = [steps[0]]
-    for step in steps[1:]:
-        positions.append(add(positions[-1], step))
-    return GeometricModel(tuple(rotations), tuple(steps), tuple(positions))
+    links = [_link(row, value) for row, value in zip(rows, q, strict=True)]
+    systems = list(accumulate((Transform(link.rotation) for link in links), matmul))
+    vectors = (*(link.translation for link in links), tip)
+    steps = [system.rotate(r) for system, r in zip((Transform(), *systems), vectors, strict=True)]
+    return GeometricModel(
+        tuple(link.rotation for link in links),
+        tuple(system.rotation for system in systems),
+        tuple(steps),
+        tuple(accumulate(steps, add)),
+    )
 
 
-def moved_from(transformed: Sequence[Rows], point: Vector) -> Vector:
-    """Return a vector given in the last system [m] as the base sees it, system by system.
-
-    p^{k-1} = [R]_k^{k-1} p^k for k = n..1, so that p^0 = [R]_1^0 [R]_2^1 ... [R]_n^{n-1} p^n.
-
-    Source: [Geometric6R]_ eq. 4-7.
-    """
-    for rotation in reversed(transformed):
-        point = Transform(rotation).rotate(point)
-    return point
+def _link(row: GeometricRow, value: Element) -> Transform:
+    """Return system T_k in T_{k-1}: [R]_k^{k-1} and r_k^{k-1}(q_k), eq. 1 and 2."""
+    axis = _AXES[row.axis]
+    if row.kind == "T":
+        return Transform(translation=add(row.r, scale(value, axis)))
+    return Transform(rotation_about(axis, value).rotation, row.r)
