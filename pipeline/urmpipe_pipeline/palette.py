@@ -36,6 +36,10 @@ RUN_COLOURS = {
 }
 """One a run of a comparison, by the word for it; none like the reference."""
 
+GHOST_COLOURS = {word: RUN_COLOURS[word] for word in list(RUN_COLOURS)[1:]} | {"silver": "#a2bcbc"}
+"""One a further branch of solved joint values, by the word for it: none like the first run, whose arm is the
+solution that was chosen. Seven, as an arm with a spherical wrist has seven further ones."""
+
 NEUTRAL_COLOUR = "#c8d0d4"
 """Links, shapes without a colour and lines through all plots: joints and paths stand out in theirs."""
 
@@ -61,3 +65,13 @@ def run_colour_word(index: int) -> str:
 def rgb(colour: str) -> tuple[int, int, int]:
     """Return red, green and blue of #rrggbb, each 0..255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
+
+
+def ghost_colour(index: int) -> str:
+    """Return the colour of a further branch of solved joint values as #rrggbb, counted from 0."""
+    return list(GHOST_COLOURS.values())[index % len(GHOST_COLOURS)]
+
+
+def ghost_colour_word(index: int) -> str:
+    """Return the word for the colour of a further branch, counted from 0."""
+    return list(GHOST_COLOURS)[index % len(GHOST_COLOURS)]

@@ -81,6 +81,11 @@ class Run:
         return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9
 
     @property
+    def single_poses(self) -> bool:
+        """True of solved targets without times: no motion joins one pose and the next."""
+        return self.goals is not None and not any(column.role == "time" for column in self.log.columns)
+
+    @property
     def rotation_recorded(self) -> FloatArray | None:
         """The orientation that the log itself recorded, on the grid, shape (g, k); None without one.
 

@@ -23,7 +23,7 @@ from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.sources import ReadOptions
 
-__all__ = ["Ghost", "Goals", "ghosts_of", "goals_of", "row_times", "solved_run"]
+__all__ = ["TARGET_PERIOD_NS", "Ghost", "Goals", "ghosts_of", "goals_of", "row_times", "solved_run"]
 
 SOURCE = "ik"
 """What such a run says where another says which reader read it."""
@@ -51,7 +51,7 @@ def solved_run(
     t_ns: IntArray | None,
     q: FloatArray,
     *,
-    goals: Goals | None = None,
+    goals: Goals,
     ghosts: Sequence[Ghost] = (),
     files: Sequence[SourceFile] = (),
     warnings: Sequence[LogWarning] = (),
@@ -106,7 +106,7 @@ def _clock(t_ns: IntArray | None, count: int) -> _Clock:
 
 
 def _refuse_misplaced(
-    name: str, chain: Chain, clock: _Clock, q: FloatArray, goals: Goals | None, ghosts: Sequence[Ghost]
+    name: str, chain: Chain, clock: _Clock, q: FloatArray, goals: Goals, ghosts: Sequence[Ghost]
 ) -> None:
     """Raise a `LogError` that tells all that does not fit together."""
     found = []
@@ -124,18 +124,18 @@ def _refuse_misplaced(
         for ghost in ghosts
         if not np.isin(ghost.t_ns - clock.start_ns, clock.t_ns).all()
     ]
-    if goals is not None and not np.array_equal(goals.t_ns - clock.start_ns, clock.t_ns):
+    if not np.array_equal(goals.t_ns - clock.start_ns, clock.t_ns):
         found.append(Finding("found targets at other times than the rows, allowed: one a row", name))
     if found:
         raise LogError(*found)
 
 
-def _unreachable(present: BoolArray, goals: Goals | None) -> Iterator[LogWarning]:
+def _unreachable(present: BoolArray, goals: Goals) -> Iterator[LogWarning]:
     """Yield how many targets the arm has no pose for, and why it has none for the first."""
     missed = np.flatnonzero(~present)
     if len(missed):
         first = int(missed[0])
-        reason = goals.reasons[first] if goals else ""
+        reason = goals.reasons[first]
         where = f"the first in row {first + 1}" + (f" ({reason})" if reason else "")
         said = f"{len(missed)} of {len(present)} targets have no solution, {where}: the run has no pose there"
         yield LogWarning("unreachable", said, first + 1)
@@ -183,6 +183,6 @@ def _others(chain: Chain, clock: _Clock, q: FloatArray, ghosts: Sequence[Ghost])
             yield Ghost(ghost.name, t_ns[other], ghost.q[other])
 
 
-def _from_start(goals: Goals | None, clock: _Clock) -> Goals | None:
+def _from_start(goals: Goals, clock: _Clock) -> Goals:
     """Return the targets with times from the first row."""
-    return None if goals is None else replace(goals, t_ns=goals.t_ns - clock.start_ns)
+    return replace(goals, t_ns=goals.t_ns - clock.start_ns)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,16 +12,24 @@ from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.errors import LogError
 from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.kinematics import positions_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_pipeline.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.joint_log import FloatArray, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning, SourceFile
+from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.solved import Ghost, ghosts_of, goals_of, row_times, solved_run
 
 UR5E = load_robot("ur5e")
 STEP_NS = 5_000_000
 FILE = SourceFile("targets.csv", "0" * 64, 123)
+
+
+def solved(name: str, chain: Chain, t_ns: IntArray | None, q: FloatArray, **rest: Any) -> Run:
+    """Return a run of targets whose place does not matter."""
+    times = row_times(len(q)) if t_ns is None else t_ns
+    rest.setdefault("goals", goals_of(Targets(np.zeros((len(times), 3))), times))
+    return solved_run(name, chain, t_ns, q, **rest)
 
 
 def way(rows: int) -> FloatArray:
@@ -37,7 +46,7 @@ def test_a_path_goes_the_way_of_a_log() -> None:
     q = way(200)
     start_ns = 12_000_000_000
     times = start_ns + np.arange(200) * STEP_NS
-    run = solved_run("path", UR5E, times, wrapped(q), files=[FILE], options={"seed": 0, "start": None})
+    run = solved("path", UR5E, times, wrapped(q), files=[FILE], options={"seed": 0, "start": None})
     assert [(entry.joint, entry.row) for entry in run.repolarizations] == [
         (UR5E.coordinates[5], 1 + int(np.argmax(q[:, 5] > math.pi)))
     ]
@@ -58,7 +67,7 @@ def test_a_path_goes_the_way_of_a_log() -> None:
 
 def test_targets_without_times_stand_a_second_apart_and_are_no_motion() -> None:
     q = np.array([way(1)[0], way(1)[0] + 2.0, -way(1)[0], way(1)[0] - 3.0])
-    run = solved_run("targets", UR5E, None, q)
+    run = solved("targets", UR5E, None, q)
     assert run.t_ns.tolist() == row_times(4).tolist() == [0, 10**9, 2 * 10**9, 3 * 10**9]
     assert run.tsp == 1.0
     np.testing.assert_array_equal(run.q, q)  # no turn is resolved between poses that no motion joins
@@ -76,7 +85,7 @@ def test_nothing_is_interpolated_across_unreachable_targets(timed: bool) -> None
     q[7, 2] = np.nan  # a solution lacks a joint: it is none
     times = np.arange(9) * STEP_NS if timed else row_times(9)
     goals = goals_of(targets_of(UR5E, way(9)), times, [None] * 3 + ["too far", "too far", *([None] * 4)])
-    run = solved_run("targets", UR5E, times if timed else None, q, goals=goals)
+    run = solved("targets", UR5E, times if timed else None, q, goals=goals)
     missing = [3, 4, 7]
     assert run.tcp is not None
     for values in (run.q, run.log.q, run.tcp.position):
@@ -90,7 +99,7 @@ def test_uneven_times_are_resampled_but_not_across_an_unreachable_target() -> No
     times = np.array([0, 5, 11, 16, 20, 26, 30]) * 1_000_000
     q = np.linspace(0.0, 0.3, 7)[:, None] + np.zeros((7, 6))
     q[3] = np.nan
-    run = solved_run("path", UR5E, times, q)
+    run = solved("path", UR5E, times, q)
     before, after = run.t_ns <= times[2], run.t_ns >= times[4]
     assert np.isfinite(run.q[before | after]).all()
     assert np.isnan(run.q[~(before | after)]).all()
@@ -108,7 +117,7 @@ def test_a_ghost_is_where_another_solution_is() -> None:
     times = row_times(4)
     found = ghosts_of(solutions, times)
     assert [ghost.name for ghost in found] == ["a", "b", "d"]
-    run = solved_run("targets", UR5E, None, chosen, ghosts=found)
+    run = solved("targets", UR5E, None, chosen, ghosts=found)
     (ghost,) = run.ghosts
     assert ghost.name == "b"
     np.testing.assert_array_equal(ghost.t_ns, times[[0, 3]])
@@ -120,7 +129,7 @@ def test_a_turn_of_a_sliding_joint_is_another_solution() -> None:
     q = np.array([[0.25, 0.5]])
     far = Ghost("far", row_times(1), q + np.array([2 * math.pi, 0.0]))
     near = Ghost("near", row_times(1), q + np.array([0.0, 2 * math.pi]))
-    run = solved_run("targets", slider, None, q, ghosts=(far, near))
+    run = solved("targets", slider, None, q, ghosts=(far, near))
     assert [ghost.name for ghost in run.ghosts] == ["far"]
     assert run.log.units == {"z": "m", "turn": "rad"}
 
@@ -128,7 +137,7 @@ def test_a_turn_of_a_sliding_joint_is_another_solution() -> None:
 def test_goals_hold_the_poses_from_the_first_row_on() -> None:
     targets = targets_of(UR5E, way(3))
     times = 7_000_000_000 + np.arange(3) * STEP_NS
-    run = solved_run("path", UR5E, times, way(3), goals=goals_of(targets, times, [None, "", None]))
+    run = solved("path", UR5E, times, way(3), goals=goals_of(targets, times, [None, "", None]))
     assert run.goals is not None
     np.testing.assert_array_equal(run.goals.t_ns, np.arange(3) * STEP_NS)
     np.testing.assert_array_equal(run.goals.position, targets.position)
@@ -142,13 +151,13 @@ def test_goals_hold_the_poses_from_the_first_row_on() -> None:
 
 def test_a_solved_path_compares_with_itself() -> None:
     times = np.arange(50) * STEP_NS
-    for run in (solved_run("path", UR5E, times, way(50)), solved_run("path", UR5E, None, way(50))):
+    for run in (solved("path", UR5E, times, way(50)), solved("path", UR5E, None, way(50))):
         assert compare_runs(run, [run], CompareOptions({"axis": 1e-9})).verdict == "pass"
 
 
 def test_where_nothing_is_reachable_there_is_a_run_without_poses() -> None:
     for times in (None, np.arange(5) * STEP_NS):
-        run = solved_run("far", UR5E, times, np.full((5, 6), np.nan))
+        run = solved("far", UR5E, times, np.full((5, 6), np.nan))
         assert np.isnan(run.q).all()
         said = "5 of 5 targets have no solution, the first in row 1: the run has no pose there"
         assert run.warnings == (LogWarning("unreachable", said, 1),)
@@ -159,15 +168,15 @@ def test_all_that_does_not_fit_together_is_told_at_once() -> None:
     ghost = Ghost("left", np.array([0, 4]), way(2))
     goals = goals_of(targets_of(UR5E, way(2)), times[:2])
     with pytest.raises(LogError) as error:
-        solved_run("path", UR5E, times, way(3), ghosts=(ghost,), goals=goals)
+        solved("path", UR5E, times, way(3), ghosts=(ghost,), goals=goals)
     assert [(one.message, one.file, one.row) for one in error.value.findings] == [
         ("found a time that is not later than the one before, allowed: increasing times", "path", 3),
         ("found a time of left that no row has, allowed: the times of the rows", "path", None),
         ("found targets at other times than the rows, allowed: one a row", "path", None),
     ]
     with pytest.raises(LogError, match="found no target, allowed: one or more"):
-        solved_run("path", UR5E, None, np.empty((0, 6)))
+        solved("path", UR5E, None, np.empty((0, 6)))
     with pytest.raises(LogError, match="found 5 joints, allowed: 6"):
-        solved_run("path", UR5E, None, np.zeros((2, 5)))
+        solved("path", UR5E, None, np.zeros((2, 5)))
     with pytest.raises(LogError, match="found 3 times of 2 targets, allowed: one each"):
-        solved_run("path", UR5E, np.arange(3), way(2))
+        solved("path", UR5E, np.arange(3), way(2))

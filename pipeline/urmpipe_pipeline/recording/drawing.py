@@ -35,7 +35,7 @@ def draw(stream: RecordingStream, result: Result, every: Sequence[Block], scene:
     words = simulation_summary(result) if isinstance(result, Simulation) else summary(result)
     stream.log(SUMMARY, rr.TextDocument(words, media_type="text/markdown"), static=True)
     few = list(overviews(result, every))
-    _draw_styles(stream, [*every, *few])
+    _draw_styles(stream, [*every, *few], lone=isinstance(result, Run) and result.single_poses)
     for block in few:
         times, values = block_columns(block, slice(None))
         stream.send_columns(block.entity, times, [values])
@@ -72,15 +72,15 @@ def _draw_run(stream: RecordingStream, place: Place, run: Run) -> None:
     draw_log_events(stream, place, run)
 
 
-def _draw_styles(stream: RecordingStream, every: Sequence[Block]) -> None:
-    """Give every series its name and its colour."""
+def _draw_styles(stream: RecordingStream, every: Sequence[Block], *, lone: bool) -> None:
+    """Give every series its name and its colour; `lone` samples, which nothing joins, are points."""
     import rerun as rr
 
     for block in every:
         if not block.names:
             continue
         colours, names = [rgb(colour) for colour in block.colours], list(block.names)
-        if len(block.t_ns) == 1:  # no line goes through one sample
+        if lone or len(block.t_ns) == 1:  # no line goes through one sample
             points = rr.SeriesPoints(colors=colours, names=names, marker_sizes=[MARK_SIZE] * len(names))
             stream.log(block.entity, points, static=True)
             continue

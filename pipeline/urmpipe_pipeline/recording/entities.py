@@ -250,7 +250,7 @@ def _solved_blocks(run: Run, place: Place, names: Mapping[Series, tuple[str, ...
     """Yield the other branches and the targets of solved joint values, by the rows of the log."""
     for ghost, key in zip(run.ghosts, branch_keys(run), strict=True):
         rows = ("row", np.searchsorted(run.log.t_ns, ghost.t_ns) + 1)
-        yield Block(branch_entity(place, key), ghost.t_ns, ghost.q, "joints", names["joints"], rows)
+        yield Block(f"{branch_entity(place, key)}/q", ghost.t_ns, ghost.q, "joints", names["joints"], rows)
     if run.goals is None:
         return
     rows = ("row", np.arange(1, len(run.goals.t_ns) + 1))
@@ -265,9 +265,9 @@ def branch_keys(run: Run) -> list[str]:
     return unique([entity_key(ghost.name) for ghost in run.ghosts])
 
 
-def branch_entity(place: Place, key: str, leaf: str = "q") -> str:
-    """Return an entity of a branch of a run."""
-    return place.prefix.rstrip("/") + entity_path("branches", key, leaf)
+def branch_entity(place: Place, key: str) -> str:
+    """Return what the entities of a branch of a run stand below."""
+    return place.prefix.rstrip("/") + entity_path("branches", key)
 
 
 def _deviation_blocks(one: Deviation, place: Place) -> Iterator[Block]:

@@ -15,6 +15,8 @@ import numpy as np
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
+from urmpipe_pipeline.recording.eye import EYE, seen
+from urmpipe_pipeline.recording.ghost_arms import fullest_time
 from urmpipe_pipeline.recording.plots import Plots, decisive_plot
 from urmpipe_pipeline.recording.scene import Scene
 from urmpipe_pipeline.recording.simulation_layout import simulation_plots, simulation_words
@@ -27,9 +29,6 @@ if TYPE_CHECKING:
     from rerun.blueprint import Blueprint, Container, Spatial3DView, TextLogView, View
 
     Row: TypeAlias = tuple[View | Container, float]
-
-EYE = np.array([0.62, -0.66, 0.42]) / np.linalg.norm([0.62, -0.66, 0.42])
-"""The way from the middle of the scene to the eye [-]: from the front right, a little above."""
 
 FIELD_OF_VIEW, FILLED, WIDE = np.radians(55.0), 0.85, 1.2
 """What the viewer's eye sees from the bottom to the top of a view in [rad] (re_view_spatial,
@@ -97,14 +96,14 @@ def _blueprint_of(root: Container) -> Blueprint:
 def opening_time(result: Result) -> int:
     """Return where the viewer should stand in [ns]: at the worst sample of what is open, else the first.
 
-    A simulation that failed opens where it ended.
+    A simulation that failed opens where it ended, solved joint values where most branches are.
     """
     if isinstance(result, Simulation):
         worst = result.judged_worst.sample if result.judged_worst is not None else 0
         shown = worst if result.failed is None else -1
         return int(result.t_ns[shown]) if len(result.t_ns) else 0
     if isinstance(result, Run):
-        return int(result.t_ns[0])
+        return fullest_time(result) if result.ghosts else int(result.t_ns[0])
     open_first = result.ranking[-1]
     return int(open_first.t_ns[open_first.worst])
 
@@ -112,9 +111,7 @@ def opening_time(result: Result) -> int:
 def eye_and_target(scene: Scene) -> tuple[FloatArray, FloatArray]:
     """Return where the eye is and what it looks at in [m], shape (3,) each: all of the scene is in view."""
     centre, radius = scene.ball()
-    right = np.cross((0.0, 0.0, 1.0), EYE)
-    right /= np.linalg.norm(right)
-    aside, above, ahead = ((scene.points() - centre) @ np.column_stack((right, np.cross(EYE, right), EYE))).T
+    aside, above, ahead = seen(scene.points() - centre).T
     slope = FILLED * np.tan(FIELD_OF_VIEW / 2)
     distance = ahead + np.maximum(np.abs(above), np.abs(aside) / WIDE) / slope
     return centre + max(radius, float(distance.max())) * EYE, centre
@@ -126,6 +123,8 @@ def _scene_view(scene: Scene) -> Spatial3DView:
     position, target = eye_and_target(scene)
     eye = rrb.EyeControls3D(position=position, look_target=target, eye_up=(0.0, 0.0, 1.0))
     entities = ["/robot/**", "/path/**", "/point/**"]
+    entities += ["/branches/**"] if scene.ghosts else []
+    entities += ["/targets/**"] if scene.goals else []
     name = f"Arm of {scene.whose} and paths [m]" if scene.whose else "Arm and paths [m]"
     return rrb.Spatial3DView(origin="/", contents=entities, name=name, eye_controls=eye)
 

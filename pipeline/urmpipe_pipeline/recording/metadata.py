@@ -140,7 +140,7 @@ def _solved(run: Run, place: Place) -> dict[str, Any]:
     keys = zip(run.ghosts, branch_keys(run), strict=True)
     reasons = run.goals.reasons if run.goals else ()
     return {
-        "ghosts": [{"name": ghost.name, "entity": branch_entity(place, key)} for ghost, key in keys],
+        "ghosts": [{"name": ghost.name, "entity": f"{branch_entity(place, key)}/q"} for ghost, key in keys],
         "missed": {row: reason for row, reason in enumerate(reasons, start=1) if reason},
     }
 

@@ -97,8 +97,8 @@ class Plots:
         yield self.array(name, unit, after, len(run.t_ns), *marks, legend=False)
 
     def speed(self, run: Run, place: Place) -> list[TimeSeriesView]:
-        """Return the speed of an ingested log's tool centre point; nothing without kinematics."""
-        if run.tcp is None:
+        """Return the speed of an ingested log's tool centre point; nothing if it has none."""
+        if run.tcp is None or run.single_poses:
             return []
         return [self.series("Speed of the TCP [m/s]", overview_entity(speed_entity(place)), legend=False)]
 
@@ -126,13 +126,14 @@ class Plots:
     def motion(self, run: Run, place: Place) -> list[TimeSeriesView]:
         """Return the derivatives and the tool centre point, as far as the run has them."""
         found: list[tuple[str, str]] = []
-        if run.log.joints:
+        if run.log.joints and not run.single_poses:
             found.append((f"Joint rates [{run.joint_unit('/s')}]", "joints/velocity"))
             found.append((f"Joint accelerations [{run.joint_unit('/s2')}]", "joints/acceleration"))
         if run.tcp is not None:
             found.append(("TCP [m]", "tcp/position"))
-            found.append(("TCP velocity [m/s]", "tcp/velocity"))
-            found.append(("TCP acceleration [m/s2]", "tcp/acceleration"))
+            if not run.single_poses:
+                found.append(("TCP velocity [m/s]", "tcp/velocity"))
+                found.append(("TCP acceleration [m/s2]", "tcp/acceleration"))
             found.append(("TCP rz, ry, rx [rad]", "tcp/euler_zyx"))
         elif run.tcp_recorded is not None and run.log.joints:
             found.append(("Recorded TCP [m]", "tcp/recorded"))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import cast
 
 import numpy as np
@@ -19,6 +19,8 @@ from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
 from urmpipe_pipeline.recording.bodies import Body, bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import enlarged
 from urmpipe_pipeline.recording.entities import Place, entity_path, places_of, printable
+from urmpipe_pipeline.recording.ghost_arms import GhostArm, ghost_arms, gone_times, samples_at
+from urmpipe_pipeline.recording.goal_marks import GoalMarks, goal_marks
 from urmpipe_pipeline.recording.signal_entities import arm_keys
 from urmpipe_pipeline.recording.ways import Way, dashed, lines_of, thinned, track_of
 from urmpipe_pipeline.results import Run
@@ -37,6 +39,9 @@ class Arm:
         colours: One a point: a joint's own, or the reference's where nothing moves.
         bodies: Its links as they look, each with the frame it moves with; none where that is not known.
         bare: True if a moving link has nothing to show: then lines stand for the links.
+        gone_ns: Times from which on there is no pose in integer [ns], shape (g,), where targets have no
+            solution; none of a log, in which a sample that is missing was only not written.
+        gone_sample: The grid sample at each, shape (g,).
     """
 
     t_ns: IntArray
@@ -45,6 +50,8 @@ class Arm:
     colours: tuple[str, ...]
     bodies: tuple[Body, ...]
     bare: bool
+    gone_ns: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    gone_sample: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
 
 
 @dataclass(frozen=True, slots=True)
@@ -70,6 +77,8 @@ class Scene:
         enlarged: The deviation as a path whose distance from the reference is a multiple of the true one.
         worst: Where the largest deviation of all runs stands.
         whose: Name of the log whose arm it is, where there are several; else empty.
+        ghosts: The further branches of solved joint values.
+        goals: What they were solved for.
     """
 
     arm: Arm | None
@@ -77,11 +86,13 @@ class Scene:
     enlarged: Way | None = None
     worst: Mark | None = None
     whose: str = ""
+    ghosts: tuple[GhostArm, ...] = ()
+    goals: GoalMarks | None = None
 
     @property
     def empty(self) -> bool:
         """True if there is nothing to see."""
-        return self.arm is None and not self.ways
+        return self.arm is None and not self.ways and not self.ghosts and self.goals is None
 
     @property
     def _every_way(self) -> tuple[Way, ...]:
@@ -93,6 +104,8 @@ class Scene:
         points = [part for way in self._every_way for part in (*way.strips, way.track.position) if len(part)]
         if self.arm is not None:
             points.append(self.arm.skeleton.reshape(-1, 3))
+        points += [ends.reshape(-1, 3) for ghost in self.ghosts for ends in (ghost.start, ghost.end)]
+        points += [part for part in self.goals.drawn if len(part)] if self.goals else []
         return np.concatenate(points) if points else np.zeros((1, 3))
 
     def ball(self) -> tuple[FloatArray, float]:
@@ -109,7 +122,7 @@ def scene_of(result: Result) -> Scene:
         return _of_simulation(result)
     standing = places_of(result)
     if isinstance(result, Run):
-        return Scene(_arm(result, None, run_colour(0)), tuple(_run_ways(result, standing[0])))
+        return _of_run(result, standing[0])
     shown = arm_of(result)
     ways = [
         _done(one, place, run_colour(i))
@@ -120,6 +133,16 @@ def scene_of(result: Result) -> Scene:
     whose = printable(shown.name) if arm is not None and len(result.runs) > 1 else ""
     scene = Scene(arm, (_asked(result.reference, shown), *ways), whose=whose)
     return replace(scene, enlarged=enlarged(result, scene.ball()[1]), worst=_worst(result))
+
+
+def _of_run(run: Run, place: Place) -> Scene:
+    """Return the arm of a run and its ways; of a solved run also the other branches and the targets."""
+    arm = _arm(run, None, run_colour(0))
+    if arm is not None and run.goals is not None:
+        gone = gone_times(run, run.log.t_ns[np.isfinite(run.log.q).all(axis=1)])
+        arm = replace(arm, gone_ns=gone, gone_sample=samples_at(run, gone))
+    ways = tuple(_run_ways(run, place))
+    return Scene(arm, ways, ghosts=ghost_arms(run, place), goals=goal_marks(run, place))
 
 
 def arm_of(result: Comparison) -> Deviation:

@@ -9,8 +9,9 @@ from numpy.typing import NDArray
 
 from urmpipe_pipeline.palette import DEVIATION_COLOUR, NEUTRAL_COLOUR, rgb
 from urmpipe_pipeline.recording.columns import time_columns
+from urmpipe_pipeline.recording.ghost_drawing import draw_ghost, draw_goals, send_gone
 from urmpipe_pipeline.recording.scene import Arm, Mark, Scene
-from urmpipe_pipeline.recording.shape_drawing import draw_body
+from urmpipe_pipeline.recording.shape_drawing import draw_body, hide_body
 from urmpipe_pipeline.recording.ways import Way
 
 if TYPE_CHECKING:
@@ -42,6 +43,10 @@ def draw_scene(stream: RecordingStream, scene: Scene) -> None:
         _draw_way(stream, way, size)
     if scene.worst is not None:
         _draw_mark(stream, scene.worst, size)
+    if scene.goals is not None:
+        draw_goals(stream, scene.goals, size)
+    for ghost in scene.ghosts:
+        draw_ghost(stream, ghost, size)
     if scene.arm is not None:
         _draw_arm(stream, scene.arm, size)
 
@@ -52,6 +57,9 @@ def _draw_arm(stream: RecordingStream, arm: Arm, size: float) -> None:
 
     for body in arm.bodies:
         draw_body(stream, body, time_columns(arm.t_ns, "sample", arm.sample))
+        if len(arm.gone_ns):
+            gone = time_columns(arm.gone_ns, "sample", arm.gone_sample)
+            hide_body(stream, body, gone, len(arm.gone_ns))
     skeleton = arm.skeleton.astype(np.float32)
     if arm.bare:
         _draw_links(stream, arm, skeleton, size)
@@ -62,6 +70,7 @@ def _draw_arm(stream: RecordingStream, arm: Arm, size: float) -> None:
     count, points = skeleton.shape[:2]
     columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3)).partition(np.full(count, points))
     stream.send_columns("/robot/joints", time_columns(arm.t_ns, "sample", arm.sample), columns)
+    send_gone(stream, "/robot/joints", arm.gone_ns, arm.gone_sample, rr.Points3D.columns(positions=[]))
 
 
 def _draw_links(stream: RecordingStream, arm: Arm, skeleton: Skeleton, size: float) -> None:
@@ -74,6 +83,7 @@ def _draw_links(stream: RecordingStream, arm: Arm, skeleton: Skeleton, size: flo
         rows = slice(start, start + STRIPS)
         times = time_columns(arm.t_ns[rows], "sample", arm.sample[rows])
         stream.send_columns("/robot/links", times, rr.LineStrips3D.columns(strips=skeleton[rows]))
+    send_gone(stream, "/robot/links", arm.gone_ns, arm.gone_sample, rr.LineStrips3D.columns(strips=[]))
 
 
 def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:

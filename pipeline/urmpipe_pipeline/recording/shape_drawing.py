@@ -19,6 +19,10 @@ if TYPE_CHECKING:
     from rerun import AsComponents, RecordingStream, TimeColumn
 
 
+UNSEEN = 1e-9
+"""Scale of a shape that is hidden; zero would be none that the viewer can invert."""
+
+
 def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> None:
     """Send a link: its frame at the times given, its shapes once.
 
@@ -26,9 +30,7 @@ def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> N
     """
     import rerun as rr
 
-    place = (
-        ("robot", "base") if body.joint is None else ("robot", "joint", printable(body.joint) or "unnamed")
-    )
+    place = ("robot", "base") if body.joint is None else _carrier(body.joint)
     position, rotation = body.position.astype(np.float32), body.quat_xyzw.astype(np.float32)
     if body.joint is None:  # the base does not move
         still = rr.Transform3D(translation=position[0], quaternion=rotation[0])
@@ -41,6 +43,29 @@ def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> N
             entity = entity_path(*place, f"visual {number}")
             stream.log(entity, _placed(visual), static=True)
             stream.log(entity, shape, static=True)
+
+
+def hide_body(stream: RecordingStream, body: Body, times: list[TimeColumn], count: int) -> None:
+    """Hide the shapes of a link that moves from some times on, until it has a pose again.
+
+    They stand there once for all times, so they are made too small to be seen.
+
+    Args:
+        stream: Where to.
+        body: The link; nothing is done to the base.
+        times: The times.
+        count: How many.
+    """
+    import rerun as rr
+
+    if body.joint is not None:
+        columns = rr.Transform3D.columns(translation=np.zeros((count, 3)), scale=np.full((count, 3), UNSEEN))
+        stream.send_columns(entity_path(*_carrier(body.joint)), times, columns)
+
+
+def _carrier(joint: str) -> tuple[str, ...]:
+    """Return where the frame of a joint stands."""
+    return "robot", "joint", printable(joint) or "unnamed"
 
 
 def _placed(visual: Visual) -> AsComponents:

@@ -10,10 +10,13 @@ import numpy as np
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.palette import run_colour_word
+from urmpipe_pipeline.palette import ghost_colour_word, run_colour_word
 from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.wording import alignment_words, excess, sync_words, tolerance_words
+
+BRANCHES = 8
+"""Branches that are listed; the others are counted."""
 
 LISTED = 4
 """Warnings that are listed; the others are counted."""
@@ -27,6 +30,7 @@ def summary(result: Run | Comparison) -> str:
 
 def _of_run(run: Run) -> Iterator[str]:
     files = ", ".join(shown(file.name) for file in run.log.files) or "no file"
+    done = "solved by" if run.goals is not None else "read as"
     robot = "No robot, so no kinematics." if run.log.joints else "A path, without joints."
     if run.robot is not None:
         robot = f"Arm: {shown(run.robot.name)}."
@@ -35,12 +39,33 @@ def _of_run(run: Run) -> Iterator[str]:
     doubts = f"; other findings: {others}, marked by crosses" if others else ""
     yield f"### {shown(run.name)}"
     rows = f"{text.counted(run.log.rows, 'row')}, {run.duration:.6g} s"
-    yield f"{files}, read as {shown(run.log.source)}: {rows}. {robot}"
+    yield f"{files}, {done} {shown(run.log.source)}: {rows}. {robot}"
     yield ""
     every = f", one in {1e3 * run.tsp:.6g} ms" if len(run.t_ns) > 1 else ""
     grid = f"Grid: {text.counted(len(run.t_ns), 'sample')}{every}."
     yield f"{grid} Repolarizations: {wraps}{marked}{doubts}." if run.log.joints else grid
+    yield from _branches(run)
     yield from warning_lines(run.warnings)
+
+
+def _branches(run: Run) -> Iterator[str]:
+    """Yield which ghost is which branch, and at how many targets it is another solution."""
+    if run.ghosts:
+        yield ""
+        yield table_row(("branch", "drawn", "rows"))
+        yield table_row("---" for _ in range(3))
+        yield table_row(
+            (
+                "chosen",
+                f"solid, its tip {run_colour_word(0)}",
+                str(int(np.isfinite(run.log.q).all(axis=1).sum())),
+            )
+        )
+    for i, ghost in enumerate(run.ghosts[:BRANCHES]):
+        yield table_row((shown(ghost.name), ghost_colour_word(i), str(len(ghost.t_ns))))
+    if len(run.ghosts) > BRANCHES:
+        yield ""
+        yield f"and {len(run.ghosts) - BRANCHES} more branches"
 
 
 def _of_comparison(result: Comparison) -> Iterator[str]:

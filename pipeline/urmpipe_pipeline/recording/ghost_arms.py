@@ -1,0 +1,163 @@
+"""The further branches of solved joint values as arms: where their links lie, and where their names stand."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.kinematics import frames_over_log, points_over_log
+from urmpipe_pipeline.ghosts import Ghost
+from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.palette import ghost_colour
+from urmpipe_pipeline.recording.entities import Place, branch_entity, branch_keys, printable
+from urmpipe_pipeline.recording.ghost_names import name_places, placed_names
+from urmpipe_pipeline.recording.ways import thinned
+from urmpipe_pipeline.results import Run
+
+STUB = 0.1
+"""Length of the piece of each joint's axis that is drawn, as a share of the arm's own reach."""
+
+
+POSES = 2_000
+"""Poses of a ghost that are drawn, at most, but for those at which it begins anew."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GhostArm:
+    """A branch as an arm that is there at some times.
+
+    Attributes:
+        name: What the branch is called.
+        entity: What it is drawn at.
+        label: Where its name stands.
+        colour: As #rrggbb.
+        t_ns: Time of each pose drawn in integer [ns], shape (m,).
+        sample: The grid sample at each, shape (m,).
+        start: Where each bone starts in [m], shape (m, bones, 3): the links, then the axes of the joints.
+        end: Where it ends.
+        links: How many of the bones are links.
+        named: Where the name stands: which of `name_places`.
+        thin: True of every second branch. Two that differ in the turn of the wrist alone have all their links
+            in common: then one is seen inside the other.
+        gone_ns: Times from which on there is no such solution in integer [ns], shape (g,).
+        gone_sample: The grid sample at each, shape (g,).
+    """
+
+    name: str
+    entity: str
+    label: str
+    colour: str
+    t_ns: IntArray
+    sample: IntArray
+    start: FloatArray
+    end: FloatArray
+    links: int
+    named: int
+    thin: bool
+    gone_ns: IntArray
+    gone_sample: IntArray
+
+
+def ghost_arms(run: Run, place: Place) -> tuple[GhostArm, ...]:
+    """Return the further branches of a run as arms, thinned out for drawing."""
+    if run.robot is None or not run.ghosts:
+        return ()
+    named = _names(run, run.robot)
+    return tuple(
+        _ghost_arm(run, run.robot, ghost, i, branch_entity(place, key), named[i])
+        for i, (ghost, key) in enumerate(zip(run.ghosts, branch_keys(run), strict=True))
+    )
+
+
+def _ghost_arm(run: Run, robot: Chain, ghost: Ghost, number: int, root: str, named: int) -> GhostArm:
+    """Return a branch as an arm."""
+    rows = _drawn_rows(run, ghost.t_ns)
+    start, end = bones_of(robot, ghost.q[rows])
+    gone = gone_times(run, ghost.t_ns)
+    return GhostArm(
+        name=printable(ghost.name),
+        entity=f"{root}/arm",
+        label=f"{root}/name",
+        colour=ghost_colour(number),
+        t_ns=ghost.t_ns[rows],
+        sample=samples_at(run, ghost.t_ns[rows]),
+        start=start,
+        end=end,
+        links=len(robot.joints),
+        named=named,
+        thin=bool(number % 2),
+        gone_ns=gone,
+        gone_sample=samples_at(run, gone),
+    )
+
+
+def fullest_time(run: Run) -> int:
+    """Return the first time in [ns] at which most branches are there, the chosen one among them."""
+    there: IntArray = np.asarray(np.isfinite(run.log.q).all(axis=1), dtype=np.int64)
+    for ghost in run.ghosts:
+        there[np.searchsorted(run.log.t_ns, ghost.t_ns)] += 1
+    return int(run.log.t_ns[np.argmax(there)])
+
+
+def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return what is drawn of an arm as lines: its links, and a piece of the axis of each joint that turns.
+
+    Two solutions can differ in the turn of a wrist alone: then all their points are the same, and only the
+    axes of the joints in between point otherwise.
+
+    Args:
+        robot: The arm.
+        q: Joint values in [rad] or [m], shape (m, joints).
+
+    Returns:
+        Where each line starts and where it ends in [m], shape (m, lines, 3) each.
+    """
+    points = points_over_log(robot, q)
+    position, rotation = frames_over_log(robot, q)
+    turning = [k for k, joint in enumerate(robot.joints) if joint.kind == "revolute"]
+    axes = np.array([robot.joints[k].axis for k in turning])
+    moved = np.array(turning) + 1  # frame 0 is the base's
+    direction = np.einsum("mkij,kj->mki", rotation[:, moved], axes)
+    reach = float(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1).max(initial=0.0))
+    stubs = position[:, moved] + STUB * reach * direction
+    return (
+        np.concatenate((points[:, :-1], position[:, moved]), axis=1),
+        np.concatenate((points[:, 1:], stubs), axis=1),
+    )
+
+
+def gone_times(run: Run, t_ns: IntArray) -> IntArray:
+    """Return the times of the rows of a run at which something that is at other rows has just ended."""
+    there = np.isin(run.log.t_ns, t_ns)
+    return run.log.t_ns[1:][there[:-1] & ~there[1:]]
+
+
+def samples_at(run: Run, t_ns: IntArray) -> IntArray:
+    """Return the last grid sample at or before each time; the first at none."""
+    return np.maximum(np.searchsorted(run.t_ns, t_ns, side="right") - 1, 0)
+
+
+def _drawn_rows(run: Run, t_ns: IntArray) -> IntArray:
+    """Return the rows of a ghost that are drawn: those thinned out, and those at which it begins anew."""
+    rows = np.searchsorted(run.log.t_ns, t_ns)
+    begins = np.flatnonzero(np.diff(rows, prepend=-2) > 1)
+    drawn = thinned(t_ns, np.zeros((len(t_ns), 1)), None)
+    return np.union1d(begins, drawn[:: math.ceil(len(drawn) / POSES)])
+
+
+def _names(run: Run, robot: Chain) -> list[int]:
+    """Return at which of its places the name of each ghost stands, by their poses at the time of opening."""
+    at = fullest_time(run)
+    ghosts = [ghost.q[[_row_at(ghost.t_ns, at)]] for ghost in run.ghosts]
+    chosen = run.log.q[run.log.t_ns == at]
+    beside = [chosen] if np.isfinite(chosen).all() else []
+    places = [[name_places(*bones_of(robot, q))[0] for q in arms] for arms in (ghosts, beside)]
+    return placed_names(*places)
+
+
+def _row_at(t_ns: IntArray, at: int) -> int:
+    """Return the last row at or before a time, else the first."""
+    return max(int(np.searchsorted(t_ns, at, side="right")) - 1, 0)

@@ -1,0 +1,66 @@
+"""The targets of solved joint values in the 3D view: frames or points, their way, and those missed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.orientation import matrices
+from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.recording.entities import Place
+from urmpipe_pipeline.recording.ways import MOST, dashed, lines_of
+from urmpipe_pipeline.results import Run
+
+FRAMES = 100
+"""Targets with an orientation that are drawn as frames, at most: more would hide each other."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class GoalMarks:
+    """What is drawn of targets.
+
+    Attributes:
+        root: The entity that it stands below.
+        origin: Where targets with an orientation are, in [m], shape (m, 3).
+        axes: Their x, y and z axes [-], shape (m, 3, 3), an axis a column.
+        points: Targets drawn as points, in [m], shape (k, 3).
+        strips: The way through targets with times, dashed, in [m].
+        missed: Targets that the arm has no pose for, in [m], shape (u, 3).
+        reasons: Why it has none, a line each, with the row.
+    """
+
+    root: str
+    origin: FloatArray
+    axes: FloatArray
+    points: FloatArray
+    strips: tuple[FloatArray, ...]
+    missed: FloatArray
+    reasons: tuple[str, ...]
+
+    @property
+    def drawn(self) -> list[FloatArray]:
+        """Every point that is drawn in [m], in arrays of shape (any, 3)."""
+        return [self.origin, self.points, *self.strips, self.missed]
+
+
+def goal_marks(run: Run, place: Place) -> GoalMarks | None:
+    """Return what is drawn of the targets of a run; None of a run that was not solved."""
+    goals = run.goals
+    if goals is None:
+        return None
+    there = np.isfinite(goals.position).all(axis=1)
+    few = int(there.sum()) <= FRAMES
+    framed = few and goals.quat_xyzw is not None
+    turned = goals.quat_xyzw[there] if framed and goals.quat_xyzw is not None else np.empty((0, 4))
+    position, none = goals.position[there], np.empty((0, 3))
+    missed = np.flatnonzero(there & goals.missed)[:MOST]
+    return GoalMarks(
+        root=place.prefix + "targets",
+        origin=position if framed else none,
+        axes=matrices(turned),
+        points=none if framed or (not few and not run.single_poses) else position[:MOST],
+        strips=dashed(lines_of(goals.position)) if not run.single_poses else (),
+        missed=goals.position[missed],
+        reasons=tuple(f"row {row + 1}: {goals.reasons[row]}" for row in missed.tolist()),
+    )
