@@ -90,7 +90,7 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
     asked = replace(options or ReadOptions(), joints=(), names=(), signs=(), offsets=())
     tables = open_tables([Path(file)], asked)
     plan = make_plan(tables, replace(asked, source=PATH), None)
-    _refuse_unclear(plan)
+    _refuse_unclear(plan, named=bool(asked.position))
     form, assumed = target_form(plan.roles, columns_of(tables.layouts, tables.titles), str(file))
     rows = read_rows(plan)
     poses = _poses(plan, rows, form)
@@ -178,8 +178,12 @@ def _times(
     return rows.clock - start, start, (), [LogWarning("period-not-used", unused)] if step is not None else []
 
 
-def _refuse_unclear(plan: Plan) -> None:
+def _refuse_unclear(plan: Plan, *, named: bool) -> None:
     """Raise if columns without names are left over, or the orientation stands in another table.
+
+    Args:
+        plan: What is to be read.
+        named: Whether the user names the columns.
 
     Raises:
         LogError: With what may be read instead.
@@ -190,8 +194,8 @@ def _refuse_unclear(plan: Plan) -> None:
         found = f"found {listed(plan.roles.rotation)} in another table than {listed(plan.roles.position)}"
         raise LogError(Finding(f"{found}, allowed: one table", file))
     cells = len(layout.names) - (not layout.names[-1])
-    if layout.header is None and cells > len(used):
-        time = f" beside the time{'s' * (len(plan.clock.columns) > 1)}" if plan.clock.columns else ""
+    if layout.header is None and cells > len(used) and not (plan.roles.rotation or named):
+        time = " beside the time" if plan.clock.columns else ""
         count = cells - len(plan.clock.columns)
         raise LogError(Finding(f"found {count} columns without names{time}, allowed: {FORMS}", file))
 

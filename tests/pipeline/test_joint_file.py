@@ -56,9 +56,13 @@ def written(path: Path, robot: Chain, q: FloatArray) -> Run:
 GANTRY = chain_of(("rail", "prismatic"), ("lift [z]", "prismatic"), ("turn", "revolute"))
 ODD = chain_of(('the "big", one', "revolute"), ("schräg; °", "revolute"), ("a/b(left)", "revolute"))
 
+CARTESIAN = chain_of(("x", "prismatic"), ("y", "prismatic"), ("z", "prismatic"), ("t", "revolute"))
+
 
 @pytest.mark.parametrize(
-    "robot", [load_robot("urm6"), load_robot("ur5e"), GANTRY, ODD], ids=["urm6", "ur5e", "gantry", "odd"]
+    "robot",
+    [load_robot("urm6"), load_robot("ur5e"), GANTRY, ODD, CARTESIAN],
+    ids=["urm6", "ur5e", "gantry", "odd", "xyz"],
 )
 def test_ingest_gives_the_same_joints_bit_by_bit_without_a_warning(robot: Chain, tmp_path: Path) -> None:
     q = motion(60, len(robot.coordinates))

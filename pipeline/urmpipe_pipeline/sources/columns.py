@@ -158,7 +158,8 @@ def refuse_twins(
 ) -> None:
     """Raise if a column that is to be used shares its name with another one.
 
-    A rate of the same name is no twin: its unit says what it is.
+    A rate of the same name is no twin, nor is an angle "t (rad)" one of the time "t (s)": the unit says what
+    it is.
 
     Args:
         used: The columns that were found to matter.
@@ -171,14 +172,13 @@ def refuse_twins(
     """
     findings = []
     for column in used:
-        order = column.unit.order if column.unit else 0
         twins = [
             other
             for other in columns
             if other.key == column.key != ""
             and other is not column
             and not other.text
-            and (other.unit.order if other.unit else 0) == order
+            and _alike(other, column)
         ]
         if twins:
             numbers = ", ".join(str(n) for n in sorted(c.number for c in (column, *twins)))
@@ -187,6 +187,13 @@ def refuse_twins(
             findings.append(Finding(message, str(layout.segment.path), layout.header, column=column.header))
     if findings:
         raise LogError(*findings)
+
+
+def _alike(one: Column, other: Column) -> bool:
+    """Tell whether two columns may hold the same quantity, by their units; one without may be anything."""
+    if one.unit and other.unit and one.unit.quantity != other.unit.quantity:
+        return False
+    return (one.unit.order if one.unit else 0) == (other.unit.order if other.unit else 0)
 
 
 def _holds_text(cells: Sequence[str], decimal: str) -> bool:

@@ -74,8 +74,7 @@ def _path_by_place(
     form = options.rotation
     if pose is None and form is not None and len(columns) == 3 + width(form):
         pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), "given as an option")
-    exact = len(columns) in (7, 12, 16)
-    behind = _trailing_pose(columns, layout, None) if pose is None and exact else None
+    behind = _trailing_pose(columns, layout, None) if pose is None else None
     pose = with_form(pose or behind or Pose(tuple(columns[:3]), evidence="there is no header"), form)
     rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
     said = [Inference("path", listed(pose.position), pose.evidence), *about_pose(pose)[1:]]

@@ -83,7 +83,8 @@ def assign(
         found = _Joints(joints, "given as an option", *_family_of(joints))
         pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
     else:
-        pose = chosen_pose(columns, options) or find_pose(numeric, layouts)
+        own = () if path else _called_as_joints(numeric, robot)
+        pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in own], layouts)
         free = [column for column in numeric if column not in (*pose.position, *pose.rotation)]
         half = bool(pose.position and not pose.rotation)
         found = _Joints(()) if path else _find_joints(free, file, robot, half_pose=half)
@@ -123,6 +124,15 @@ def _family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ..
         if all(len(matching) == 1 for matching in of_joint):
             return (), tuple(matching[0] for matching in of_joint)
     return (), ()
+
+
+def _called_as_joints(numeric: Sequence[Column], robot: Chain | None) -> tuple[Column, ...]:
+    """Return the columns named exactly as the robot's joints: x, y, z of a gantry are no position."""
+    if robot is None:
+        return ()
+    found = named_after(numeric, robot.coordinates, "position")
+    names = [key(name) for name in robot.coordinates]
+    return found if [column.key for column in found] == names else ()
 
 
 def _find_joints(free: Sequence[Column], file: str, robot: Chain | None, *, half_pose: bool) -> _Joints:

@@ -23,6 +23,7 @@ MOST_RAD = 2 * np.pi * 1.01
 """Angles of which none is told in a unit and most are beyond a turn in [rad] are hardly in rad."""
 
 _OURS = frozenset(("rx", "ry", "rz"))
+_KUKA = frozenset("abc")
 _HALF = re.compile(r"(^|_)(r[xyz]|q[xyzw]|roll|pitch|yaw)(_(rad|deg))?\Z")
 
 
@@ -64,7 +65,8 @@ def rotation_units(
 ) -> tuple[list[Unit], list[LogWarning]]:
     """Return the unit of each column of an orientation, rad where none is told, and what was assumed.
 
-    That rz, ry, rx are in rad is the form of targets, and no assumption.
+    That angles are in rad is the form of targets, and no assumption, unless most of them are beyond a turn
+    or they are called A, B, C as KUKA's, which are in degrees.
 
     Args:
         columns: The columns.
@@ -79,7 +81,7 @@ def rotation_units(
         return [unit or known[0] for unit in told], []
     units = [vocabulary().units["rad"]] * len(columns)
     beyond = len(values) > 0 and bool(np.median(np.abs(values).max(axis=1)) > MOST_RAD)
-    if all(column.words & _OURS for column in columns) and not beyond:
+    if not beyond and not any(column.key in _KUKA for column in columns):
         return units, []
     why = ", though most are beyond a turn" if beyond else ""
     said = f"no unit is given for {listed(columns)}: they are taken as rad{why}"
