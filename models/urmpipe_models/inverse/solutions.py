@@ -14,7 +14,15 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 TextArray: TypeAlias = NDArray[np.object_]
 """Texts as Python objects: most are empty, and one object then."""
 
-SingularFamily = Literal["wrist on axis 1", "wrist aligned", "arm stretched", "arm withdrawn"]
+SingularFamily = Literal[
+    "wrist on axis 1",
+    "wrist on axis 2",
+    "wrist aligned",
+    "arm stretched",
+    "arm withdrawn",
+    "postures meet",
+    "flips meet",
+]
 """The families in which an arm loses a freedom; two can meet in one pose."""
 
 
