@@ -130,7 +130,8 @@ class PositionArm:
         if self.order == "both":
             u1, u3, meet = quartic_roots(self.equations, seen)
             meeting: dict[SingularFamily, BoolArray] = {"postures meet": meet}
-            reasons = Reach(self.equations, self.size).out_of_reach(seen, np.isnan(u3[0]) & ~meet)
+            reasons: TextArray = np.full(meet.shape, "", dtype=np.object_)
+            Reach(self.equations, self.size).tell_place(reasons, np.isnan(u3[0]) & ~meet, seen)
             reasons[meet & np.isnan(u3[0])] = "the same as the posture before: two postures meet here"
         else:
             u1, u3, reasons, meeting = self._in_order(seen)
@@ -183,13 +184,13 @@ class PositionArm:
         if self.order == "first":
             at = np.where(none1, 0.0, u1)
             rest = np.tensordot(third, np.tensordot(a1, at, 1) - apart[:, None, None], 1)
-            reach.elbow(reasons, none3 & ~none1, third, rest)
-            reach.side(reasons, none1, seen, first @ a1, np.broadcast_to(first @ apart, none1.shape))
+            reach.tell_elbow(reasons, none3 & ~none1, third, rest)
+            reach.tell_side(reasons, none1, seen, first @ a1, np.broadcast_to(first @ apart, none1.shape))
         else:
             at = np.where(none3, 0.0, u3)
             rest = np.tensordot(first, np.tensordot(a3, at, 1) + apart[:, None, None], 1)
-            reach.side(reasons, none1 & ~none3, seen, first @ a1, rest)
-            reach.elbow(reasons, none3, third, np.broadcast_to(-(third @ apart), none3.shape))
+            reach.tell_side(reasons, none1 & ~none3, seen, first @ a1, rest)
+            reach.tell_elbow(reasons, none3, third, np.broadcast_to(-(third @ apart), none3.shape))
         return reasons
 
     def _told_once(
