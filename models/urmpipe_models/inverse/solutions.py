@@ -17,10 +17,13 @@ TextArray: TypeAlias = NDArray[np.object_]
 SingularFamily = Literal[
     "wrist on axis 1",
     "wrist beside axis 1",
+    "wrist on axis 2",
     "wrist aligned",
     "arm stretched",
     "arm withdrawn",
     "branches meet",
+    "postures meet",
+    "flips meet",
 ]
 """The families in which an arm loses a freedom; two can meet in one pose.
 
