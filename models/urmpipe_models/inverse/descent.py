@@ -3,16 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_models.elementwise import Element
 from urmpipe_models.inverse.small_systems import dot_product, factor, gram
-from urmpipe_models.inverse.task import BoolArray, FloatArray, Miss, Task, merged, picked
+from urmpipe_models.inverse.task import BoolArray, FloatArray, IntArray, Miss, Task, picked, restore
 
-IntArray: TypeAlias = NDArray[np.intp]
 Method = Literal["lm", "dls", "pinv"]
 
 METHODS: tuple[Method, ...] = ("lm", "dls", "pinv")
@@ -97,10 +95,10 @@ class Rows:
     gain: FloatArray
     miss: Miss
 
-    def kept(self, rows: BoolArray) -> Rows:
+    def kept(self, rows: IntArray) -> Rows:
         """Return some of the rows."""
         task, q, miss = self.task.kept(rows), picked(self.q, rows), self.miss.kept(rows)
-        return Rows(self.index[rows], task, q, self.gain[rows], miss)
+        return Rows(self.index.take(rows), task, q, self.gain.take(rows), miss)
 
 
 def descend(progress: Progress, task: Task, index: IntArray, settings: Settings, steps: int) -> None:
@@ -156,10 +154,10 @@ def _parted(progress: Progress, rows: Rows, leaving: BoolArray, settings: Settin
     """Store the rows that leave, and return the others."""
     if not leaving.any():
         return rows
-    gone = rows.kept(leaving)
+    gone = rows.kept(np.flatnonzero(leaving))
     _store(progress, gone, settings)
     progress.ended[gone.index] = True
-    return rows.kept(~leaving)
+    return rows.kept(np.flatnonzero(~leaving))
 
 
 def _store(progress: Progress, rows: Rows, settings: Settings) -> None:
@@ -219,8 +217,10 @@ def _marquardt(rows: Rows, J: list[list[Element]], settings: Settings) -> Rows:
     accepted = (gained > 1e-4 * foreseen) & (foreseen > 0.0)
     gain = rows.gain * np.where(gained > 0.75 * foreseen, 0.125, np.where(gained < 0.25 * foreseen, 4.0, 1.0))
     gain = np.clip(gain, *GAINS)
-    if not accepted.all():
-        q, new = merged(accepted, q, rows.q), new.where(accepted, now)
+    refused = np.flatnonzero(~accepted)
+    if len(refused):
+        restore(q, rows.q, refused)
+        new = new.restored(refused, now)
     return replace(rows, q=q, gain=gain, miss=new)
 
 

@@ -133,7 +133,7 @@ def settle(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> t
         size[rows] = np.where(kept, new.size, size[rows])
         going = (size[rows] > LEAST_MOTION) & (length > LENGTHS[0])
         if not going.all():
-            rows, t, length, part = rows[going], t[:, going], length[going], part.kept(going)
+            rows, t, length, part = rows[going], t[:, going], length[going], part.kept(np.flatnonzero(going))
     return q, size
 
 

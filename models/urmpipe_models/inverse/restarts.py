@@ -9,12 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.chain import Chain, Joint
-from urmpipe_models.inverse.descent import IntArray
 from urmpipe_models.inverse.iterative import Refined, refine
 from urmpipe_models.inverse.limits import TURN, within_limits
 from urmpipe_models.inverse.solutions import NEAREST_POINT, FloatArray, Solutions
 from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.inverse.task import BoolArray, characteristic_length
+from urmpipe_models.inverse.task import BoolArray, IntArray, characteristic_length
 
 DISTINCT = 1e-3
 """Solutions are two if a joint differs by more than this in [rad] or [m], revolute joints by the shorter way.

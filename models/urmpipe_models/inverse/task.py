@@ -19,7 +19,7 @@ from urmpipe_models.transform import Transform
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
-RowChoice: TypeAlias = NDArray[np.bool_] | NDArray[np.intp]
+IntArray: TypeAlias = NDArray[np.intp]
 
 HALF_TURN_SINE = 1e-6
 """Below this sine an angle near pi takes its axis from the symmetric part of the rotation matrix."""
@@ -61,25 +61,23 @@ class Miss:
         """|e|^2 in [m2]."""
         return np.asarray(self.distance2 + self.turn2)
 
-    def kept(self, rows: RowChoice) -> Miss:
+    def kept(self, rows: IntArray) -> Miss:
         """Return some of the rows."""
         return Miss(
             picked(self.error, rows),
             [picked(row, rows) for row in self.jacobian],
-            self.distance2[rows],
+            self.distance2.take(rows),
             picked([self.turn2], rows)[0],
             self.length,
         )
 
-    def where(self, chosen: BoolArray, other: Miss) -> Miss:
-        """Return the rows that are chosen, and the other's elsewhere."""
-        return Miss(
-            merged(chosen, self.error, other.error),
-            [merged(chosen, a, b) for a, b in zip(self.jacobian, other.jacobian, strict=True)],
-            np.where(chosen, self.distance2, other.distance2),
-            merged(chosen, [self.turn2], [other.turn2])[0],
-            self.length,
-        )
+    def restored(self, rows: IntArray, other: Miss) -> Miss:
+        """Return this one with the other's rows at some places: its own arrays, written over there."""
+        restore(self.error, other.error, rows)
+        for row, before in zip(self.jacobian, other.jacobian, strict=True):
+            restore(row, before, rows)
+        restore([self.distance2, self.turn2], [other.distance2, other.turn2], rows)
+        return self
 
 
 @dataclass(frozen=True)
@@ -101,7 +99,7 @@ class Task:
         """The characteristic length in [m]."""
         return characteristic_length(self.chain)
 
-    def kept(self, rows: RowChoice) -> Task:
+    def kept(self, rows: IntArray) -> Task:
         """Return some of the rows."""
         x, y, z = picked(self.position, rows)
         if self.columns is None:
@@ -112,8 +110,7 @@ class Task:
     def miss(self, q: Sequence[FloatArray]) -> Miss:
         """Return what is missed at joint values q in [rad] or [m], one array a coordinate."""
         pose, columns = pose_and_jacobian(self.chain, q)
-        count = len(q[0])
-        error = [np.broadcast_to(value, count) for value in subtract(self.position, pose.translation)]
+        error = list(subtract(self.position, pose.translation))
         rows = [[column[k] for column in columns] for k in range(3)]
         distance2 = dot((error[0], error[1], error[2]), (error[0], error[1], error[2]))
         if self.columns is None:
@@ -168,14 +165,16 @@ def redundancy(chain: Chain, targets: Targets) -> int:
     return len(chain.coordinates) - int(np.linalg.matrix_rank(J, rtol=1e-9).max())
 
 
-def picked(elements: Sequence[Element], rows: RowChoice) -> list[Element]:
+def picked(elements: Sequence[Element], rows: IntArray) -> list[Element]:
     """Return some of the rows of each element; a constant holds for any."""
-    return [value[rows] if isinstance(value, np.ndarray) else value for value in elements]
+    return [value.take(rows) if isinstance(value, np.ndarray) else value for value in elements]
 
 
-def merged(chosen: BoolArray, a: Sequence[Element], b: Sequence[Element]) -> list[Element]:
-    """Return of each pair a where chosen, b elsewhere; a constant of both stays one."""
-    return [np.where(chosen, x, y) if isinstance(x, np.ndarray) else x for x, y in zip(a, b, strict=True)]
+def restore(elements: Sequence[Element], before: Sequence[Element], rows: IntArray) -> None:
+    """Write what was before over some rows of each element; a constant has not changed."""
+    for new, old in zip(elements, before, strict=True):
+        if isinstance(new, np.ndarray):
+            new[rows] = old[rows]
 
 
 def _fill_half_turns(
