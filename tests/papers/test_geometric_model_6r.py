@@ -224,10 +224,8 @@ def test_eq_16_gives_the_angles() -> None:
 
 def alpha_z() -> FloatArray:
     """Eq. 36 with its second argument whole: it breaks off after (-sq1 sq4 + (cq1 cq2."""
-    return np.arctan2(
-        -(-C1 * S4 + A * C4) * S5 + D * C5,
-        (-S1 * S4 + B * C4) * S5 - E * C5,
-    )
+    first, second = -(-C1 * S4 + A * C4) * S5 + D * C5, (-S1 * S4 + B * C4) * S5 - E * C5
+    return np.asarray(np.arctan2(first, second))
 
 
 def radicand_of_beta() -> FloatArray:
@@ -254,7 +252,7 @@ def lost_from_beta() -> FloatArray:
 def beta_x() -> FloatArray:
     """Eq. 37 with its root and the term that it lacks."""
     cosine = -C4 * S5 * C2 * S3 - C4 * S5 * S2 * C3 + C5 * C2 * C3 - C5 * S2 * S3
-    return np.arctan2(np.sqrt(radicand_of_beta() + lost_from_beta()), cosine)
+    return np.asarray(np.arctan2(np.sqrt(radicand_of_beta() + lost_from_beta()), cosine))
 
 
 def numerators_of_gamma() -> tuple[FloatArray, FloatArray]:
