@@ -131,11 +131,11 @@ class _Search:
         found[:, rows] = np.where(refined.converged[:, None], refined.q, np.nan).reshape(count, -1, joints)
         self.found.extend(found)
         self.pending[rows] &= ~refined.converged.reshape(count, -1).any(axis=0)
-        self._keep_nearest(rows, refined)
+        self._keep_nearest(rows, count, refined)
 
-    def _keep_nearest(self, rows: IntArray, refined: Refined) -> None:
-        """Keep where the tool came nearest to the targets at `rows`, of as many attempts as there are."""
-        residual = np.where(np.isnan(refined.residual), np.inf, refined.residual).reshape(-1, len(rows))
+    def _keep_nearest(self, rows: IntArray, count: int, refined: Refined) -> None:
+        """Keep where the tool came nearest to the targets at `rows`, of `count` attempts."""
+        residual = np.where(np.isnan(refined.residual), np.inf, refined.residual).reshape(count, len(rows))
         best = np.argmin(residual, axis=0)
         nearer = residual.min(axis=0) < self.residual[rows]
         of, to = (best * len(rows) + np.arange(len(rows)))[nearer], rows[nearer]
