@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-KEY_WIDTH = 28
+KEY_WIDTH = 32
 """Widest that a key is; longer ones are folded."""
 
 GAP = 2
