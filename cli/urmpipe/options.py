@@ -103,7 +103,6 @@ class QuantityType(click.ParamType[float]):
 DURATION = QuantityType(
     "SECONDS", {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "a positive time in s, such as 0.005 or 5ms"
 )
-LENGTH = QuantityType("M", {"m": 1.0, "mm": 1e-3}, "a positive length in m, such as 0.0035 or 3.5mm")
 
 
 def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str] | None:
@@ -195,10 +194,43 @@ def take_log_options(options: dict[str, Any]) -> tuple[Chain | None, ReadOptions
     return take_robot(options), read_options(options, log_map.read)
 
 
+def strict_option(command: Command) -> Command:
+    """Add --strict."""
+    return click.option("--strict", is_flag=True, help="Warnings are errors (exit 2).")(command)
+
+
+def table_options(command: Command) -> Command:
+    """Add the options that say how any table is read: its map, columns, units and signs."""
+    for option in (
+        click.option(
+            "--unit",
+            "units",
+            multiple=True,
+            callback=_units,
+            metavar="[COLUMN=]UNIT",
+            help="Unit of the joint angles (rad, deg), or of one column.",
+        ),
+        click.option("--time", metavar="COLUMN", help="The time column."),
+        click.option("--decimal", type=click.Choice([".", ","]), help="The decimal sign."),
+        click.option("--delimiter", metavar="CHAR", help="What parts the columns: , ; tab space."),
+        click.option(
+            "--rotation", type=click.Choice(FORMS), help="Form of the recorded orientation, if it is open."
+        ),
+        click.option(
+            "--map",
+            "log_map",
+            type=click.Path(dir_okay=False, path_type=Path),
+            help="How to read these logs (TOML); options given here come first.",
+        ),
+    ):
+        command = option(command)
+    return command
+
+
 def log_options(command: Command) -> Command:
     """Add the options of every command that takes a log."""
     for option in (
-        click.option("--strict", is_flag=True, help="Warnings are errors (exit 2)."),
+        strict_option,
         click.option("--skip-bad", is_flag=True, help="Leave out rows that cannot be read, up to 1 %."),
         click.option(
             "--derivative",
@@ -219,27 +251,8 @@ def log_options(command: Command) -> Command:
             help="What the joints are limited to, in their own unit [default: by the wraps].",
         ),
         click.option("--period", type=DURATION, help="Period of a log without a time column [default: 5ms]."),
-        click.option(
-            "--unit",
-            "units",
-            multiple=True,
-            callback=_units,
-            metavar="[COLUMN=]UNIT",
-            help="Unit of the joint angles (rad, deg), or of one column.",
-        ),
         click.option("--joints", type=NamesType(), help="The joint columns, in the robot's order."),
-        click.option("--time", metavar="COLUMN", help="The time column."),
-        click.option("--decimal", type=click.Choice([".", ","]), help="The decimal sign."),
-        click.option("--delimiter", metavar="CHAR", help="What parts the columns: , ; tab space."),
-        click.option(
-            "--rotation", type=click.Choice(FORMS), help="Form of the recorded orientation, if it is open."
-        ),
-        click.option(
-            "--map",
-            "log_map",
-            type=click.Path(dir_okay=False, path_type=Path),
-            help="How to read these logs (TOML); options given here come first.",
-        ),
+        table_options,
         click.option("--source", metavar="NAME", help="Who wrote the log: coppeliasim, solidworks, ..."),
     ):
         command = option(command)
