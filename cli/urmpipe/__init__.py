@@ -6,6 +6,7 @@
     urmpipe.report([comparison], "report.html")
     urmpipe.export(run, "log.parquet")
     simulation = urmpipe.simulate("log-to-delta", arguments={"log": "log.csv"})
+    urmpipe.ik("targets.csv", robot="arm6").to_frame()
     urmpipe.build_fmu("kinematic_chain", robot="urm6")
 
 The functions are loaded when they are first used.
@@ -24,12 +25,15 @@ if TYPE_CHECKING:
     from urmpipe.api import write_map as write_map
     from urmpipe.building import build_fmu as build_fmu
     from urmpipe.comparing import compare as compare
+    from urmpipe.inverse_result import InverseResult as InverseResult
     from urmpipe.simulating import simulate as simulate
+    from urmpipe.solving import ik as ik
     from urmpipe_fmus.build import BuiltFmu as BuiltFmu
     from urmpipe_models.catalogue import load_robot as load_robot
     from urmpipe_models.catalogue import robot_names as robot_names
     from urmpipe_models.chain import Chain as Chain
     from urmpipe_models.errors import UrmpipeError as UrmpipeError
+    from urmpipe_models.inverse.targets import Targets as Targets
     from urmpipe_pipeline.comparison import Comparison as Comparison
     from urmpipe_pipeline.export import Exported as Exported
     from urmpipe_pipeline.recording import read_recording as read_recording
@@ -46,6 +50,8 @@ _HOME = {
     "Chain": "urmpipe_models.chain",
     "Comparison": "urmpipe_pipeline.comparison",
     "ReadOptions": "urmpipe_pipeline.sources",
+    "InverseResult": "urmpipe.inverse_result",
+    "Targets": "urmpipe_models.inverse.targets",
     "Exported": "urmpipe_pipeline.export",
     "Report": "urmpipe.api",
     "Run": "urmpipe_pipeline.results",
@@ -54,6 +60,7 @@ _HOME = {
     "build_fmu": "urmpipe.building",
     "compare": "urmpipe.comparing",
     "export": "urmpipe.api",
+    "ik": "urmpipe.solving",
     "ingest": "urmpipe.api",
     "load_robot": "urmpipe_models.catalogue",
     "read_map": "urmpipe_pipeline.sources",

@@ -31,6 +31,7 @@ COMMANDS = {
     "view": "Open recordings in the viewer.",
     "export": "Write a recording as CSV, Parquet, MAT or TUM.",
     "robot": "List, show and export robots.",
+    "ik": "Find joint values for poses of the tool.",
     "fmu": "List units, build and check FMUs.",
     "simulate": "Run a system of blocks.",
 }

@@ -1,0 +1,139 @@
+"""`urmpipe ik`."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import click
+from click.core import ParameterSource
+
+from urmpipe.options import (
+    DURATION,
+    JointValuesType,
+    output_options,
+    robot_options,
+    strict_option,
+    table_options,
+    take_log_options,
+)
+from urmpipe.process import tune_pyarrow
+
+
+def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
+    """Return a tolerance on each axis in [m]; of one of several kinds in urmpipe.toml that on an axis."""
+    if value is None:
+        return None
+    from urmpipe_pipeline.tolerance import parse_tolerance
+
+    kinds = parse_tolerance(value)
+    if set(kinds) != {"axis"} and ctx.get_parameter_source("tolerance") != ParameterSource.DEFAULT_MAP:
+        raise click.BadParameter(f"found {value!r}, allowed: a length on each axis, such as 0.0035 or 3.5mm")
+    return kinds.get("axis")
+
+
+@click.command(short_help="Find joint values for poses of the tool.")
+@click.argument("targets", metavar="TARGETS|PATH", type=click.Path(path_type=Path))
+@click.option(
+    "-o",
+    "--output",
+    metavar="LOG.csv|RUN.rrd",
+    type=click.Path(path_type=Path),
+    help="Write a joint log that ingest reads, or a recording.",
+)
+@click.option(
+    "--all",
+    "every",
+    is_flag=True,
+    help="Print all solutions, and record every branch as a ghost arm; without a closed form by restarts.",
+)
+@click.option(
+    "--start",
+    type=JointValuesType(),
+    help="Joint values to be near to, in rad and m [default: the robot's own].",
+)
+@click.option(
+    "--tolerance",
+    metavar="M",
+    callback=_on_axes,
+    help="Let a target out of reach take the nearest point within this on each axis, such as 3.5mm.",
+)
+@click.option("--tsp", type=DURATION, help="Time from row to row of a file without times: it is a path then.")
+@click.option(
+    "--within-pi", is_flag=True, help="Write joints without limits within -pi to pi, as CoppeliaSim does."
+)
+@click.option(
+    "--method",
+    type=click.Choice(["auto", "closed", "iterative"]),
+    default="auto",
+    show_default=True,
+    help="How it is solved; auto: by the closed form of the arm if it has one.",
+)
+@click.option(
+    "--restarts",
+    type=click.IntRange(min=0),
+    default=20,
+    show_default=True,
+    help="Random starts of the iterative solver where the first fails.",
+)
+@click.option("--seed", type=int, default=0, show_default=True, help="Of the random starts.")
+@strict_option
+@table_options
+@robot_options
+@output_options
+def ik(
+    targets: Path,
+    as_json: bool,
+    quiet: bool,
+    every: bool,
+    output: Path | None,
+    **options: Any,
+) -> int:
+    """Find joint values that bring the tool centre point of an arm to targets.
+
+    TARGETS is a table of x, y, z (m) and, if the orientation counts, rz, ry, rx (rad) or a quaternion: each
+    row stands for itself. A PATH has a time, too (or --tsp): its rows are reached one after the other,
+    without a jump where the arm can.
+
+    \b
+    Examples:
+      urmpipe ik targets.csv --robot arm6
+      urmpipe ik targets.csv --robot ur5e --all --json
+      urmpipe ik targets.csv --robot panda --start 0,-0.8,0,-2.4,0,1.6,0.8 -o targets.rrd --all
+      urmpipe ik path.csv --robot urm6 -o log.csv
+      urmpipe ik path.csv --robot ur5e --tolerance 3.5mm -o run.rrd
+
+    Exit codes: 0 every target reached, 1 not so (rows that hold no target count, and along a path jumps and
+    joints that are too fast), 2 bad input or usage.
+    """
+    tune_pyarrow()
+    from urmpipe.inverse_printing import print_inverse
+    from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar, say
+    from urmpipe.solving import ik as solve
+
+    log_map = options["log_map"]
+    robot, read = take_log_options(options)
+    del options["robot_named"]
+    names = ("start", "tolerance", "tsp", "within_pi", "method", "restarts", "seed", "strict")
+    with progress_bar(f"Solving {targets}", quiet=quiet) as progress:
+        result = solve(
+            targets,
+            robot,
+            read=read,
+            every=every,
+            output=output,
+            inputs=[log_map] if log_map else [],
+            progress=progress,
+            **{name: options[name] for name in names},
+        )
+    if not quiet:
+        print_warnings(result.warnings)
+    if as_json:
+        print_json(result.to_dict())
+    elif not quiet:
+        print_inverse(result, every=every)
+        if output is not None and output.suffix == ".rrd":
+            print_recording(output)
+        elif output is not None:
+            say(f"Joints: {output}  (read it: urmpipe ingest {output} --robot {result.robot.name})")
+    return 0 if result.verdict == "pass" else 1

@@ -1,0 +1,97 @@
+"""What `urmpipe.ik` writes: a joint log that `ingest` reads, or a recording with branches as ghost arms."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+
+from urmpipe.inverse_result import InverseResult
+from urmpipe_models.errors import OptionError
+from urmpipe_models.inverse.solutions import Solutions
+from urmpipe_models.orientation import quaternions
+from urmpipe_pipeline.ghosts import Ghost, Goals
+from urmpipe_pipeline.joint_file import write_joint_log
+from urmpipe_pipeline.joint_log import IntArray, SourceFile
+from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.solved import TARGET_PERIOD_NS, solved_run
+
+Written = Literal["joints", "recording"]
+"""Kinds of outputs."""
+
+KINDS: dict[str, Written] = {".csv": "joints", ".rrd": "recording"}
+
+
+def output_kind(output: Path | None) -> Written | None:
+    """Return what an output is by its suffix; None without one.
+
+    Raises:
+        OptionError: If the suffix is another.
+    """
+    if output is None:
+        return None
+    kind = KINDS.get(output.suffix.lower())
+    if kind is None:
+        allowed = "a name that ends in .csv (a joint log) or .rrd (a recording)"
+        raise OptionError(f"-o: found {str(output)!r}, allowed: {allowed}")
+    return kind
+
+
+def run_of_solutions(
+    result: InverseResult, branches: Solutions | None, file: SourceFile | None, options: dict[str, Any]
+) -> Run:
+    """Return the run of the solutions nearest to the start, with the others as ghosts.
+
+    Args:
+        result: What was found.
+        branches: The solutions that are to be ghosts; None for no ghosts.
+        file: Where the targets came from.
+        options: The options that were given, by name.
+    """
+    t_ns = result.t_ns
+    if t_ns is None:
+        t_ns = np.arange(len(result), dtype=np.int64) * TARGET_PERIOD_NS
+    rotation = result.targets.rotation
+    quat = None if rotation is None else quaternions(rotation.reshape(-1, 9), "matrix")
+    goals = Goals(t_ns, result.targets.position, quat, tuple(one or "" for one in result.reasons))
+    return solved_run(
+        result.name,
+        result.robot,
+        result.t_ns,
+        result.q,
+        goals=goals,
+        ghosts=tuple(() if branches is None else _ghosts(branches, t_ns)),
+        files=() if file is None else (file,),
+        warnings=result.warnings,
+        options=options,
+    )
+
+
+def _ghosts(solutions: Solutions, t_ns: IntArray) -> Iterator[Ghost]:
+    """Yield each branch where it exists."""
+    for column, name in enumerate(solutions.branches):
+        there = solutions.reached[:, column]
+        if there.any():
+            yield Ghost(name, t_ns[there], solutions.q[there, column])
+
+
+def write_joints(result: InverseResult, path: Path, inputs: Sequence[Path]) -> None:
+    """Write the solutions nearest to the start as a joint log; rows that have none are left out.
+
+    Raises:
+        OutputError: If it may not be written there, or did not read back as it was written.
+    """
+    joints = result.robot.moving
+    with guarded_output(path, inputs, "joints") as part:
+        write_joint_log(
+            part,
+            path,
+            joints=result.robot.coordinates,
+            units=["rad" if joint.kind == "revolute" else "m" for joint in joints],
+            q=result.q,
+            row=result.row,
+            t_ns=result.t_ns,
+        )

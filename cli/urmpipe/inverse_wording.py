@@ -1,0 +1,134 @@
+"""What inverse kinematics says in words: rows, what was reached, why not, and what was chosen."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from urmpipe.inverse_result import InverseResult
+from urmpipe_models.chain import Chain
+from urmpipe_models.inverse.solutions import BoolArray, Solutions
+from urmpipe_models.inverse.targets import Targets
+from urmpipe_pipeline.joint_log import IntArray, LogWarning
+from urmpipe_pipeline.text import DIGITS, SHOWN, counted, enumerated
+
+NAMED = 6
+"""Rows or stretches of rows that are named; the others are counted."""
+
+MILLI = 1e-3
+"""A target in mm that is read as m is a thousand times too far."""
+
+FAR = 10.0
+"""A target so many times farther than the arm reaches is no slip of the path, but may be one of the unit."""
+
+
+def rows_text(rows: Sequence[int] | IntArray) -> str:
+    """Return rows for a sentence, stretches of them as such: "row 3", "rows 3, 7-9 and 40 more"."""
+    rows = np.asarray(rows)
+    first = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) != 1)
+    last = np.append(first[1:], len(rows)) - 1
+    parts = [
+        str(rows[a]) if a == b else f"{rows[a]}-{rows[b]}"
+        for a, b in zip(first[:NAMED], last[:NAMED], strict=True)
+    ]
+    more = len(rows) - 1 - last[:NAMED][-1]
+    said = ", ".join(parts) + (f" and {more} more" if more else "")
+    return f"row{'' if len(rows) == 1 else 's'} {said}"
+
+
+def joint_number(value: float, unit: str) -> str:
+    """Return a joint value in [rad] as [deg] or in [m] as [mm]; what is only rounding is 0."""
+    return f"{round(float(value) * SHOWN[unit][1], DIGITS) + 0.0:.{DIGITS}f}"
+
+
+def method_words(method: str) -> str:
+    """Return what solved the targets: "closed form: spherical wrist", or "iterative"."""
+    return method if method == "iterative" else f"closed form: {method}"
+
+
+def reach_words(result: InverseResult) -> str:
+    """Say how many targets the arm reaches, and how they were solved."""
+    count, reached = len(result), int(result.reached.sum())
+    number = counted(count, "target") if reached == count else f"{reached} of {counted(count, 'target')}"
+    said = f"{result.name}: {result.robot.name} reaches {number} ({method_words(result.method)})"
+    if result.path is None:
+        return said
+    jumps, fast = len(result.path.jumps), len(result.path.too_fast)
+    others = [counted(jumps, "jump")] * bool(jumps) + [f"{counted(fast, 'joint')} too fast"] * bool(fast)
+    return f"{said}, with {enumerated(others)}" if others else said
+
+
+def unreached(result: InverseResult, *, every: bool) -> Iterator[str]:
+    """Yield why targets have no solution, and, if all branches are asked for, why single branches have none.
+
+    Rows that follow each other for one reason are one line.
+    """
+    reasons = [reason or "" for reason in result.reasons]
+    start = 0
+    for end in range(1, len(reasons) + 1):
+        if end == len(reasons) or reasons[end] != reasons[start]:
+            if reasons[start]:
+                yield f"{rows_text(result.row[start:end])} not reached: {reasons[start]}"
+            elif every and result.method != "iterative":
+                yield from _branches_unreached(result, start, end)
+            start = end
+
+
+def _branches_unreached(result: InverseResult, start: int, end: int) -> Iterator[str]:
+    """Yield why branches of targets that others reach have no solution."""
+    for index in range(start, end):
+        found: dict[str, list[str]] = {}
+        for branch, reason in zip(result.solutions.branches, result.solutions.reasons[index], strict=True):
+            if reason:
+                found.setdefault(reason, []).append(branch)
+        for reason, branches in found.items():
+            yield f"{rows_text(result.row[index : index + 1])}: not {'; '.join(branches)}: {reason}"
+
+
+def singular_warnings(solutions: Solutions, row: IntArray, listed: BoolArray) -> Iterator[LogWarning]:
+    """Yield one warning for each family of singular poses: what is infinite there, and what was chosen.
+
+    Args:
+        solutions: What was found.
+        row: Data row of each target.
+        listed: True of the solutions that a person is shown, shape (n, k).
+    """
+    for one in solutions.singular:
+        rows = row[(one.where & listed & solutions.reached).any(axis=1)]
+        if len(rows):
+            said = f"{one.free}; chosen: {one.chosen}" if one.free else "a direction of motion is lost there"
+            yield LogWarning("singular", f"{rows_text(rows)}: {one.family}: {said}")
+
+
+def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarning]:
+    """Yield a warning of the targets that the tool only comes near to."""
+    short = np.asarray(np.where(solutions.reached, solutions.shortfall, 0.0)).max(axis=1)
+    if short.any():
+        worst = int(np.argmax(short))
+        said = (
+            f"{rows_text(row[short > 0.0])}: out of reach, the nearest point is taken (--tolerance): up to"
+            f" {1e3 * short[worst]:.4g} mm away, in row {row[worst]}"
+        )
+        yield LogWarning("nearest-point", said)
+
+
+def far_warnings(chain: Chain, targets: Targets, row: IntArray, reached: BoolArray) -> Iterator[LogWarning]:
+    """Yield a warning of targets that are far out of reach, and would not be if they were in mm."""
+    reach = longest(chain)
+    away = np.linalg.norm(targets.position - np.asarray(chain.base.translation, dtype=float), axis=1)
+    with np.errstate(invalid="ignore"):
+        far = ~reached & (away > FAR * reach) & (MILLI * away <= reach)
+    if far.any():
+        said = (
+            f"{rows_text(row[far])}: up to {away[far].max():.6g} m from the base, while {chain.name} reaches"
+            f" no farther than {reach:.4g} m; in mm? --unit x=mm --unit y=mm --unit z=mm"
+        )
+        yield LogWarning("too-far", said)
+
+
+def longest(chain: Chain) -> float:
+    """Return what the tool centre point is away from the base at most, in [m]: all lengths in one line."""
+    frames = [*(joint.origin for joint in chain.joints), chain.tip, chain.tool]
+    slides = [max(abs(joint.lower), abs(joint.upper)) for joint in chain.moving if joint.kind == "prismatic"]
+    return float(sum(np.linalg.norm(frame.translation) for frame in frames)) + sum(slides)

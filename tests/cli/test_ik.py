@@ -1,0 +1,367 @@
+"""`urmpipe ik` as a user runs it: targets and paths in; a table, JSON, a joint log or a recording out."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from urmpipe.main import run
+from urmpipe_datasets import LOGS
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.inverse.targets import misses, targets_of
+from urmpipe_models.orientation import quaternions
+from urmpipe_pipeline.ingest import ingest_log
+from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.results import Run
+
+FloatArray = NDArray[np.float64]
+Captured = pytest.CaptureFixture[str]
+
+HALF_PI = "1.5707963267948966"
+DEFAULT = f"-0.069,0,0.112,0.7853981633974483,-{HALF_PI},-0.7853981633974483\n"
+"""The default position of the 2019 paper, where theta5 = 0 in one of its solutions."""
+
+PRINTED = """
+-3.1416 -1.1547 -0.4276  3.1416  1.5593  0
+-3.1416 -1.1547 -0.4276  0      -1.5593  3.1416
+-3.1416  1.7113  0.7329  0       0.6974  3.1416
+-3.1416  1.7113  0.7329 -3.1416 -0.6974  0
+ 0       0       0       0       0       0
+ 0       4.0689  0.3053  0       1.9090  0
+ 0       4.0689  0.3053  3.1416 -1.9090  3.1416
+"""
+"""Its solutions as the paper prints them, without the one at theta5 = 0 that is not one (see errata)."""
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """The working folder, with targets of arm6: the default position, one out of reach, one that is none."""
+    rows = [DEFAULT, "2,0,0.1,0,0,0\n", "nan,0,0.3,0,0,0\n", "0,0,0.3,0,0,0\n"]
+    (tmp_path / "targets.csv").write_text("x,y,z,rz,ry,rx\n" + "".join(rows))
+    (tmp_path / "default.csv").write_text("x,y,z,rz,ry,rx\n" + DEFAULT)
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+def answer(capsys: Captured, code: int, *arguments: str | Path) -> dict[str, Any]:
+    """Return what a command prints as JSON."""
+    assert run(["ik", *map(str, arguments), "--json"]) == code
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def turned(angles: FloatArray) -> FloatArray:
+    """Return angles within -pi to pi."""
+    return np.asarray(angles - 2 * np.pi * np.round(angles / (2 * np.pi)))
+
+
+def write_path(path: Path, robot: str, q: FloatArray, period: float = 0.01) -> None:
+    """Write the poses of joint values as a path of poses."""
+    targets = targets_of(load_robot(robot), q)
+    assert targets.rotation is not None
+    quat = quaternions(targets.rotation.reshape(-1, 9), "matrix")
+    table = np.column_stack([period * np.arange(len(q)), targets.position, quat])
+    np.savetxt(path, table, delimiter=",", header="t,x,y,z,qx,qy,qz,qw", comments="", fmt="%.16g")
+
+
+# --- targets -----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("options", [(), ("--all",)])
+def test_json_lists_all_eight_solutions_of_the_papers_default_position(
+    capsys: Captured, options: tuple[str, ...]
+) -> None:
+    found = answer(capsys, 0, "default.csv", "--robot", "arm6", *options)
+    assert (found["schema"], found["method"], found["verdict"]) == (1, "spherical wrist", "pass")
+    (target,) = found["targets"]
+    assert (target["row"], target["reason"]) == (1, None)
+    assert target["singular"] == ["wrist aligned"]
+    solutions = np.array([one["q"] for one in target["solutions"]])
+    assert len(solutions) == 8
+    assert len({one["branch"] for one in target["solutions"]}) == 8
+    assert max(one["miss"] for one in target["solutions"]) < 1e-12
+    assert max(one["angle"] for one in target["solutions"]) < 1e-12
+    printed = np.array([line.split() for line in PRINTED.split("\n") if line], dtype=float)
+    away = np.abs(turned(solutions[None] - printed[:, None])).max(axis=2)
+    assert (away.min(axis=1) < 1e-4).all()  # the paper prints four digits
+    assert target["nearest"] == int(np.argmin(np.abs(solutions).sum(axis=1)))
+
+
+def test_one_bad_row_does_not_stop_the_others(capsys: Captured) -> None:
+    found = answer(capsys, 1, "targets.csv", "--robot", "arm6")
+    assert (found["verdict"], found["reached"]) == ("fail", 2)
+    assert [one["row"] for one in found["targets"]] == [1, 2, 3, 4]
+    assert [len(one["solutions"]) for one in found["targets"]] == [8, 0, 0, 8]
+    reasons = [one["reason"] for one in found["targets"]]
+    assert reasons[0] is None
+    assert reasons[3] is None
+    assert reasons[2] == "column x: found no number, allowed: a finite number"
+    assert "allowed: " in reasons[1]
+
+
+def test_the_table_has_the_solution_nearest_to_the_start_and_tells_why_others_are_not_reached(
+    capsys: Captured,
+) -> None:
+    assert run(["ik", "targets.csv", "--robot", "arm6"]) == 1
+    out, err = capsys.readouterr()
+    lines = out.splitlines()
+    assert lines[0] == "FAIL  targets: arm6 reaches 2 of 4 targets (closed form: spherical wrist)"
+    first = next(line for line in lines if line.startswith("1 "))
+    assert first.split()[-8:-2] == ["0.0000"] * 6
+    assert lines[-1] == "row 3 not reached: column x: found no number, allowed: a finite number"
+    assert lines[-2].startswith("row 2 not reached: ")
+    warnings = err.splitlines()
+    assert any(line.startswith("warning: row 1: wrist aligned: theta4 and theta6: ") for line in warnings)
+
+
+def test_all_prints_every_solution_and_start_chooses(capsys: Captured) -> None:
+    assert run(["ik", "default.csv", "--robot", "arm6", "--all"]) == 0
+    rows = [line for line in capsys.readouterr().out.splitlines() if line.startswith("1 ")]
+    assert len(rows) == 8
+    assert run(["ik", "default.csv", "--robot", "arm6", "--start", "3.1,1.7,0.7,0,0.7,3.1"]) == 0
+    (row,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("1 ")]
+    assert np.allclose(
+        np.array(row.split()[-8:-2], float), [180, 98.0503, 41.9932, 0, 39.9565, 180], atol=1e-4
+    )
+
+
+def test_quiet_prints_nothing(capsys: Captured) -> None:
+    assert run(["ik", "targets.csv", "--robot", "arm6", "-q"]) == 1
+    assert capsys.readouterr() == ("", "")
+
+
+def test_strict_makes_a_choice_an_error_and_writes_nothing(capsys: Captured, folder: Path) -> None:
+    before = sorted(folder.iterdir())
+    assert run(["ik", "default.csv", "--robot", "arm6", "--strict", "-o", "log.csv"]) == 2
+    err = capsys.readouterr().err
+    assert err.startswith("error: singular: row 1: wrist aligned: ")
+    assert err.endswith(" (--strict)\n")
+    assert sorted(folder.iterdir()) == before
+
+
+def test_a_target_just_out_of_reach_takes_the_nearest_point_within_the_tolerance(
+    capsys: Captured, folder: Path
+) -> None:
+    (folder / "high.csv").write_text("x,y,z\n-0.03,0,0.374\n")
+    assert run(["ik", "high.csv", "--robot", "arm6"]) == 1
+    capsys.readouterr()
+    found = answer(capsys, 0, "high.csv", "--robot", "arm6", "--tolerance", "3.5mm")
+    (solution,) = found["targets"][0]["solutions"]
+    assert 1e-3 < solution["miss"] < 3.5e-3
+    (warning,) = [one for one in found["warnings"] if one["kind"] == "nearest-point"]
+    assert warning["message"].startswith(
+        "row 1: out of reach, the nearest point is taken (--tolerance): up to "
+    )
+
+
+def test_an_iterative_arm_lists_what_restarts_collect(capsys: Captured, folder: Path) -> None:
+    arm = load_robot("urm6")
+    q = np.array([[0.3, 2.9, -0.4, 3.3, 0.2, 2.8]])
+    write_path(folder / "one.csv", "urm6", q)
+    text = (folder / "one.csv").read_text().splitlines()
+    (folder / "one.csv").write_text("\n".join(line.partition(",")[2] for line in text) + "\n")
+    one = answer(capsys, 0, "one.csv", "--robot", "urm6")
+    every = answer(capsys, 0, "one.csv", "--robot", "urm6", "--all")
+    again = answer(capsys, 0, "one.csv", "--robot", "urm6", "--all")
+    assert one["method"] == every["method"] == "iterative"
+    assert len(one["targets"][0]["solutions"]) == 1
+    solutions = np.array([found["q"] for found in every["targets"][0]["solutions"]])
+    assert len(solutions) > 1
+    position, turn = misses(arm, solutions, targets_of(arm, np.repeat(q, len(solutions), axis=0)))
+    assert np.abs(position).max() < 1e-9
+    assert np.abs(turn).max() < 1e-9
+    assert again == every
+
+
+# --- outputs -----------------------------------------------------------------------------------------
+
+
+def test_a_joint_log_is_what_ingest_reads(capsys: Captured, folder: Path) -> None:
+    q = np.array([0.1, -0.9, 1.2, -0.5, 0.7, 0.2]) + 0.3 * np.sin(
+        np.outer(np.arange(60) / 60, np.arange(1, 7))
+    )
+    write_path(folder / "path.csv", "ur5e", q)
+    start = ",".join(map(str, q[0]))
+    assert run(["ik", "path.csv", "--robot", "ur5e", "--start", start, "-o", "log.csv"]) == 0
+    out = capsys.readouterr().out
+    assert out.splitlines()[0] == "PASS  path: ur5e reaches 60 targets (closed form: three parallel axes)"
+    assert out.splitlines()[-1] == "Joints: log.csv  (read it: urmpipe ingest log.csv --robot ur5e)"
+    log = ingest_log([folder / "log.csv"], robot=load_robot("ur5e")).log
+    assert log.joints == load_robot("ur5e").coordinates
+    assert np.array_equal(log.t_ns, 10_000_000 * np.arange(60))
+    assert np.abs(log.q - q).max() < 1e-9  # the poses stand in the file with 16 digits
+    assert run(["ik", "path.csv", "--robot", "ur5e", "-o", "log.csv", "-q"]) == 0  # one of ours is replaced
+
+
+def test_targets_without_solution_are_left_out_of_a_log_and_nothing_at_all_is_not_written(
+    capsys: Captured, folder: Path
+) -> None:
+    assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "log.csv", "-q"]) == 1
+    table = np.genfromtxt(folder / "log.csv", delimiter=",", names=True)
+    assert table["urmpipe_target_row"].tolist() == [1, 4]
+    (folder / "far.csv").write_text("x,y,z,rz,ry,rx\n2,0,0.1,0,0,0\n")
+    assert run(["ik", "far.csv", "--robot", "arm6", "-o", "far-log.csv"]) == 1
+    out, err = capsys.readouterr()
+    assert "row 1 not reached: " in out
+    assert err == "warning: far-log.csv is not written: no target was reached\n"
+    assert not (folder / "far-log.csv").exists()
+
+
+def test_a_recording_shows_the_solution_and_every_other_branch_as_a_ghost(
+    capsys: Captured, folder: Path
+) -> None:
+    assert run(["ik", "targets.csv", "--robot", "arm6", "--all", "-o", "targets.rrd"]) == 1
+    assert "Recording: targets.rrd" in capsys.readouterr().out
+    made = read_recording(folder / "targets.rrd")
+    assert isinstance(made, Run)
+    assert np.isfinite(made.q).all(axis=1).tolist() == [True, False, False, True]
+    assert len(made.ghosts) == 8
+    found = answer(capsys, 1, "targets.csv", "--robot", "arm6")
+    for target, t in ((0, 0), (3, 3_000_000_000)):
+        listed = {one["branch"]: one["q"] for one in found["targets"][target]["solutions"]}
+        shown = {one.name: one.q[one.t_ns == t][0].tolist() for one in made.ghosts if t in one.t_ns}
+        assert len(shown) == 7
+        assert all(listed[name] == q for name, q in shown.items())
+    assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "targets.rrd", "-q"]) == 1
+    alone = read_recording(folder / "targets.rrd")
+    assert isinstance(alone, Run)
+    assert not alone.ghosts
+
+
+def test_all_of_a_path_records_the_branches_that_run_beside_it(capsys: Captured, folder: Path) -> None:
+    q = np.array([0.3, 0.8, -0.6, 0.5, 0.7, 0.2]) + 0.2 * np.sin(
+        np.outer(np.arange(40) / 40, np.arange(1, 7))
+    )
+    write_path(folder / "path.csv", "arm6", q)
+    start = ",".join(map(str, q[0]))
+    assert run(["ik", "path.csv", "--robot", "arm6", "--start", start, "--all", "-o", "path.rrd"]) == 0
+    made = read_recording(folder / "path.rrd")
+    assert isinstance(made, Run)
+    assert np.abs(made.q - q).max() < 1e-9
+    assert {len(one.t_ns) for one in made.ghosts} == {40}
+    arm, targets = load_robot("arm6"), targets_of(load_robot("arm6"), q)
+    for ghost in made.ghosts:
+        position, turn = misses(arm, ghost.q, targets)
+        assert np.abs(position).max() < 1e-10
+        assert np.abs(turn).max() < 1e-10
+
+
+def test_an_output_that_is_not_ours_or_is_an_input_is_never_replaced(capsys: Captured, folder: Path) -> None:
+    before = (folder / "targets.csv").read_bytes()
+    assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "targets.csv"]) == 2
+    assert capsys.readouterr().err == (
+        "error: targets.csv: found an input of this command, allowed: any other name for the joint log\n"
+    )
+    assert (folder / "targets.csv").read_bytes() == before
+    (folder / "mine.csv").write_text("precious\n")
+    assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "mine.csv"]) == 2
+    assert capsys.readouterr().err == (
+        "error: mine.csv: found a file that is no joint log of urmpipe's, allowed: a new name, or such a"
+        " joint log to replace\n"
+    )
+    assert (folder / "mine.csv").read_text() == "precious\n"
+
+
+# --- paths -------------------------------------------------------------------------------------------
+
+
+def test_a_path_has_a_summary_and_one_solution_a_row_in_json(capsys: Captured, folder: Path) -> None:
+    q = np.array([0.3, 0.8, -0.6, 0.5, 0.7, 0.2]) + 0.2 * np.sin(
+        np.outer(np.arange(40) / 40, np.arange(1, 7))
+    )
+    write_path(folder / "path.csv", "arm6", q)
+    start = ",".join(map(str, q[0]))
+    assert run(["ik", "path.csv", "--robot", "arm6", "--start", start]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == "PASS  path: arm6 reaches 40 targets (closed form: spherical wrist)"
+    assert lines[1].startswith("      branch: ")
+    assert lines[2].startswith("      nearest to a singularity at t = 0.")
+    assert lines[3].startswith("      off by ")
+    found = answer(capsys, 0, "path.csv", "--robot", "arm6", "--start", start)
+    assert (found["jumps"], found["too_fast"]) == ([], [])
+    solved = np.array([one["solutions"][0]["q"] for one in found["targets"]])
+    assert np.abs(solved - q).max() < 1e-9
+    assert [one["t"] for one in found["targets"]] == pytest.approx(0.01 * np.arange(40), abs=1e-12)
+
+
+def test_a_period_makes_a_path_of_targets_without_times(capsys: Captured, folder: Path) -> None:
+    (folder / "line.csv").write_text("x,y,z\n" + "".join(f"0.2,{0.001 * k},1.0\n" for k in range(20)))
+    found = answer(capsys, 0, "line.csv", "--robot", "urm6", "--tsp", "5ms")
+    assert [one["t"] for one in found["targets"]] == pytest.approx(0.005 * np.arange(20), abs=1e-12)
+    assert "jumps" in found
+    alone = answer(capsys, 0, "line.csv", "--robot", "urm6")
+    assert "jumps" not in alone
+    assert "t" not in alone["targets"][0]
+
+
+def test_a_joint_that_is_too_fast_fails_the_path(capsys: Captured, folder: Path) -> None:
+    q = np.tile([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], (30, 1))
+    q[:, 0] += 0.05 * np.arange(30)  # 5 rad/s at 10 ms; the arm's first joint is allowed 3.14
+    write_path(folder / "path.csv", "ur5e", q)
+    start = ",".join(map(str, q[0]))
+    found = answer(capsys, 1, "path.csv", "--robot", "ur5e", "--start", start)
+    assert found["reached"] == 30
+    (fast,) = found["too_fast"]
+    assert (fast["row"], fast["last_row"]) == (1, 30)
+    assert fast["joint"] == load_robot("ur5e").coordinates[0]
+    assert fast["speed"] == pytest.approx(5.0, abs=1e-6)
+    assert run(["ik", "path.csv", "--robot", "ur5e", "--start", start]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == (
+        "FAIL  path: ur5e reaches 30 targets (closed form: three parallel axes), with 1 joint too fast"
+    )
+    joint = fast["joint"]
+    assert (
+        f"      {joint} too fast: 286.5 deg/s of 180 deg/s allowed, at t = 0.000 s (row 1) to row 30" in lines
+    )
+
+
+def test_all_of_a_path_needs_a_recording_and_a_closed_form(capsys: Captured, folder: Path) -> None:
+    assert run(["ik", "default.csv", "--robot", "arm6", "--tsp", "1", "--all"]) == 2
+    assert capsys.readouterr().err == (
+        "error: --all: found with a path and no recording, allowed: with -o RUN.rrd, where every branch is a"
+        " ghost arm; or with targets without times\n"
+    )
+    assert run(["ik", "default.csv", "--robot", "urm6", "--tsp", "1", "--all", "-o", "a.rrd"]) == 2
+    assert capsys.readouterr().err == (
+        "error: --all: found with a path of urm6 that has no closed form, allowed: with poses and an arm that"
+        " has a closed form, whose branches run along the path; or with targets without times\n"
+    )
+
+
+@pytest.mark.slow
+def test_the_demo_path_solved_for_urm6_passes_against_itself(
+    urmpipe: Callable[..., Any], folder: Path
+) -> None:
+    ran = urmpipe("ik", LOGS / "path.csv", "--robot", "urm6", "-o", "log.csv")
+    assert ran.code == 0, ran.err
+    assert ran.out.startswith("PASS  path: urm6 reaches 7383 targets (iterative)\n")
+    ran = urmpipe(
+        "compare", LOGS / "path.csv", "log.csv", "--robot", "urm6", "--tolerance", "0.0035", "--json"
+    )
+    assert ran.code == 0, ran.err
+    found = json.loads(ran.out)
+    assert found["verdict"] == "pass"
+    assert found["runs"][0]["delta"]["norm"]["max"] < 1e-8
+
+
+# --- defaults ----------------------------------------------------------------------------------------
+
+
+def test_a_labs_defaults(capsys: Captured, folder: Path) -> None:
+    (folder / "urmpipe.toml").write_text(
+        'robot = "arm6"\ntolerance = {axis = "2mm", angle = "0.5deg"}\n[ik]\nseed = 3\n'
+    )
+    assert run(["ik", "default.csv"]) == 0
+    assert capsys.readouterr().err.startswith(
+        f"defaults of {folder}/urmpipe.toml: robot=arm6, tolerance=axis=2mm,angle=0.5deg, seed=3\n"
+    )
+    (folder / "urmpipe.toml").write_text('robot = "arm6"\n[ik]\nall = true\noutput = "x.csv"\n')
+    assert run(["ik", "default.csv"]) == 2
+    assert "key ik.output: unknown" in capsys.readouterr().err
