@@ -12,8 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe.chain_drawing import chain_text
+from urmpipe.inverse_wording import method_words
 from urmpipe.printing import new_console, new_table
 from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.inverse.closed_form import closed_form
 from urmpipe_models.kinematics import forward, points_over_log
 from urmpipe_models.robot_file import chain_to_dict
 from urmpipe_models.transform import Transform, euler_zyx, rpy_of
@@ -42,6 +44,12 @@ class PosedChain:
     skeleton: NDArray[np.float64]
 
     @property
+    def inverse(self) -> str:
+        """What makes its inverse a closed form, such as "spherical wrist"; "iterative" without one."""
+        form = closed_form(self.chain)
+        return "iterative" if form is None else form.name
+
+    @property
     def title(self) -> str:
         """The robot's name, and what it is if that is known."""
         return ": ".join(filter(None, (self.chain.name, self.chain.description)))
@@ -56,7 +64,7 @@ class PosedChain:
         described = chain_to_dict(self.chain)
         return {
             "schema": 1, **described, "coordinates": list(self.chain.coordinates), "q": list(self.q),
-            "points": points,
+            "points": points, "inverse": self.inverse,
         }  # fmt: skip
 
 
@@ -82,6 +90,7 @@ def print_chain(posed: PosedChain) -> None:
     console.print(posed.title, soft_wrap=True)
     if chain.source:
         console.print(f"Source: {chain.source}", soft_wrap=True)
+    console.print(f"Inverse: {method_words(posed.inverse)}", soft_wrap=True)
     console.print(_parameters(posed))
     console.print(_points(posed))
     console.print(
