@@ -251,8 +251,8 @@ def log_options(command: Command) -> Command:
             help="What the joints are limited to, in their own unit [default: by the wraps].",
         ),
         click.option("--period", type=DURATION, help="Period of a log without a time column [default: 5ms]."),
-        click.option("--joints", type=NamesType(), help="The joint columns, in the robot's order."),
         table_options,
+        click.option("--joints", type=NamesType(), help="The joint columns, in the robot's order."),
         click.option("--source", metavar="NAME", help="Who wrote the log: coppeliasim, solidworks, ..."),
     ):
         command = option(command)
