@@ -96,24 +96,47 @@ class ParallelAxes:
             targets: Poses.
             near: Joint values in [rad], shape (joints,) or (n, joints), taken where a joint is free.
         """
-        wish = None if near is None else np.broadcast_to(np.atleast_2d(near), (len(targets), 6)).T
+        wish = np.broadcast_to(np.atleast_2d(np.zeros(6) if near is None else near), (len(targets), 6)).T
         with np.errstate(invalid="ignore", divide="ignore"):
             motion = self.arm.to_frame @ _pose(targets) @ self.arm.from_tip
-            outer = outer_joints(self.arm, motion, None if wish is None else wish[0])
-            wrist = _wrist(self.arm, outer, motion, None if wish is None else wish[5])
-            links = _links(self.arm, wrist.place, outer.side, None if wish is None else wish[1])
+            outer = outer_joints(self.arm, motion, wish[0])
+            wrist = _wrist(self.arm, outer, motion, wish[5])
+            links = _links(self.arm, wrist.place, outer.side, wish[1])
         q4 = wrist.phi - links.q2 - links.q3
         joints = np.broadcast_arrays(outer.q1, links.q2, links.q3, q4, outer.q5, wrist.q6)
         signs = np.array((1.0, *self.arm.signs, 1.0, 1.0))
         q = wrapped(_by_target(np.stack(joints, axis=-1)) * signs)
         reached = np.asarray(np.isfinite(q).all(axis=2))
-        families = (*outer.singular, *_wrist_families(self.names, wrist.free, near), *links.singular)
+        families = self._families(outer, wrist, links, near is None)
         spread = [replace(one, where=_by_target(_like(one.where, q4)) & reached) for one in families]
         return Solutions(
             np.where(reached[..., None], q, np.nan),
             self.branches,
             _by_target(_like(outer.reasons, q4) + links.reasons),
             tuple(one for one in spread if one.where.any()),
+        )
+
+    def _families(
+        self, outer: OuterJoints, wrist: _Wrist, links: _Links, at_zero: bool
+    ) -> tuple[Singular, ...]:
+        """Return the families of singular poses, and what is free there."""
+        q1, q2, q3, q4, _, q6 = self.names
+        zero, start = (
+            ("{} = 0", ", and pi where {}") if at_zero else ("{} of the start", ", and pi more where {}")
+        )
+        flips = start.format("flipped") + ", or the nearest value in reach"
+        return (
+            Singular("wrist on axis 1", outer.free, q1, zero.format(q1) + start.format("left")),
+            *outer.singular,
+            Singular(
+                "wrist aligned",
+                wrist.free,
+                f"{q6}, which {q2}, {q3} and {q4} follow",
+                zero.format(q6) + flips,
+            ),
+            Singular("arm stretched", links.stretched),
+            Singular("arm withdrawn", links.withdrawn & ~links.free),
+            Singular("arm withdrawn", links.free, q2, zero.format(q2)),
         )
 
 
@@ -134,7 +157,7 @@ class _Wrist:
     free: BoolArray
 
 
-def _wrist(arm: ParallelGeometry, outer: OuterJoints, motion: Transform, near: FloatArray | None) -> _Wrist:
+def _wrist(arm: ParallelGeometry, outer: OuterJoints, motion: Transform, near: FloatArray) -> _Wrist:
     """Return q6 and the motion P in the plane that q1 and q5 leave.
 
     R6 takes R_M^T z to R5^T z with M = exp(-xi_1 q1) G. Where axis 6 is along z, both are along axis 6 and
@@ -151,7 +174,7 @@ def _wrist(arm: ParallelGeometry, outer: OuterJoints, motion: Transform, near: F
     held = turn5.inverse().point(arm.p4)
     free = sine <= REACH
     if (sine <= NEARLY_ALIGNED).any():
-        wish = np.where(outer.flip, np.pi, 0.0)[:, None] + (0.0 if near is None else near)
+        wish = np.where(outer.flip, np.pi, 0.0)[:, None] + near
         wish = np.where(free, wish, q6)
         reaching = _in_reach(arm, rest, held, wish)
         loose = (sine <= NEARLY_ALIGNED) & (sine * np.abs(reaching - wish) <= np.where(free, np.inf, REACH))
@@ -181,7 +204,7 @@ def _in_reach(arm: ParallelGeometry, rest: Transform, held: Vector, wish: FloatA
     cosine = np.cos(away)
     allowed = np.clip(cosine, least, most)
     moved = wish + np.copysign(np.arccos(np.clip(allowed, -1.0, 1.0)), away) - away
-    return np.where((allowed == cosine) | (np.abs(allowed) > 1.0), wish, moved)
+    return np.where((allowed == cosine) | (np.abs(allowed) > 1.0 + REACH), wish, moved)
 
 
 @dataclass(frozen=True, slots=True)
@@ -191,18 +214,22 @@ class _Links:
     Attributes:
         q2: In [rad].
         q3: In [rad].
-        reasons: Why there are none, shape (2, a, b, n).
-        singular: Arm stretched, arm withdrawn.
+        reasons: Why there are none.
+        stretched: Where both elbows are one, the links stretched.
+        withdrawn: The same, one link folded back on the other.
+        free: Where axis 4 is on axis 2, which leaves q2 free.
     """
 
     q2: FloatArray
     q3: FloatArray
     reasons: TextArray
-    singular: tuple[Singular, ...]
+    stretched: BoolArray
+    withdrawn: BoolArray
+    free: BoolArray
 
 
 def _links(
-    arm: ParallelGeometry, place: tuple[FloatArray, FloatArray], side: FloatArray, near: FloatArray | None
+    arm: ParallelGeometry, place: tuple[FloatArray, FloatArray], side: FloatArray, near: FloatArray
 ) -> _Links:
     """Return q2 and q3 that bring the point p4 to a place in the plane.
 
@@ -223,33 +250,19 @@ def _links(
     free = reached & (r <= REACH * arm.size)
     to_place = np.arctan2(place[1], place[0])
     bend = np.arctan2(fore * np.sin(psi), upper + fore * np.cos(psi))
-    q2 = np.where(free, 0.0 if near is None else near * arm.signs[0], to_place - first - bend)
+    q2 = np.where(free, near * arm.signs[0], to_place - first - bend)
     reasons = texts_where(
         ~reached & np.isfinite(r),
         f"axis 4 is {{:.4g}} m from axis 2, allowed: {short:.4g} to {long:.4g} m",
         r,
     )
-    singular = (
-        Singular("arm stretched", stretched & reached),
-        Singular("arm withdrawn", withdrawn & reached & ~free),
-        Singular("arm withdrawn", free, "q2", "q2 = 0"),
-    )
-    return _Links(q2 + np.zeros_like(psi), psi - (second - first), _like(reasons, psi), singular)
-
-
-def _wrist_families(names: tuple[str, ...], free: BoolArray, near: FloatArray | None) -> tuple[Singular, ...]:
-    """Return the family of poses in which axis 6 is parallel to axes 2, 3 and 4."""
-    _, q2, q3, q4, _, q6 = names
-    chosen = (
-        f"{q6} = 0, and pi where flipped" if near is None else f"{q6} of the start, and pi more where flipped"
-    )
-    return (
-        Singular(
-            "wrist aligned",
-            free,
-            f"{q6}, which {q2}, {q3} and {q4} follow",
-            f"{chosen}, or the nearest value in reach",
-        ),
+    return _Links(
+        q2 + np.zeros_like(psi),
+        psi - (second - first),
+        _like(reasons, psi),
+        stretched & reached,
+        withdrawn & reached,
+        free,
     )
 
 
