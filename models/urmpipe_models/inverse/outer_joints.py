@@ -105,7 +105,7 @@ def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> Oute
     )
     singular = (
         Singular("wrist beside axis 1", _everywhere(meet & ~free, q5)),
-        Singular("wrist aligned", folded & (np.sin(theta) > REACH)),
+        Singular("flips meet", folded & (np.sin(theta) > REACH)),
     )
     side = np.broadcast_to(np.array([1.0, -1.0])[:, None, None], q1.shape)
     return OuterJoints(q1, q5, side, np.array([False, True]), reasons, free, singular)
@@ -168,7 +168,10 @@ def _parallel(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
         np.abs(height),
         np.full_like(height, reach),
     )
-    singular = (Singular("branches meet", _everywhere(meet, q5) | np.broadcast_to(fold, q5.shape)),)
+    singular = (
+        Singular("postures meet", _everywhere(meet, q5)),
+        Singular("flips meet", np.broadcast_to(fold, q5.shape)),
+    )
     side = np.broadcast_to(np.array([1.0, -1.0])[:, None, None], q1.shape)
     return OuterJoints(q1, q5, side, np.array([False, True]), reasons, np.zeros(len(r), dtype=bool), singular)
 
@@ -212,7 +215,7 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     near = np.diff(q1, axis=0) < NEAR_ROOTS
     meet[1:] |= near
     meet[:-1] |= near
-    singular = (Singular("branches meet", meet),)
+    singular = (Singular("postures meet", meet),)
     return OuterJoints(
         q1,
         q5,

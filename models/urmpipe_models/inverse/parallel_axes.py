@@ -16,6 +16,7 @@ Source: [EliasWen2022]_ for the case; the steps are ours.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,9 @@ from urmpipe_models.transform import Transform, rotation_about
 
 NEARLY_ALIGNED = 1e-5
 """Axis 6 nearer to parallel to axis 4 than this, in [rad], leaves q6 too uncertain for the reach of p4."""
+
+ONE = 1e-9
+"""Two solutions of a singular pose that differ by less than this in every joint, in [rad], are one."""
 
 ELBOWS = ("elbow up", "elbow down")
 
@@ -105,38 +109,43 @@ class ParallelAxes:
         q4 = wrist.phi - links.q2 - links.q3
         joints = np.broadcast_arrays(outer.q1, links.q2, links.q3, q4, outer.q5, wrist.q6)
         signs = np.array((1.0, *self.arm.signs, 1.0, 1.0))
-        q = wrapped(_by_target(np.stack(joints, axis=-1)) * signs)
+        q = wrapped(_by_target(np.stack(joints, axis=-1)) * signs) + 0.0  # no -0.0
+        reasons = _by_target(_like(outer.reasons, q4) + links.reasons)
+        families = [
+            replace(one, where=_by_target(_like(one.where, q4)))
+            for one in self._families(outer, wrist, links, near is None)
+        ]
+        _tell_once(q, reasons, self.branches, [one.where for one in families])
         reached = np.asarray(np.isfinite(q).all(axis=2))
-        families = self._families(outer, wrist, links, near is None)
-        spread = [replace(one, where=_by_target(_like(one.where, q4)) & reached) for one in families]
-        return Solutions(
-            np.where(reached[..., None], q, np.nan),
-            self.branches,
-            _by_target(_like(outer.reasons, q4) + links.reasons),
-            tuple(one for one in spread if one.where.any()),
-        )
+        q[~reached] = np.nan
+        spread = (replace(one, where=one.where & reached) for one in families)
+        singular = tuple(one for one in spread if one.where.any())
+        return Solutions(q, self.branches, reasons, singular)
 
     def _families(
         self, outer: OuterJoints, wrist: _Wrist, links: _Links, at_zero: bool
     ) -> tuple[Singular, ...]:
         """Return the families of singular poses, and what is free there."""
         q1, q2, q3, q4, _, q6 = self.names
-        zero, start = (
-            ("{} = 0", ", and pi where {}") if at_zero else ("{} of the start", ", and pi more where {}")
-        )
-        flips = start.format("flipped") + ", or the nearest value in reach"
+        taken = "= 0" if at_zero else "as near"
+        flipped = f"{q6} {taken}, and pi more for the flipped wrist, or the nearest value in reach"
         return (
-            Singular("wrist on axis 1", outer.free, q1, zero.format(q1) + start.format("left")),
+            Singular(
+                "wrist on axis 1",
+                outer.free,
+                f"{q1}: any value",
+                f"{q1} {taken}, and pi more for the left arm",
+            ),
             *outer.singular,
             Singular(
                 "wrist aligned",
                 wrist.free,
-                f"{q6}, which {q2}, {q3} and {q4} follow",
-                zero.format(q6) + flips,
+                f"{q6}: any value in reach, and {q2}, {q3}, {q4} with it",
+                flipped,
             ),
             Singular("arm stretched", links.stretched),
             Singular("arm withdrawn", links.withdrawn & ~links.free),
-            Singular("arm withdrawn", links.free, q2, zero.format(q2)),
+            Singular("arm withdrawn", links.free, f"{q2}: any value", f"{q2} {taken}"),
         )
 
 
@@ -264,6 +273,22 @@ def _links(
         withdrawn & reached,
         free,
     )
+
+
+def _tell_once(q: FloatArray, reasons: TextArray, branches: tuple[str, ...], where: list[BoolArray]) -> None:
+    """Take out of the solutions of singular poses the second of two that are one, such as a stretched elbow.
+
+    Args:
+        q: Solutions in [rad], shape (n, k, 6); the second ones become NaN.
+        reasons: Why there is none, shape (n, k); the second ones name the first.
+        branches: What the k are called.
+        where: Where they are singular, each of shape (n, k).
+    """
+    rows = np.flatnonzero(np.any(where, axis=0).any(axis=1))
+    for first, second in combinations(range(len(branches)), 2):
+        same = np.abs(wrapped(q[rows, first] - q[rows, second])).max(axis=1) < ONE
+        q[rows[same], second] = np.nan
+        reasons[rows[same], second] = f"the same as {branches[first]}: both meet here"
 
 
 def _lengths(arm: ParallelGeometry) -> tuple[float, float]:
