@@ -25,17 +25,16 @@ from numpy.typing import NDArray
 from urmpipe_models.elementwise import Element, Vector, cross, dot, scale, subtract
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.outer_joints import (
-    EDGE,
     REACH,
     OuterJoints,
     outer_joints,
     outer_names,
-    texts_where,
 )
 from urmpipe_models.inverse.parallel_geometry import ParallelGeometry, parallel_geometry
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Singular, Solutions, TextArray
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.trigonometric import wrapped
+from urmpipe_models.inverse.two_links import TwoLinks, link_lengths, two_links
 from urmpipe_models.screws import Screws
 from urmpipe_models.transform import Transform, rotation_about
 
@@ -105,12 +104,12 @@ class ParallelAxes:
             motion = self.arm.to_frame @ _pose(targets) @ self.arm.from_tip
             outer = outer_joints(self.arm, motion, wish[0])
             wrist = _wrist(self.arm, outer, motion, wish[5])
-            links = _links(self.arm, wrist.place, outer.side, wish[1])
+            links = two_links(self.arm, wrist.place, outer.side, wish[1])
         q4 = wrist.phi - links.q2 - links.q3
         joints = np.broadcast_arrays(outer.q1, links.q2, links.q3, q4, outer.q5, wrist.q6)
         signs = np.array((1.0, *self.arm.signs, 1.0, 1.0))
         q = wrapped(_by_target(np.stack(joints, axis=-1)) * signs) + 0.0  # no -0.0
-        reasons = _by_target(_like(outer.reasons, q4) + links.reasons)
+        reasons = _by_target(outer.reasons + links.reasons)
         families = [
             replace(one, where=_by_target(_like(one.where, q4)))
             for one in self._families(outer, wrist, links, near is None)
@@ -123,7 +122,7 @@ class ParallelAxes:
         return Solutions(q, self.branches, reasons, singular)
 
     def _families(
-        self, outer: OuterJoints, wrist: _Wrist, links: _Links, at_zero: bool
+        self, outer: OuterJoints, wrist: _Wrist, links: TwoLinks, at_zero: bool
     ) -> tuple[Singular, ...]:
         """Return the families of singular poses, and what is free there."""
         q1, q2, q3, q4, _, q6 = self.names
@@ -207,72 +206,13 @@ def _in_reach(arm: ParallelGeometry, rest: Transform, held: Vector, wish: FloatA
     a, b = (2.0 * (o[0] * one[0] + o[1] * one[1]) for one in (u, w))
     mean = o[0] ** 2 + o[1] ** 2 + u[0] ** 2 + u[1] ** 2
     swing, middle = np.hypot(a, b), np.arctan2(b, a)
-    upper, fore = _lengths(arm)
+    upper, fore = link_lengths(arm)
     least, most = ((square - mean) / swing for square in ((upper - fore) ** 2, (upper + fore) ** 2))
     away = wrapped(wish - middle)
     cosine = np.cos(away)
     allowed = np.clip(cosine, least, most)
     moved = wish + np.copysign(np.arccos(np.clip(allowed, -1.0, 1.0)), away) - away
     return np.where((allowed == cosine) | (np.abs(allowed) > 1.0 + REACH), wish, moved)
-
-
-@dataclass(frozen=True, slots=True)
-class _Links:
-    """Joints 2 and 3 of both elbows, each of shape (2, a, b, n); their signs are those of z.
-
-    Attributes:
-        q2: In [rad].
-        q3: In [rad].
-        reasons: Why there are none.
-        stretched: Where both elbows are one, the links stretched.
-        withdrawn: The same, one link folded back on the other.
-        free: Where axis 4 is on axis 2, which leaves q2 free.
-    """
-
-    q2: FloatArray
-    q3: FloatArray
-    reasons: TextArray
-    stretched: BoolArray
-    withdrawn: BoolArray
-    free: BoolArray
-
-
-def _links(
-    arm: ParallelGeometry, place: tuple[FloatArray, FloatArray], side: FloatArray, near: FloatArray
-) -> _Links:
-    """Return q2 and q3 that bring the point p4 to a place in the plane.
-
-    With the links' lengths l2, l3, the distance r and the angle psi between the links
-    tan^2(psi/2) = (l2 + l3 - r)(l2 + l3 + r) / ((r - |l2 - l3|)(r + |l2 - l3|)).
-    """
-    upper, fore = _lengths(arm)
-    r = np.hypot(*place)
-    short, long = abs(upper - fore), upper + fore
-    stretched, withdrawn = long - r <= EDGE * arm.size, r - short <= EDGE * arm.size
-    reached = (r <= long + REACH * arm.size) & (r >= short - REACH * arm.size)
-    up = np.where(stretched, 0.0, (long - r) * (long + r))
-    down = np.where(withdrawn, 0.0, (r - short) * (r + short))
-    psi = 2.0 * np.arctan2(np.sqrt(np.maximum(up, 0.0)), np.sqrt(np.maximum(down, 0.0)))
-    psi = np.where(reached, np.stack((-side * psi, side * psi)), np.nan)
-    first = float(np.arctan2(arm.p3[1], arm.p3[0]))
-    second = float(np.arctan2(arm.p4[1] - arm.p3[1], arm.p4[0] - arm.p3[0]))
-    free = reached & (r <= REACH * arm.size)
-    to_place = np.arctan2(place[1], place[0])
-    bend = np.arctan2(fore * np.sin(psi), upper + fore * np.cos(psi))
-    q2 = np.where(free, near * arm.signs[0], to_place - first - bend)
-    reasons = texts_where(
-        ~reached & np.isfinite(r),
-        f"axis 4 is {{:.4g}} m from axis 2, allowed: {short:.4g} to {long:.4g} m",
-        r,
-    )
-    return _Links(
-        q2 + np.zeros_like(psi),
-        psi - (second - first),
-        _like(reasons, psi),
-        stretched & reached,
-        withdrawn & reached,
-        free,
-    )
 
 
 def _tell_once(q: FloatArray, reasons: TextArray, branches: tuple[str, ...], where: list[BoolArray]) -> None:
@@ -289,14 +229,6 @@ def _tell_once(q: FloatArray, reasons: TextArray, branches: tuple[str, ...], whe
         same = np.abs(wrapped(q[rows, first] - q[rows, second])).max(axis=1) < ONE
         q[rows[same], second] = np.nan
         reasons[rows[same], second] = f"the same as {branches[first]}: both meet here"
-
-
-def _lengths(arm: ParallelGeometry) -> tuple[float, float]:
-    """Return the lengths of the links from axis 2 to axis 3 and on to axis 4, in [m]."""
-    return (
-        float(np.hypot(arm.p3[0], arm.p3[1])),
-        float(np.hypot(arm.p4[0] - arm.p3[0], arm.p4[1] - arm.p3[1])),
-    )
 
 
 def _pose(targets: Targets) -> Transform:

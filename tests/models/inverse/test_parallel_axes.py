@@ -68,7 +68,8 @@ def random_arm(rng: np.random.Generator, wrist: str, signs: tuple[int, int] = (1
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     steps = np.diff(np.vstack((np.zeros(3), point)), axis=0)
     joints = tuple(
-        Joint(f"j{k}", origin=from_offset(steps[k]), axis=tuple(direction[k].tolist())) for k in range(6)
+        Joint(f"j{k}", origin=from_offset(steps[k].tolist()), axis=tuple(direction[k].tolist()))
+        for k in range(6)
     )
     base, tip, tool = (from_offset(rng.uniform(-1.0, 1.0, 6)) for _ in range(3))
     return Chain("random", joints, tip, base, tool)
@@ -197,9 +198,10 @@ def test_straight_up_three_families_meet_and_the_start_is_found() -> None:
     chain = load_robot("ur5e")
     q = np.array([chain.start])
     solutions = form_of(chain).solve(targets_of(chain, q))
-    assert solutions.reached.all()
     assert solutions.families(0) == ["wrist beside axis 1", "wrist aligned", "arm stretched"]
     assert apart(solutions, q)[0] < 1e-7
+    assert solutions.reached[0].tolist() == [True, *[False] * 7]
+    assert set(solutions.reasons[0, 1:]) == {"the same as right, elbow up, not flipped: both meet here"}
 
 
 def test_an_aligned_wrist_has_both_flips_and_says_what_is_free_and_what_was_chosen() -> None:
@@ -214,8 +216,12 @@ def test_an_aligned_wrist_has_both_flips_and_says_what_is_free_and_what_was_chos
     there = [one for one, where in zip(solutions.branches, aligned.where[0], strict=True) if where]
     q6 = np.array([math.pi if one.endswith(", flipped") else 0.0 for one in there])
     np.testing.assert_allclose(np.abs(solutions.q[0, aligned.where[0], 5]), q6, atol=1e-12)
-    assert aligned.free == "wrist_3_joint, which shoulder_lift_joint, elbow_joint and wrist_1_joint follow"
-    assert aligned.chosen == "wrist_3_joint = 0, and pi where flipped, or the nearest value in reach"
+    assert aligned.free == (
+        "wrist_3_joint: any value in reach, and shoulder_lift_joint, elbow_joint, wrist_1_joint with it"
+    )
+    assert aligned.chosen == (
+        "wrist_3_joint = 0, and pi more for the flipped wrist, or the nearest value in reach"
+    )
 
 
 def test_where_q6_of_the_convention_is_out_of_reach_the_nearest_in_reach_is_taken() -> None:
@@ -254,12 +260,12 @@ def test_an_arm_with_equal_links_leaves_q2_free_where_it_is_folded() -> None:
     targets = targets_of(chain, q)
     solutions = form_of(chain).solve(targets)
     assert_every_solution_meets(chain, targets, solutions, EXACT)
-    (folded,) = [one for one in solutions.singular if one.free == "b"]
+    (folded,) = [one for one in solutions.singular if one.free == "b: any value"]
     assert folded.family == "arm withdrawn" and folded.chosen == "b = 0"
     assert (solutions.q[0, folded.where[0], 1] == 0.0).all()
     near = form_of(chain).solve(targets, near=q)
     assert apart(near, q)[0] < 1e-7
-    assert [one.chosen for one in near.singular if one.free == "b"] == ["b of the start"]
+    assert [one.chosen for one in near.singular if one.free == "b: any value"] == ["b as near"]
 
 
 def test_without_a_shoulder_offset_the_wrist_can_be_on_axis_1_which_leaves_q1_free() -> None:
@@ -270,7 +276,7 @@ def test_without_a_shoulder_offset_the_wrist_can_be_on_axis_1_which_leaves_q1_fr
     assert solutions.reached.any()
     assert_every_solution_meets(chain, targets, solutions, EXACT)
     (on_axis,) = [one for one in solutions.singular if one.family == "wrist on axis 1"]
-    assert (on_axis.free, on_axis.chosen) == ("a", "a = 0, and pi where left")
+    assert (on_axis.free, on_axis.chosen) == ("a: any value", "a = 0, and pi more for the left arm")
     np.testing.assert_array_equal(on_axis.where, solutions.reached)
     sides = np.array([0.0 if "right" in one else math.pi for one in solutions.branches])
     np.testing.assert_allclose(solutions.q[0, :, 0][on_axis.where[0]], sides[on_axis.where[0]], atol=1e-15)

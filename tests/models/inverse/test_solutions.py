@@ -28,7 +28,9 @@ def test_the_nearest_solution_is_taken_by_the_shorter_way() -> None:
     found, start = two_targets(), np.array([-3.0])
     assert found.nearest_column(start, np.array([math.inf])).tolist() == [1, 1]
     assert found.nearest_column(start, np.array([TURN])).tolist() == [0, 1]
-    np.testing.assert_allclose(found.nearest(start, np.array([TURN])), [[3.0 - TURN], [0.5]], atol=1e-15)
+    np.testing.assert_allclose(
+        found.nearest(start, np.array([TURN])), [[3.0 - TURN], [0.5 - TURN]], atol=1e-15
+    )
     np.testing.assert_allclose(found.nearest(start, np.array([math.inf])), [[-1.0], [0.5]])
 
 

@@ -74,11 +74,12 @@ def test_without_a_start_the_one_solution_is_near_the_start_of_the_robot() -> No
 def test_solutions_are_in_the_turn_nearest_to_the_start_that_the_limits_allow() -> None:
     chain = load_robot("ur5e")
     q, targets = poses(chain, 20)
-    start = q + np.array([2.0 * math.pi, 0.0, 0.0, 0.0, 0.0, -2.0 * math.pi]) * np.where(q < 0.0, 1.0, -1.0)
+    start = q + np.array([2.0 * math.pi, 0.0, 0.0, 0.0, 0.0, 2.0 * math.pi]) * np.where(q < 0.0, 1.0, -1.0)
     found = solve(chain, targets, start=start)
-    lower, upper = -2.0 * math.pi, 2.0 * math.pi
-    expected = np.where((start >= lower) & (start <= upper), start, q)
-    np.testing.assert_allclose(found.q[:, 0], expected, atol=1e-8)
+    np.testing.assert_allclose(found.q[:, 0], start, atol=1e-8)
+    beyond = solve(chain, targets, start=start + 4.0 * math.pi)
+    assert_met(chain, targets, beyond)
+    assert beyond.reached.all() and (beyond.q[:, 0] > -1e-9).all()  # the last turn that +-2 pi allows
 
 
 def test_limits_leave_out_branches_and_say_which_joint() -> None:
@@ -135,8 +136,10 @@ def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) ->
 
 
 def test_only_bad_targets_are_no_error() -> None:
-    found = solve(load_robot("ur5e"), Targets(np.full((2, 3), np.nan), np.stack([np.eye(3)] * 2)))
-    assert not found.reached.any() and found.reason(1) is not None
+    for name in ("ur5e", "urm6"):
+        found = solve(load_robot(name), Targets(np.full((2, 3), np.nan), np.stack([np.eye(3)] * 2)))
+        assert len(found) == 2 and not found.reached.any()
+        assert found.reason(1) == "the position is nan, nan, nan m, allowed: finite numbers"
 
 
 def test_no_targets_give_no_solutions() -> None:
@@ -159,17 +162,11 @@ def test_a_rotation_written_with_seven_digits_is_the_nearest_rotation() -> None:
 
 def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
     chain = load_robot("ur5e")
-    # The arm stretched out, and the target farther along its links
-    q = np.array([0.3, -0.4, 0.0, 0.3, 1.2, 0.2])
+    q = np.array([0.3, -math.pi / 2, 0.0, -math.pi / 2, 1.2, 0.2])  # stretched straight up
     targets = targets_of(chain, q[None])
-    along = (
-        targets.position - targets_of(chain, q[None] + np.array([0.0, math.pi, 0.0, 0.0, 0.0, 0.0])).position
-    )
-    outwards = along / np.linalg.norm(along)
-    out = Targets(
-        np.vstack((targets.position + 0.002 * outwards, targets.position + 0.2 * outwards)),
-        np.repeat(targets.rotation, 2, axis=0) if targets.rotation is not None else None,
-    )
+    assert targets.rotation is not None
+    above = targets.position + np.array([[0.0, 0.0, 0.002], [0.0, 0.0, 0.2]])
+    out = Targets(above, np.repeat(targets.rotation, 2, axis=0))
     refused = solve(chain, out, start=q)
     assert not refused.reached.any()
     found = solve(chain, out, start=q, tolerance=0.0035)
@@ -221,7 +218,7 @@ def test_redundant_arms_are_solved_iteratively() -> None:
 
 def test_a_start_outside_the_limits_is_a_place_to_be_near_to() -> None:
     chain = narrow(load_robot("ur5e"), -2.0, 2.0)
-    q, targets = poses(chain, 5)
+    _, targets = poses(chain, 5)
     found = solve(chain, targets, start=np.full(6, 50.0))
     assert_met(chain, targets, found)
     assert found.reached.all()
@@ -245,8 +242,8 @@ def test_everything_wrong_with_the_options_is_told_at_once() -> None:
     assert [str(one) for one in caught.value.findings] == [
         "start: found a value that is not finite, allowed: finite numbers in rad and m",
         "tolerance: found inf m, allowed: more than 0, finite",
-        "method closed: robot urm6 has no closed form, allowed: six revolute joints whose last three axes meet"
-        " in a point or whose axes 2, 3 and 4 are parallel; use method iterative",
+        "method closed: robot urm6 has no closed form, allowed: six revolute joints whose last three axes"
+        " meet in a point or whose axes 2, 3 and 4 are parallel; use method iterative",
     ]
 
 
