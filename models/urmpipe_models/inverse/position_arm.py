@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -29,6 +30,9 @@ EXACT = 1e-14
 
 LEFT = 2e-11
 """Polished joints that leave the wrist centre off by more than this, in units of the arm's size, are none."""
+
+SAME = 1e-5
+"""Polished postures that differ by less than this, in [rad] or the arm's size, are one."""
 
 Order = Literal["first", "third", "both"]
 
@@ -128,16 +132,16 @@ class PositionArm:
         target = position / self.size
         seen = self.equations.seen(target)
         if self.order == "both":
-            u1, u3, meet = quartic_roots(self.equations, seen)
-            meeting: dict[SingularFamily, BoolArray] = {"postures meet": meet}
-            reasons: TextArray = np.full(meet.shape, "", dtype=np.object_)
-            Reach(self.equations, self.size).tell_place(reasons, np.isnan(u3[0]) & ~meet, seen)
-            reasons[meet & np.isnan(u3[0])] = "the same as the posture before: two postures meet here"
+            u1, u3 = quartic_roots(self.equations, seen)
+            reasons: TextArray = np.full(u3[0].shape, "", dtype=np.object_)
+            Reach(self.equations, self.size).tell_place(reasons, np.isnan(u3[0]), seen)
+            meeting: dict[SingularFamily, BoolArray] = {}
         else:
             u1, u3, reasons, meeting = self._in_order(seen)
         q, on_axis = self._joints(seen, u1, u3, near)
         if not self.exact:
             q = self._polished(q, target, reasons)
+            self._tell_once(q, reasons, meeting)
         found = np.isfinite(q).all(axis=0)
         meeting = {family: where & found for family, where in meeting.items()}
         return Postures(q, reasons, meeting, (on_axis[0] & found, on_axis[1] & found))
@@ -162,7 +166,7 @@ class PositionArm:
             u1, u3 = roots1.u, roots3.u[:, None]
             meet1, meet3 = roots1.meet[None], roots3.meet[None, None]
         if equations.axis @ equations.third.axis < -RANK:
-            u3 = u3[:, :, ::-1]
+            u1, u3, meet1 = u1[:, :, ::-1], u3[:, :, ::-1], meet1[:, ::-1]
         u1, u3 = np.broadcast_arrays(u1, u3)
         reasons = self._reasons(seen, u1, u3)
         u1, u3, meeting = self._told_once(u1.copy(), u3.copy(), meet1, meet3, reasons)
@@ -260,6 +264,20 @@ class PositionArm:
             )
         turned = np.where(self.screws.revolute[:3, None, None], wrapped(better), better * unit)
         return np.where(whole & ~missed, turned, np.nan)
+
+    def _tell_once(self, q: FloatArray, reasons: TextArray, meeting: dict[SingularFamily, BoolArray]) -> None:
+        """Make NaN of every posture that an earlier one equals, and tell that they meet."""
+        turning = self.screws.revolute[:3, None]
+        meet = np.zeros(q.shape[1:], dtype=bool)
+        for first, second in combinations(range(q.shape[1]), 2):
+            away = q[:, first] - q[:, second]
+            away = np.where(turning, wrapped(away), away / self.size)
+            same = np.abs(away).max(axis=0) < SAME
+            meet[first] |= same
+            q[:, second, same] = np.nan
+            reasons[second, same] = f"the same as {self.branches[first]}: both meet here"
+        if meet.any():
+            meeting["postures meet"] = meet | meeting.get("postures meet", np.zeros_like(meet))
 
 
 def position_arm(screws: Screws, wrist: FloatArray) -> PositionArm | None:

@@ -5,20 +5,14 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_models.inverse.loop_equations import LoopEquations, Seen
-from urmpipe_models.inverse.solutions import BoolArray, FloatArray
+from urmpipe_models.inverse.solutions import FloatArray
 from urmpipe_models.inverse.trigonometric import quadric_roots
 
-SAME_ANGLE = 4e-6
-"""Roots nearer than this are one, in [rad]: rounding parts those of a double root by some 1e-7."""
-
-SAME_PLACE = 1e-5
-"""The same of u1, in units of the arm's size."""
-
-FAR = 1e-9
-"""A prismatic joint beyond 1 / FAR, in units of the arm's size, is a root at infinity: none."""
+FAR = 1e-3
+"""A prismatic joint beyond 1 / FAR arm's sizes is a root at infinity, moved by rounding: none."""
 
 
-def quartic_roots(equations: LoopEquations, seen: Seen) -> tuple[FloatArray, FloatArray, BoolArray]:
+def quartic_roots(equations: LoopEquations, seen: Seen) -> tuple[FloatArray, FloatArray]:
     """Return u1 and u3 of A1 u1 + b1 = A3 u3 + b3, both on their tracks.
 
     u1 = G u3 + g, put into |u1|^2 = rho^2 (or u1[1] = u1[0]^2 of a prismatic joint 1), leaves a quadric in
@@ -26,7 +20,7 @@ def quartic_roots(equations: LoopEquations, seen: Seen) -> tuple[FloatArray, Flo
 
     Returns:
         u1 and u3, shape (2, 4, n), by rising q3 from where the second equation is largest on; NaN where
-        there is none, and the second one of a double root. Where two are one, shape (4, n).
+        there is none.
     """
     inverse = np.linalg.inv(equations.first.coefficients)
     g = inverse @ (equations.constant[:, None] - seen.constant)
@@ -36,29 +30,17 @@ def quartic_roots(equations: LoopEquations, seen: Seen) -> tuple[FloatArray, Flo
         matrix = equations.radius * inverse @ equations.third.coefficients @ turn
         x = quadric_roots(_circle(matrix, g, seen.radius, equations.first.revolute))
         unit = np.stack((np.cos(x), np.sin(x)))
-        u1, u3 = _u1(matrix, g, unit), equations.radius * np.tensordot(turn, unit, 1)
-    else:
-        matrix = inverse @ equations.third.coefficients
-        x = quadric_roots(_in_half_angle(_parabola(matrix, g, seen.radius, equations.first.revolute)))
-        t = np.where(np.abs(np.cos(x / 2)) > FAR, np.tan(x / 2), np.nan)
-        u3 = np.stack((t, t * t))
-        u1 = _u1(matrix, g, u3)
-    return _told_once(x, u1, u3)
+        return _u1(matrix, g, unit), equations.radius * np.tensordot(turn, unit, 1)
+    matrix = inverse @ equations.third.coefficients
+    x = quadric_roots(_in_half_angle(_parabola(matrix, g, seen.radius, equations.first.revolute)))
+    t = np.where(np.abs(np.cos(x / 2)) > FAR, np.tan(x / 2), np.nan)
+    u3 = np.stack((t, t * t))
+    return _u1(matrix, g, u3), u3
 
 
 def _u1(matrix: FloatArray, g: FloatArray, unit: FloatArray) -> FloatArray:
     """Return G u + g."""
     return np.asarray(np.tensordot(matrix, unit, 1) + g[:, None])
-
-
-def _told_once(x: FloatArray, u1: FloatArray, u3: FloatArray) -> tuple[FloatArray, FloatArray, BoolArray]:
-    """Return u1 and u3 with NaN in the second one of two equal roots, and where two are equal."""
-    with np.errstate(invalid="ignore"):
-        again = np.zeros(x.shape, dtype=bool)
-        again[1:] = (np.diff(x, axis=0) < SAME_ANGLE) & (np.abs(np.diff(u1, axis=1)).max(axis=0) < SAME_PLACE)
-    meet = again.copy()
-    meet[:-1] |= again[1:]
-    return np.where(again, np.nan, u1), np.where(again, np.nan, u3), meet
 
 
 def _circle(m: FloatArray, g: FloatArray, radius: FloatArray, revolute: bool) -> list[FloatArray]:

@@ -21,14 +21,13 @@ SingularFamily = Literal[
     "wrist aligned",
     "arm stretched",
     "arm withdrawn",
-    "branches meet",
     "postures meet",
     "flips meet",
 ]
 """The families in which an arm loses a freedom; two can meet in one pose.
 
 "wrist beside axis 1": as near to axis 1 as the offset of the shoulder lets it come, where the right and the
-left arm are one (UR arms). "branches meet": two branches of any other kind are one.
+left arm meet (UR arms).
 """
 
 NEAREST_POINT = "nearest point"
