@@ -11,7 +11,7 @@ from urmpipe_pipeline.joint_log import IntArray
 from urmpipe_pipeline.sources.diagnose import MAY_BE_MISSING, CarefulReader
 from urmpipe_pipeline.sources.sniff import Layout
 from urmpipe_pipeline.sources.stream import byte_encoding, end_of_rows, row_blocks
-from urmpipe_pipeline.sources.table import ClockColumn, Numbers, read_fast
+from urmpipe_pipeline.sources.table import ClockColumn, Numbers, Scales, clock_scales, read_fast
 from urmpipe_pipeline.sources.text_cells import TextCells
 
 READ_WITH_CARE = 1 << 16
@@ -32,7 +32,8 @@ def read_blockwise(
         allowed: What a cell may hold, for the findings.
     """
     reader = CarefulReader(layout, columns, clock, allowed)
-    parts = [part for block in row_blocks(layout) for part in _parts(reader, block)]
+    scales = clock_scales(layout, clock)
+    parts = [part for block in row_blocks(layout) for part in _parts(reader, block, scales)]
     values = [part.values for part in parts] or [np.empty((0, len(columns)))]
     times = [_times(part) for part in parts] or [np.empty(0, dtype=np.int64)]
     return replace(
@@ -49,10 +50,11 @@ def _times(part: Numbers) -> IntArray:
     return np.zeros(len(part.values), dtype=np.int64) if part.clock is None else part.clock
 
 
-def _parts(reader: CarefulReader, block: bytes, *, small: bool = False) -> Iterator[Numbers]:
+def _parts(reader: CarefulReader, block: bytes, scales: Scales, *, small: bool = False) -> Iterator[Numbers]:
     """Yield the numbers of some whole rows: of all at once, or a small part at a time."""
     newline = reader.layout.segment.newline
-    numbers = None if reader.waits else read_fast(reader.layout, reader.columns, reader.clock, block)
+    about = reader.layout, reader.columns, reader.clock
+    numbers = None if reader.waits else read_fast(*about, block, scales)
     if numbers is not None:
         reader.pass_over(len(numbers.values), block.count(newline.encode()))
         yield numbers
@@ -61,7 +63,7 @@ def _parts(reader: CarefulReader, block: bytes, *, small: bool = False) -> Itera
         yield reader.read(text.removesuffix(newline).split(newline))
     else:
         for part in _small_parts(reader.layout, block):
-            yield from _parts(reader, part, small=True)
+            yield from _parts(reader, part, scales, small=True)
 
 
 def _small_parts(layout: Layout, block: bytes) -> Iterator[bytes]:

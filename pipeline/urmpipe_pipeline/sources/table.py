@@ -7,7 +7,7 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 import pyarrow as pa
@@ -85,8 +85,23 @@ class Numbers:
         return row if self.rows is None else int(self.rows[row - 1])
 
 
+Scales: TypeAlias = tuple[tuple[int, ...], ...]
+"""How many decimals of each column of numbers of a clock are read: as few as may do, then all."""
+
+
+def clock_scales(layout: Layout, clock: Sequence[ClockColumn]) -> Scales:
+    """Return how many decimals of a clock are read, the same for all blocks of a table."""
+    numeric = [part for part in clock if not part.forms]
+    both = (tuple(_scale(layout, part, exact) for part in numeric) for exact in (False, True))
+    return tuple(dict.fromkeys(both))
+
+
 def read_fast(
-    layout: Layout, columns: Sequence[int], clock: Sequence[ClockColumn], block: bytes | None = None
+    layout: Layout,
+    columns: Sequence[int],
+    clock: Sequence[ClockColumn],
+    block: bytes | None = None,
+    scales: Scales | None = None,
 ) -> Numbers | None:
     """Return the numbers of some columns, or None if the parser stumbles over a row or a cell.
 
@@ -96,14 +111,14 @@ def read_fast(
         clock: The columns of its clock; their values in [ns] are added. If they are text, their cells are
             read as they are.
         block: Some whole rows, as they stand in the file, instead of all.
+        scales: What `clock_scales` returned, of a table that is read in many blocks.
     """
     texts = [part for part in clock if part.forms]
     numeric = [part for part in clock if not part.forms]
-    narrow, wide = ([_scale(layout, part, exact) for part in numeric] for exact in (False, True))
-    for scales in (narrow,) if narrow == wide else (narrow, wide):
+    for decimals in clock_scales(layout, clock) if scales is None else scales:
         try:
-            table, left_out = _parse(layout, columns, numeric, scales, texts, block)
-            numbers = _numbers(table, columns, numeric, scales)
+            table, left_out = _parse(layout, columns, numeric, decimals, texts, block)
+            numbers = _numbers(table, columns, numeric, decimals)
             cells = tuple(_text_cells(table, layout, part) for part in texts)
             return replace(numbers, texts=cells, left_out=left_out)
         except (pa.ArrowInvalid, OverflowError):
