@@ -20,7 +20,7 @@ class Provenance:
     """What is needed to repeat a run.
 
     Attributes:
-        command: Which function made it: ingest or compare.
+        command: Which function made it, such as ingest, compare or ik.
         options: The options that were given, by name.
         inputs: The files it came from.
         versions: Versions of urmpipe, Python and the libraries that computed.

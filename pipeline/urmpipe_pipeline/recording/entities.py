@@ -22,6 +22,7 @@ What is there to be looked at only, and is not read back:
     overview/...                                                few rows of what is long, and a run's speed
     marks/repolarization/up, down, doubt; marks/worst/<plot>    in the plots of a run
     tolerance/delta, path, angle, joints                        what is allowed, in the plot of each
+    branches/<branch>/arm, name; targets/path, points, frames, missed
     events/..., summary, robot/..., path/..., point/...
 """
 

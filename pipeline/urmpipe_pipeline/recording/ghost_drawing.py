@@ -18,7 +18,7 @@ from urmpipe_pipeline.recording.ghost_names import name_places
 from urmpipe_pipeline.recording.goal_marks import GoalMarks
 
 if TYPE_CHECKING:
-    from rerun import ComponentColumnList, LineStrips3D, RecordingStream
+    from rerun import ComponentColumnList, LineStrips3D, Points3D, RecordingStream
 
 LINK_RADIUS, AXIS_RADIUS = 0.012, 0.005
 FRAME_LENGTH, FRAME_RADIUS, WAY_RADIUS, GOAL_RADIUS, MISSED_RADIUS = 0.09, 0.004, 0.0065, 0.012, 0.02
@@ -103,7 +103,7 @@ def draw_goals(stream: RecordingStream, goals: GoalMarks, size: float) -> None:
     """Send the targets: they stand at all times."""
     import rerun as rr
 
-    grey, red = rgb(REFERENCE_COLOUR), rgb(DEVIATION_COLOUR)
+    grey = rgb(REFERENCE_COLOUR)
     if goals.strips:
         strips = [strip.astype(np.float32) for strip in goals.strips]
         way = rr.LineStrips3D(strips, colors=[grey], radii=[WAY_RADIUS * size])
@@ -114,11 +114,17 @@ def draw_goals(stream: RecordingStream, goals: GoalMarks, size: float) -> None:
     if len(goals.origin):
         stream.log(f"{goals.root}/frames", _frames(goals, size), static=True)
     if len(goals.missed):
-        missed = rr.Points3D(
-            goals.missed, colors=[red], radii=[MISSED_RADIUS * size], labels=goals.reasons,
-            show_labels=len(goals.missed) <= LABELLED,
-        )  # fmt: skip
-        stream.log(f"{goals.root}/missed", missed, static=True)
+        stream.log(f"{goals.root}/missed", _missed(goals, size), static=True)
+
+
+def _missed(goals: GoalMarks, size: float) -> Points3D:
+    """Return the targets that the arm has no pose for: few with their reasons, many as a thin line."""
+    import rerun as rr
+
+    few = len(goals.missed) <= LABELLED
+    radius = (MISSED_RADIUS if few else WAY_RADIUS) * size
+    colours = [rgb(DEVIATION_COLOUR)]
+    return rr.Points3D(goals.missed, colors=colours, radii=[radius], labels=goals.reasons, show_labels=few)
 
 
 def _frames(goals: GoalMarks, size: float) -> LineStrips3D:

@@ -26,8 +26,9 @@ class GoalMarks:
         axes: Their x, y and z axes [-], shape (m, 3, 3), an axis a column.
         points: Targets drawn as points, in [m], shape (k, 3).
         strips: The way through targets with times, dashed, in [m].
-        missed: Targets that the arm has no pose for, in [m], shape (u, 3).
-        reasons: Why it has none, a line each, with the row.
+        reached: Every target that the arm has a pose for, in [m], shape (r, 3).
+        missed: Targets that it has none for, in [m], shape (u, 3).
+        reasons: Why it has none, a line each, with the row; of several reasons the first.
     """
 
     root: str
@@ -35,13 +36,9 @@ class GoalMarks:
     axes: FloatArray
     points: FloatArray
     strips: tuple[FloatArray, ...]
+    reached: FloatArray
     missed: FloatArray
     reasons: tuple[str, ...]
-
-    @property
-    def drawn(self) -> list[FloatArray]:
-        """Every point that is drawn in [m], in arrays of shape (any, 3)."""
-        return [self.origin, self.points, *self.strips, self.missed]
 
 
 def goal_marks(run: Run, place: Place) -> GoalMarks | None:
@@ -61,6 +58,7 @@ def goal_marks(run: Run, place: Place) -> GoalMarks | None:
         axes=matrices(turned),
         points=none if framed or (not few and not run.single_poses) else position[:MOST],
         strips=dashed(lines_of(goals.position)) if not run.single_poses else (),
+        reached=goals.position[there & ~goals.missed],
         missed=goals.position[missed],
-        reasons=tuple(f"row {row + 1}: {goals.reasons[row]}" for row in missed.tolist()),
+        reasons=tuple(f"row {row + 1}: {goals.reasons[row].split('; ')[0]}" for row in missed.tolist()),
     )

@@ -27,6 +27,9 @@ from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.simulation import Result, Simulation
 from urmpipe_pipeline.trajectory import Trajectory
 
+NEAR = 1.5
+"""Targets that are missed are in view if they are not further from the middle than so many radii."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Arm:
@@ -100,20 +103,37 @@ class Scene:
         return self.ways if self.enlarged is None else (*self.ways, self.enlarged)
 
     def points(self) -> FloatArray:
-        """Return every point that is drawn in [m], shape (n, 3); the origin if there is none."""
+        """Return every point that is to be in view in [m], shape (n, 3); the origin if there is none.
+
+        Targets that are missed by far are not: they would make the arm small.
+        """
         points = [part for way in self._every_way for part in (*way.strips, way.track.position) if len(part)]
         if self.arm is not None:
             points.append(self.arm.skeleton.reshape(-1, 3))
         points += [ends.reshape(-1, 3) for ghost in self.ghosts for ends in (ghost.start, ghost.end)]
-        points += [part for part in self.goals.drawn if len(part)] if self.goals else []
-        return np.concatenate(points) if points else np.zeros((1, 3))
+        if self.goals is not None:
+            points.append(self.goals.reached)
+            points.append(_near(np.concatenate(points), self.goals.missed))
+        return np.concatenate(points) if sum(map(len, points)) else np.zeros((1, 3))
 
     def ball(self) -> tuple[FloatArray, float]:
         """Return centre, shape (3,), and radius of a ball around everything, in [m]; 1 m around one point."""
-        every = self.points()
-        low, high = every.min(axis=0), every.max(axis=0)
-        radius = float(np.linalg.norm(high - low)) / 2
-        return (low + high) / 2, radius or 1.0
+        return _ball(self.points())
+
+
+def _near(points: FloatArray, missed: FloatArray) -> FloatArray:
+    """Return the targets missed that are not far from the other points; all if there are no others."""
+    if not len(points):
+        return missed
+    centre, radius = _ball(points)
+    return np.asarray(missed[np.linalg.norm(missed - centre, axis=1) <= NEAR * radius])
+
+
+def _ball(points: FloatArray) -> tuple[FloatArray, float]:
+    """Return centre and radius of a ball around points; 1 m around one point."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    radius = float(np.linalg.norm(high - low)) / 2
+    return (low + high) / 2, radius or 1.0
 
 
 def scene_of(result: Result) -> Scene:
@@ -172,8 +192,9 @@ def _run_ways(run: Run, place: Place) -> Iterator[Way]:
         yield Way(*entities, colour, wanted, dashed(strips) if wanted else strips, track)
     if run.tcp is not None:
         entities = place.named("path"), place.named("point")
+        strips = () if run.single_poses else lines_of(run.tcp.position)
         track = track_of(run.t_ns, run.tcp.position)
-        yield Way(*entities, run_colour(0), False, lines_of(run.tcp.position), track)
+        yield Way(*entities, run_colour(0), False, strips, track)
 
 
 def _asked(reference: Trajectory, shown: Deviation) -> Way:

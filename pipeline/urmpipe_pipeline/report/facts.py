@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -38,8 +39,19 @@ def run_facts(run: Run) -> tuple[Fact, ...]:
         Fact("Rows", f"{run.log.rows} every {text.seconds(run.log.period)} s"),
         Fact("Grid", f"{len(run.t_ns)} samples every {text.seconds(run.tsp)} s"),
         Fact("Duration", f"{text.seconds(run.duration)} s"),
+        *_solved_facts(run),
         Fact("Recording", str(run.recording) if run.recording else ""),
     )
+
+
+def _solved_facts(run: Run) -> Iterator[Fact]:
+    """Yield how many targets were reached, and by which further branches; nothing of a log."""
+    if run.goals is None:
+        return
+    reached = int(np.isfinite(run.log.q).all(axis=1).sum())
+    yield Fact("Targets", f"{reached} of {run.log.rows} with a solution")
+    branches = "; ".join(f"{ghost.name}: {len(ghost.t_ns)}" for ghost in run.ghosts)
+    yield Fact("Other branches", branches, "and the rows where each is another solution")
 
 
 def comparison_facts(comparison: Comparison) -> tuple[Fact, ...]:
