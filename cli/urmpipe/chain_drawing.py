@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from html import escape
 from itertools import pairwise, zip_longest
@@ -123,20 +123,32 @@ def _character(bits: int, unicode: bool) -> str:
 
 
 def _label(grid: list[list[str]], cells: NDArray[np.float64], base: str, point: str) -> None:
-    """Mark the points and write their names beside them; points of one cell share a label."""
-    names: dict[tuple[int, int], list[str]] = {}
+    """Mark the points and write their names beside them; points of one cell share a label.
+
+    Where there is no room for all their names, the label of a run is its first and its last: p4..p8.
+    """
+    names: dict[tuple[int, int], list[int]] = {}
     for k, (x, y) in enumerate(cells):
-        names.setdefault((int(y), int(x)), []).append(f"p{k}" if k else "base")
+        names.setdefault((int(y), int(x)), []).append(k)
     for (row, column), here in names.items():
-        grid[row][column] = base if here[0] == "base" else point
+        grid[row][column] = point if here[0] else base
     taken = set(names)
     for (row, column), here in names.items():
-        label = ",".join(here)
-        place = _place(row, column, len(label), grid, taken)
-        if place is not None:
-            r, c = place
-            grid[r][c : c + len(label)] = label
-            taken.update((r, c + i) for i in range(len(label)))
+        for label in _labels(here):
+            place = _place(row, column, len(label), grid, taken)
+            if place is not None:
+                r, c = place
+                grid[r][c : c + len(label)] = label
+                taken.update((r, c + i) for i in range(len(label)))
+                break
+
+
+def _labels(points: list[int]) -> Iterator[str]:
+    """Yield what points of one place may be called, the base as 0: the longest first."""
+    names = [f"p{k}" if k else "base" for k in points]
+    yield ",".join(names)
+    if len(points) > 2 and points[-1] - points[0] == len(points) - 1:
+        yield f"{names[0]}..{names[-1]}"
 
 
 def _place(

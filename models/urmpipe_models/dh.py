@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 from urmpipe_models.chain import Chain, Joint, JointKind
@@ -13,18 +13,18 @@ from urmpipe_models.transform import Transform, rotation_x, rotation_z, translat
 
 @dataclass(frozen=True, slots=True)
 class DHRow:
-    """One joint and one link.
+    """One joint and one link, or a frame between two of them.
 
     The coordinate q adds to theta of a revolute and to d of a prismatic joint, so that theta or d is
-    the joint's offset.
+    the joint's offset. A fixed row has no coordinate: an auxiliary frame, or a flange at the end.
 
     Attributes:
         theta: Angle about z in [rad], any element.
         d: Way along z in [m], any element.
         a: Link length along x in [m], any element; a_{i-1} in the modified form.
         alpha: Link twist about x in [rad], any element; alpha_{i-1} in the modified form.
-        name: The joint's name; q1, q2, ... where it is empty.
-        kind: revolute or prismatic.
+        name: The joint's name; where it is empty q1, q2, ... by coordinate, and frame1, ... by row if fixed.
+        kind: revolute, prismatic or fixed.
         lower: Least coordinate allowed, in [rad] or [m].
         upper: Largest coordinate allowed, in [rad] or [m].
         velocity: Largest speed, in [rad/s] or [m/s].
@@ -57,7 +57,7 @@ def dh_chain(
 
     Args:
         name: The robot's name.
-        rows: One a joint, from the base outwards.
+        rows: One a joint or fixed frame, from the base outwards.
         base: Where DH frame 0 stands in the world.
         tool: The tool centre point in the last DH frame.
         start: Calibration pose q(0) in [rad] or [m].
@@ -99,7 +99,7 @@ def modified_dh_chain(
 
     Args:
         name: The robot's name.
-        rows: One a joint, from the base outwards; a row holds alpha_{i-1}, a_{i-1}, theta_i, d_i.
+        rows: One a joint or fixed frame, from the base outwards: alpha_{i-1}, a_{i-1}, theta_i, d_i.
         base: Where frame 0 stands in the world.
         tool: The tool centre point in the last frame.
         start: Calibration pose q(0) in [rad] or [m].
@@ -136,12 +136,20 @@ def _screw_x(row: DHRow) -> Transform:
 def _joints(rows: Sequence[DHRow], origins: Sequence[Transform]) -> tuple[Joint, ...]:
     return tuple(
         Joint(
-            row.name or f"q{k}",
+            name,
             row.kind,
             origin,
             lower=row.lower,
             upper=row.upper,
             velocity=row.velocity,
         )
-        for k, (row, origin) in enumerate(zip(rows, origins, strict=True), start=1)
+        for name, row, origin in zip(_names(rows), rows, origins, strict=True)
     )
+
+
+def _names(rows: Sequence[DHRow]) -> Iterator[str]:
+    """Yield the name of every row, given or counted."""
+    coordinate = 0
+    for k, row in enumerate(rows, start=1):
+        coordinate += row.kind != "fixed"
+        yield row.name or (f"frame{k}" if row.kind == "fixed" else f"q{coordinate}")

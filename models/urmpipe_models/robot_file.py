@@ -9,6 +9,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple, TypeAlias, cast
 
+from urmpipe_models.articulated_6r import articulated_6r
 from urmpipe_models.chain import Chain, Joint, JointKind, Mimic
 from urmpipe_models.dh import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.errors import Finding, RobotError
@@ -33,13 +34,15 @@ class _Limits(NamedTuple):
 def read_robot_file(path: str | Path) -> Chain:
     """Return the arm that a TOML file describes.
 
-    Common keys: `kind` (urm, dh, modified_dh, joints or urdf), `name` (the file's stem by default),
-    `description`, `source`, `length_unit` (m, mm), `angle_unit` (rad, deg), `start`, and the tables
-    `[base]` and `[tool]` with `translation` and `rpy` (or `rotation`, three rows). By kind:
+    Common keys: `kind` (urm, dh, modified_dh, articulated6r, joints or urdf), `name` (the file's stem by
+    default), `description`, `source`, `length_unit` (m, mm), `angle_unit` (rad, deg), `start`, and the
+    tables `[base]` and `[tool]` with `translation` and `rpy` (or `rotation`, three rows). By kind:
 
     - urm: `lengths`, `tilts`, `directions`; `[limits]` with `lower`, `upper`, `velocity`, each one number
-      or one a joint.
-    - dh, modified_dh: `[[joints]]` with `name`, `kind`, `theta`, `d`, `a`, `alpha`; `[limits]`.
+      or one a moving joint.
+    - dh, modified_dh: `[[joints]]` with `name`, `kind` (fixed: a frame without a coordinate), `theta`, `d`,
+      `a`, `alpha`; `[limits]`.
+    - articulated6r: `lengths` l0..l4 (see `articulated_6r`); `[limits]`.
     - joints: `[[joints]]` with `name`, `kind`, `origin`, `axis`, `lower`, `upper`, `velocity`, `mimic`;
       `[tip]`. A mimic has `joint`, `offset` and `multiplier`, the last in rad and m always.
     - urdf: `file` (relative to this one), `base_link`, `tip_link`.
@@ -165,9 +168,25 @@ def _read_urm(table: Table, units: Units, folder: Path) -> Build:
 
 def _read_dh(table: Table, units: Units, folder: Path, *, modified: bool = False) -> Build:
     rows = [_dh_row(row, units) for row in table.tables("joints")]
-    limits = _limits(table.table("limits"), [row.kind for row in rows], units)
-    limited = [replace(row, **limit._asdict()) for row, limit in zip(rows, limits, strict=True)]
+    moving = [row.kind for row in rows if row.kind != "fixed"]
+    limits = iter(_limits(table.table("limits"), moving, units))
+    limited = [row if row.kind == "fixed" else replace(row, **next(limits)._asdict()) for row in rows]
     return partial(modified_dh_chain if modified else dh_chain, rows=limited)
+
+
+def _read_articulated6r(table: Table, units: Units, folder: Path) -> Build:
+    lengths = tuple(units.length(value) for value in table.numbers("lengths", 5))
+    limits = _limits(table.table("limits"), ["revolute"] * 6, units)
+
+    def build(name: str) -> Chain:
+        """Return the arm with its limits."""
+        chain = articulated_6r(*lengths, name=name)
+        limited = [
+            replace(joint, **limit._asdict()) for joint, limit in zip(chain.joints, limits, strict=True)
+        ]
+        return replace(chain, joints=tuple(limited))
+
+    return build
 
 
 def _read_joints(table: Table, units: Units, folder: Path) -> Build:
@@ -185,6 +204,7 @@ _READERS: dict[str, Callable[[Table, Units, Path], Build]] = {
     "urm": _read_urm,
     "dh": _read_dh,
     "modified_dh": partial(_read_dh, modified=True),
+    "articulated6r": _read_articulated6r,
     "joints": _read_joints,
     "urdf": _read_urdf,
 }
@@ -197,7 +217,7 @@ def _dh_row(table: Table, units: Units) -> DHRow:
         a=units.length(table.number("a", 0.0)),
         alpha=units.angle(table.number("alpha", 0.0)),
         name=table.text("name", ""),
-        kind=cast("JointKind", table.choice("kind", ("revolute", "prismatic"), "revolute")),
+        kind=cast("JointKind", table.choice("kind", ("revolute", "prismatic", "fixed"), "revolute")),
     )
     table.close()
     return row

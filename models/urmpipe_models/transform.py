@@ -24,6 +24,9 @@ from urmpipe_models.elementwise import (
 SINGULAR_COSINE = 1e-9
 """Below this cosine of ry, rz and rx are not separately defined (double precision leaves no digits)."""
 
+SINGULAR_SINE = 1e-9
+"""Below this sine of x, z1 and z2 of Z-X-Z are not separately defined."""
+
 _QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 """cos and sin of 0, 1, 2 and 3 quarter turns."""
 
@@ -183,6 +186,37 @@ def euler_zyx(rotation: tuple[Vector, Vector, Vector]) -> tuple[Element, Element
     ry = np.arctan2(-a31, cosine)
     rx = np.arctan2(np.where(singular, 0.0, a32) + 0.0, np.where(singular, 1.0, a33))
     return rz, ry, rx, singular
+
+
+def from_zxz(z1: Element, x: Element, z2: Element) -> Transform:
+    """Return Rz(z1) Rx(x) Rz(z2), angles in [rad]. Source: [Geometric6R]_ eq. 34."""
+    return rotation_z(z1) @ rotation_x(x) @ rotation_z(z2)
+
+
+def euler_zxz(rotation: tuple[Vector, Vector, Vector]) -> tuple[Element, Element, Element, Element]:
+    """Return the moving Z-X-Z Euler angles of R = Rz(z1) Rx(x) Rz(z2), and where they are singular.
+
+    z1 = atan2(a13, -a23), x = atan2(hypot(a13, a23), a33), z2 = atan2(a31, a32): x is in [0, pi]. At
+    x = 0 and x = pi only z1 + z2 and z1 - z2 are defined: there z2 = 0 and z1 = atan2(a21, a11) by
+    convention. The paper's z2, from the rows x and y turned back by z1, is the same angle; the last row
+    gives it without a product.
+
+    Args:
+        rotation: Rows of R.
+
+    Returns:
+        z1, x, z2 in [rad] and a flag that is true (1 in a trace) where the convention was used.
+
+    Source: [Geometric6R]_ eq. 15, 16, with the singular cases the paper leaves out (gamma_nz = +-1).
+    """
+    (a11, _, a13), (a21, _, a23), (a31, a32, a33) = rotation
+    sine = np.hypot(a13, a23)
+    singular = sine < SINGULAR_SINE
+    across: Element = np.where(singular, a21, a13)
+    z1 = np.arctan2(across + 0.0, np.where(singular, a11, -a23))  # + 0.0: see `euler_zyx`
+    x = np.arctan2(sine, a33)
+    z2 = np.arctan2(np.where(singular, 0.0, a31) + 0.0, np.where(singular, 1.0, a32))
+    return z1, x, z2, singular
 
 
 def rpy_of(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float, float]:

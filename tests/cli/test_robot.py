@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 import xml.etree.ElementTree as ET
 from pathlib import Path
 from typing import Any
@@ -19,7 +20,21 @@ from urmpipe_models.robot_file import chain_from_dict
 from urmpipe_models.urdf_reader import read_urdf
 from urmpipe_models.urdf_writer import write_urdf
 
-NAMES = ["ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "urm4", "urm6", "urm8"]
+NAMES = [
+    "arm6",
+    "articulated6r",
+    "iiwa14",
+    "panda",
+    "ur3",
+    "ur5",
+    "ur10",
+    "ur3e",
+    "ur5e",
+    "ur10e",
+    "urm4",
+    "urm6",
+    "urm8",
+]
 
 
 def skeleton(name: str) -> Any:
@@ -42,7 +57,7 @@ def test_list_as_json(urmpipe: Any) -> None:
     answer = json.loads(urmpipe("robot", "list", "--json").out)
     assert answer["schema"] == 1
     assert [robot["name"] for robot in answer["robots"]] == NAMES
-    assert answer["robots"][6]["joints"] == ["phi1", "phi2", "phi3", "phi4"]
+    assert answer["robots"][NAMES.index("urm4")]["joints"] == ["phi1", "phi2", "phi3", "phi4"]
 
 
 # --- show ------------------------------------------------------------------------------------------
@@ -168,8 +183,20 @@ def test_drawings_fit_and_label_every_point(name: str, width: int) -> None:
         text = chain_text(skeleton(name), width, unicode=unicode)
         assert max(map(len, text.splitlines())) <= width
         assert unicode or text.isascii()
+        told = re.sub(r"p(\d+)\.\.p(\d+)", every_name, text)
         for k in range(1, len(load_robot(name).joints) + 1):
-            assert text.count(f"p{k}") == 2  # once a view
+            assert told.count(f"p{k}") == 2  # once a view
+
+
+def every_name(shortened: re.Match[str]) -> str:
+    """Return p4,p5,p6 of p4..p6, in which points of one place are named where room is scarce."""
+    first, last = map(int, shortened.groups())
+    return ",".join(f"p{k}" for k in range(first, last + 1))
+
+
+def test_points_of_one_place_are_named_first_to_last_where_room_is_scarce() -> None:
+    assert "● p4..p8" in chain_text(skeleton("arm6"), 60)
+    assert "● p4,p5,p6,p7,p8" in chain_text(skeleton("arm6"), 80)
 
 
 def test_a_drawing_is_to_scale_and_the_right_way_up() -> None:

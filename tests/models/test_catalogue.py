@@ -10,12 +10,26 @@ import pytest
 
 from urmpipe_models.catalogue import load_robot, parse_offset, robot_names
 from urmpipe_models.errors import OptionError, RobotError
-from urmpipe_models.kinematics import forward
+from urmpipe_models.kinematics import forward, poses_over_log
 from urmpipe_models.robot_file import chain_from_dict, chain_to_dict
 from urmpipe_models.transform import from_offset
 from urmpipe_models.urdf_writer import write_urdf
 
-NAMES = ("ur3", "ur5", "ur10", "ur3e", "ur5e", "ur10e", "urm4", "urm6", "urm8")
+NAMES = (
+    "arm6",
+    "articulated6r",
+    "iiwa14",
+    "panda",
+    "ur3",
+    "ur5",
+    "ur10",
+    "ur3e",
+    "ur5e",
+    "ur10e",
+    "urm4",
+    "urm6",
+    "urm8",
+)
 
 DH = {  # d1, a2, a3, d4, d5, d6 in m, as Universal Robots publishes them
     "ur3": (0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819),
@@ -70,6 +84,56 @@ def test_urm_arms_are_the_papers_modules(modules: int) -> None:
         assert (joint.lower, joint.upper, joint.velocity) == (-math.inf, math.inf, math.inf)
 
 
+def test_arm6_is_the_papers_with_two_frames_that_do_not_move() -> None:
+    chain = load_robot("arm6")
+    assert chain.coordinates == tuple(f"theta{k}" for k in range(1, 7))
+    assert [joint.name for joint in chain.joints if joint.kind == "fixed"] == ["aux2", "aux5"]
+    tip = forward(chain, [0.0] * 6)[-1].translation
+    np.testing.assert_allclose(tip, [-0.069, 0.0, 0.112], rtol=0.0, atol=1e-16)  # rounding
+    assert chain.start == (0.0,) * 6
+
+
+def test_articulated6r_says_that_its_lengths_are_assumed() -> None:
+    chain = load_robot("articulated6r")
+    assert "its lengths are an assumption" in chain.source
+    tip = forward(chain, [0.0] * 6)[-1].translation
+    np.testing.assert_allclose(tip, [0.0, 0.0, 1.4], rtol=1e-15)  # straight up: the sum of its lengths
+
+
+URDFS = {  # robot, file, its link at the robot's tip, FK to [m, -], speeds and ranges to [rad/s, rad]
+    "panda of Gepetto": ("panda", "Gepetto_example-robot-data/panda.urdf", "panda_link8", 1e-15, 0.0),
+    # its right angles have 12 digits: 2.6e-12 rad times seven of them and 1 m
+    "panda of FancySafeBot": ("panda", "FancySafeBot_fsb-library/panda.urdf", "panda_link8", 5e-11, None),
+    # its limits are degrees cut to four digits: 2.0942 for 120 deg
+    "iiwa14 of ROS-Industrial": (
+        "iiwa14", "ros-industrial_kuka_experimental/lbr_iiwa_14_r820.urdf", "tool0", 1e-15, 3e-4,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("which", list(URDFS))
+def test_redundant_arms_are_those_of_urdfs_that_others_wrote(shared: Path, which: str) -> None:
+    robot, file, tip, rounding, cut = URDFS[which]
+    chain, other = load_robot(robot), load_robot(shared / "robots" / file, tip_link=tip)
+    assert chain.coordinates == other.coordinates
+    q = np.random.default_rng(3).uniform(-3.0, 3.0, (1000, 7))
+    for got, expected in zip(poses_over_log(chain, q), poses_over_log(other, q), strict=True):
+        np.testing.assert_allclose(got, expected, rtol=0.0, atol=rounding)
+    if cut is None:  # it gives other limits than the maker
+        return
+    ours, theirs = (
+        [(joint.lower, joint.upper, joint.velocity) for joint in arm.moving] for arm in (chain, other)
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=cut)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_start_lies_within_the_joint_ranges(name: str) -> None:
+    chain = load_robot(name)
+    for joint, value in zip(chain.moving, chain.start, strict=True):
+        assert joint.lower <= value <= joint.upper
+
+
 def test_an_unknown_name_gets_the_nearest_and_all_others() -> None:
     with pytest.raises(RobotError) as caught:
         load_robot("urm66")
@@ -78,6 +142,9 @@ def test_an_unknown_name_gets_the_nearest_and_all_others() -> None:
     with pytest.raises(RobotError) as caught:
         load_robot("kuka")
     assert str(caught.value) == f"unknown robot 'kuka'; {allowed}"
+    with pytest.raises(RobotError) as caught:
+        load_robot("iiwa")
+    assert str(caught.value) == f"unknown robot 'iiwa' (did you mean iiwa14?); {allowed}"
 
 
 def test_files_are_loaded_by_their_suffix(tmp_path: Path) -> None:

@@ -92,6 +92,23 @@ def test_names_limits_and_speeds_go_into_the_chain() -> None:
     assert (chain.start, chain.description, chain.source) == ((0.1, 0.2), "two joints", "a test")
 
 
+@pytest.mark.parametrize(("build", "matrix"), [(dh_chain, standard), (modified_dh_chain, modified)])
+def test_a_fixed_row_is_its_matrix_and_takes_no_coordinate(build: Any, matrix: Any) -> None:
+    rows = [
+        DHRow(0.1, 0.2, 0.3, 0.4),
+        DHRow(0.5, 0.6, 0.7, 0.8, kind="fixed"),
+        DHRow(0.9, -0.2, 0.1, -0.4, kind="prismatic"),
+        DHRow(-0.3, 0.1, 0.2, 1.1, name="flange", kind="fixed"),
+    ]
+    chain = build("arm", rows)
+    assert chain.coordinates == ("q1", "q2")
+    assert [joint.name for joint in chain.joints] == ["q1", "frame2", "q2", "flange"]
+    still = DHRow(0.5, 0.6, 0.7, 0.8), DHRow(-0.3, 0.1, 0.2, 1.1)  # the same rows as joints at 0
+    expected = matrix(rows[0], 1.2) @ matrix(still[0], 0.0) @ matrix(rows[2], 0.7) @ matrix(still[1], 0.0)
+    got = homogeneous(forward(chain, [1.2, 0.7])[-1])
+    np.testing.assert_allclose(got, expected, rtol=0.0, atol=ROUNDING)
+
+
 def test_an_arm_needs_a_joint() -> None:
     for build in (dh_chain, modified_dh_chain):
         with pytest.raises(RobotError) as caught:

@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from urmpipe_models.articulated_6r import articulated_6r
 from urmpipe_models.chain import Chain, Joint, Mimic
 from urmpipe_models.dh import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.errors import RobotError
@@ -91,6 +92,55 @@ def test_dh_rows(robot: Any, kind: str, build: Any) -> None:
     """
     rows = [DHRow(0.1, 0.2, 0.3, 0.4, "turn", lower=-1.0), DHRow(d=0.5, kind="prismatic", lower=-2.0)]
     assert robot(text) == build("arm", rows, start=(0.1, 0.2))
+
+
+def test_fixed_dh_rows_have_no_coordinate_no_limits_and_no_start(robot: Any) -> None:
+    text = """
+        kind = "modified_dh"
+        limits = { lower = [-1, -2], upper = [3, 4], velocity = [5, 6] }
+        start = [0.1, 0.2]
+        [[joints]]
+        d = 0.2
+        [[joints]]
+        kind = "fixed"
+        a = 0.3
+        [[joints]]
+        kind = "prismatic"
+        [[joints]]
+        name = "flange"
+        kind = "fixed"
+        d = 0.5
+    """
+    chain = robot(text)
+    assert [joint.name for joint in chain.joints] == ["q1", "frame2", "q2", "flange"]
+    assert [joint.kind for joint in chain.joints] == ["revolute", "fixed", "prismatic", "fixed"]
+    assert chain.start == (0.1, 0.2)
+    limits = [(joint.lower, joint.upper, joint.velocity) for joint in chain.joints]
+    assert limits[0::2] == [(-1.0, 3.0, 5.0), (-2.0, 4.0, 6.0)]
+    assert limits[1::2] == [(-math.inf, math.inf, math.inf)] * 2
+
+
+def test_articulated6r_by_its_lengths(robot: Any) -> None:
+    chain = robot("""
+        kind = "articulated6r"
+        length_unit = "mm"
+        angle_unit = "deg"
+        lengths = [100, 200, 300, 400, 50]
+        limits = { lower = [-180, -90, -90, -180, -90, -360], velocity = 90 }
+    """)
+    bare = articulated_6r(0.1, 0.2, 0.3, 0.4, 0.05)
+    assert (chain.name, chain.tip, chain.start) == ("arm", bare.tip, (0.0,) * 6)
+    assert [joint.origin for joint in chain.joints] == [joint.origin for joint in bare.joints]
+    assert [joint.axis for joint in chain.joints] == [joint.axis for joint in bare.joints]
+    quarter = math.pi / 2
+    assert [joint.lower for joint in chain.joints] == [
+        -math.pi,
+        *[-quarter] * 2,
+        -math.pi,
+        -quarter,
+        -2 * math.pi,
+    ]
+    assert [joint.velocity for joint in chain.joints] == [quarter] * 6
 
 
 def test_joints_of_any_kind(robot: Any) -> None:
@@ -219,12 +269,13 @@ def test_faults_in_rows_name_the_row(robot: Any) -> None:
     [
         (
             "",
-            "arm.toml: key kind: found nothing, allowed: one of urm, dh, modified_dh, joints, urdf",
+            "arm.toml: key kind: found nothing, allowed: one of urm, dh, modified_dh, articulated6r, joints,"
+            " urdf",
         ),
         (
             'kind = "dh_modified"',
-            "arm.toml: key kind: found 'dh_modified', allowed: one of urm, dh, modified_dh, joints, urdf"
-            " (did you mean modified_dh?)",
+            "arm.toml: key kind: found 'dh_modified', allowed: one of urm, dh, modified_dh,"
+            " articulated6r, joints, urdf (did you mean modified_dh?)",
         ),
         ('kind = "dh"\njoints = 5', "arm.toml: key joints: found 5, allowed: a list of tables"),
         ('kind = "dh"\njoints = []', "arm.toml: robot arm: has no moving joint; at least one is needed"),
@@ -243,6 +294,18 @@ def test_faults_in_rows_name_the_row(robot: Any) -> None:
         (
             f'kind = "dh"\njoints = [{{ d = {10**400} }}]',
             f"arm.toml: key joints[0].d: found {'1' + '0' * 56}..., allowed: a finite number",
+        ),
+        (
+            'kind = "articulated6r"\nlengths = [1, 2, 3]',
+            "arm.toml: key lengths: found [1, 2, 3], allowed: 5 finite numbers",
+        ),
+        (
+            'kind = "dh"\nlimits = { upper = [1, 2] }\njoints = [{ d = 1 }, { kind = "fixed" }]',
+            "arm.toml: key limits.upper: found [1, 2], allowed: a number, or 1 numbers, one a joint",
+        ),
+        (
+            'kind = "dh"\njoints = [{ kind = "fixed" }]',
+            "arm.toml: robot arm: has no moving joint; at least one is needed",
         ),
         ('kind = "urdf"\nfile = "no.urdf"', "no.urdf: cannot be read: No such file or directory"),
     ],

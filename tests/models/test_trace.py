@@ -16,7 +16,7 @@ from urmpipe_models.drive_controller import Gains, next_voltage, sample_number
 from urmpipe_models.kinematics import forward, jacobian
 from urmpipe_models.motion import motions
 from urmpipe_models.set_point import JointMotion, set_point
-from urmpipe_models.transform import euler_zyx
+from urmpipe_models.transform import euler_zxz, euler_zyx, from_zxz, rotation_z
 from urmpipe_models.urm import urm_chain
 
 FloatArray = NDArray[np.float64]
@@ -60,16 +60,28 @@ def test_forward_jacobian_and_motions_trace_with_symbolic_joints(symbols: list[A
     x, xd, xdd = (symbol.elements() for symbol in symbols)
     pose_of = traced("pose", [q], [*forward(chain, x)[-1].translation])
     euler_of = traced("euler", [q], [*euler_zyx(forward(chain, x)[-1].rotation)])
+    zxz_of = traced("zxz", [q], [*euler_zxz(forward(chain, x)[-1].rotation)])
     jacobian_of = traced("jacobian", [q], flat(jacobian(chain, x)))
     motion_of = traced("motion", [q, qd, qdd], everything(motions(chain, x, xd, xdd)[-1]))
     for values in np.random.default_rng(11).uniform(-1.0, 1.0, (20, 3, 6)).tolist():
         tip = forward(chain, values[0])[-1]
         assert_traced(pose_of(values[0]), flat(tip.translation))
         assert_traced(euler_of(values[0]), flat(euler_zyx(tip.rotation)), size=20.0)  # 1 / cos(ry)
+        assert_traced(zxz_of(values[0]), flat(euler_zxz(tip.rotation)), size=20.0)  # 1 / sin(x)
         assert_traced(jacobian_of(values[0]), flat(jacobian(chain, values[0])))
         assert_traced(
             motion_of(*values), everything(motions(chain, *values)[-1]), size=20.0
         )  # speeds of up to 6
+
+
+def test_euler_angles_trace_where_they_are_singular() -> None:
+    casadi.GlobalOptions.setNumpyMode(-1)
+    x = casadi.SX.sym("x", 3)
+    zxz_of = traced("zxz", [x], [*euler_zxz(from_zxz(*x.elements()).rotation)])
+    for values in [(0.4, 0.0, 0.5), (0.4, np.pi, 0.5), (-2.0, 0.0, -0.1), (0.4, 1.0, 0.5)]:
+        assert_traced(zxz_of(values), flat(euler_zxz(from_zxz(*values).rotation)))
+    turn = casadi.SX.sym("turn")
+    assert_traced(traced("zxz", [turn], [*euler_zxz(rotation_z(turn).rotation)])(0.3), [0.3, 0.0, 0.0, 1.0])
 
 
 def test_lengths_and_tilts_trace_as_parameters(symbols: list[Any]) -> None:

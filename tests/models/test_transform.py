@@ -8,16 +8,18 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from urmpipe_models.transform import (
     Transform,
+    euler_zxz,
     euler_zyx,
     from_offset,
     from_rpy,
+    from_zxz,
     rotation_about,
     rotation_x,
     rotation_y,
@@ -152,6 +154,73 @@ def test_euler_angles_of_a_column_of_rotations() -> None:
     assert ry == pytest.approx(math.pi / 2)
     np.testing.assert_array_equal(got, 0.0)
     assert np.all(singular)
+
+
+@given(angles, angles, angles)
+def test_from_zxz_is_scipys_moving_z_x_z(z1: float, x: float, z2: float) -> None:
+    expected = Rotation.from_euler("ZXZ", [z1, x, z2]).as_matrix()
+    np.testing.assert_allclose(matrix(from_zxz(z1, x, z2).rotation), expected, atol=ROUNDING)
+
+
+@given(angles, st.floats(0.07, 3.07), angles)
+def test_zxz_angles_come_back_away_from_the_singular_ones(z1: float, x: float, z2: float) -> None:
+    got = euler_zxz(from_zxz(z1, x, z2).rotation)
+    turned = [np.sin(np.subtract(a, b) / 2.0) for a, b in zip(got[:3], (z1, x, z2), strict=True)]
+    np.testing.assert_allclose(turned, 0.0, atol=15 * ROUNDING)  # ill-conditioned by 1 / sin(x) <= 15
+    assert not got[3]
+
+
+@given(angles, st.floats(-math.pi, 0.0), angles)
+def test_a_negative_x_is_the_same_rotation_as_a_positive_one(z1: float, x: float, z2: float) -> None:
+    rotation = from_zxz(z1, x, z2).rotation
+    got_z1, got_x, got_z2, _ = euler_zxz(rotation)
+    assert got_x >= 0.0
+    back = from_zxz(float(got_z1), float(got_x), float(got_z2)).rotation
+    np.testing.assert_allclose(matrix(back), matrix(rotation), atol=3e-7)  # as near ninety degrees
+
+
+@pytest.mark.parametrize("x", [0.0, math.pi, -math.pi])
+@given(z1=angles, z2=angles)
+def test_at_0_and_180_degrees_z2_is_zero_and_z1_turns_all(x: float, z1: float, z2: float) -> None:
+    rotation = from_zxz(z1, x, z2).rotation
+    got_z1, got_x, got_z2, singular = euler_zxz(rotation)
+    assert singular
+    assert got_z2 == 0.0
+    assert got_x == pytest.approx(abs(x), abs=1e-15)
+    back = from_zxz(float(got_z1), float(got_x), 0.0).rotation
+    np.testing.assert_allclose(matrix(back), matrix(rotation), atol=ROUNDING)
+
+
+@pytest.mark.parametrize("x", [0.0, math.pi])
+@given(power=st.floats(-9.5, -7.0), z1=angles, z2=angles)
+def test_near_0_and_180_degrees_the_rotation_still_comes_back(
+    x: float, power: float, z1: float, z2: float
+) -> None:
+    rotation = from_zxz(z1, x + 10.0**power, z2).rotation
+    got_z1, got_x, got_z2, _ = euler_zxz(rotation)
+    back = from_zxz(float(got_z1), float(got_x), float(got_z2)).rotation
+    # as near ninety degrees of the other convention
+    np.testing.assert_allclose(matrix(back), matrix(rotation), atol=3e-7)
+
+
+@given(angles, st.floats(-1.5, 1.5), angles)
+def test_both_conventions_tell_the_same_rotation(rz: float, ry: float, rx: float) -> None:
+    rotation = from_rpy(rx, ry, rz).rotation
+    z1, x, z2, singular = euler_zxz(rotation)
+    assume(not singular and np.sin(x) > 0.07)
+    back = euler_zyx(from_zxz(float(z1), float(x), float(z2)).rotation)
+    turned = [np.sin(np.subtract(a, b) / 2.0) for a, b in zip(back[:3], (rz, ry, rx), strict=True)]
+    # ill-conditioned by 1 / sin(x) <= 15 there and by 1 / cos(ry) <= 15 back
+    np.testing.assert_allclose(turned, 0.0, atol=225 * ROUNDING)
+
+
+def test_zxz_angles_of_a_column_of_rotations() -> None:
+    x = np.array([0.0, 0.3, math.pi])
+    z1, got, z2, singular = euler_zxz((rotation_z(0.5) @ rotation_x(x) @ rotation_z(0.2)).rotation)
+    np.testing.assert_allclose(z1, [0.7, 0.5, 0.3], atol=10 * ROUNDING)
+    np.testing.assert_allclose(got, x, atol=ROUNDING)
+    np.testing.assert_allclose(z2, [0.0, 0.2, 0.0], atol=10 * ROUNDING)
+    np.testing.assert_array_equal(singular, [True, False, True])
 
 
 @given(angles, angles | st.sampled_from([math.pi / 2, -math.pi / 2]), angles)

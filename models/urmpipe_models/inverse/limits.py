@@ -46,7 +46,7 @@ def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = 
     turns = np.where(_turns(chain), np.clip(np.round((wish - solutions.q) / TURN), least, most), 0.0)
     shifted = solutions.q + turns * TURN
     outside = (shifted < lower - LIMIT_ROUNDING) | (shifted > upper + LIMIT_ROUNDING)
-    refused = outside.any(axis=2)
+    refused = np.asarray(outside.any(axis=2))
     return replace(
         solutions,
         q=np.where(refused[..., None], np.nan, np.clip(shifted, lower, upper)),

@@ -14,8 +14,21 @@ BoolArray: TypeAlias = NDArray[np.bool_]
 TextArray: TypeAlias = NDArray[np.object_]
 """Texts as Python objects: most are empty, and one object then."""
 
-SingularFamily = Literal["wrist on axis 1", "wrist aligned", "arm stretched", "arm withdrawn"]
-"""The families in which an arm loses a freedom; two can meet in one pose."""
+SingularFamily = Literal[
+    "wrist on axis 1",
+    "wrist beside axis 1",
+    "wrist on axis 2",
+    "wrist aligned",
+    "arm stretched",
+    "arm withdrawn",
+    "postures meet",
+    "flips meet",
+]
+"""The families in which an arm loses a freedom; two can meet in one pose.
+
+"wrist beside axis 1": as near to axis 1 as the offset of the shoulder lets it come, where the right and the
+left arm meet (UR arms).
+"""
 
 NEAREST_POINT = "nearest point"
 """What a solution is called that comes as near as it can to a target out of reach."""
