@@ -39,7 +39,7 @@ from urmpipe_models.inverse.task import (
 )
 from urmpipe_models.kinematics import THREADS
 
-BLOCK = 2048
+BLOCK = 4096
 """Rows of a block: its hundred or so arrays stay in a core's cache."""
 
 ROUND = 8

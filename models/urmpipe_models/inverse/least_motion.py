@@ -9,33 +9,38 @@ solution is a point of least motion where the gradient has no part in the null s
 
     t = (I - J^+ J) (home - q) = 0,
 
-that is where home - q is J^T lambda, and where no held joint would come off its limit: home - q - J^T lambda points out there. From a solution
-the arm moves along t, by the step of Barzilai and Borwein, back onto the target by Levenberg-Marquardt, and
-keeps what has brought it nearer to home: what is found is a minimum, not only stationary, but one near by.
+that is where home - q is J^T lambda, and where no held joint would come off its limit:
+home - q - J^T lambda points out there. From a solution the arm moves along t, by the step of Barzilai and
+Borwein, back onto the target by Levenberg-Marquardt, and keeps what has brought it nearer to home: what is
+found is a minimum, not only stationary, but one near by.
 
 Sources: [NakamuraHanafusa1986]_ (redundancy resolved in the null space); [BarzilaiBorwein1988]_.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.elementwise import Element, times
 from urmpipe_models.inverse.descent import Progress, Settings, descend
-from urmpipe_models.inverse.small_systems import dot_product, factor, gram
+from urmpipe_models.inverse.small_systems import (
+    dot_product,
+    factor,
+    gram,
+    product,
+    transposed_product,
+)
 from urmpipe_models.inverse.task import BoolArray, FloatArray, Task
 
 LEAST_MOTION = 1e-6
-"""A tangent t of at most this in every joint, in [rad] or [m], is none: |q - home|^2 has no digits for less."""
+"""A tangent t of at most this in every joint, in [rad] or [m], counts as none."""
 
 RANK_DAMPING = 1e-13
 """Of J J^T, relative to its trace: singular values below 3e-7 of the norm count as the null space's."""
 
 EXACT = 1e-13
-"""What moves come back to, in [m] and [rad]: 1e-10 off the target feigns motion that the last moves do not have."""
+"""What moves come back to in [m] and [rad]: 1e-10 off the target would feign more than a last move gains."""
 
 CORRECTIONS = 8
 """Steps to come back onto the target; a move from which more are needed was too long."""
@@ -71,7 +76,7 @@ def tangent(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> 
         home: Where least motion counts from, shape (joints, n).
         settings: The limits.
     """
-    J = task.miss(list(q)).jacobian
+    J = task.miss(q).jacobian
     low, high = q <= settings.lower[:, None], q >= settings.upper[:, None]
     left = _left(J, home - q, ~(low | high))
     inward = np.where(low, np.maximum(left, 0.0), np.where(high, np.maximum(-left, 0.0), 0.0))
@@ -83,22 +88,13 @@ def tangent(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> 
     return Tangent(t, np.abs(t).max(axis=0))
 
 
-def _left(J: list[list[Element]], wish: FloatArray, free: BoolArray) -> FloatArray:
+def _left(J: FloatArray, wish: FloatArray, free: BoolArray) -> FloatArray:
     """Return wish - J^T lambda of all joints with lambda = (J_f J_f^T)^-1 J_f wish_f of the free ones."""
-    moving = J if free.all() else [_of_free(row, free) for row in J]
+    moving = np.where(free, J, 0.0)
     squares = gram(moving)
-    trace = sum(row[-1] for row in squares)
-    slope = [dot_product(row, list(wish)) for row in moving]
-    multipliers = factor(squares, RANK_DAMPING * trace).solve(slope)
-    columns = zip(*J, strict=True)
-    return np.array(
-        [value - dot_product(column, multipliers) for value, column in zip(wish, columns, strict=True)]
-    )
-
-
-def _of_free(row: Sequence[Element], free: BoolArray) -> list[Element]:
-    """Return a row of J with zeros where a joint is held."""
-    return [times(value, np.where(one, 1.0, 0.0)) for value, one in zip(row, free, strict=True)]
+    trace = np.maximum(sum(squares[k, k] for k in range(len(squares))), np.finfo(float).tiny)
+    multipliers = factor(squares, RANK_DAMPING * trace).solve(product(moving, wish))
+    return wish - transposed_product(J, multipliers)
 
 
 def settle(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> tuple[FloatArray, FloatArray]:
@@ -141,16 +137,15 @@ def _moved(
     task: Task, q: FloatArray, home: FloatArray, t: FloatArray, length: FloatArray, settings: Settings
 ) -> tuple[FloatArray, BoolArray]:
     """Return joint values a step along t, back on the target, and where they are nearer to home."""
-    there = np.clip(q + length * t, settings.lower[:, None], settings.upper[:, None])
-    progress = Progress.at(there.T)
+    progress = Progress.at(settings.within(q + length * t).T)
     exact = replace(settings, metres=EXACT, radians=EXACT)
     descend(progress, task, np.arange(len(length)), exact, CORRECTIONS)
     met = (progress.distance <= settings.metres) & (progress.angle <= settings.radians)
-    gain = np.square(q - home).sum(axis=0) - np.square(progress.q - home).sum(axis=0)
+    gain = dot_product(q - home, q - home) - dot_product(progress.q - home, progress.q - home)
     return progress.q, met & (gain > 0.0)
 
 
 def _spectral(moved: FloatArray, turned: FloatArray) -> FloatArray:
     """Return |dq|^2 / (dq . -dt), the longest step where |q - home|^2 is not convex."""
-    bend = (moved * turned).sum(axis=0)
-    return np.where(bend > 0.0, np.square(moved).sum(axis=0) / np.where(bend > 0.0, bend, 1.0), LENGTHS[1])
+    bend = dot_product(moved, turned)
+    return np.where(bend > 0.0, dot_product(moved, moved) / np.where(bend > 0.0, bend, 1.0), LENGTHS[1])

@@ -75,8 +75,8 @@ def random_starts(chain: Chain, count: int, seed: int) -> FloatArray:
     """Return uniformly random joint values within the limits, shape (count, joints).
 
     A revolute joint that is open at an end is drawn from one turn: from its only limit, or (-pi, pi]; a
-    prismatic one from as far as the arm is long: from its only limit, or to both sides. The first draws do not
-    depend on how many follow.
+    prismatic one from as far as the arm is long: from its only limit, or to both sides. The first draws do
+    not depend on how many follow.
     """
     ranges = np.array([_range(joint, 4.0 * characteristic_length(chain)) for joint in chain.moving])
     draws = np.random.default_rng(seed).uniform(size=(count, len(ranges)))
