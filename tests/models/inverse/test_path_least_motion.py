@@ -96,28 +96,31 @@ def test_the_distance_to_singular_poses_is_told_along_the_path(followed: JointPa
     np.testing.assert_allclose(
         smallest, np.linalg.svd(J, compute_uv=False)[:, -1], rtol=0.0, atol=1e-12
     )  # the same matrix, decomposed twice
-    assert smallest[0] < 1e-12 < 1e-3 < smallest[1000:].min()
+    assert smallest[0] < 1e-12
+    assert smallest[1000:].min() > 1e-3
 
 
-def test_windows_give_what_one_sample_after_the_other_gives(followed: JointPath, demo_path: FloatArray) -> None:
+def test_windows_give_what_one_sample_after_the_other_gives(
+    followed: JointPath, demo_path: FloatArray
+) -> None:
     """Newton's method on min |q - q_{k-1}|^2 subject to FK(q) = x_k, written plainly, sample by sample."""
-    chain, rows = followed.chain, slice(1000, 1200)
+    chain, rows = followed.chain, slice(1000, 1060)
     expected = [followed.q[rows.start]]
     for target in demo_path[rows.start + 1 : rows.stop]:
         q = last = expected[-1]
-        for _ in range(20):
+        for _ in range(6):
             error, _ = misses(chain, q[None], Targets(target[None]))
             J = jacobian_over_log(chain, q[None])[0, :3]
             q = last + np.linalg.pinv(J) @ (error[0] + J @ (q - last))
         expected.append(q)
-    # rad: 200 samples, each converged to 1e-10 and damped by 1e-8 m^2 / sigma^2 of a step of 1e-3
+    # rad: 60 samples, each converged to 1e-10 and damped by 1e-8 m^2 / sigma^2 of a step of 1e-3
     np.testing.assert_allclose(followed.q[rows], expected, rtol=0.0, atol=1e-6)
 
 
-def test_joints_within_pi_are_unwrapped_by_the_repolarizer(followed: JointPath, demo_path: FloatArray) -> None:
-    wrapped = follow(
-        followed.chain, Targets(demo_path), followed.t_ns, within_pi=True
-    )
+def test_joints_within_pi_are_unwrapped_by_the_repolarizer(
+    followed: JointPath, demo_path: FloatArray
+) -> None:
+    wrapped = follow(followed.chain, Targets(demo_path), followed.t_ns, within_pi=True)
     assert np.abs(followed.q).max() > math.pi
     assert wrapped.q.max() <= math.pi
     assert wrapped.q.min() > -math.pi
@@ -145,9 +148,11 @@ def test_a_redundant_arm_follows_poses_within_its_limits() -> None:
 
 def test_a_joint_is_held_on_its_limit_and_let_go_again() -> None:
     free, limited = planar(3), planar(3, upper=0.5)
-    t = np.linspace(0.0, 2.0 * math.pi, 400)
-    circle = np.column_stack((2.0 - 0.8 * np.sin(t), 0.5 - 0.8 * np.cos(t), np.zeros_like(t)))
     start = np.array([0.2, -0.6, 0.3])
+    t = np.linspace(0.0, 2.0 * math.pi, 400)
+    circle = targets_of(free, start[None]).position + 0.6 * np.column_stack(
+        (np.cos(t) - 1.0, np.sin(t), np.zeros_like(t))
+    )
     without = follow(free, Targets(circle), times(400), start=start)
     path = follow(limited, Targets(circle), times(400), start=start)
     assert without.q[:, 0].max() > 0.6
@@ -253,6 +258,6 @@ def test_far_apart_samples_are_followed_one_by_one() -> None:
 def test_the_same_seed_gives_the_same_motion_bit_for_bit() -> None:
     arm = planar(3)
     rng = np.random.default_rng(5)
-    targets = Targets(np.column_stack((rng.uniform(-2.5, 2.5, (30, 2)), np.zeros(30))))
-    one, other = (follow(arm, targets, times(30), seed=3) for _ in range(2))
+    targets = Targets(np.column_stack((rng.uniform(-2.5, 2.5, (8, 2)), np.zeros(8))))
+    one, other = (follow(arm, targets, times(8), seed=3, restarts=5) for _ in range(2))
     assert np.array_equal(one.q, other.q, equal_nan=True)
