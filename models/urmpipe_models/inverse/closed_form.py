@@ -8,6 +8,7 @@ from typing import Protocol
 from urmpipe_models.chain import Chain
 from urmpipe_models.inverse.parallel_axes import parallel_axes
 from urmpipe_models.inverse.solutions import FloatArray, Solutions
+from urmpipe_models.inverse.spherical_wrist import spherical_wrist
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.screws import screws
 
@@ -49,4 +50,7 @@ def closed_form(chain: Chain) -> ClosedForm | None:
     the last three meet in a point, or those of joints 2, 3 and 4 are parallel.
     """
     of_chain = screws(chain)
-    return None if of_chain is None else parallel_axes(of_chain, chain.coordinates)
+    if of_chain is None:
+        return None
+    names = chain.coordinates
+    return spherical_wrist(of_chain, names) or parallel_axes(of_chain, names)

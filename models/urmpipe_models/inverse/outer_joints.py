@@ -44,7 +44,8 @@ class OuterJoints:
         side: 1 where the wrist is on that side of axis 1 that k1 x z points to, -1 else, shape (a, 1, n).
         flip: False of the first, true of the second wrist, shape (b,).
         reasons: Why there is none, shape (a, b, n).
-        singular: The families that pairs lie in, `where` of shape (a, b, n).
+        free: Where the wrist is on axis 1, which leaves q1 free, shape (n,).
+        singular: The other families that pairs lie in, `where` of shape (a, b, n).
     """
 
     q1: FloatArray
@@ -52,10 +53,11 @@ class OuterJoints:
     side: FloatArray
     flip: BoolArray
     reasons: TextArray
+    free: BoolArray
     singular: tuple[Singular, ...]
 
 
-def outer_joints(arm: ParallelGeometry, motion: Transform, near: FloatArray | None) -> OuterJoints:
+def outer_joints(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> OuterJoints:
     """Return the pairs of q1 and q5 that put axis 6 into its place.
 
     Where axes 5 and 6 meet, p6 is their meeting point and `place` alone gives q1; where they are parallel,
@@ -64,7 +66,7 @@ def outer_joints(arm: ParallelGeometry, motion: Transform, near: FloatArray | No
     Args:
         arm: The arm.
         motion: G of n targets, in the frame of the arm.
-        near: q1 in [rad] where it is free, shape (n,); 0 if None.
+        near: q1 in [rad] where it is free, shape (n,).
     """
     if arm.p5 == arm.p6:
         return _meeting(arm, motion, near)
@@ -78,15 +80,14 @@ def outer_names(arm: ParallelGeometry) -> tuple[tuple[str, ...], tuple[str, ...]
     return ("right", "left"), ("not flipped", "flipped")
 
 
-def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray | None) -> OuterJoints:
+def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> OuterJoints:
     """Axes 5 and 6 meet, as those of a UR arm: `place` gives q1, a spherical triangle q5."""
     a, b, c = _shoulder(arm.k1, subtract(motion.point(arm.p6), arm.p1), arm.p5[2] - arm.p1[2])
     r, within = np.hypot(a, b), REACH * arm.size
     free = (r <= within) & (np.abs(c) <= within)
     c, meet = _on_edge(r, c, EDGE * arm.size, within)
     left, right = linear_roots(a, b, c)
-    wish = np.zeros_like(r) if near is None else near
-    q1 = np.where(free, (wish, wrapped(wish + np.pi)), (right, left))[:, None]
+    q1 = np.where(free, (near, near + np.pi), (right, left))[:, None]
     axis6 = rotation_about(arm.k1, -q1).rotate(motion.rotate(arm.k6))
     theta = np.arctan2(np.hypot(axis6[0], axis6[1]), axis6[2])
     q5, folded, allowed = _fifth(arm, theta)
@@ -103,12 +104,11 @@ def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray | None) 
         theta,
     )
     singular = (
-        Singular("wrist on axis 1", _everywhere(free, q5), "q1", "q1 = 0, and pi where left"),
         Singular("wrist beside axis 1", _everywhere(meet & ~free, q5)),
-        Singular("wrist aligned", folded & (np.sin(theta) > REACH)),
+        Singular("flips meet", folded & (np.sin(theta) > REACH)),
     )
     side = np.broadcast_to(np.array([1.0, -1.0])[:, None, None], q1.shape)
-    return OuterJoints(q1, q5, side, np.array([False, True]), reasons, singular)
+    return OuterJoints(q1, q5, side, np.array([False, True]), reasons, free, singular)
 
 
 def _fifth(arm: ParallelGeometry, theta: FloatArray) -> tuple[FloatArray, BoolArray, tuple[float, float]]:
@@ -168,9 +168,12 @@ def _parallel(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
         np.abs(height),
         np.full_like(height, reach),
     )
-    singular = (Singular("branches meet", _everywhere(meet, q5) | np.broadcast_to(fold, q5.shape)),)
+    singular = (
+        Singular("postures meet", _everywhere(meet, q5)),
+        Singular("flips meet", np.broadcast_to(fold, q5.shape)),
+    )
     side = np.broadcast_to(np.array([1.0, -1.0])[:, None, None], q1.shape)
-    return OuterJoints(q1, q5, side, np.array([False, True]), reasons, singular)
+    return OuterJoints(q1, q5, side, np.array([False, True]), reasons, np.zeros(len(r), dtype=bool), singular)
 
 
 def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
@@ -212,8 +215,16 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     near = np.diff(q1, axis=0) < NEAR_ROOTS
     meet[1:] |= near
     meet[:-1] |= near
-    singular = (Singular("branches meet", meet),)
-    return OuterJoints(q1, q5, np.where(slope < 0.0, -1.0, 1.0), np.array([False]), reasons, singular)
+    singular = (Singular("postures meet", meet),)
+    return OuterJoints(
+        q1,
+        q5,
+        np.where(slope < 0.0, -1.0, 1.0),
+        np.array([False]),
+        reasons,
+        np.zeros(q1.shape[-1], dtype=bool),
+        singular,
+    )
 
 
 def _newton_step(

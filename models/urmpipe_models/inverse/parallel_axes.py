@@ -16,27 +16,33 @@ Source: [EliasWen2022]_ for the case; the steps are ours.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.elementwise import Element, Vector, add, cross, dot, scale, subtract
+from urmpipe_models.elementwise import Element, Vector, cross, dot, scale, subtract
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.outer_joints import (
-    EDGE,
     REACH,
     OuterJoints,
     outer_joints,
     outer_names,
-    texts_where,
 )
 from urmpipe_models.inverse.parallel_geometry import ParallelGeometry, parallel_geometry
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Singular, Solutions, TextArray
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.trigonometric import wrapped
+from urmpipe_models.inverse.two_links import TwoLinks, link_lengths, two_links
 from urmpipe_models.screws import Screws
 from urmpipe_models.transform import Transform, rotation_about
+
+NEARLY_ALIGNED = 1e-5
+"""Axis 6 nearer to parallel to axis 4 than this, in [rad], leaves q6 too uncertain for the reach of p4."""
+
+ONE = 1e-9
+"""Two solutions of a singular pose that differ by less than this in every joint, in [rad], are one."""
 
 ELBOWS = ("elbow up", "elbow down")
 
@@ -93,24 +99,52 @@ class ParallelAxes:
             targets: Poses.
             near: Joint values in [rad], shape (joints,) or (n, joints), taken where a joint is free.
         """
-        wish = None if near is None else np.broadcast_to(np.atleast_2d(near), (len(targets), 6)).T
+        wish = np.broadcast_to(np.atleast_2d(np.zeros(6) if near is None else near), (len(targets), 6)).T
         with np.errstate(invalid="ignore", divide="ignore"):
             motion = self.arm.to_frame @ _pose(targets) @ self.arm.from_tip
-            outer = outer_joints(self.arm, motion, None if wish is None else wish[0])
-            wrist = _wrist(self.arm, outer, motion, None if wish is None else wish[5])
-            links = _links(self.arm, wrist.place, outer.side, None if wish is None else wish[1])
+            outer = outer_joints(self.arm, motion, wish[0])
+            wrist = _wrist(self.arm, outer, motion, wish[5])
+            links = two_links(self.arm, wrist.place, outer.side, wish[1])
         q4 = wrist.phi - links.q2 - links.q3
         joints = np.broadcast_arrays(outer.q1, links.q2, links.q3, q4, outer.q5, wrist.q6)
         signs = np.array((1.0, *self.arm.signs, 1.0, 1.0))
-        q = wrapped(_by_target(np.stack(joints, axis=-1)) * signs)
+        q = wrapped(_by_target(np.stack(joints, axis=-1)) * signs) + 0.0  # no -0.0
+        reasons = _by_target(outer.reasons + links.reasons)
+        families = [
+            replace(one, where=_by_target(_like(one.where, q4)))
+            for one in self._families(outer, wrist, links, near is None)
+        ]
+        _tell_once(q, reasons, self.branches, [one.where for one in families])
         reached = np.asarray(np.isfinite(q).all(axis=2))
-        families = (*outer.singular, *_wrist_families(self.names, wrist.free, near), *links.singular)
-        spread = [replace(one, where=_by_target(_like(one.where, q4)) & reached) for one in families]
-        return Solutions(
-            np.where(reached[..., None], q, np.nan),
-            self.branches,
-            _by_target(_like(outer.reasons, q4) + links.reasons),
-            tuple(one for one in spread if one.where.any()),
+        q[~reached] = np.nan
+        spread = (replace(one, where=one.where & reached) for one in families)
+        singular = tuple(one for one in spread if one.where.any())
+        return Solutions(q, self.branches, reasons, singular)
+
+    def _families(
+        self, outer: OuterJoints, wrist: _Wrist, links: TwoLinks, at_zero: bool
+    ) -> tuple[Singular, ...]:
+        """Return the families of singular poses, and what is free there."""
+        q1, q2, q3, q4, _, q6 = self.names
+        taken = "= 0" if at_zero else "as near"
+        flipped = f"{q6} {taken}, and pi more for the flipped wrist, or the nearest value in reach"
+        return (
+            Singular(
+                "wrist on axis 1",
+                outer.free,
+                f"{q1}: any value",
+                f"{q1} {taken}, and pi more for the left arm",
+            ),
+            *outer.singular,
+            Singular(
+                "wrist aligned",
+                wrist.free,
+                f"{q6}: any value in reach, and {q2}, {q3}, {q4} with it",
+                flipped,
+            ),
+            Singular("arm stretched", links.stretched),
+            Singular("arm withdrawn", links.withdrawn & ~links.free),
+            Singular("arm withdrawn", links.free, f"{q2}: any value", f"{q2} {taken}"),
         )
 
 
@@ -131,23 +165,28 @@ class _Wrist:
     free: BoolArray
 
 
-def _wrist(arm: ParallelGeometry, outer: OuterJoints, motion: Transform, near: FloatArray | None) -> _Wrist:
+def _wrist(arm: ParallelGeometry, outer: OuterJoints, motion: Transform, near: FloatArray) -> _Wrist:
     """Return q6 and the motion P in the plane that q1 and q5 leave.
 
     R6 takes R_M^T z to R5^T z with M = exp(-xi_1 q1) G. Where axis 6 is along z, both are along axis 6 and
     q6 is free: `near` (0, and pi where flipped, by default), or the value nearest to it with p4 in reach.
+    Where it is nearly along z, rounding leaves q6 uncertain, and within that p4 is kept in reach too.
     """
     rest = _about_line(arm.k1, arm.p1, -outer.q1) @ motion
     turn5 = _about_line(arm.k5, arm.p5, outer.q5)
-    goal, now = turn5.rotation[2], rest.rotation[2]
-    along = dot(arm.k6, goal) * dot(arm.k6, now)
-    q6 = np.arctan2(dot(arm.k6, cross(now, goal)), dot(now, goal) - along)
+    # only the parts across axis 6 count; first taken, they keep their digits where they are small
+    goal, now = _across(arm.k6, turn5.rotation[2]), _across(arm.k6, rest.rotation[2])
+    q6 = np.arctan2(dot(arm.k6, cross(now, goal)), dot(now, goal))
     axis6 = rest.rotate(arm.k6)
-    free = _like(np.hypot(axis6[0], axis6[1]) <= REACH, q6)
+    sine = _like(np.hypot(axis6[0], axis6[1]), q6)
     held = turn5.inverse().point(arm.p4)
-    if free.any():
-        wish = np.where(outer.flip, np.pi, 0.0)[:, None] + (0.0 if near is None else near)
-        q6 = np.where(free, _in_reach(arm, rest, held, _like(wish, q6)), q6)
+    free = sine <= REACH
+    if (sine <= NEARLY_ALIGNED).any():
+        wish = np.where(outer.flip, np.pi, 0.0)[:, None] + near
+        wish = np.where(free, wish, q6)
+        reaching = _in_reach(arm, rest, held, wish)
+        loose = (sine <= NEARLY_ALIGNED) & (sine * np.abs(reaching - wish) <= np.where(free, np.inf, REACH))
+        q6 = np.where(loose, reaching, wish)
     turn6 = _about_line(arm.k6, arm.p6, -q6)
     x, y, _ = rest.rotate(turn6.rotate(turn5.rotation[0]))
     place = rest.point(turn6.point(held))
@@ -159,98 +198,37 @@ def _in_reach(arm: ParallelGeometry, rest: Transform, held: Vector, wish: FloatA
 
     p4 then runs on a circle: |o + u cos q6 + w sin q6|^2 = o^2 + u^2 + 2 o (u cos q6 + w sin q6).
     """
-    arm_length = subtract(held, arm.p6)
-    on_axis = scale(dot(arm.k6, arm_length), arm.k6)
-    o = rest.point(add(arm.p6, on_axis))[:2]
-    u = rest.rotate(subtract(arm_length, on_axis))[:2]
-    w = rest.rotate(cross(arm_length, arm.k6))[:2]
+    lever = subtract(held, arm.p6)
+    across = _across(arm.k6, lever)
+    o = rest.point(subtract(held, across))[:2]
+    u = rest.rotate(across)[:2]
+    w = rest.rotate(cross(lever, arm.k6))[:2]
     a, b = (2.0 * (o[0] * one[0] + o[1] * one[1]) for one in (u, w))
     mean = o[0] ** 2 + o[1] ** 2 + u[0] ** 2 + u[1] ** 2
     swing, middle = np.hypot(a, b), np.arctan2(b, a)
-    upper, fore = _lengths(arm)
+    upper, fore = link_lengths(arm)
     least, most = ((square - mean) / swing for square in ((upper - fore) ** 2, (upper + fore) ** 2))
     away = wrapped(wish - middle)
     cosine = np.cos(away)
     allowed = np.clip(cosine, least, most)
-    moved = middle + np.copysign(np.arccos(np.clip(allowed, -1.0, 1.0)), away)
-    return np.where((allowed == cosine) | (np.abs(allowed) > 1.0), wish, moved)
+    moved = wish + np.copysign(np.arccos(np.clip(allowed, -1.0, 1.0)), away) - away
+    return np.where((allowed == cosine) | (np.abs(allowed) > 1.0 + REACH), wish, moved)
 
 
-@dataclass(frozen=True, slots=True)
-class _Links:
-    """Joints 2 and 3 of both elbows, each of shape (2, a, b, n); their signs are those of z.
+def _tell_once(q: FloatArray, reasons: TextArray, branches: tuple[str, ...], where: list[BoolArray]) -> None:
+    """Take out of the solutions of singular poses the second of two that are one, such as a stretched elbow.
 
-    Attributes:
-        q2: In [rad].
-        q3: In [rad].
-        reasons: Why there are none, shape (2, a, b, n).
-        singular: Arm stretched, arm withdrawn.
+    Args:
+        q: Solutions in [rad], shape (n, k, 6); the second ones become NaN.
+        reasons: Why there is none, shape (n, k); the second ones name the first.
+        branches: What the k are called.
+        where: Where they are singular, each of shape (n, k).
     """
-
-    q2: FloatArray
-    q3: FloatArray
-    reasons: TextArray
-    singular: tuple[Singular, ...]
-
-
-def _links(
-    arm: ParallelGeometry, place: tuple[FloatArray, FloatArray], side: FloatArray, near: FloatArray | None
-) -> _Links:
-    """Return q2 and q3 that bring the point p4 to a place in the plane.
-
-    With the links' lengths l2, l3, the distance r and the angle psi between the links
-    tan^2(psi/2) = (l2 + l3 - r)(l2 + l3 + r) / ((r - |l2 - l3|)(r + |l2 - l3|)).
-    """
-    upper, fore = _lengths(arm)
-    r = np.hypot(*place)
-    short, long = abs(upper - fore), upper + fore
-    stretched, withdrawn = long - r <= EDGE * arm.size, r - short <= EDGE * arm.size
-    reached = (r <= long + REACH * arm.size) & (r >= short - REACH * arm.size)
-    up = np.where(stretched, 0.0, (long - r) * (long + r))
-    down = np.where(withdrawn, 0.0, (r - short) * (r + short))
-    psi = 2.0 * np.arctan2(np.sqrt(np.maximum(up, 0.0)), np.sqrt(np.maximum(down, 0.0)))
-    psi = np.where(reached, np.stack((-side * psi, side * psi)), np.nan)
-    first = float(np.arctan2(arm.p3[1], arm.p3[0]))
-    second = float(np.arctan2(arm.p4[1] - arm.p3[1], arm.p4[0] - arm.p3[0]))
-    free = reached & (r <= REACH * arm.size)
-    to_place = np.arctan2(place[1], place[0])
-    bend = np.arctan2(fore * np.sin(psi), upper + fore * np.cos(psi))
-    q2 = np.where(free, 0.0 if near is None else near * arm.signs[0], to_place - first - bend)
-    reasons = texts_where(
-        ~reached & np.isfinite(r),
-        f"axis 4 is {{:.4g}} m from axis 2, allowed: {short:.4g} to {long:.4g} m",
-        r,
-    )
-    singular = (
-        Singular("arm stretched", stretched & reached),
-        Singular("arm withdrawn", withdrawn & reached & ~free),
-        Singular("arm withdrawn", free, "q2", "q2 = 0"),
-    )
-    return _Links(q2 + np.zeros_like(psi), psi - (second - first), _like(reasons, psi), singular)
-
-
-def _wrist_families(names: tuple[str, ...], free: BoolArray, near: FloatArray | None) -> tuple[Singular, ...]:
-    """Return the family of poses in which axis 6 is parallel to axes 2, 3 and 4."""
-    _, q2, q3, q4, _, q6 = names
-    chosen = (
-        f"{q6} = 0, and pi where flipped" if near is None else f"{q6} of the start, and pi more where flipped"
-    )
-    return (
-        Singular(
-            "wrist aligned",
-            free,
-            f"{q6}, which {q2}, {q3} and {q4} follow",
-            f"{chosen}, or the nearest value in reach",
-        ),
-    )
-
-
-def _lengths(arm: ParallelGeometry) -> tuple[float, float]:
-    """Return the lengths of the links from axis 2 to axis 3 and on to axis 4, in [m]."""
-    return (
-        float(np.hypot(arm.p3[0], arm.p3[1])),
-        float(np.hypot(arm.p4[0] - arm.p3[0], arm.p4[1] - arm.p3[1])),
-    )
+    rows = np.flatnonzero(np.any(where, axis=0).any(axis=1))
+    for first, second in combinations(range(len(branches)), 2):
+        same = np.abs(wrapped(q[rows, first] - q[rows, second])).max(axis=1) < ONE
+        q[rows[same], second] = np.nan
+        reasons[rows[same], second] = f"the same as {branches[first]}: both meet here"
 
 
 def _pose(targets: Targets) -> Transform:
@@ -265,6 +243,11 @@ def _about_line(k: Vector, p: Vector, angle: Element) -> Transform:
     """Return the rotation by an angle in [rad] about the line along k through p."""
     turned = rotation_about(k, angle)
     return Transform(turned.rotation, subtract(p, turned.rotate(p)))
+
+
+def _across(k: Vector, v: Vector) -> Vector:
+    """Return the part of a vector across a unit vector k: v - k (k . v)."""
+    return subtract(v, scale(dot(k, v), k))
 
 
 def _like(values: NDArray[Any], other: FloatArray) -> NDArray[Any]:

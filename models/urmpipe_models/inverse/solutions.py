@@ -17,15 +17,17 @@ TextArray: TypeAlias = NDArray[np.object_]
 SingularFamily = Literal[
     "wrist on axis 1",
     "wrist beside axis 1",
+    "wrist on axis 2",
     "wrist aligned",
     "arm stretched",
     "arm withdrawn",
-    "branches meet",
+    "postures meet",
+    "flips meet",
 ]
 """The families in which an arm loses a freedom; two can meet in one pose.
 
 "wrist beside axis 1": as near to axis 1 as the offset of the shoulder lets it come, where the right and the
-left arm are one (UR arms). "branches meet": two branches of any other kind are one.
+left arm meet (UR arms).
 """
 
 NEAREST_POINT = "nearest point"

@@ -110,6 +110,8 @@ class _Search:
         """Return what the iterative solver finds."""
         from urmpipe_models.inverse.restarts import solve_iteratively
 
+        if not len(targets):
+            return no_solutions([], ("1",), len(self.chain.coordinates))
         return solve_iteratively(
             self.chain,
             targets,

@@ -1,0 +1,43 @@
+"""Angles between directions, elementwise, to the last digits wherever they point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from urmpipe_models.elementwise import cross
+from urmpipe_models.inverse.solutions import FloatArray
+from urmpipe_models.inverse.trigonometric import wrapped
+from urmpipe_models.transform import rotation_about
+
+
+def turned(axis: FloatArray, angle: FloatArray, vector: FloatArray) -> FloatArray:
+    """Return vectors turned about an axis: R(axis, angle) vector, shape (3, ...).
+
+    Args:
+        axis: Unit vector, shape (3,).
+        angle: In [rad], shape (...).
+        vector: Shape (3, ...), each of its coordinates broadcasts with the angle.
+    """
+    parts = rotation_about(axis.tolist(), angle).rotate((vector[0], vector[1], vector[2]))
+    return np.stack(np.broadcast_arrays(*parts, angle)[:3])
+
+
+def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the angle in (-pi, pi] by which one vector must turn about an axis to point as another does.
+
+    Args:
+        axis: Unit vector, shape (3,).
+        start: Shape (3, ...), or (3,) for all.
+        end: See start; what both have along the axis does not count.
+    """
+    along = np.tensordot(axis, start, 1) * np.tensordot(axis, end, 1)
+    sine = sum(a * b for a, b in zip(axis.tolist(), cross(tuple(start), tuple(end)), strict=True))
+    cosine = sum(a * b for a, b in zip(start, end, strict=True)) - along
+    return wrapped(np.arctan2(sine, cosine))
+
+
+def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the angle in [0, pi] between a vector, shape (3,), and others, shape (3, ...), in [rad]."""
+    x, y, z = cross(tuple(first.tolist()), tuple(second))
+    cosine = sum(a * b for a, b in zip(first.tolist(), second, strict=True))
+    return np.asarray(np.arctan2(np.sqrt(x * x + y * y + z * z), cosine))
