@@ -16,12 +16,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
+from urmpipe_models.inverse.choices import Choices
 from urmpipe_models.inverse.closed_form import ClosedForm
-from urmpipe_models.inverse.iterative import limits_of
-from urmpipe_models.inverse.limits import LIMIT_ROUNDING, TURN, within_limits
+from urmpipe_models.inverse.limits import within_limits
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, SingularFamily, Solutions, TextArray
 from urmpipe_models.inverse.stretches import stretches
 from urmpipe_models.inverse.targets import Targets
+
+FEW, MANY = 8, 1024
+"""Samples that are looked at together in a column, twice as many each time while it is the nearest."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,70 +54,66 @@ def walk(chain: Chain, form: ClosedForm, targets: Targets, start: FloatArray) ->
         start: Joint values in [rad] that the first sample shall be near to, shape (joints,).
     """
     found = within_limits(chain, form.solve(targets))
-    reached = np.asarray(found.reached.any(axis=1))
-    q, column = np.full((len(targets), len(start)), np.nan), np.zeros(len(targets), dtype=np.intp)
-    free_until = dict(stretches(_left_free(found) & reached))
-    choices, last, before = _Choices.of(chain, found), start, -1
-    for sample in np.flatnonzero(reached).tolist():
-        if sample in free_until:
-            rows = slice(sample, free_until[sample] + 1)
-            near = within_limits(chain, form.solve(targets.rows(rows), last), last)
-            choices.put(rows, _Choices.of(chain, near))
-        label = column[before] if 0 <= before < sample - 1 else None
-        column[sample], last = choices.nearest(sample, last, label)
-        q[sample], before = last, sample
-    return Walked(q, *_told(found, column, reached))
+    way = _Way(chain, form, targets, found, start)
+    for sample in np.flatnonzero(found.reached.any(axis=1)).tolist():
+        if sample > way.at:
+            way.step(sample)
+            way.go_on()
+    return Walked(way.q, *_told(found, way.column))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Choices:
-    """The solutions of samples, and the whole turns that each joint may be off them.
+class _Way:
+    """A way along the solutions of a path, taken sample by sample and, where it is plain, many at once.
 
     Attributes:
-        q: In [rad], shape (n, k, joints); 0 where there is none.
-        lost: Infinity where there is none, 0 elsewhere, shape (n, k).
-        least: Whole turns that a joint may turn less, shape (n, k, joints).
-        most: Whole turns that a joint may turn more, shape (n, k, joints).
+        at: The last sample with a solution, -1 before the first.
+        q: The solutions taken, shape (n, joints).
+        column: The columns that they are in, -1 where there is none, shape (n,).
     """
 
-    q: FloatArray
-    lost: FloatArray
-    least: FloatArray
-    most: FloatArray
+    def __init__(
+        self, chain: Chain, form: ClosedForm, targets: Targets, found: Solutions, start: FloatArray
+    ) -> None:
+        """Stand before the first sample; the arguments are those of `walk`, and what it found."""
+        self._chain, self._form, self._targets = chain, form, targets
+        self._choices = Choices.of(chain, found)
+        self._free = stretches(_left_free(found))
+        self._last, self._many = start, FEW
+        self.at = -1
+        self.q = np.full((len(found), len(start)), np.nan)
+        self.column = np.full(len(found), -1, dtype=np.intp)
 
-    @classmethod
-    def of(cls, chain: Chain, found: Solutions) -> _Choices:
-        """Return the choices that solutions within limits leave."""
-        lower, upper = limits_of(chain)
-        q = np.where(found.reached[..., None], found.q, 0.0)
-        least = np.ceil((lower - LIMIT_ROUNDING - q) / TURN)
-        most = np.floor((upper + LIMIT_ROUNDING - q) / TURN)
-        return cls(q, np.where(found.reached, 0.0, np.inf), least, most)
+    def step(self, sample: int) -> None:
+        """Take the nearest solution of a sample; after a gap the one of the same branch."""
+        if self._free and self._free[0][0] <= sample:
+            self._settle(slice(sample, self._free.pop(0)[1] + 1))
+        same = int(self.column[self.at]) if 0 <= self.at < sample - 1 else None
+        column, q = self._choices.nearest(sample, self._last, same)
+        self._take(sample, column, q[None])
 
-    def put(self, rows: slice, other: _Choices) -> None:
-        """Put in the place of some samples what was found for them anew."""
-        for mine, others in (
-            (self.q, other.q),
-            (self.lost, other.lost),
-            (self.least, other.least),
-            (self.most, other.most),
-        ):
-            mine[rows] = others
+    def go_on(self) -> None:
+        """Stay in the column as long as its solution is the nearest."""
+        column, stop = int(self.column[self.at]), self._free[0][0] if self._free else len(self.q)
+        while (first := self.at + 1) < stop:
+            rows = slice(first, min(first + self._many, stop))
+            found = self._choices.going_on(rows, column, self._last)
+            if len(found):
+                self._take(first, column, found)
+            if len(found) < rows.stop - rows.start:
+                self._many = FEW
+                return
+            self._many = min(2 * self._many, MANY)
 
-    def nearest(self, sample: int, last: FloatArray, column: int | None) -> tuple[int, FloatArray]:
-        """Return the column and the joint values that are nearest to the last ones.
+    def _take(self, first: int, column: int, q: FloatArray) -> None:
+        """Take solutions of a column, one a sample."""
+        rows = slice(first, first + len(q))
+        self.q[rows], self.column[rows] = q, column
+        self.at, self._last = rows.stop - 1, q[-1]
 
-        Args:
-            sample: Its index.
-            last: Joint values before, shape (joints,).
-            column: Taken whatever its distance, if it has a solution; None to take the nearest.
-        """
-        turns = np.rint((last - self.q[sample]) / TURN)
-        near = self.q[sample] + TURN * np.minimum(np.maximum(turns, self.least[sample]), self.most[sample])
-        away = near - last
-        if column is None or self.lost[sample, column] > 0.0:
-            column = int(np.argmin(np.einsum("kj,kj->k", away, away) + self.lost[sample]))
-        return column, near[column]
+    def _settle(self, rows: slice) -> None:
+        """Leave the joints that are free at singular poses where they are."""
+        found = self._form.solve(self._targets.rows(rows), self._last)
+        self._choices.put(rows, Choices.of(self._chain, within_limits(self._chain, found, self._last)))
 
 
 def _left_free(found: Solutions) -> BoolArray:
@@ -127,10 +126,10 @@ def _left_free(found: Solutions) -> BoolArray:
 
 
 def _told(
-    found: Solutions, column: NDArray[np.intp], reached: BoolArray
+    found: Solutions, column: NDArray[np.intp]
 ) -> tuple[TextArray, TextArray, dict[SingularFamily, BoolArray]]:
     """Return names, reasons and families of the solutions that were taken."""
-    rows = np.arange(len(found))
+    reached, rows = column >= 0, np.arange(len(found))
     branch = np.where(reached, found.labels[rows, column], "")
     reasons = np.full(len(found), "", dtype=np.object_)
     reasons[~reached] = [found.reason(sample) for sample in np.flatnonzero(~reached).tolist()]

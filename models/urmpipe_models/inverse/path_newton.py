@@ -80,17 +80,18 @@ def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, dam
 
 
 def _in_turn(null: FloatArray, before: FloatArray, towards: FloatArray) -> FloatArray:
-    """Return c_k = N_k (c_{k-1} + p_{k-1} - p_k) + J_k^# e_k, the corrections q_k - p_k, shape (w, joints).
+    """Return c_k = N_k c_{k-1} + (N_k (p_{k-1} - p_k) + J_k^# e_k), the corrections q_k - p_k.
 
     Args:
         null: N_k, shape (w, joints, joints).
         before: p_{k-1} - p_k, of the first sample q_0 - p_1, shape (w, joints).
         towards: J_k^# e_k, shape (w, joints).
     """
+    alone = (null @ before[:, :, None])[:, :, 0] + towards
     corrections = []
     correction = np.zeros(null.shape[1])
-    for matrix, step, toward in zip(null, before, towards, strict=True):
-        correction = matrix.dot(correction + step) + toward
+    for matrix, own in zip(null, alone, strict=True):
+        correction = matrix.dot(correction) + own
         corrections.append(correction)
     return np.array(corrections)
 

@@ -1,0 +1,258 @@
+"""Paths of poses of arms with a closed form: the continuous branch, singular poses, jumps, limits, speeds."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import OptionError
+from urmpipe_models.inverse.jumps import jump_samples
+from urmpipe_models.inverse.path import follow
+from urmpipe_models.inverse.solve import solve
+from urmpipe_models.inverse.targets import Targets, targets_of
+
+FloatArray = NDArray[np.float64]
+
+ROUNDING = 1e-9
+"""rad: what a closed form's 1e-12 become where the Jacobian's least singular value is 1e-3."""
+
+PERIOD = 5_000_000
+"""5 ms in ns."""
+
+UR = np.array([0.3, -1.2, 1.4, -0.8, 1.2, 0.3])
+"""A pose in rad of a UR arm, its elbow and wrist bent."""
+
+
+def times(count: int) -> NDArray[np.int64]:
+    return PERIOD * np.arange(count, dtype=np.int64)
+
+
+def limited(chain: Chain, joint: int, lower: float, upper: float) -> Chain:
+    """The same arm with other limits of one joint, in rad."""
+    joints = list(chain.joints)
+    place = chain.joints.index(chain.moving[joint])
+    joints[place] = replace(joints[place], lower=lower, upper=upper)
+    return replace(chain, joints=tuple(joints))
+
+
+def line(first: FloatArray, last: FloatArray, count: int) -> FloatArray:
+    """Joint values on a line, shape (count, joints)."""
+    return first + np.linspace(0.0, 1.0, count)[:, None] * (last - first)
+
+
+amounts = st.lists(st.floats(-0.4, 0.4), min_size=6, max_size=6)
+
+
+@settings(deadline=None)  # the first case imports
+@given(amounts, amounts, st.sampled_from(["ur3", "ur5e", "ur10e"]))
+def test_the_motion_that_a_path_was_made_from_is_found_again(
+    one: list[float], other: list[float], robot: str
+) -> None:
+    arm = load_robot(robot)
+    q = line(UR + np.array(one), UR + np.array(other), 40)
+    path = follow(arm, targets_of(arm, q), times(40), start=q[0])
+    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=ROUNDING)
+    assert path.jumps == path.singular == ()
+    assert path.method == "three parallel axes"
+    assert len(set(path.branch)) == 1
+
+
+def test_turns_are_counted_on_up_to_the_limits() -> None:
+    arm = load_robot("ur5e")
+    q = line(
+        UR + np.array([2.0, 0.0, 0.0, 0.0, 0.0, -6.0]), UR + np.array([5.5, 0.0, 0.0, 0.0, 0.0, 5.5]), 600
+    )
+    path = follow(arm, targets_of(arm, q), times(600), start=q[0])
+    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=ROUNDING)
+    assert path.jumps == ()
+
+
+def test_through_an_aligned_wrist_the_outer_joints_go_on_as_they_were() -> None:
+    arm = load_robot("ur5e")
+    q = line(
+        UR + np.array([0.0, 0.0, 0.0, 0.0, -1.5, 0.0]), UR + np.array([0.3, 0.2, -0.2, 0.0, -0.9, 0.0]), 201
+    )
+    q[:, 4] = np.linspace(-0.3, 0.3, 201)
+    q[:, 5] = 0.3
+    q[:, 3] = -0.8
+    q[100, 4] = 0.0
+    path = follow(arm, targets_of(arm, q), times(201), start=q[0])
+    # rad: at 0.003 rad from the singular pose 1e-12 become 1e-9 and more
+    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=1e-7)
+    assert path.jumps == ()
+    assert path.branch[0] != path.branch[-1]
+    assert [one.text for one in path.singular] == ["sample 100 at 0.500 s: wrist aligned"]
+
+
+def test_a_path_within_a_singular_family_keeps_the_free_joints_still() -> None:
+    arm = load_robot("ur5e")
+    q = line(UR, UR + np.array([0.5, 0.3, -0.3, 0.0, 0.0, 0.0]), 100)
+    q[:, 4] = 0.0
+    path = follow(arm, targets_of(arm, q), times(100), start=q[0])
+    target, found = targets_of(arm, q), targets_of(arm, path.q)
+    # m and -: a singular pose is taken as such within 1e-8 or so of its sine
+    np.testing.assert_allclose(found.position, target.position, rtol=0.0, atol=1e-8)
+    np.testing.assert_allclose(found.rotation, target.rotation, rtol=0.0, atol=1e-7)
+    assert path.jumps == ()
+    assert (path.singular[0].first, path.singular[0].last) == (0, 99)
+    assert path.singular[0].text == "samples 0 to 99, 0.000 to 0.495 s: wrist aligned"
+    assert np.ptp(path.q[:, 5]) < 1e-6  # rad: q6 is what the pose leaves free, or follows q4
+
+
+def test_what_is_out_of_reach_is_left_out_and_the_branch_goes_on() -> None:
+    arm = load_robot("ur5e")
+    q = line(UR, UR + np.array([1.0, 0.2, 0.1, 0.3, 0.2, -0.4]), 300)
+    targets = targets_of(arm, q)
+    targets.position[100:150, 0] += 3.0
+    targets.position[200] = math.nan
+    path = follow(arm, targets, times(300), start=q[0])
+    out = np.zeros(300, dtype=bool)
+    out[100:150] = out[200] = True
+    assert (path.reached == ~out).all()
+    np.testing.assert_allclose(path.q[~out], q[~out], rtol=0.0, atol=ROUNDING)
+    assert path.jumps == ()
+    assert path.reasons[200] == "the position is nan, nan, nan m, allowed: finite numbers"
+    assert all(" m" in text and "allowed" in text for text in path.reasons[100:150])
+    assert set(path.branch[~out]) == {path.branch[0]}
+
+
+def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
+    arm = load_robot("ur5e")
+    stretched = np.array([0.3, -0.9, 0.0, -0.7, 1.2, 0.3])
+    q = line(stretched + np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0]), stretched, 41)
+    targets = targets_of(arm, q)
+    shoulder = np.array([0.0, 0.0, 0.1625])
+    away = targets.position[-1] - shoulder
+    targets.position[-1] += 0.002 * away / np.linalg.norm(away)
+    assert not follow(arm, targets, times(41), start=q[0]).reached[-1]
+    path = follow(arm, targets, times(41), start=q[0], tolerance=0.0035)
+    assert path.reached.all()
+    assert path.branch[-1] == "nearest point"
+    assert 0.0 < path.shortfall[-1] <= 0.002 + 1e-9  # m: the pose before the shift is that near
+    assert not path.shortfall[:-1].any()
+
+
+def test_a_branch_that_ends_is_left_by_a_jump_that_is_told() -> None:
+    free = load_robot("ur5e")
+    arm = limited(free, 0, -3.0, 3.0)
+    q = line(
+        UR + np.array([2.0, 0.0, 0.0, 0.0, 0.0, 0.0]), UR + np.array([3.2, 0.0, 0.0, 0.0, 0.0, 0.0]), 121
+    )
+    targets = targets_of(free, q)
+    path = follow(arm, targets, times(121), start=q[0])
+    assert path.reached.all()
+    assert path.q[:, 0].max() <= 3.0
+    (jump,) = path.jumps
+    assert jump.sample == int(np.argmax(q[:, 0] > 3.0))
+    assert jump.t == pytest.approx(0.005 * jump.sample, abs=1e-12)
+    assert jump.position == tuple(targets.position[jump.sample])
+    assert (jump.from_branch, jump.to_branch) == tuple(path.branch[jump.sample - 1 : jump.sample + 1])
+    assert jump.from_branch != jump.to_branch
+    steps = path.q[jump.sample] - path.q[jump.sample - 1]
+    assert {one.joint: one.step for one in jump.joints} == {
+        name: step for name, step in zip(arm.coordinates, steps, strict=True) if abs(step) >= 0.1
+    }
+    x, y, z = jump.position
+    assert jump.text == (
+        f"sample {jump.sample} at {jump.t:.3f} s, ({x:.4f}, {y:.4f}, {z:.4f}) m: a jump from"
+        f" {jump.from_branch} to {jump.to_branch}: " + ", ".join(map(str, jump.joints))
+    )
+    assert {one.joint for one in path.too_fast} <= {one.joint for one in jump.joints}
+
+
+def test_a_joint_at_the_end_of_its_turns_starts_anew_and_that_is_told() -> None:
+    arm = limited(limited(load_robot("ur5e"), 0, -1.0, 1.0), 4, 0.1, 3.0)  # no other branch within limits
+    upper = arm.moving[5].upper
+    q = line(UR, UR + np.array([0.0, 0.0, 0.0, 0.0, 0.0, 0.4]), 81)
+    q[:, 5] += upper - 0.5
+    path = follow(arm, targets_of(arm, q), times(81), start=q[0])
+    (jump,) = path.jumps
+    assert jump.sample == int(np.argmax(q[:, 5] > upper))
+    assert jump.from_branch == jump.to_branch
+    (step,) = jump.joints
+    assert step.joint == arm.coordinates[5]
+    assert step.step == pytest.approx(0.005 - 2.0 * math.pi, abs=1e-9)
+    assert "a jump: " in jump.text
+
+
+def test_a_joint_that_would_be_too_fast_is_told_once_a_stretch() -> None:
+    arm = load_robot("ur5e")
+    t = np.linspace(0.0, 1.0, 201)
+    q = np.repeat(UR[None], 201, axis=0)
+    q[:, 0] += 0.4 * np.sin(2.0 * math.pi * 2.0 * t)  # 5.03 rad/s at most, allowed: 3.14
+    path = follow(arm, targets_of(arm, q), times(201), start=q[0])
+    speed = np.abs(np.diff(q[:, 0])) / 0.005
+    over = speed > arm.moving[0].velocity
+    assert [one.joint for one in path.too_fast] == [arm.coordinates[0]] * 5
+    assert sum(one.last - one.first for one in path.too_fast) == over.sum()
+    first = path.too_fast[0]
+    assert (first.first, first.t) == (0, 0.0)
+    assert first.speed == pytest.approx(speed.max(), abs=1e-6)
+    assert first.text == (
+        f"samples 0 to {first.last} from 0.000 s: joint {arm.coordinates[0]} moves at"
+        f" {speed.max():.4g} rad/s, allowed: 3.142"
+    )
+    slow = follow(arm, targets_of(arm, q), 2 * times(201), start=q[0])
+    assert slow.too_fast == ()
+
+
+def test_the_start_decides_the_branch() -> None:
+    arm = load_robot("ur5e")
+    q = line(UR, UR + 0.2, 20)
+    targets = targets_of(arm, q)
+    away = UR * [1.0, 1.0, 1.0, 1.0, -1.0, 1.0] + np.array([0.0, 0.0, 0.0, 3.0, 0.0, 3.0])
+    flipped = follow(arm, targets, times(20), start=away)
+    assert flipped.branch[0] != follow(arm, targets, times(20), start=UR).branch[0]
+    assert flipped.jumps == ()
+    np.testing.assert_allclose(targets_of(arm, flipped.q).position, targets.position, rtol=0.0, atol=1e-10)
+
+
+def test_a_step_is_a_jump_only_if_half_of_it_leaves_the_path() -> None:
+    arm = load_robot("ur5e")
+    bent = UR
+    every = solve(arm, targets_of(arm, bent[None]), every=True)
+    flipped = every.q[0, every.branches.index("left, elbow up, flipped")]
+    aligned = UR * [1.0, 1.0, 1.0, 1.0, 0.0, 1.0]
+    apart = np.array([0.0, 0.0, 0.0, 0.4, 0.0, 0.4])
+    for q, expected in (
+        (np.array([bent, bent + 0.05, bent + 0.4]), []),  # a long step along a smooth motion
+        (np.array([bent, flipped]), [1]),
+        (np.array([bent, bent + np.array([0, 0, 0, 0, 0, 2.0 * math.pi])]), [1]),
+        (np.array([aligned, aligned + 0.01 + apart]), []),
+    ):
+        assert jump_samples(arm, q, False).tolist() == expected
+
+
+def test_all_that_is_wrong_with_the_options_is_told_at_once() -> None:
+    arm = load_robot("ur5e")
+    targets = targets_of(arm, line(UR, UR + 0.1, 3))
+    with pytest.raises(OptionError) as caught:
+        follow(
+            arm,
+            targets,
+            np.array([0, 5, 5]),
+            start=np.zeros(5),
+            tolerance=-1.0,
+            restarts=-1,
+        )
+    assert [str(one) for one in caught.value.findings] == [
+        "t_ns: found 5 ns at sample 2 after 5 ns, allowed: times that rise",
+        "start: found [0., 0., 0., 0., 0.], allowed: 6 finite numbers, in rad or m, one each of"
+        f" {', '.join(arm.coordinates)}",
+        "tolerance: found -1 m, allowed: more than 0, finite",
+        "restarts: found -1, allowed: 0 or more",
+    ]
+    with pytest.raises(
+        OptionError, match=r"t_ns: found float64 of shape \(2,\), allowed: integer ns of shape \(3,\)"
+    ):
+        follow(arm, targets, np.array([0.0, 1.0]))  # type: ignore[arg-type]
+    with pytest.raises(OptionError, match="targets: found none, allowed: a path of one sample or more"):
+        follow(arm, Targets(np.empty((0, 3))), times(0))
