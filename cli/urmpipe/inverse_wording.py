@@ -122,7 +122,7 @@ def far_warnings(chain: Chain, targets: Targets, row: IntArray, reached: BoolArr
     if far.any():
         said = (
             f"{rows_text(row[far])}: up to {away[far].max():.6g} m from the base, while {chain.name} reaches"
-            f" no farther than {reach:.4g} m; in mm? --unit x=mm --unit y=mm --unit z=mm"
+            f" no farther than {reach:.4g} m: in mm? Allowed: m, or of a file --unit x=mm"
         )
         yield LogWarning("too-far", said)
 

@@ -11,6 +11,8 @@ import pytest
 
 import urmpipe
 from urmpipe_datasets import LOGS
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.inverse.targets import targets_of
 from urmpipe_pipeline.delta_verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import provenance
@@ -18,7 +20,7 @@ from urmpipe_pipeline.simulation import Signal, SimulatedBlock, Simulation
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"`(\w+)`", PAGE))
-FREE = {"units", "tolerance", "noise", "before", "now", "delta", "start", "joints", "joint_turns"}
+FREE = {"steps", "units", "tolerance", "noise", "before", "now", "delta", "start", "joints", "joint_turns"}
 """Objects whose keys are names of columns, axes, joints, kinds or options."""
 
 
@@ -44,6 +46,18 @@ def printed() -> list[dict[str, Any]]:
 def test_each_key_is_named(printed: list[dict[str, Any]]) -> None:
     assert keys(printed) - NAMED == set()
     assert {"from", "half_period", "share_out", "sample_max"} <= keys(printed)
+
+
+def test_each_key_of_inverse_kinematics_is_named() -> None:
+    slow, fast = [0.1, -0.9, 1.2, -0.5, 0.7, 0.2], [0.4, -0.9, 1.2, -0.5, 0.7, 0.2]
+    poses = targets_of(load_robot("ur5e"), np.array([slow, fast, [2.4, 1.9, -1.2, 0.5, -2.7, 1.2]]))
+    path = urmpipe.ik(poses, "ur5e", tsp=0.01, start=slow)
+    found = path.to_dict()
+    assert found["jumps"]
+    assert found["too_fast"]
+    assert keys(found) - NAMED == set()
+    assert {"branch", "nearest", "singular", "last_row", "steps", "miss"} <= keys(found)
+    assert keys(urmpipe.ik(poses, "ur5e").to_dict()) <= keys(found)
 
 
 def test_each_key_of_a_simulation_is_named() -> None:
