@@ -26,12 +26,10 @@ A joint held on a limit has no column in J; J_h^T y_k then says which way it wou
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.elementwise import Element
 from urmpipe_models.inverse.small_systems import Factor, factor, gram
 from urmpipe_models.inverse.task import FloatArray, Miss, Task
 
@@ -66,13 +64,13 @@ def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, dam
         held: Where a joint is held in [rad] or [m], NaN of one that is free, shape (joints,).
         damping: lambda^2 of each sample in [m2/rad2], shape (w,).
     """
-    miss = task.miss(list(np.ascontiguousarray(guess.T)))
+    miss = task.miss(np.ascontiguousarray(guess.T))
     free = np.isnan(held)
-    rows = [[entry if free[i] else 0.0 for i, entry in enumerate(row)] for row in miss.jacobian]
+    rows = miss.jacobian * free[:, None]
     system = factor(gram(rows), damping)
-    J = _stacked(rows, len(guess))
-    inverse = _stacked([system.solve(column) for column in zip(*rows, strict=True)], len(guess))
-    error = _stacked([miss.error], len(guess))[:, 0]
+    J = np.ascontiguousarray(rows.transpose(2, 0, 1))
+    columns = np.array([system.solve(rows[:, joint]) for joint in range(len(held))])
+    inverse, error = np.ascontiguousarray(columns.transpose(2, 0, 1)), miss.error.T
     before = np.vstack((np.where(free, last, held), guess[:-1])) - guess
     q = guess + _in_turn(np.eye(len(held)) - inverse @ J, before, np.einsum("wij,wj->wi", inverse, error))
     pull = None if free.all() else _pull(system, miss, J, np.vstack((before[:1], q[:-1] - guess[1:])))
@@ -99,15 +97,5 @@ def _in_turn(null: FloatArray, before: FloatArray, towards: FloatArray) -> Float
 def _pull(system: Factor, miss: Miss, J: FloatArray, s: FloatArray) -> FloatArray:
     """Return J^T y of every joint, held ones too: y = (J J^T + lambda^2 1)^-1 (e - J s)."""
     moved = np.einsum("wij,wj->wi", J, s)
-    y = system.solve([error - moved[:, k] for k, error in enumerate(miss.error)])
-    whole = _stacked(miss.jacobian, len(s))
-    return np.asarray(np.einsum("wij,wi->wj", whole, np.array(y).T))
-
-
-def _stacked(rows: Sequence[Sequence[Element]], count: int) -> FloatArray:
-    """Return rows of elements as matrices, shape (count, rows, columns)."""
-    stacked = np.empty((count, len(rows), len(rows[0])))
-    for i, row in enumerate(rows):
-        for j, entry in enumerate(row):
-            stacked[:, i, j] = entry
-    return stacked
+    y = system.solve(miss.error - moved.T)
+    return np.asarray(np.einsum("ijw,iw->wj", miss.jacobian, y))
