@@ -151,12 +151,12 @@ def main() -> None:
         "|---|---|---|---|---|---|---|---|",
     ]
     bounds = []
-    for name in jobs:
-        mine, other = ours[name], theirs[name]
-        ratio = statistics.median(b["seconds"] / a["seconds"] for a, b in zip(mine, other, strict=True))
-        lines.append(f"| {name} | {cells(mine)} | {cells(other)} | {ratio:.2f} |")
-        bounds.append(Bound(f"{name}: s", statistics.median(one["seconds"] for one in mine), under=1.0))
-        bounds.append(Bound(f"{name}: solved", mine[-1]["solved"], least=samples))
+    for name, own in ours.items():
+        peers = theirs[name]
+        ratio = statistics.median(b["seconds"] / a["seconds"] for a, b in zip(own, peers, strict=True))
+        lines.append(f"| {name} | {cells(own)} | {cells(peers)} | {ratio:.2f} |")
+        bounds.append(Bound(f"{name}: s", statistics.median(one["seconds"] for one in own), under=1.0))
+        bounds.append(Bound(f"{name}: solved", own[-1]["solved"], least=samples))
     write_results("inverse_path", lines, bounds)
 
 

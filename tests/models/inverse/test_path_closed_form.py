@@ -30,6 +30,9 @@ PERIOD = 5_000_000
 UR = np.array([0.3, -1.2, 1.4, -0.8, 1.2, 0.3])
 """A pose in rad of a UR arm, its elbow and wrist bent."""
 
+BENT = np.array([0.3, 0.4, -0.5, 0.7, -0.4, 0.2])
+"""One of an arm with a spherical wrist."""
+
 
 def times(count: int) -> NDArray[np.int64]:
     return PERIOD * np.arange(count, dtype=np.int64)
@@ -60,7 +63,8 @@ def test_the_motion_that_a_path_was_made_from_is_found_again(
     q = line(UR + np.array(one), UR + np.array(other), 40)
     path = follow(arm, targets_of(arm, q), times(40), start=q[0])
     np.testing.assert_allclose(path.q, q, rtol=0.0, atol=ROUNDING)
-    assert path.jumps == path.singular == ()
+    assert path.jumps == ()
+    assert path.singular == ()
     assert path.method == "three parallel axes"
     assert len(set(path.branch)) == 1
 
@@ -75,36 +79,66 @@ def test_turns_are_counted_on_up_to_the_limits() -> None:
     assert path.jumps == ()
 
 
-def test_through_an_aligned_wrist_the_outer_joints_go_on_as_they_were() -> None:
-    arm = load_robot("ur5e")
-    q = line(
-        UR + np.array([0.0, 0.0, 0.0, 0.0, -1.5, 0.0]), UR + np.array([0.3, 0.2, -0.2, 0.0, -0.9, 0.0]), 201
-    )
+def aligned_half_way(robot: str) -> tuple[Chain, FloatArray]:
+    """An arm and 201 joint values that pass exactly through an aligned wrist at sample 100."""
+    arm = load_robot(robot)
+    bent = UR if robot == "ur5e" else BENT
+    # joints 4 and 6 of the UR arm turn about axes apart from each other, so that it must come in straight
+    by = [0.3, 0.2, -0.2, 0.0, 0.0, 0.0] if robot == "ur5e" else [0.4, 0.3, 0.3, 0.0, 0.0, 0.0]
+    q = line(bent, bent + np.array(by), 201)
     q[:, 4] = np.linspace(-0.3, 0.3, 201)
-    q[:, 5] = 0.3
-    q[:, 3] = -0.8
     q[100, 4] = 0.0
+    return arm, q
+
+
+@pytest.mark.parametrize("robot", ["arm6", "articulated6r", "ur5e"])
+def test_through_an_aligned_wrist_the_joints_go_on_as_they_were(robot: str) -> None:
+    arm, q = aligned_half_way(robot)
     path = follow(arm, targets_of(arm, q), times(201), start=q[0])
-    # rad: at 0.003 rad from the singular pose 1e-12 become 1e-9 and more
-    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=1e-7)
+    # rad: 1e-12 over the sine of 0.003 rad, with a margin of ten
+    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=1e-8)
     assert path.jumps == ()
-    assert path.branch[0] != path.branch[-1]
+    assert path.branch[0].endswith(", flipped") != path.branch[-1].endswith(", flipped")
     assert [one.text for one in path.singular] == ["sample 100 at 0.500 s: wrist aligned"]
 
 
-def test_a_path_within_a_singular_family_keeps_the_free_joints_still() -> None:
-    arm = load_robot("ur5e")
-    q = line(UR, UR + np.array([0.5, 0.3, -0.3, 0.0, 0.0, 0.0]), 100)
+@pytest.mark.parametrize("robot", ["arm6", "articulated6r", "ur5e"])
+def test_a_path_within_an_aligned_wrist_keeps_the_free_joints_still(robot: str) -> None:
+    arm, q = aligned_half_way(robot)
     q[:, 4] = 0.0
-    path = follow(arm, targets_of(arm, q), times(100), start=q[0])
-    target, found = targets_of(arm, q), targets_of(arm, path.q)
-    # m and -: a singular pose is taken as such within 1e-8 or so of its sine
-    np.testing.assert_allclose(found.position, target.position, rtol=0.0, atol=1e-8)
-    np.testing.assert_allclose(found.rotation, target.rotation, rtol=0.0, atol=1e-7)
+    path = follow(arm, targets_of(arm, q), times(201), start=q[0])
+    # rad: nothing is near singular here, the family is resolved as it is
+    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=ROUNDING)
     assert path.jumps == ()
-    assert (path.singular[0].first, path.singular[0].last) == (0, 99)
-    assert path.singular[0].text == "samples 0 to 99, 0.000 to 0.495 s: wrist aligned"
-    assert np.ptp(path.q[:, 5]) < 1e-6  # rad: q6 is what the pose leaves free, or follows q4
+    assert [one.text for one in path.singular] == ["samples 0 to 200, 0.000 to 1.000 s: wrist aligned"]
+
+
+@settings(deadline=None, max_examples=30)
+@given(st.integers(0, 10_000), st.sampled_from(["arm6", "ur5e"]))
+def test_a_walk_is_what_taking_the_nearest_sample_by_sample_gives(seed: int, robot: str) -> None:
+    """All solutions in all allowed turns, and of them the nearest: written plainly, on coarse motions."""
+    rng = np.random.default_rng(seed)
+    arm = load_robot(robot)
+    for joint in range(6):
+        arm = limited(arm, joint, *sorted(rng.uniform([-9.0, 2.0], [-2.0, 9.0])))
+    t = np.linspace(0.0, 1.0, 40)[:, None]
+    q = rng.uniform(-2.0, 2.0, 6) + rng.uniform(-2.0, 2.0, 6) * t
+    targets = targets_of(arm, q)
+    path = follow(arm, targets, times(40), start=q[0])
+    every = solve(arm, targets, every=True)
+    turns = 2.0 * math.pi * np.arange(-4.0, 5.0)
+    lower, upper = (np.array([getattr(one, side) for one in arm.moving]) for side in ("lower", "upper"))
+    last = q[0]
+    gaps = np.flatnonzero(~every.reached.any(axis=1))
+    for k, solutions in enumerate(every.q[: gaps[0] if len(gaps) else None]):
+        options = []
+        for one in solutions[every.reached[k]]:
+            shifted = one + turns[:, None]
+            shifted[(shifted < lower - 1e-9) | (shifted > upper + 1e-9)] = math.inf
+            options.append(np.take_along_axis(shifted, np.abs(shifted - last).argmin(0)[None], 0)[0])
+        last = options[int(np.argmin([np.square(one - last).sum() for one in options]))]
+        np.testing.assert_allclose(path.q[k], last, rtol=0.0, atol=ROUNDING)
+        last = path.q[k]
 
 
 def test_what_is_out_of_reach_is_left_out_and_the_branch_goes_on() -> None:
@@ -253,6 +287,6 @@ def test_all_that_is_wrong_with_the_options_is_told_at_once() -> None:
     with pytest.raises(
         OptionError, match=r"t_ns: found float64 of shape \(2,\), allowed: integer ns of shape \(3,\)"
     ):
-        follow(arm, targets, np.array([0.0, 1.0]))  # type: ignore[arg-type]
+        follow(arm, targets, np.array([0.0, 1.0]))
     with pytest.raises(OptionError, match="targets: found none, allowed: a path of one sample or more"):
         follow(arm, Targets(np.empty((0, 3))), times(0))

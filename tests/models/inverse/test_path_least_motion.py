@@ -73,7 +73,9 @@ def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(
     followed: JointPath, demo_path: FloatArray
 ) -> None:
     assert_met(followed, Targets(demo_path))
-    assert followed.jumps == followed.too_fast == followed.singular == ()
+    assert followed.jumps == ()
+    assert followed.too_fast == ()
+    assert followed.singular == ()
     assert set(followed.branch) == {"1"}
     assert followed.method == "least motion"
     assert not followed.shortfall.any()
