@@ -10,7 +10,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain
+from urmpipe_models.inverse.targets import targets_of
 from urmpipe_models.kinematics import point_over_log
 from urmpipe_models.urm import urm_chain
 from urmpipe_pipeline.audit_entry import AuditEntry
@@ -19,6 +21,7 @@ from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.solved import Ghost, goals_of, row_times, solved_run
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)
 TILT = math.radians(52.0)
@@ -26,6 +29,7 @@ PERIOD_NS = 5_000_000
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
+MakeSolved = Callable[..., Run]
 
 
 def arm() -> Chain:
@@ -97,6 +101,36 @@ def build_comparison(names: tuple[str, ...] = ("coppeliasim", "matlab"), rows: i
     return compare_runs(build_run("asked for", rows), runs, CompareOptions({"axis": 0.0035}))
 
 
+STEP_NS = 20_000_000
+TOO_FAR = "the wrist centre is 1.2 m away, allowed: 0.1 to 0.9 m"
+BRANCHES = ("right, elbow up, flipped", "left, elbow down, not flipped")
+
+
+def slow_motion(rows: int) -> FloatArray:
+    """Return a slow motion of six joints, a row 20 ms."""
+    t = np.arange(rows)[:, None] * STEP_NS / 1e9
+    return np.array([0.1, -1.2, 1.3, -0.4, 0.7, 0.3]) + np.array([0.3, 0.2, -0.2, 0.4, -0.3, 0.5]) * t
+
+
+def build_solved(
+    rows: int = 40, timed: bool = True, names: tuple[str, ...] = BRANCHES, robot: Chain | None = None
+) -> Run:
+    """Return a solved run: rows 5 to 8 unreachable, and ghost k there from row 2 k on, 20 to 29 apart."""
+    chain, q = robot or load_robot("ur5e"), slow_motion(rows)
+    times = np.arange(rows) * STEP_NS if timed else row_times(rows)
+    targets = targets_of(chain, q)
+    q[5:9] = np.nan
+    reasons = [TOO_FAR if 5 <= k < 9 else "" for k in range(rows)]
+    ghosts = []
+    for k, name in enumerate(names):
+        there = np.r_[2 * k : min(20, rows), 30:rows] if rows > 30 else np.arange(min(k, rows - 1), rows)
+        ghosts.append(Ghost(name, times[there], slow_motion(rows)[there] + 0.3 * (k + 1)))
+    return solved_run(
+        "targets", chain, times if timed else None, q, goals=goals_of(targets, times, reasons), ghosts=ghosts,
+        files=[SourceFile("targets.csv", "0" * 64, 123)], options={"robot": "ur5e", "all": True},
+    )  # fmt: skip
+
+
 def arm_of_shapes(folder: Path) -> Path:
     """Write a URDF of six turning joints, its links a box, a cylinder, a mesh, ... each in its own colour.
 
@@ -148,6 +182,11 @@ def shapes(tmp_path: Path) -> Path:
 @pytest.fixture
 def make_run() -> MakeRun:
     return build_run
+
+
+@pytest.fixture
+def make_solved() -> MakeSolved:
+    return build_solved
 
 
 @pytest.fixture

@@ -6,6 +6,7 @@ import subprocess
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,15 @@ from urmpipe_models.kinematics import frames_over_log, points_over_log
 from urmpipe_models.urdf_reader import read_urdf
 from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.joint_log import FloatArray
-from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
+from urmpipe_pipeline.palette import (
+    AXIS_COLOURS,
+    DEVIATION_COLOUR,
+    JOINT_COLOURS,
+    REFERENCE_COLOUR,
+    ghost_colour,
+    rgb,
+    run_colour,
+)
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.layout import FIELD_OF_VIEW, eye_and_target
 from urmpipe_pipeline.recording.scene import Scene, scene_of
@@ -27,6 +36,7 @@ from urmpipe_pipeline.simulation import Simulation
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
+MakeSolved = Callable[..., Run]
 Picture = NDArray[np.uint8]
 
 DRIVERS = sorted(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
@@ -169,6 +179,33 @@ def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison
     assert complaints(viewer) == []
     assert_drawn(picture, left=[*JOINT_COLOURS[:5], REFERENCE_COLOUR], right=right)
     assert "delta = asked for - a b/c.d [x] Ω [m]" in view_names(viewer)
+
+
+def test_a_branch_in_the_viewer_is_there_only_where_there_is_such_a_solution(
+    viewer: Any, make_solved: MakeSolved, tmp_path: Path
+) -> None:
+    """At 0.5 s neither the arm is there, whose joints have the same colours, nor a branch."""
+    run = make_solved(rows=60, names=("up", "down"))
+    assert run.goals is not None
+    q = run.q.copy()
+    q[20:30] = np.nan
+    run = replace(run, q=q, log=replace(run.log, q=q), goals=replace(run.goals, quat_xyzw=None))
+    path = write_recording(run, tmp_path / "solved.rrd")
+    viewer.open(str(path))
+    ghosts = [ghost_colour(0), ghost_colour(1)]
+
+    def seen(picture: Picture) -> list[bool]:
+        return [pixels(picture, colour) >= 50 for colour in ghosts]
+
+    def shows(wanted: list[bool], picture: Picture) -> bool:
+        return seen(picture) == wanted
+
+    for at, there in ((0.3, True), (0.5, False), (0.8, True)):
+        wanted = [there, there]
+        picture = scene_at(viewer, at, path, partial(shows, wanted))
+        assert seen(picture) == wanted
+        assert pixels(picture, DEVIATION_COLOUR) >= 20  # the targets missed stand at all times
+    assert complaints(viewer) == []
 
 
 def test_a_log_without_a_robot_in_the_viewer(viewer: Any, make_run: MakeRun, tmp_path: Path) -> None:

@@ -8,8 +8,10 @@ import numpy as np
 import pytest
 
 from urmpipe_models.catalogue import load_robot, parse_offset
+from urmpipe_models.inverse.targets import Targets
 from urmpipe_pipeline.comparison import Comparison, Stretch
 from urmpipe_pipeline.report import facts
+from urmpipe_pipeline.solved import Ghost, goals_of, row_times, solved_run
 from urmpipe_pipeline.trajectory import Alignment, Sync
 from urmpipe_pipeline.wording import tool_option
 
@@ -112,3 +114,19 @@ def test_a_stretch_of_one_sample_has_no_length() -> None:
 def test_a_correlation_of_nearly_nothing_has_no_sign(comparison: Comparison) -> None:
     assert facts.speed_correlation(replace(comparison.runs[0], speed_correlation=-0.0001)) == "+0.000"
     assert facts.speed_correlation(replace(comparison.runs[0], speed_correlation=None)) == ""
+
+
+def test_a_solved_run_tells_its_targets_and_its_branches() -> None:
+    robot = load_robot("ur5e")
+    q = np.array([[0.1, -1.2, 1.3, -0.4, 0.7, 0.3], [np.nan] * 6, [0.2, -1.2, 1.3, -0.4, 0.7, 0.3]])
+    goals = goals_of(Targets(np.zeros((3, 3))), row_times(3), ["", "too far", ""])
+    ghosts = [
+        Ghost(name, row_times(3)[there], q[there] + 1) for name, there in (("up", [0, 2]), ("down", [2]))
+    ]
+    run = solved_run("targets", robot, None, q, goals=goals, ghosts=ghosts)
+    told = {fact.name: fact.value for fact in facts.run_facts(run)}
+    assert (told["Source"], told["Targets"]) == ("ik", "2 of 3 with a solution")
+    assert told["Other branches"] == "up: 2; down: 1"
+    assert "Other branches" not in {fact.name for fact in facts.run_facts(replace(run, ghosts=()))}
+    log = facts.run_facts(replace(run, ghosts=(), goals=None))
+    assert {"Targets", "Other branches"}.isdisjoint(fact.name for fact in log)
