@@ -137,13 +137,7 @@ def descend(progress: Progress, task: Task, index: IntArray, settings: Settings,
 
 def _under_way(miss: Miss, settings: Settings) -> BoolArray:
     """Return where the target is neither met nor not a number."""
-    return np.asarray((miss.square < np.inf) & ~_met(miss, settings))
-
-
-def _met(miss: Miss, settings: Settings) -> BoolArray:
-    """Return where position and orientation are as near as was asked for."""
-    within = miss.distance2 <= settings.metres**2
-    return np.asarray(within & (miss.turn2 <= (miss.length * settings.radians) ** 2))
+    return np.asarray((miss.square < np.inf) & ~miss.within(settings.metres, settings.radians))
 
 
 def _ended(rows: Rows, settings: Settings) -> BoolArray:
@@ -175,7 +169,7 @@ def _store(progress: Progress, rows: Rows, settings: Settings) -> None:
     progress.gain[at] = rows.gain
     progress.distance[at] = np.sqrt(rows.miss.distance2)
     progress.angle[at] = np.sqrt(rows.miss.turn2) / rows.miss.length
-    progress.arrived[at] = _met(rows.miss, settings)
+    progress.arrived[at] = rows.miss.within(settings.metres, settings.radians)
 
 
 def _free(rows: Rows, settings: Settings) -> FloatArray:

@@ -69,6 +69,10 @@ class Miss:
         """|e|^2 in [m2]."""
         return np.asarray(self.distance2 + self.turn2)
 
+    def within(self, metres: float, radians: float) -> BoolArray:
+        """Return where position and orientation are as near as that, in [m] and [rad]."""
+        return np.asarray((self.distance2 <= metres**2) & (self.turn2 <= (self.length * radians) ** 2))
+
     def kept(self, rows: IntArray) -> Miss:
         """Return some of the rows."""
         error, jacobian = self.error[:, rows], self.jacobian[:, :, rows]
