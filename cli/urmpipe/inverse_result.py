@@ -139,7 +139,7 @@ class InverseResult:
             "jumps": [
                 {
                     "row": int(self.row[one.sample]),
-                    "t": one.t,
+                    "t": self._time(one.sample),
                     "position": list(one.position),
                     "from": one.from_branch,
                     "to": one.to_branch,
@@ -152,7 +152,7 @@ class InverseResult:
                     "joint": one.joint,
                     "row": int(self.row[one.first]),
                     "last_row": int(self.row[one.last]),
-                    "t": one.t,
+                    "t": self._time(one.first),
                     "speed": one.speed,
                     "allowed": one.allowed,
                 }
@@ -160,13 +160,17 @@ class InverseResult:
             ],
         }
 
+    def _time(self, index: int) -> float | None:
+        """Return the time of a target in [s]; None where each stands for itself."""
+        return None if self.t_ns is None else float(self.t_ns[index]) / 1e9
+
     def _target(self, index: int) -> dict[str, Any]:
         """Return a target as --json has it: every solution, and which of them is nearest to the start."""
         columns = np.flatnonzero(self.solutions.reached[index])
         chosen = np.flatnonzero(columns == self.chosen[index]).tolist()
         return {
             "row": int(self.row[index]),
-            **({} if self.t is None else {"t": float(self.t[index])}),
+            **({} if self.t_ns is None else {"t": self._time(index)}),
             "solutions": [self._solution(index, int(column)) for column in columns],
             "nearest": chosen[0] if chosen else None,
             "singular": self.solutions.families(index),

@@ -1,0 +1,166 @@
+"""`urmpipe.ik` in Python: arrays in, a result with a table, JSON and a notebook's display out."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+import urmpipe
+from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.inverse.targets import misses, targets_of
+from urmpipe_models.orientation import quaternions
+from urmpipe_pipeline.results import json_ready
+
+FloatArray = NDArray[np.float64]
+
+Q = np.array([[0.3, 0.8, -0.6, 0.5, 0.7, 0.2], [-1.0, 0.5, -0.2, 1.0, -0.8, 2.0]])
+ARM = urmpipe.load_robot("arm6")
+TARGETS = targets_of(ARM, Q)
+
+
+def matrices(targets: urmpipe.Targets) -> FloatArray:
+    """Return poses as matrices, shape (n, 4, 4)."""
+    poses = np.tile(np.eye(4), (len(targets), 1, 1))
+    poses[:, :3, 3] = targets.position
+    assert targets.rotation is not None
+    poses[:, :3, :3] = targets.rotation
+    return poses
+
+
+def test_a_file_matrices_and_targets_are_one_and_the_same(tmp_path: Path) -> None:
+    rotation = TARGETS.rotation
+    assert rotation is not None
+    table = np.column_stack([TARGETS.position, quaternions(rotation.reshape(-1, 9), "matrix")])
+    file = tmp_path / "targets.csv"
+    np.savetxt(file, table, delimiter=",", header="x,y,z,qx,qy,qz,qw", comments="", fmt="%.17g")
+    of_file, of_arrays = urmpipe.ik(file, "arm6"), urmpipe.ik(matrices(TARGETS), ARM)
+    of_targets = urmpipe.ik(TARGETS, "arm6")
+    assert np.array_equal(of_arrays.solutions.q, of_targets.solutions.q, equal_nan=True)
+    assert np.nanmax(np.abs(of_file.solutions.q - of_targets.solutions.q)) < 1e-9  # 1 digit of the quaternion
+    assert (of_file.name, of_targets.name) == ("targets", "targets")
+    one = urmpipe.ik(matrices(TARGETS)[1], "arm6")
+    assert np.array_equal(one.solutions.q[0], of_targets.solutions.q[1], equal_nan=True)
+
+
+@settings(max_examples=25, deadline=None)
+@given(st.integers(0, 10_000))
+def test_the_solution_nearest_to_the_start_is_the_start_itself(seed: int) -> None:
+    q = np.random.default_rng(seed).uniform(-3.0, 3.0, 6)
+    found = urmpipe.ik(targets_of(ARM, q[None]), ARM, start=q.tolist())
+    distances = np.linalg.norm(found.solutions.q[0] - q, axis=1)
+    assert found.chosen[0] == int(np.nanargmin(distances))
+    assert np.nanmin(distances) < 1e-5  # near a singular pose rounding of 1e-16 leaves its root
+    assert found.miss[0, found.chosen[0]] < 1e-10
+
+
+def test_the_table_has_every_solution_and_why_there_is_none() -> None:
+    poses = matrices(TARGETS)
+    poses = np.concatenate([poses, poses[:1]])
+    poses[2, :3, 3] = 2.0, 0.0, 0.1
+    found = urmpipe.ik(poses, "arm6")
+    assert found.verdict == "fail"
+    assert found.reached.tolist() == [True, True, False]
+    frame = found.to_frame()
+    assert list(frame.columns) == ["row", "branch", *ARM.coordinates, "miss", "angle", "nearest", "reason"]
+    for row, count in (
+        (1, int(found.solutions.reached[0].sum())),
+        (2, int(found.solutions.reached[1].sum())),
+    ):
+        part = frame[frame["row"] == row]
+        assert len(part) == count > 1
+        assert part["nearest"].sum() == 1
+        assert part["branch"].nunique() == count
+        q = part[list(ARM.coordinates)].to_numpy()
+        position, turn = misses(ARM, q, TARGETS.rows(np.full(count, row - 1)))
+        assert np.abs(position).max() < 1e-10
+        assert np.abs(turn).max() < 1e-10
+    (last,) = frame[frame["row"] == 3].to_dict("records")
+    assert last["reason"] == found.reasons[2]
+    assert np.isnan(last["theta1"])
+    assert last["branch"] == ""
+    assert not last["nearest"]
+    assert np.isnan(found.q[2]).all()
+    assert found.branch[2] == ""
+
+
+def test_a_notebook_shows_the_table() -> None:
+    shown = urmpipe.ik(TARGETS, "arm6")._repr_html_()
+    assert shown.startswith("<table")
+    assert "<th>theta1</th>" in shown
+    assert "right, elbow" in shown
+
+
+def test_positions_take_any_orientation() -> None:
+    found = urmpipe.ik(TARGETS.position, "arm6")
+    assert (found.method, found.angle) == ("iterative", None)
+    assert found.miss.max() < 1e-9
+    assert "angle" not in found.to_frame()
+    assert found.to_dict()["targets"][0]["solutions"][0]["angle"] is None
+
+
+def test_arrays_with_times_are_a_path() -> None:
+    q = Q[0] + 0.2 * np.sin(np.outer(np.arange(30) / 30, np.arange(1, 7)))
+    poses = targets_of(ARM, q)
+    with_times = urmpipe.ik(poses, ARM, t=0.01 * np.arange(30) + 5.0, start=q[0].tolist())
+    by_period = urmpipe.ik(poses, ARM, tsp=0.01, start=q[0].tolist())
+    assert np.abs(with_times.q - q).max() < 1e-9
+    assert np.array_equal(with_times.q, by_period.q)
+    assert with_times.path is not None
+    assert with_times.to_dict()["targets"][0]["t"] == 5.0
+    assert with_times.to_frame()["t"].tolist() == pytest.approx((5.0 + 0.01 * np.arange(30)).tolist())
+    assert json.loads(json.dumps(json_ready(by_period.to_dict())))["verdict"] == "pass"
+
+
+def test_joints_without_limits_can_be_written_within_pi() -> None:
+    free = replace(ARM, joints=tuple(replace(one, lower=-np.inf, upper=np.inf) for one in ARM.joints))
+    q = Q[0] + np.outer(np.linspace(0.0, 7.0, 200), [1.0, 0, 0, 0, 0, 0])
+    poses = targets_of(free, q)
+    turned = urmpipe.ik(poses, free, tsp=0.01, start=q[0].tolist())
+    within = urmpipe.ik(poses, free, tsp=0.01, start=q[0].tolist(), within_pi=True)
+    assert turned.q[-1, 0] - turned.q[0, 0] == pytest.approx(7.0, abs=1e-9)
+    assert np.abs(within.q).max() <= np.pi
+    assert np.abs(np.exp(1j * within.q) - np.exp(1j * turned.q)).max() < 1e-12
+    far = urmpipe.ik(TARGETS, free, start=(Q[0] + 4 * np.pi).tolist())
+    assert np.abs(far.q[0] - Q[0] - 4 * np.pi).max() < 1e-9
+    near = urmpipe.ik(TARGETS, free, start=(Q[0] + 4 * np.pi).tolist(), within_pi=True)
+    assert np.abs(near.q[0] - Q[0]).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        (
+            {"targets": np.zeros((5, 2))},
+            "targets: found an array of shape (5, 2), allowed: (n, 3), positions in m,",
+        ),
+        ({"targets": np.zeros((0, 3))}, "targets: found none, allowed: one or more"),
+        ({"t": [0.0]}, "t: found shape (1,), allowed: (2,), one time for each target, in s"),
+        ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: finite, strictly increasing"),
+        ({"t": [0.0, 1.0], "tsp": 1.0}, "found t and tsp, allowed: one of both"),
+        ({"start": [0.0]}, "--start: found 1 values, allowed: 6, one for each of theta1, "),
+        ({"robot": None}, "found no robot; allowed: --robot NAME|FILE, a TOML, a URDF or one of arm6, "),
+        (
+            {"output": "log.txt"},
+            "-o: found 'log.txt', allowed: a name that ends in .csv (a joint log) or .rrd",
+        ),
+    ],
+)
+def test_wrong_arguments(options: dict[str, object], said: str) -> None:
+    given: dict[str, object] = {"targets": TARGETS, "robot": "arm6"} | options
+    with pytest.raises(OptionError) as error:
+        urmpipe.ik(**given)  # type: ignore[arg-type]
+    assert str(error.value).startswith(said)
+
+
+def test_a_file_brings_its_own_times(tmp_path: Path) -> None:
+    with pytest.raises(OptionError, match="t: found times beside a file, allowed: with arrays"):
+        urmpipe.ik(tmp_path / "path.csv", "arm6", t=[0.0])
+    with pytest.raises(LogError, match="found no such file"):
+        urmpipe.ik(tmp_path / "path.csv", "arm6")
