@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urmpipe.guards import PathLike, Robot, place_robot, refuse_warnings
+from urmpipe.inverse_blocks import solve_in_blocks
 from urmpipe.inverse_output import Written, output_kind, run_of_solutions, write_joints
 from urmpipe.inverse_result import IndexArray, InverseResult, missed_by
 from urmpipe.inverse_targets import GivenTargets, TargetsLike, given_targets
@@ -24,6 +25,7 @@ from urmpipe_models.inverse.limits import periods
 from urmpipe_models.inverse.path import follow
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Singular, Solutions, TextArray
 from urmpipe_models.inverse.solve import Method, solve
+from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.transform import Transform
 from urmpipe_pipeline.joint_log import IntArray, LogWarning
 from urmpipe_pipeline.outputs import refuse_output
@@ -32,6 +34,9 @@ from urmpipe_pipeline.sources import ReadOptions
 
 KEPT = "a direction of motion is lost there", "a joint that is free stays where it was"
 """What is infinite at a singular pose along a path, and what is chosen there."""
+
+SOLVING = 0.7
+"""Share of the work that solving is where something is written, too."""
 
 RESTARTS = 20
 """Random starts of the iterative solver for a target that it does not reach from the start."""
@@ -86,7 +91,7 @@ def ik(
         strict: Whether a warning is an error.
         output: A joint log (.csv) or a recording (.rrd) to write.
         inputs: Files besides the targets that are never replaced.
-        progress: Told the share of the recording that is written, 0..1.
+        progress: Told the share that is done, 0..1.
 
     Returns:
         The solutions: `q`, `branch`, `reasons`, `to_frame()`, `to_dict()`.
@@ -104,7 +109,10 @@ def ik(
         lambda: given_targets(targets, t, tsp, read),
     )
     arm, kind, given = for_each(lambda make: make(), parts)
-    asked = _Asked(arm, given, _start(arm, start), every, tolerance, within_pi, method, restarts, seed)
+    solving, writing = _parts(progress, path is not None)
+    asked = _Asked(
+        arm, given, _start(arm, start), every, tolerance, within_pi, method, restarts, seed, solving
+    )
     _refuse_what_no_path_has(asked, kind)
 
     kept = [Path(one) for one in (*([targets] if isinstance(targets, (str, Path)) else []), *inputs)]
@@ -121,8 +129,18 @@ def ik(
         write_joints(result, path, kept)
     else:
         run = run_of_solutions(result, _branches(asked, result), given.file, asked.options)
-        write_recording(run, path, kept, progress)
+        write_recording(run, path, kept, writing)
     return replace(result, output=path)
+
+
+def _parts(
+    progress: Callable[[float], None] | None, writes: bool
+) -> tuple[Callable[[float], None] | None, Callable[[float], None] | None]:
+    """Return what to tell the progress of solving and of writing; None where nobody is told."""
+    if progress is None:
+        return None, None
+    share = SOLVING if writes else 1.0
+    return lambda done: progress(share * done), lambda done: progress(share + (1.0 - share) * done)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -138,6 +156,7 @@ class _Asked:
     method: Method
     restarts: int
     seed: int
+    progress: Callable[[float], None] | None
 
     @property
     def form(self) -> ClosedForm | None:
@@ -159,10 +178,15 @@ class _Asked:
 
     def solutions(self, *, every: bool) -> Solutions:
         """Return the solutions of the targets, each for itself."""
-        return solve(
-            self.arm, self.given.targets, start=self.start, every=every, tolerance=self.tolerance,
-            restarts=self.restarts, seed=self.seed, method=self.method,
-        )  # fmt: skip
+
+        def found(targets: Targets) -> Solutions:
+            """Return the solutions of some of them."""
+            return solve(
+                self.arm, targets, start=self.start, every=every, tolerance=self.tolerance,
+                restarts=self.restarts, seed=self.seed, method=self.method,
+            )  # fmt: skip
+
+        return solve_in_blocks(found, self.given.targets, self.progress)
 
 
 def _of_targets(asked: _Asked) -> InverseResult:

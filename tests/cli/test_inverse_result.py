@@ -90,6 +90,25 @@ def test_the_table_has_every_solution_and_why_there_is_none() -> None:
     assert found.branch[2] == ""
 
 
+@pytest.mark.parametrize(("robot", "every"), [("urm6", False), ("urm6", True), ("arm6", True)])
+def test_progress_is_told_and_changes_nothing(robot: str, every: bool) -> None:
+    arm = urmpipe.load_robot(robot)
+    q = np.random.default_rng(3).uniform(-1.0, 1.0, (600, 6))
+    q[550] = 0.0  # a wrist of arm6 that is aligned, in the second block
+    targets = targets_of(arm, q)
+    targets.position[7] = np.nan
+    told: list[float] = []
+    options = {"every": every, "restarts": 2}
+    whole = urmpipe.ik(targets, arm, **options)  # type: ignore[arg-type]
+    blocks = urmpipe.ik(targets, arm, **options, progress=told.append)  # type: ignore[arg-type]
+    assert told == [512 / 600, 1.0]
+    assert np.array_equal(whole.solutions.q, blocks.solutions.q, equal_nan=True)
+    assert whole.to_dict() == blocks.to_dict()
+    assert [one.family for one in blocks.solutions.singular] == [
+        one.family for one in whole.solutions.singular
+    ]
+
+
 def test_a_notebook_shows_the_table() -> None:
     shown = urmpipe.ik(TARGETS, "arm6")._repr_html_()
     assert shown.startswith("<table")
