@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import Literal
 
 import numpy as np
-from numpy.typing import NDArray
 
-from urmpipe_models.elementwise import Element
-from urmpipe_models.inverse.small_systems import dot_product, factor, gram
-from urmpipe_models.inverse.task import BoolArray, FloatArray, Miss, Task, merged, picked
+from urmpipe_models.inverse.small_systems import (
+    dot_product,
+    factor,
+    gram,
+    product,
+    transposed_product,
+)
+from urmpipe_models.inverse.task import BoolArray, FloatArray, IntArray, Miss, Task
 
-IntArray: TypeAlias = NDArray[np.intp]
 Method = Literal["lm", "dls", "pinv"]
 
 METHODS: tuple[Method, ...] = ("lm", "dls", "pinv")
@@ -25,6 +28,9 @@ GAINS = (1e-8, 1e8)
 
 STATIONARY = 1e-7
 """Where the cosine between e and what each free joint can change of it is less, e cannot be made less."""
+
+LEAST_RATIO = 1e-4
+"""A step that gains less of what was foreseen is not taken."""
 
 LONGEST_STEP = 0.5
 """Of damped least squares and the pseudoinverse, in [rad] or [m] of any joint."""
@@ -48,6 +54,10 @@ class Settings:
     def limited(self) -> bool:
         """Whether any joint has a limit."""
         return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
+
+    def within(self, q: FloatArray) -> FloatArray:
+        """Return joint values, shape (joints, n), clipped to their limits."""
+        return np.clip(q, self.lower[:, None], self.upper[:, None]) if self.limited else q
 
 
 @dataclass(frozen=True, slots=True)
@@ -87,19 +97,19 @@ class Progress:
         )
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """The rows of a block that are still on their way, one array a coordinate."""
+    """The rows of a block that are still on their way: q of shape (joints, n), gain of shape (n,)."""
 
     index: IntArray
     task: Task
-    q: list[FloatArray]
+    q: FloatArray
     gain: FloatArray
     miss: Miss
 
-    def kept(self, rows: BoolArray) -> Rows:
+    def kept(self, rows: IntArray) -> Rows:
         """Return some of the rows."""
-        task, q, miss = self.task.kept(rows), picked(self.q, rows), self.miss.kept(rows)
+        task, q, miss = self.task.kept(rows), self.q[:, rows], self.miss.kept(rows)
         return Rows(self.index[rows], task, q, self.gain[rows], miss)
 
 
@@ -113,7 +123,7 @@ def descend(progress: Progress, task: Task, index: IntArray, settings: Settings,
         settings: How to step.
         steps: The most to take.
     """
-    q = list(progress.q[:, index])
+    q = progress.q[:, index]
     rows = Rows(index, task, q, progress.gain[index], task.miss(q))
     rows = _parted(progress, rows, _ended(rows, settings), settings)
     for _ in range(steps):
@@ -121,135 +131,105 @@ def descend(progress: Progress, task: Task, index: IntArray, settings: Settings,
             return
         progress.steps[rows.index] += 1
         rows = _stepped(rows, settings)
-        rows = _parted(progress, rows, ~(_under_way(rows.miss, settings)), settings)
+        rows = _parted(progress, rows, ~_under_way(rows.miss, settings), settings)
     _store(progress, rows, settings)
 
 
 def _under_way(miss: Miss, settings: Settings) -> BoolArray:
     """Return where the target is neither met nor not a number."""
-    square = miss.square
-    return (square < np.inf) & ~_met(miss, settings)
-
-
-def _met(miss: Miss, settings: Settings) -> BoolArray:
-    """Return where position and orientation are as near as was asked for."""
-    within = miss.distance2 <= settings.metres**2
-    return np.asarray(within & (miss.turn2 <= (miss.length * settings.radians) ** 2))
+    return np.asarray((miss.square < np.inf) & ~miss.within(settings.metres, settings.radians))
 
 
 def _ended(rows: Rows, settings: Settings) -> BoolArray:
     """Return where the target is met, is no number, or cannot be come nearer to.
 
-    The gradient of |e|^2 / 2 is -J^T e; held joints do not count.
+    The gradient of |e|^2 / 2 is -J^T e; joints that are held do not count.
     """
-    J = _held(rows, settings)
-    least = STATIONARY**2 * rows.miss.square
-    moves = np.zeros(len(rows.index), np.bool_)
-    for column in zip(*J, strict=True):
-        slope = dot_product(column, rows.miss.error)
-        moves |= slope * slope > least * dot_product(column, column)
-    moves &= rows.gain < GAINS[1]
-    return ~(_under_way(rows.miss, settings) & moves)
+    J = _free(rows, settings)
+    slope = transposed_product(J, rows.miss.error)
+    moves = slope * slope > STATIONARY**2 * rows.miss.square * dot_product(J, J)
+    going = _under_way(rows.miss, settings) & np.asarray(moves.any(axis=0))
+    return np.asarray(~going | (rows.gain >= GAINS[1]))
 
 
 def _parted(progress: Progress, rows: Rows, leaving: BoolArray, settings: Settings) -> Rows:
     """Store the rows that leave, and return the others."""
     if not leaving.any():
         return rows
-    gone = rows.kept(leaving)
+    gone = rows.kept(np.flatnonzero(leaving))
     _store(progress, gone, settings)
     progress.ended[gone.index] = True
-    return rows.kept(~leaving)
+    return rows.kept(np.flatnonzero(~leaving))
 
 
 def _store(progress: Progress, rows: Rows, settings: Settings) -> None:
     """Write how far the rows have come."""
     at = rows.index
-    for joint, value in zip(progress.q, rows.q, strict=True):
-        joint[at] = value
+    progress.q[:, at] = rows.q
     progress.gain[at] = rows.gain
     progress.distance[at] = np.sqrt(rows.miss.distance2)
     progress.angle[at] = np.sqrt(rows.miss.turn2) / rows.miss.length
-    progress.arrived[at] = _met(rows.miss, settings)
+    progress.arrived[at] = rows.miss.within(settings.metres, settings.radians)
 
 
-def _held(rows: Rows, settings: Settings) -> list[list[Element]]:
+def _free(rows: Rows, settings: Settings) -> FloatArray:
     """Return J without the joints that stand at a limit and would leave it downhill: J^T e points out."""
     J = rows.miss.jacobian
     if not settings.limited:
         return J
-    free = [
-        ~((q <= low) & (slope < 0.0) | (q >= high) & (slope > 0.0))
-        for q, low, high, slope in zip(
-            rows.q,
-            settings.lower,
-            settings.upper,
-            (dot_product(column, rows.miss.error) for column in zip(*J, strict=True)),
-            strict=True,
-        )
-    ]
-    return [[np.where(one, value, 0.0) for one, value in zip(free, row, strict=True)] for row in J]
+    slope = transposed_product(J, rows.miss.error)
+    held = (rows.q <= settings.lower[:, None]) & (slope < 0.0)
+    held |= (rows.q >= settings.upper[:, None]) & (slope > 0.0)
+    return np.where(held, 0.0, J)
 
 
 def _stepped(rows: Rows, settings: Settings) -> Rows:
     """Return the rows after one step of the method, within limits."""
-    J = _held(rows, settings)
+    J = _free(rows, settings)
     if settings.method == "lm":
         return _marquardt(rows, J, settings)
-    step = _pseudoinverse(J, rows.miss.error) if settings.method == "pinv" else None
-    if step is None:
+    if settings.method == "dls":
         step = damped_step(J, rows.miss.error, (settings.damping * rows.miss.length) ** 2)
-    longest = np.max(np.abs(step), axis=0)
-    shorter = np.minimum(1.0, LONGEST_STEP / np.maximum(longest, LONGEST_STEP))
-    q = _limited([value + shorter * change for value, change in zip(rows.q, step, strict=True)], settings)
+    else:
+        step = pseudoinverse_step(J, rows.miss.error)
+    step *= np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(step).max(axis=0), LONGEST_STEP))
+    q = settings.within(rows.q + step)
     return replace(rows, q=q, miss=rows.task.miss(q))
 
 
-def _marquardt(rows: Rows, J: list[list[Element]], settings: Settings) -> Rows:
-    """Return the rows after a Levenberg-Marquardt step, taken where it comes nearer as foreseen."""
-    now = rows.miss
-    square = now.square
-    step = damped_step(J, now.error, rows.gain * square)
-    q = _limited([value + change for value, change in zip(rows.q, step, strict=True)], settings)
-    step = [after - before for after, before in zip(q, rows.q, strict=True)] if settings.limited else step
-    left = [error - dot_product(row, step) for error, row in zip(now.error, J, strict=True)]
+def _marquardt(rows: Rows, J: FloatArray, settings: Settings) -> Rows:
+    """Return the rows after a Levenberg-Marquardt step, taken where it comes nearer as was foreseen.
+
+    Foreseen is |e|^2 - |e - J dq|^2; the gain ratio is what was gained of it.
+    """
+    now, square = rows.miss, rows.miss.square
+    q = settings.within(rows.q + damped_step(J, now.error, rows.gain * square))
+    left = now.error - product(J, q - rows.q)
     foreseen = square - dot_product(left, left)
     new = rows.task.miss(q)
     gained = square - new.square
-    accepted = (gained > 1e-4 * foreseen) & (foreseen > 0.0)
-    gain = rows.gain * np.where(gained > 0.75 * foreseen, 0.125, np.where(gained < 0.25 * foreseen, 4.0, 1.0))
-    gain = np.clip(gain, *GAINS)
-    if not accepted.all():
-        q, new = merged(accepted, q, rows.q), new.where(accepted, now)
-    return replace(rows, q=q, gain=gain, miss=new)
+    factors = np.where(gained > 0.75 * foreseen, 0.125, np.where(gained < 0.25 * foreseen, 4.0, 1.0))
+    refused = np.flatnonzero(~((gained > LEAST_RATIO * foreseen) & (foreseen > 0.0)))
+    if len(refused):
+        q[:, refused] = rows.q[:, refused]
+        new.restore(refused, now)
+    return replace(rows, q=q, gain=np.clip(rows.gain * factors, *GAINS), miss=new)
 
 
-def damped_step(J: list[list[Element]], error: list[FloatArray], damping: Element) -> list[FloatArray]:
+def damped_step(J: FloatArray, error: FloatArray, damping: FloatArray | float) -> FloatArray:
     """Return dq = (J^T J + mu I)^-1 J^T e = J^T (J J^T + mu I)^-1 e, by the smaller of the two systems.
 
     Args:
-        J: Its rows.
-        error: e.
-        damping: mu, in the unit of J squared.
+        J: Shape (m, joints, n).
+        error: e, shape (m, n).
+        damping: mu, in the unit of J squared, shape (n,) or one for all.
     """
-    columns = list(zip(*J, strict=True))
-    if len(J) <= len(columns):
-        y = factor(gram(J), damping).solve(error)
-        return [dot_product(column, y) for column in columns]
-    return factor(gram(columns), damping).solve([dot_product(column, error) for column in columns])
+    if J.shape[0] <= J.shape[1]:
+        return transposed_product(J, factor(gram(J), damping).solve(error))
+    return factor(gram(J.transpose(1, 0, 2)), damping).solve(transposed_product(J, error))
 
 
-def _pseudoinverse(J: list[list[Element]], error: list[FloatArray]) -> list[FloatArray]:
-    """Return J^+ e, J^+ the Moore-Penrose pseudoinverse by singular values."""
-    count = len(error[0])
-    matrix = np.array([[np.broadcast_to(value, count) for value in row] for row in J]).transpose(2, 0, 1)
-    return list(np.einsum("nij,jn->in", np.linalg.pinv(matrix, rcond=RANK_CUTOFF), np.array(error)))
-
-
-def _limited(q: list[FloatArray], settings: Settings) -> list[FloatArray]:
-    """Return joint values within their limits."""
-    if not settings.limited:
-        return q
-    return [
-        np.clip(value, low, high) for value, low, high in zip(q, settings.lower, settings.upper, strict=True)
-    ]
+def pseudoinverse_step(J: FloatArray, error: FloatArray) -> FloatArray:
+    """Return dq = J^+ e, J^+ the Moore-Penrose pseudoinverse by singular values; shapes as `damped_step`."""
+    inverse = np.linalg.pinv(J.transpose(2, 0, 1), rcond=RANK_CUTOFF).transpose(1, 2, 0)
+    return product(np.asarray(inverse, dtype=np.float64), error)

@@ -25,20 +25,21 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.descent import METHODS, IntArray, Method, Progress, Settings, descend
+from urmpipe_models.inverse.descent import METHODS, Method, Progress, Settings, descend
 from urmpipe_models.inverse.least_motion import settle
 from urmpipe_models.inverse.limits import periods
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.task import (
     BoolArray,
     FloatArray,
+    IntArray,
     characteristic_length,
     redundancy,
     task_of,
 )
 from urmpipe_models.kinematics import THREADS
 
-BLOCK = 2048
+BLOCK = 4096
 """Rows of a block: its hundred or so arrays stay in a core's cache."""
 
 ROUND = 8

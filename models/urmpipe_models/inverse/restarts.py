@@ -9,12 +9,11 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.chain import Chain, Joint
-from urmpipe_models.inverse.descent import IntArray
 from urmpipe_models.inverse.iterative import Refined, refine
 from urmpipe_models.inverse.limits import TURN, within_limits
 from urmpipe_models.inverse.solutions import NEAREST_POINT, FloatArray, Solutions
 from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.inverse.task import BoolArray, characteristic_length
+from urmpipe_models.inverse.task import BoolArray, IntArray, characteristic_length
 
 DISTINCT = 1e-3
 """Solutions are two if a joint differs by more than this in [rad] or [m], revolute joints by the shorter way.
@@ -76,8 +75,8 @@ def random_starts(chain: Chain, count: int, seed: int) -> FloatArray:
     """Return uniformly random joint values within the limits, shape (count, joints).
 
     A revolute joint that is open at an end is drawn from one turn: from its only limit, or (-pi, pi]; a
-    prismatic one from as far as the arm is long: from its only limit, or to both sides. The first draws do not
-    depend on how many follow.
+    prismatic one from as far as the arm is long: from its only limit, or to both sides. The first draws do
+    not depend on how many follow.
     """
     ranges = np.array([_range(joint, 4.0 * characteristic_length(chain)) for joint in chain.moving])
     draws = np.random.default_rng(seed).uniform(size=(count, len(ranges)))

@@ -1,82 +1,88 @@
-"""Small symmetric positive definite systems, elementwise: one array an entry, all rows at once.
+"""Small symmetric positive definite systems, many at once: one array an entry.
 
-`numpy.linalg.solve` calls LAPACK once a row, which costs more than the Jacobian that the row is about.
-Here a system of a few unknowns is written out entry by entry, so that one NumPy operation serves a
-block of rows; constant zeros fold away (see `elementwise`).
+`numpy.linalg.solve` calls LAPACK once a system, which costs more than the Jacobian that a system of six
+unknowns is about. Here a matrix is an array of shape (k, k, n), so that an entry's n values lie side by side
+and each elimination is a few NumPy operations on all systems. Sums are written term by term: their rounding
+must not depend on n, or what one row comes to would depend on which others are solved beside it.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
+from numpy.typing import NDArray
 
-from urmpipe_models.elementwise import Element, minus, plus, times
+FloatArray: TypeAlias = NDArray[np.float64]
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Factor:
     """A = L D L^T, the Cholesky factor without square roots.
 
     Attributes:
-        lower: Row i holds L_i0 .. L_i,i-1; the diagonal is 1.
-        inverse: 1 / D_i.
+        lower: L below its diagonal of ones, shape (k, k, n); what stands elsewhere is not used.
+        inverse: 1 / D_i, shape (k, n).
     """
 
-    lower: tuple[tuple[Element, ...], ...]
-    inverse: tuple[Element, ...]
+    lower: FloatArray
+    inverse: FloatArray
 
-    def solve(self, b: Sequence[Element]) -> list[Element]:
-        """Return x of A x = b."""
-        x: list[Element] = []
-        for row, right in zip(self.lower, b, strict=True):
-            x.append(_less(right, row, x))
-        x = [times(value, inverse) for value, inverse in zip(x, self.inverse, strict=True)]
-        for i in reversed(range(len(x))):
-            x[i] = _less(x[i], [row[i] for row in self.lower[i + 1 :]], x[i + 1 :])
+    def solve(self, b: FloatArray) -> FloatArray:
+        """Return x of A x = b, both of shape (k, n)."""
+        x = np.array(b)
+        for j in range(len(x) - 1):
+            x[j + 1 :] -= self.lower[j + 1 :, j] * x[j]
+        x *= self.inverse
+        for j in range(len(x) - 1, 0, -1):
+            x[:j] -= self.lower[j, :j] * x[j]
         return x
 
 
-def factor(A: Sequence[Sequence[Element]], damping: Element = 0.0) -> Factor:
-    """Return the factor of A + damping I.
+def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> Factor:
+    """Return the factor of A + mu I.
 
-    Where A is positive semidefinite and the damping more than 0, no pivot D_i is less than the damping;
-    rounding, which can make it so where A is singular, is held to that.
+    Where A is positive semidefinite no pivot D_i is less than mu. Rounding, which can make it so where A is
+    singular, is held to that: the factor is finite for any such A if mu > 0.
 
     Args:
-        A: The lower triangle: row i holds A_i0 .. A_ii.
-        damping: One element, not negative; 0 of a matrix that is positive definite by itself.
+        A: Symmetric, shape (k, k, n); positive definite where mu is 0.
+        damping: mu, not negative, shape (n,) or one for all.
     """
-    damped = not (isinstance(damping, float) and damping == 0.0)
-    lower: list[tuple[Element, ...]] = []
-    inverse: list[Element] = []
-    for i, entries in enumerate(A):
-        scaled: list[Element] = []  # L_ij D_j
-        for j in range(i):
-            scaled.append(_less(entries[j], lower[j], scaled))
-        row = tuple(times(value, inverse[j]) for j, value in enumerate(scaled))
-        pivot = _less(plus(entries[i], damping), row, scaled)
-        lower.append(row)
-        inverse.append(1.0 / (np.maximum(pivot, damping) if damped else pivot))
-    return Factor(tuple(lower), tuple(inverse))
+    lower, scaled, inverse = np.zeros(A.shape), np.zeros(A.shape), np.empty(A.shape[1:])
+    for j in range(len(A)):
+        column = A[j:, j] - product(lower[j:, :j], scaled[j, :j]) if j else A[:, 0]
+        np.divide(1.0, np.maximum(column[0] + damping, damping), out=inverse[j])
+        scaled[j + 1 :, j] = column[1:]
+        np.multiply(column[1:], inverse[j], out=lower[j + 1 :, j])
+    return Factor(lower, inverse)
 
 
-def gram(rows: Sequence[Sequence[Element]]) -> list[list[Element]]:
-    """Return the lower triangle of M M^T, M given by its rows."""
-    return [[dot_product(rows[i], rows[j]) for j in range(i + 1)] for i in range(len(rows))]
+def gram(M: FloatArray) -> FloatArray:
+    """Return M M^T, shape (k, k, n), of matrices of shape (k, p, n)."""
+    square = np.empty((len(M), len(M), M.shape[2]))
+    for i, row in enumerate(M):
+        square[i, : i + 1] = square[: i + 1, i] = product(M[: i + 1], row)
+    return square
 
 
-def dot_product(a: Sequence[Element], b: Sequence[Element]) -> Element:
-    """Return sum_k a_k b_k."""
-    total: Element = 0.0
-    for x, y in zip(a, b, strict=True):
-        total = plus(total, times(x, y))
+def product(M: FloatArray, x: FloatArray) -> FloatArray:
+    """Return M x, shape (k, n), of matrices of shape (k, p, n) and vectors of shape (p, n)."""
+    total: FloatArray = M[:, 0] * x[0]
+    for p in range(1, len(x)):
+        total += M[:, p] * x[p]
     return total
 
 
-def _less(value: Element, a: Sequence[Element], b: Sequence[Element]) -> Element:
-    """Return value - sum_k a_k b_k."""
-    for x, y in zip(a, b, strict=True):
-        value = minus(value, times(x, y))
-    return value
+def transposed_product(M: FloatArray, x: FloatArray) -> FloatArray:
+    """Return M^T x, shape (p, n), of matrices of shape (k, p, n) and vectors of shape (k, n)."""
+    return dot_product(M, x)
+
+
+def dot_product(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return sum_k a_k b_k, shape (..., n), of a of shape (k, ..., n) and b of shape (k, n) or that of a."""
+    total: FloatArray = a[0] * b[0]
+    for k in range(1, len(a)):
+        total += a[k] * b[k]
+    return total
