@@ -68,10 +68,10 @@ def random_arm(rng: np.random.Generator, wrist: str, signs: tuple[int, int] = (1
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     steps = np.diff(np.vstack((np.zeros(3), point)), axis=0)
     joints = tuple(
-        Joint(f"j{k}", origin=from_offset(steps[k].tolist()), axis=tuple(direction[k].tolist()))
-        for k in range(6)
+        Joint(f"j{k}", origin=from_offset(step.tolist()), axis=tuple(axis.tolist()))
+        for k, (step, axis) in enumerate(zip(steps, direction, strict=True))
     )
-    base, tip, tool = (from_offset(rng.uniform(-1.0, 1.0, 6)) for _ in range(3))
+    base, tip, tool = (from_offset(rng.uniform(-1.0, 1.0, 6).tolist()) for _ in range(3))
     return Chain("random", joints, tip, base, tool)
 
 
