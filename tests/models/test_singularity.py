@@ -243,8 +243,9 @@ def test_the_length_is_that_of_the_links_after_the_first_axis(name: str, length:
     assert characteristic_length(longer) == pytest.approx(length + 0.25, rel=1e-14)
 
 
-def test_it_does_not_ask_where_frames_stand_or_where_joints_are_zero() -> None:
-    chain = load_robot("panda")
+@pytest.mark.parametrize("name", ["panda", "ur5", "arm6"])
+def test_it_does_not_ask_where_frames_stand_or_where_joints_are_zero(name: str) -> None:
+    chain = load_robot(name)
     shifts = [translation(0.0, 0.0, 0.1 * k) @ rotation_z(0.3 * k) for k in range(len(chain.joints))]
     before = [Transform(), *(shift.inverse() for shift in shifts)]
     joints = tuple(
@@ -256,8 +257,9 @@ def test_it_does_not_ask_where_frames_stand_or_where_joints_are_zero() -> None:
 
 
 def test_axes_that_were_meant_to_be_parallel_are() -> None:
-    rows = [DHRow(a=0.4, alpha=1e-4), DHRow(a=0.3, alpha=-1e-4), DHRow(a=0.1)]
-    assert characteristic_length(dh_chain("calibrated", rows)) == pytest.approx(0.8, rel=1e-4)
+    leaning = Joint("second", origin=from_offset([0.4, 0.0, 0.0, 0.0, 1e-4, 0.0]))  # they meet 4 km away
+    chain = Chain("calibrated", (Joint("first"), leaning), tip=translation(0.3, 0.0, 0.0))
+    assert characteristic_length(chain) == pytest.approx(0.7, rel=1e-6)
 
 
 def test_arms_of_few_axes() -> None:

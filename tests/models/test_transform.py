@@ -203,6 +203,15 @@ def test_near_0_and_180_degrees_the_rotation_still_comes_back(
     np.testing.assert_allclose(matrix(back), matrix(rotation), atol=3e-7)
 
 
+@pytest.mark.parametrize(("x", "singular"), [(1e-8, False), (1e-10, True)])
+def test_the_zxz_angles_are_told_apart_down_to_a_sine_of_1e_9(x: float, singular: bool) -> None:
+    for near in (x, math.pi - x):
+        z1, _, z2, flag = euler_zxz(from_zxz(0.4, near, 0.5).rotation)
+        assert flag == singular
+        if not singular:
+            np.testing.assert_allclose((z1, z2), (0.4, 0.5), rtol=0.0, atol=1e-7)  # 1e-16 / 1e-8, and some
+
+
 @given(angles, st.floats(-1.5, 1.5), angles)
 def test_both_conventions_tell_the_same_rotation(rz: float, ry: float, rx: float) -> None:
     rotation = from_rpy(rx, ry, rz).rotation

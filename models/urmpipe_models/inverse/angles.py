@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.elementwise import cross
+from urmpipe_models.elementwise import cross, dot
 from urmpipe_models.inverse.solutions import FloatArray
 from urmpipe_models.inverse.trigonometric import wrapped
 from urmpipe_models.transform import rotation_about
@@ -28,12 +28,12 @@ def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatAr
     Args:
         axis: Unit vector, shape (3,).
         start: Shape (3, ...), or (3,) for all.
-        end: See start; what both have along the axis does not count.
+        end: See start; what both have along the axis does not count. It is taken off first, so that vectors
+            that are almost along the axis lose no digit.
     """
-    along = np.tensordot(axis, start, 1) * np.tensordot(axis, end, 1)
-    sine = sum(a * b for a, b in zip(axis.tolist(), cross(tuple(start), tuple(end)), strict=True))
-    cosine = sum(a * b for a, b in zip(start, end, strict=True)) - along
-    return wrapped(np.arctan2(sine, cosine))
+    x, y, z = (float(one) for one in axis)
+    u, v = cross((x, y, z), tuple(start)), cross((x, y, z), tuple(end))
+    return wrapped(np.arctan2(dot((x, y, z), cross(u, v)), dot(u, v)))
 
 
 def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:

@@ -12,8 +12,11 @@ from urmpipe_models.inverse.solutions import BoolArray, FloatArray, TextArray
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.targets import Targets
 
-MOST_AT_ONCE = 64
-"""Samples out of reach that are tried together."""
+MOST_AT_ONCE = 512
+"""Samples out of reach that are tried together: a few hundred cost hardly more than one."""
+
+MORE = 4
+"""How many times as many are tried next while all are out of reach."""
 
 
 @dataclass(eq=False)
@@ -22,7 +25,7 @@ class LeastMotionPath:
 
     Where a sample does not follow from the one before by least motion, `solve` looks for it, from the
     sample before and from random restarts. If it is out of reach, so are probably the next ones: they are
-    tried together, twice as many each time.
+    tried together, more of them each time.
 
     Attributes:
         chain: The arm.
@@ -67,7 +70,7 @@ class LeastMotionPath:
         )
         met = found.reached[:, 0] & (found.shortfall[:, 0] == 0.0)
         alike = 1 if met[0] else _alike(met, found.reached[:, 0])
-        self._at_once = min(MOST_AT_ONCE, 2 * self._at_once) if alike == len(met) and not met[0] else 1
+        self._at_once = min(MOST_AT_ONCE, MORE * self._at_once) if alike == len(met) and not met[0] else 1
         self.reasons[sample : sample + alike] = found.reasons[:alike, 0]
         self.shortfall[sample : sample + alike] = found.shortfall[:alike, 0]
         return np.asarray(found.q[:alike, 0])

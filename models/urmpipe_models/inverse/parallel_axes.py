@@ -225,7 +225,7 @@ def _tell_once(q: FloatArray, reasons: TextArray, branches: tuple[str, ...], whe
         where: Where they are singular, each of shape (n, k).
     """
     rows = np.flatnonzero(np.any(where, axis=0).any(axis=1))
-    for first, second in combinations(range(len(branches)), 2):
+    for first, second in combinations(range(len(branches)), 2) if len(rows) else ():
         same = np.abs(wrapped(q[rows, first] - q[rows, second])).max(axis=1) < ONE
         q[rows[same], second] = np.nan
         reasons[rows[same], second] = f"the same as {branches[first]}: both meet here"

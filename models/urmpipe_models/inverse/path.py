@@ -150,7 +150,7 @@ def _told(
     if branch is None:
         branch = _numbered(len(found.q), reached, jumping)
     else:
-        jumping = np.union1d(jumping, _changed_over_a_gap(branch, reached))
+        jumping = _with_gaps(jumping, branch, reached)
     jumps = jumps_at(
         chain, reached[jumping], reached[jumping - 1], found.q, seconds, targets.position, branch
     )
@@ -182,10 +182,14 @@ def _numbered(count: int, reached: NDArray[np.intp], jumping: NDArray[np.intp]) 
     return branch
 
 
-def _changed_over_a_gap(branch: TextArray, reached: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return which reached samples follow ones without a solution, on another branch than before them."""
-    gap, other = np.diff(reached) > 1, branch[reached][1:] != branch[reached][:-1]
-    return np.asarray(np.flatnonzero(gap & other) + 1)
+def _with_gaps(jumping: NDArray[np.intp], branch: TextArray, reached: NDArray[np.intp]) -> NDArray[np.intp]:
+    """Return the jumps among reached samples: after ones without a solution, those to another branch.
+
+    How the tool would have moved meanwhile is not known, so that its way tells nothing there.
+    """
+    gap = np.diff(reached, prepend=-1) > 1
+    other = np.append(False, branch[reached][1:] != branch[reached][:-1])
+    return np.union1d(jumping[~gap[jumping]], np.flatnonzero(gap & other))
 
 
 def _wrapped(q: FloatArray, period: FloatArray) -> FloatArray:

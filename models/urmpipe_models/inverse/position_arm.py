@@ -93,9 +93,11 @@ class PositionArm:
         parallel, or axes 1 and 2 meet, this is the side of axis 1 that the wrist lies on, along k1 x k2.
         elbow down and elbow up, of the right arm: the distance of the wrist from axis 2 shrinks or grows
         as joint 3 turns in the sense of joint 2; of the left arm the other way round. So an elbow above
-        the line from axis 2 to the wrist is up on both sides of axis 1, seen along k1, whatever sense axis
-        2 has. A joint with one root alone has no word. The postures of an arm without such an order are
-        numbered by q3 from the pose where the wrist is farthest from axis 2 on: such arms can change
+        the line from axis 2 to the wrist, seen along k1, is up on both sides of axis 1 and whatever sense
+        axis 2 has, as long as the wrist is farther out than axis 2. A joint with one root alone has no word.
+
+        The postures of an arm without such an order are numbered by q3, from the pose where the wrist is
+        farthest from axis 2 on: such arms can change
         from one to another without passing a singular pose, so that no name would last.
         """
         if self.order == "both":

@@ -158,6 +158,37 @@ def test_what_is_out_of_reach_is_left_out_and_the_branch_goes_on() -> None:
     assert set(path.branch[~out]) == {path.branch[0]}
 
 
+def moved_over_a_gap(by: list[float]) -> tuple[FloatArray, Targets]:
+    """Joint values in rad and poses of a UR5e that moves while its targets are out of reach."""
+    first = line(UR, UR + 0.1, 20)
+    first[:, 4] -= 0.9
+    q = np.vstack((first, first + np.array(by)))
+    targets = targets_of(load_robot("ur5e"), q)
+    targets.position[18:22, 2] += 3.0
+    return q, targets
+
+
+def test_after_a_gap_the_branch_of_before_goes_on_though_another_is_nearer() -> None:
+    arm = load_robot("ur5e")
+    q, targets = moved_over_a_gap([0.0, 0.0, 0.0, 2.9, 0.0, 2.9])
+    path = follow(arm, targets, times(40), start=q[0])
+    np.testing.assert_allclose(path.q[22:], q[22:], rtol=0.0, atol=ROUNDING)
+    assert path.branch[22] == path.branch[17]
+    assert path.jumps == ()
+    nearest = follow(arm, targets.rows(slice(22, 40)), times(18), start=path.q[17])
+    assert nearest.branch[0] != path.branch[22]
+
+
+def test_another_branch_after_a_gap_is_told_as_a_jump() -> None:
+    arm = limited(load_robot("ur5e"), 0, -2.0, 2.0)
+    q, targets = moved_over_a_gap([2.5, 0.0, 0.0, 0.0, 0.0, 0.0])
+    path = follow(arm, targets, times(40), start=q[0])
+    (jump,) = path.jumps
+    assert jump.sample == 22
+    assert (jump.from_branch, jump.to_branch) == (path.branch[17], path.branch[22])
+    assert jump.from_branch != jump.to_branch
+
+
 def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     arm = load_robot("ur5e")
     stretched = np.array([0.3, -0.9, 0.0, -0.7, 1.2, 0.3])

@@ -226,6 +226,21 @@ def test_one_sample_and_equal_samples_are_paths_too() -> None:
     np.testing.assert_allclose(path.q[0], path.q[1], rtol=0.0, atol=1e-9)
 
 
+@pytest.mark.parametrize("robot", ["ur5e", "arm6", "urm6"])
+@pytest.mark.parametrize("place", [math.nan, 9.0])
+def test_a_path_of_which_no_sample_has_a_solution_has_a_reason_each(robot: str, place: float) -> None:
+    arm = load_robot(robot)
+    targets = targets_of(arm, np.full((3, 6), 0.3))
+    targets.position[:] = place
+    path = follow(arm, targets, times(3), within_pi=True, restarts=2)
+    assert not path.reached.any()
+    assert all("finite numbers" in text if math.isnan(place) else " m" in text for text in path.reasons)
+    assert list(path.branch) == ["", "", ""]
+    assert path.jumps == ()
+    assert path.too_fast == ()
+    assert path.singular == ()
+
+
 def test_prismatic_joints_follow_too() -> None:
     gantry = Chain(
         "gantry",
