@@ -18,6 +18,7 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.rotation import PURE
 from urmpipe_pipeline.sources.row_faults import Rows, read_rows
+from urmpipe_pipeline.sources.sniff_targets import sniff_targets
 from urmpipe_pipeline.sources.table import release_memory
 from urmpipe_pipeline.sources.tables import PATH, open_tables
 from urmpipe_pipeline.sources.target_rotation import rotation_units, target_form, target_rotations
@@ -88,7 +89,7 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
     Source: [UrmArm2021]_ eq. 22 (t = i Tsp).
     """
     asked = replace(options or ReadOptions(), joints=(), names=(), signs=(), offsets=())
-    tables = open_tables([Path(file)], asked)
+    tables = open_tables([Path(file)], asked, sniff_targets)
     plan = make_plan(tables, replace(asked, source=PATH), None)
     _refuse_unclear(plan, named=bool(asked.position))
     form, assumed = target_form(plan.roles, columns_of(tables.layouts, tables.titles), str(file))

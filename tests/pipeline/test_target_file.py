@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -154,6 +155,49 @@ def test_each_wrong_row_has_its_reason_and_the_others_stay(read: Read) -> None:
     assert targets.row.tolist() == list(range(1, 11))
     assert targets.position[[0, 9]].tolist() == [[0.3, 0.1, 0.5], [0.4, 0.1, 0.5]]
     assert np.isnan(targets.position[1:9]).all()
+
+
+ROWS = {
+    "0.3,0.1,0.5": None,
+    "nan,0.1,0.5": "column x: found no number, allowed: a finite number",
+    "0.1,0.2": "found 2 cells, allowed: 3",
+    "0.1,0.2,0.3,0.4": "found 4 cells, allowed: 3",
+    "0.1,abc,0.5": "column y: found 'abc', allowed: a finite number",
+    "a,b,c": "found 'a,b,c', allowed: a row of numbers",
+    "-0.5": "found 1 cell, allowed: 3",
+    "to do": "found 1 cell ('to do'), allowed: 3",
+}
+"""Rows, and what is wrong with each."""
+
+
+@pytest.mark.parametrize("count", [1, 2, 3])
+def test_a_good_row_is_read_whatever_stands_around_it(read: Read, count: int) -> None:
+    """Each order of rows of each kind, one of them good: most may be wrong, the first one too."""
+    for rows in product(ROWS, repeat=count):
+        if None not in map(ROWS.get, rows):
+            continue
+        targets = read("x,y,z\n" + "\n".join(rows) + "\n")
+        reasons = {k + 1: said for k, row in enumerate(rows) if (said := ROWS[row])}
+        assert (targets.faults, len(targets)) == (reasons, count), rows
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "sep=;\r\nx;y;z\r\n0,4;0,1;0,5\r\n0,4;da;0,5\r\n",
+        "\ufeffx;y;z\n0,4;0,1;0,5\n0,4;da;0,5\n",
+        "# taught\n# x y z\n0.4 0.1 0.5\n0.4 da 0.5\n",
+        "Pick positions\n\nx,y,z\n[m],[m],[m]\n0.4,0.1,0.5\n0.4,da,0.5\n",
+        '"x";"y";"z"\n"0.4";"0.1";"0.5"\n"0.4";"da";"0.5"\n',
+        "x,y,z,\n0.4,0.1,0.5,\n0.4,da,0.5,\n",
+        "Title of x y z\nx,y,z\n0.4,0.1,0.5\n0.4,da,0.5\n",
+        "x\ty\tz\r0.4\t0.1\t0.5\r0.4\tda\t0.5\r",
+    ],
+)
+def test_the_header_may_be_written_as_programs_do(read: Read, text: str) -> None:
+    targets = read(text)
+    assert targets.position[0].tolist() == [0.4, 0.1, 0.5]
+    assert targets.faults == {2: "column y: found 'da', allowed: a finite number"}
 
 
 def test_the_first_and_only_row_may_be_wrong_if_one_of_its_cells_is_a_number(read: Read) -> None:

@@ -126,11 +126,11 @@ def test_poses_come_back_whatever_the_spelling(written: Written) -> None:
 
 @st.composite
 def damaged(draw: st.DrawFn) -> tuple[Written, list[list[str]], dict[int, str]]:
-    """Poses, their rows of which one or two are damaged, and what the reason of each must hold."""
-    written = draw(poses(least=6))
+    """Poses, their rows of which all but one may be damaged, and the reason of each."""
+    written = draw(poses(least=2))
     titles, rows = list(written.columns), written.rows()
     reasons: dict[int, str] = {}
-    for k in draw(st.lists(st.integers(0, len(rows) - 1), min_size=1, max_size=2, unique=True)):
+    for k in draw(st.lists(st.integers(0, len(rows) - 1), min_size=1, max_size=len(rows) - 1, unique=True)):
         title = draw(st.sampled_from(written.used))
         shown = title.replace(" ", "") if written.style[0] == " " else title
         said = {"abc": "found 'abc'", "nan": "found no number", "inf": "found inf", "1-2": "found '1-2'"}
@@ -138,7 +138,7 @@ def damaged(draw: st.DrawFn) -> tuple[Written, list[list[str]], dict[int, str]]:
             said[""] = "found no number"
         kind = draw(st.sampled_from([*said, "short", "long"]))
         if kind == "short":
-            rows[k] = rows[k][:-1] if written.style[0] != "" else rows[k]
+            rows[k] = rows[k][:-1]
             reasons[k + 1] = f"found {len(titles) - 1} cells, allowed: {len(titles)}"
         elif kind == "long":
             rows[k] = [*rows[k], "0.5"]

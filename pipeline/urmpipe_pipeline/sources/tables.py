@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TypeAlias
 
 from urmpipe_models.errors import OptionError, for_each
 from urmpipe_pipeline.joint_log import Inference
@@ -50,12 +51,17 @@ class Tables:
         return [layout.segment.path for layout in self.layouts]
 
 
-def open_tables(files: Sequence[Path], options: ReadOptions) -> Tables:
+Sniff: TypeAlias = Callable[[Segment, str | None, str | None], Layout]
+"""What finds out how a plain table is written, with delimiter and decimal sign as options give them."""
+
+
+def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff = sniff) -> Tables:
     """Return the tables of a log's files.
 
     Args:
         files: The files.
         options: What the user says.
+        sniff_plain: What finds out how a table without labels and arrays is written.
 
     Raises:
         LogError: If a file is no text table; all files are looked at first.
@@ -71,7 +77,7 @@ def open_tables(files: Sequence[Path], options: ReadOptions) -> Tables:
     if len(files) == 1 and (forced or (options.source is None and coppeliasim.is_export(segments[0]))):
         titled = coppeliasim.graphs(segments[0]) or titled
         forced = True
-    layouts = for_each(lambda item: _layout(item[1], options), titled)
+    layouts = for_each(lambda item: _layout(item[1], options, sniff_plain), titled)
     if len(files) > 1:
         layouts = [across(layout) for layout in layouts]
     known, said = _known(layouts, options) if not forced else (None, _coppeliasim(titled, options))
@@ -88,11 +94,11 @@ def open_tables(files: Sequence[Path], options: ReadOptions) -> Tables:
     )
 
 
-def _layout(segment: Segment, options: ReadOptions) -> Layout:
+def _layout(segment: Segment, options: ReadOptions, sniff_plain: Sniff) -> Layout:
     """Return how a table is written: rows with labels, with arrays in their cells, or plain ones."""
     given = options.delimiter, options.decimal
     found = None if options.delimiter else sniff_labels(segment)
-    return found or sniff_arrays(segment, *given) or with_names(sniff(segment, *given))
+    return found or sniff_arrays(segment, *given) or with_names(sniff_plain(segment, *given))
 
 
 def _known(layouts: Sequence[Layout], options: ReadOptions) -> tuple[KnownSource | None, Inference]:
