@@ -134,10 +134,13 @@ def test_a_turn_of_a_sliding_joint_is_another_solution() -> None:
     assert run.log.units == {"z": "m", "turn": "rad"}
 
 
-def test_goals_hold_the_poses_from_the_first_row_on() -> None:
+def test_goals_and_ghosts_have_times_from_the_first_row_on() -> None:
     targets = targets_of(UR5E, way(3))
     times = 7_000_000_000 + np.arange(3) * STEP_NS
-    run = solved("path", UR5E, times, way(3), goals=goals_of(targets, times, [None, "", None]))
+    ghost = Ghost("other", times[1:], way(3)[1:] + 0.5)
+    run = solved(
+        "path", UR5E, times, way(3), goals=goals_of(targets, times, [None, "", None]), ghosts=[ghost]
+    )
     assert run.goals is not None
     np.testing.assert_array_equal(run.goals.t_ns, np.arange(3) * STEP_NS)
     np.testing.assert_array_equal(run.goals.position, targets.position)
@@ -147,6 +150,9 @@ def test_goals_hold_the_poses_from_the_first_row_on() -> None:
     np.testing.assert_allclose(matrices(run.goals.quat_xyzw), targets.rotation, rtol=0, atol=1e-15)
     assert run.goals.reasons == ("", "", "")
     assert not run.goals.missed.any()
+    (other,) = run.ghosts
+    np.testing.assert_array_equal(other.t_ns, [STEP_NS, 2 * STEP_NS])
+    np.testing.assert_array_equal(other.q, ghost.q)
 
 
 def test_a_solved_path_compares_with_itself() -> None:
