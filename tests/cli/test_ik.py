@@ -131,6 +131,17 @@ def test_all_prints_every_solution_and_start_chooses(capsys: Captured) -> None:
     )
 
 
+def test_warnings_are_of_the_solutions_that_are_shown(capsys: Captured) -> None:
+    start = ("--start", "3.1,1.7,0.7,0,0.7,3.1")  # near a solution whose wrist is not aligned
+    assert run(["ik", "default.csv", "--robot", "arm6", *start]) == 0
+    assert capsys.readouterr().err == ""
+    assert answer(capsys, 0, "default.csv", "--robot", "arm6", *start)["targets"][0]["singular"] == [
+        "wrist aligned"
+    ]
+    assert run(["ik", "default.csv", "--robot", "arm6", "--all", *start]) == 0
+    assert capsys.readouterr().err.startswith("warning: row 1: wrist aligned: ")
+
+
 def test_quiet_prints_nothing(capsys: Captured) -> None:
     assert run(["ik", "targets.csv", "--robot", "arm6", "-q"]) == 1
     assert capsys.readouterr() == ("", "")
@@ -205,6 +216,11 @@ def test_targets_without_solution_are_left_out_of_a_log_and_nothing_at_all_is_no
     assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "log.csv", "-q"]) == 1
     table = np.genfromtxt(folder / "log.csv", delimiter=",", names=True)
     assert table["urmpipe_target_row"].tolist() == [1, 4]
+    written = np.array([[row[name] for name in table.dtype.names[:-1]] for row in table])
+    found = answer(capsys, 1, "targets.csv", "--robot", "arm6", "-o", "log.csv")
+    assert found["output"] == "log.csv"
+    nearest = [one["solutions"][one["nearest"]]["q"] for one in found["targets"] if one["solutions"]]
+    assert np.array_equal(written, nearest)
     (folder / "far.csv").write_text("x,y,z,rz,ry,rx\n2,0,0.1,0,0,0\n")
     assert run(["ik", "far.csv", "--robot", "arm6", "-o", "far-log.csv"]) == 1
     out, err = capsys.readouterr()
@@ -228,6 +244,15 @@ def test_a_recording_shows_the_solution_and_every_other_branch_as_a_ghost(
         shown = {one.name: one.q[one.t_ns == t][0].tolist() for one in made.ghosts if t in one.t_ns}
         assert len(shown) == 7
         assert all(listed[name] == q for name, q in shown.items())
+    head = "x,y,z,rz,ry,rx\n"
+    (folder / "some.csv").write_text(
+        f"{head}{DEFAULT}-0.309,0,0.072{DEFAULT[14:]}"
+    )  # stretched: left arm only
+    assert run(["ik", "some.csv", "--robot", "arm6", "--all", "-o", "some.rrd", "-q"]) == 0
+    some = read_recording(folder / "some.rrd")
+    assert isinstance(some, Run)
+    assert sum(1_000_000_000 in one.t_ns for one in some.ghosts) == 3
+    assert all(np.isfinite(one.q).all() for one in some.ghosts)
     assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "targets.rrd", "-q"]) == 1
     alone = read_recording(folder / "targets.rrd")
     assert isinstance(alone, Run)
@@ -295,6 +320,11 @@ def test_a_period_makes_a_path_of_targets_without_times(capsys: Captured, folder
     found = answer(capsys, 0, "line.csv", "--robot", "urm6", "--tsp", "5ms")
     assert [one["t"] for one in found["targets"]] == pytest.approx(0.005 * np.arange(20), abs=1e-12)
     assert "jumps" in found
+    (folder / "late.csv").write_text(
+        "t,x,y,z\n" + "".join(f"{7 + k},0.2,{0.001 * k},1.0\n" for k in range(4))
+    )
+    late = answer(capsys, 0, "late.csv", "--robot", "urm6")
+    assert [one["t"] for one in late["targets"]] == [7.0, 8.0, 9.0, 10.0]
     alone = answer(capsys, 0, "line.csv", "--robot", "urm6")
     assert "jumps" not in alone
     assert "t" not in alone["targets"][0]
