@@ -26,13 +26,11 @@ A joint held on a limit has no column in J; J_h^T y_k then says which way it wou
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.elementwise import Element
-from urmpipe_models.inverse.small_systems import Factor, factor, gram
+from urmpipe_models.inverse.small_systems import Factor, factor, gram, product, transposed_product
 from urmpipe_models.inverse.task import FloatArray, Miss, Task
 
 DAMPING = 1e-8
@@ -66,15 +64,14 @@ def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, dam
         held: Where a joint is held in [rad] or [m], NaN of one that is free, shape (joints,).
         damping: lambda^2 of each sample in [m2/rad2], shape (w,).
     """
-    miss = task.miss(list(np.ascontiguousarray(guess.T)))
+    miss = task.miss(np.ascontiguousarray(guess.T))
     free = np.isnan(held)
-    rows = [[entry if free[i] else 0.0 for i, entry in enumerate(row)] for row in miss.jacobian]
-    system = factor(gram(rows), damping)
-    J = _stacked(rows, len(guess))
-    inverse = _stacked([system.solve(column) for column in zip(*rows, strict=True)], len(guess))
-    error = _stacked([miss.error], len(guess))[:, 0]
+    J = miss.jacobian * free[:, None]
+    system = factor(gram(J), damping)
+    inverse = np.array([system.solve(column) for column in J.transpose(1, 0, 2)])
+    null = np.eye(len(held)) - _rows(inverse) @ _rows(J)
     before = np.vstack((np.where(free, last, held), guess[:-1])) - guess
-    q = guess + _in_turn(np.eye(len(held)) - inverse @ J, before, np.einsum("wij,wj->wi", inverse, error))
+    q = guess + _in_turn(null, before, transposed_product(J, system.solve(miss.error)).T)
     pull = None if free.all() else _pull(system, miss, J, np.vstack((before[:1], q[:-1] - guess[1:])))
     return Swept(q, np.sqrt(miss.square), pull)
 
@@ -98,16 +95,10 @@ def _in_turn(null: FloatArray, before: FloatArray, towards: FloatArray) -> Float
 
 def _pull(system: Factor, miss: Miss, J: FloatArray, s: FloatArray) -> FloatArray:
     """Return J^T y of every joint, held ones too: y = (J J^T + lambda^2 1)^-1 (e - J s)."""
-    moved = np.einsum("wij,wj->wi", J, s)
-    y = system.solve([error - moved[:, k] for k, error in enumerate(miss.error)])
-    whole = _stacked(miss.jacobian, len(s))
-    return np.asarray(np.einsum("wij,wi->wj", whole, np.array(y).T))
+    y = system.solve(miss.error - product(J, np.ascontiguousarray(s.T)))
+    return transposed_product(miss.jacobian, y).T
 
 
-def _stacked(rows: Sequence[Sequence[Element]], count: int) -> FloatArray:
-    """Return rows of elements as matrices, shape (count, rows, columns)."""
-    stacked = np.empty((count, len(rows), len(rows[0])))
-    for i, row in enumerate(rows):
-        for j, entry in enumerate(row):
-            stacked[:, i, j] = entry
-    return stacked
+def _rows(matrices: FloatArray) -> FloatArray:
+    """Return matrices of shape (k, p, w) one after the other, shape (w, k, p)."""
+    return np.ascontiguousarray(matrices.transpose(2, 0, 1))
