@@ -30,7 +30,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.inverse.small_systems import Factor, factor, gram
+from urmpipe_models.inverse.small_systems import Factor, factor, gram, product, transposed_product
 from urmpipe_models.inverse.task import FloatArray, Miss, Task
 
 DAMPING = 1e-8
@@ -66,13 +66,12 @@ def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, dam
     """
     miss = task.miss(np.ascontiguousarray(guess.T))
     free = np.isnan(held)
-    rows = miss.jacobian * free[:, None]
-    system = factor(gram(rows), damping)
-    J = np.ascontiguousarray(rows.transpose(2, 0, 1))
-    columns = np.array([system.solve(rows[:, joint]) for joint in range(len(held))])
-    inverse, error = np.ascontiguousarray(columns.transpose(2, 0, 1)), miss.error.T
+    J = miss.jacobian * free[:, None]
+    system = factor(gram(J), damping)
+    inverse = np.array([system.solve(column) for column in J.transpose(1, 0, 2)])
+    null = np.eye(len(held)) - _rows(inverse) @ _rows(J)
     before = np.vstack((np.where(free, last, held), guess[:-1])) - guess
-    q = guess + _in_turn(np.eye(len(held)) - inverse @ J, before, np.einsum("wij,wj->wi", inverse, error))
+    q = guess + _in_turn(null, before, transposed_product(J, system.solve(miss.error)).T)
     pull = None if free.all() else _pull(system, miss, J, np.vstack((before[:1], q[:-1] - guess[1:])))
     return Swept(q, np.sqrt(miss.square), pull)
 
@@ -96,6 +95,10 @@ def _in_turn(null: FloatArray, before: FloatArray, towards: FloatArray) -> Float
 
 def _pull(system: Factor, miss: Miss, J: FloatArray, s: FloatArray) -> FloatArray:
     """Return J^T y of every joint, held ones too: y = (J J^T + lambda^2 1)^-1 (e - J s)."""
-    moved = np.einsum("wij,wj->wi", J, s)
-    y = system.solve(miss.error - moved.T)
-    return np.asarray(np.einsum("ijw,iw->wj", miss.jacobian, y))
+    y = system.solve(miss.error - product(J, np.ascontiguousarray(s.T)))
+    return transposed_product(miss.jacobian, y).T
+
+
+def _rows(matrices: FloatArray) -> FloatArray:
+    """Return matrices of shape (k, p, w) one after the other, shape (w, k, p)."""
+    return np.ascontiguousarray(matrices.transpose(2, 0, 1))
