@@ -22,7 +22,7 @@ RANK = 1e-6
 """Axes count as meeting or as parallel where that changes a loop equation by this, relative to the others.
 
 The equations are then solved as if they did, and the joints are polished until the wrist is where it
-shall be; without it a quadric whose roots meet in pairs would be solved, with half the digits.
+shall be. Only where axes are off by 1e-8 to 1e-6 a posture that lies next to a fold may be lost by this.
 """
 
 EXACT = 1e-14

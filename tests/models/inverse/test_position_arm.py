@@ -95,5 +95,5 @@ def test_an_arm_that_is_almost_special_loses_no_digit(parameter: str, off: float
         assert_reached(chain, targets, solutions)
         lost += int((away_from(chain, solutions, q).min(axis=1) > 2e-5).sum())
         count += len(q)
-    # where both limits of the solver meet, 1e-6, a posture next to a fold may be lost
-    assert lost <= (0.01 * count if 1e-8 <= off <= 1e-5 else 0)
+    # taken for special up to 1e-6, and polished from there: next to a fold a posture may be lost
+    assert lost <= (0.01 * count if 1e-8 <= off <= 1e-6 else 0)
