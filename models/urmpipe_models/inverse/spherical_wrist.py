@@ -124,15 +124,13 @@ class SphericalWrist:
             angles.angle.reshape(postures.reasons.shape),
             angles.meet.reshape(postures.reasons.shape),
         )
-        for row, slot in np.argwhere(~reached & (reasons == "")):
+        allowed = f"allowed: {self.wrist.least:.6f} to {self.wrist.most:.6f} rad"
+        for row, slot in np.argwhere(~reached & (reasons == "")).tolist():
             posture = slot // 2, row
             if meet[posture]:
                 reasons[row, slot] = f"the same as {self.branches[slot - 1]}: both meet here"
             elif np.isfinite(angle[posture]):
-                reasons[row, slot] = (
-                    f"axis 6 must stand at {angle[posture]:.6f} rad to axis 4,"
-                    f" allowed: {self.wrist.least:.6f} to {self.wrist.most:.6f} rad"
-                )
+                reasons[row, slot] = f"axis 6 must stand at {angle[posture]:.6f} rad to axis 4, {allowed}"
             else:
                 reasons[row, slot] = "the target is not finite, allowed: finite numbers"
         return reasons
