@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.inverse.angles import turned
-from urmpipe_models.inverse.position_arm import PositionArm, Postures, position_arm
+from urmpipe_models.inverse.position_arm import PositionArm, position_arm
+from urmpipe_models.inverse.postures import Postures
 from urmpipe_models.inverse.solutions import (
     BoolArray,
     FloatArray,
