@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
-from urmpipe_models.catalogue import load_robot
+from urmpipe_models.catalogue import load_robot, robot_names
 from urmpipe_models.chain import Chain, Joint, Mimic
 from urmpipe_models.dh import DHRow, dh_chain
 from urmpipe_models.errors import OutputError, RobotError
@@ -311,7 +311,7 @@ def test_dh_arms_come_back(dh_rows: SearchStrategy[list[DHRow]], data: st.DataOb
     assert_same(chain, read_urdf(tmp_path / "chain.urdf"))
 
 
-@pytest.mark.parametrize("name", ["urm4", "urm6", "urm8", "ur5e"])
+@pytest.mark.parametrize("name", robot_names())
 def test_the_catalogues_arms_come_back(name: str, tmp_path: Path) -> None:
     chain = load_robot(name).placed(from_offset([1.0, 2.0, 3.0]), from_offset([0.0, 0.0, 0.15]))
     write_urdf(chain, tmp_path / "robot.urdf")

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Protocol
 
 from urmpipe_models.chain import Chain
+from urmpipe_models.inverse.parallel_axes import parallel_axes
 from urmpipe_models.inverse.solutions import FloatArray, Solutions
+from urmpipe_models.inverse.spherical_wrist import spherical_wrist
 from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.screws import screws
 
 
 class ClosedForm(Protocol):
@@ -38,6 +42,15 @@ class ClosedForm(Protocol):
         ...
 
 
+@lru_cache(maxsize=32)
 def closed_form(chain: Chain) -> ClosedForm | None:
-    """Return the closed form of an arm, recognised from its geometry alone; None if it has none."""
-    return None
+    """Return the closed form of an arm, recognised from its geometry alone; None if it has none.
+
+    Six revolute joints, whatever they are described by, on any base and with any tool, of which the axes of
+    the last three meet in a point, or those of joints 2, 3 and 4 are parallel.
+    """
+    of_chain = screws(chain)
+    if of_chain is None:
+        return None
+    names = chain.coordinates
+    return spherical_wrist(of_chain, names) or parallel_axes(of_chain, names)

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from typing import Literal, TypeAlias
+from dataclasses import dataclass, field, replace
+from typing import Any, Literal, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,6 +16,7 @@ TextArray: TypeAlias = NDArray[np.object_]
 
 SingularFamily = Literal[
     "wrist on axis 1",
+    "wrist beside axis 1",
     "wrist on axis 2",
     "wrist aligned",
     "arm stretched",
@@ -23,7 +24,14 @@ SingularFamily = Literal[
     "postures meet",
     "flips meet",
 ]
-"""The families in which an arm loses a freedom; two can meet in one pose."""
+"""The families in which an arm loses a freedom; two can meet in one pose.
+
+"wrist beside axis 1": as near to axis 1 as the offset of the shoulder lets it come, where the right and the
+left arm meet (UR arms).
+"""
+
+NEAREST_POINT = "nearest point"
+"""What a solution is called that comes as near as it can to a target out of reach."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -51,15 +59,27 @@ class Solutions:
     Attributes:
         q: In [rad] or [m], shape (n, k, joints); a solution that there is not is NaN in every joint.
         branches: What each of the k is called: of a closed form its branch, such as "right, elbow up,
-            flipped"; of an iterative solver "1", "2", ..., nearest to the start first.
+            flipped"; of an iterative solver "1", "2", ..., nearest to the start first; of `picked` what it
+            was picked for.
         reasons: Why there is none, one line, shape (n, k); empty where there is one.
         singular: The families of singular poses that solutions lie in.
+        shortfall: How far the tool stays from a target that it is told to come near to, in [m], shape (n, k);
+            0, the default, where the target is met.
+        labels: What each solution is called, shape (n, k); by default what its column is, `branches`.
     """
 
     q: FloatArray
     branches: tuple[str, ...]
     reasons: TextArray
     singular: tuple[Singular, ...] = ()
+    shortfall: FloatArray = field(default_factory=lambda: np.zeros(()))
+    labels: TextArray = field(default_factory=lambda: np.array("", dtype=np.object_))
+
+    def __post_init__(self) -> None:
+        shape = self.q.shape[:2]
+        labels = self.labels if self.labels.ndim else np.array(self.branches, dtype=np.object_)
+        object.__setattr__(self, "shortfall", np.broadcast_to(self.shortfall, shape))
+        object.__setattr__(self, "labels", np.broadcast_to(labels, shape))
 
     def __len__(self) -> int:
         return len(self.q)
@@ -82,21 +102,54 @@ class Solutions:
     def nearest(self, start: FloatArray, period: FloatArray) -> FloatArray:
         """Return of each target the solution nearest to a start, shape (n, joints); NaN where there is none.
 
+        It is returned in the turn nearest to the start; see `nearest_column` for what near means.
+        """
+        column = self.nearest_column(start, period)[:, None, None]
+        near = np.take_along_axis(self._away(start, period), column, axis=1)[:, 0] + np.atleast_2d(start)
+        near[~self.reached.any(axis=1)] = np.nan
+        return near
+
+    def nearest_column(self, start: FloatArray, period: FloatArray) -> NDArray[np.intp]:
+        """Return of each target the column of the solution nearest to a start, shape (n,); 0 if it has none.
+
         The distance is sum((q - start)^2) with each difference of a joint that may turn without end taken
-        by the shorter way, and the solution is returned in the turn nearest to the start.
+        by the shorter way.
 
         Args:
             start: Joint values in [rad] or [m], shape (joints,) or (n, joints).
             period: 2 pi of a joint that may turn without end, infinity of any other, shape (joints,).
         """
+        distance = np.square(self._away(start, period)).sum(axis=2)
+        return np.asarray(np.argmin(np.where(self.reached, distance, np.inf), axis=1))
+
+    def picked(self, column: NDArray[np.intp], name: str) -> Solutions:
+        """Return one solution a target, k = 1: that of a column each.
+
+        Args:
+            column: Index of a column for each target, shape (n,).
+            name: What the one column is called; its `labels` keep the name of the branch.
+        """
+        one = column[:, None]
+
+        def pick(values: NDArray[Any]) -> NDArray[Any]:
+            """Return the column of each target, shape (n, 1)."""
+            return np.take_along_axis(values, one, axis=1)
+
+        return Solutions(
+            np.take_along_axis(self.q, one[:, :, None], axis=1),
+            (name,),
+            pick(self.reasons),
+            tuple(replace(family, where=pick(family.where)) for family in self.singular),
+            pick(self.shortfall),
+            pick(self.labels),
+        )
+
+    def _away(self, start: FloatArray, period: FloatArray) -> FloatArray:
+        """Return q - start by the shorter way, shape (n, k, joints)."""
         turning = np.isfinite(period)
         away = self.q - np.broadcast_to(np.atleast_2d(start)[:, None, :], self.q.shape)
         away[..., turning] -= period[turning] * np.round(away[..., turning] / period[turning])
-        distance = np.where(self.reached, np.square(away).sum(axis=2), np.inf)
-        best = np.argmin(distance, axis=1)[:, None, None]
-        near = np.take_along_axis(away, best, axis=1)[:, 0] + np.atleast_2d(start)
-        near[~self.reached.any(axis=1)] = np.nan
-        return near
+        return away
 
 
 def no_solutions(reasons: Sequence[str], branches: tuple[str, ...], joints: int) -> Solutions:

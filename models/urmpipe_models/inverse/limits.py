@@ -1,0 +1,90 @@
+"""The limits of joints: which turn of a solution is allowed, and which solution is not."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+
+from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Solutions, TextArray
+
+LIMIT_ROUNDING = 1e-11
+"""A solution beyond a limit by this, in [rad] or [m], is on it: rounding. It is put on the limit."""
+
+TURN = 2.0 * math.pi
+
+
+def periods(chain: Chain) -> FloatArray:
+    """Return 2 pi of each joint that may turn without end, infinity of any other, shape (joints,).
+
+    Without end turns a revolute joint without limits. One that may turn by several turns but has limits, as
+    those of a UR arm, has none: from 6.2 rad to 0.1 rad it is not 0.18 rad if it ends at 2 pi. Which of its
+    turns is allowed and nearest, `within_limits` knows.
+    """
+    free = [not (math.isfinite(joint.lower) or math.isfinite(joint.upper)) for joint in chain.moving]
+    return np.where(_turns(chain) & np.array(free), TURN, np.inf)
+
+
+def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = None) -> Solutions:
+    """Return solutions with every revolute joint shifted by whole turns into its limits.
+
+    Args:
+        chain: The arm.
+        solutions: Its solutions, limits not asked.
+        near: Joint values in [rad] or [m], shape (joints,) or (n, joints): of the turns that are allowed the
+            nearest to it is taken; to 0 by default.
+
+    Returns:
+        The solutions; one with a joint that cannot be brought into its limits is NaN and has a reason.
+    """
+    lower, upper = _limits(chain)
+    least = np.ceil((lower - LIMIT_ROUNDING - solutions.q) / TURN)
+    most = np.floor((upper + LIMIT_ROUNDING - solutions.q) / TURN)
+    wish = 0.0 if near is None else np.atleast_2d(near)[:, None, :]
+    turns = np.where(_turns(chain), np.clip(np.round((wish - solutions.q) / TURN), least, most), 0.0)
+    shifted = solutions.q + turns * TURN
+    outside = (shifted < lower - LIMIT_ROUNDING) | (shifted > upper + LIMIT_ROUNDING)
+    refused = np.asarray(outside.any(axis=2))
+    return replace(
+        solutions,
+        q=np.where(refused[..., None], np.nan, np.clip(shifted, lower, upper)),
+        reasons=_reasons(chain, solutions, outside),
+        singular=tuple(replace(one, where=one.where & ~refused) for one in solutions.singular),
+    )
+
+
+def _limits(chain: Chain) -> tuple[FloatArray, FloatArray]:
+    """Return the lower and upper limits, each of shape (joints,)."""
+    return np.array([one.lower for one in chain.moving]), np.array([one.upper for one in chain.moving])
+
+
+def _turns(chain: Chain) -> BoolArray:
+    """Return true of the joints that a whole turn leaves where they were, shape (joints,).
+
+    The one that another follows (mimic) is none of them: the other one turns by a multiple.
+    """
+    followed = {joint.mimic.joint for joint in chain.joints if joint.mimic is not None}
+    return np.array([joint.kind == "revolute" and joint.name not in followed for joint in chain.moving])
+
+
+def _reasons(chain: Chain, solutions: Solutions, outside: BoolArray) -> TextArray:
+    """Return the reasons of solutions with those of the joints that are outside their limits."""
+    texts = solutions.reasons.copy()
+    for target, column in zip(*np.nonzero(outside.any(axis=2)), strict=True):
+        faults = [
+            _fault(chain.moving[joint], float(solutions.q[target, column, joint]), bool(_turns(chain)[joint]))
+            for joint in np.flatnonzero(outside[target, column])
+        ]
+        texts[target, column] = "; ".join(faults)
+    return texts
+
+
+def _fault(joint: Joint, value: float, turns: bool) -> str:
+    """Say that a joint cannot be at a value in [rad] or [m], in the turn nearest to its limits."""
+    if turns:
+        value += TURN * round((0.5 * (joint.lower + joint.upper) - value) / TURN)
+    unit = "m" if joint.kind == "prismatic" else "rad"
+    allowed = f"{joint.lower:.4g} to {joint.upper:.4g} {unit}"
+    return f"joint {joint.name} at {value:.4g} {unit}, allowed: {allowed}"

@@ -1,0 +1,199 @@
+"""The one entry: joint values that bring the tool of any arm to its targets."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import OptionError
+from urmpipe_models.inverse.checks import checked
+from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
+from urmpipe_models.inverse.limits import periods, within_limits
+from urmpipe_models.inverse.solutions import (
+    NEAREST_POINT,
+    BoolArray,
+    FloatArray,
+    Singular,
+    Solutions,
+    no_solutions,
+)
+from urmpipe_models.inverse.targets import Targets
+
+Method = Literal["auto", "closed", "iterative"]
+METHODS: tuple[Method, ...] = ("auto", "closed", "iterative")
+
+NEAREST = "nearest"
+"""What the one column of solutions is called that were picked of the branches of a closed form."""
+
+
+def solve(
+    chain: Chain,
+    targets: Targets,
+    *,
+    start: FloatArray | None = None,
+    every: bool = False,
+    tolerance: float | None = None,
+    restarts: int = 20,
+    seed: int = 0,
+    method: Method = "auto",
+) -> Solutions:
+    """Return joint values, limits kept, that bring the tool centre point to its targets.
+
+    An arm with a closed form is solved by it where poses are asked; every other arm, and positions with any
+    orientation, iteratively from `start` and from random restarts. A target that is none (not finite, no
+    rotation) or out of reach gets a reason and stops no other.
+
+    Args:
+        chain: The arm.
+        targets: Poses, or positions with any orientation.
+        start: Joint values in [rad] or [m], shape (joints,) or (n, joints), that solutions are to be near to;
+            of the chain by default. They may lie outside the limits of the joints; solutions do not. Where a
+            singular pose leaves a joint free it is taken from here if `start` is given or one solution asked.
+        every: Return all solutions, one column a branch; otherwise the one nearest to `start`, whose branch
+            stands in `labels`.
+        tolerance: In [m] along each axis: a target out of reach takes the nearest point that the tool can get
+            to if it is no farther away than this; `shortfall` says how far it is.
+        restarts: Random starts of the iterative solver for what it does not reach from `start`.
+        seed: Of the random starts: the same seed, the same solutions.
+        method: "closed" or "iterative" to allow only one of them.
+
+    Raises:
+        OptionError: With all that is wrong with the options.
+    """
+    position_only = targets.rotation is None
+    targets, reasons = checked(targets)
+    form = None if position_only or method == "iterative" else closed_form(chain)
+    faults = list(_faults(chain, len(targets), start, tolerance, restarts, method))
+    if method == "closed" and form is None:
+        faults.append(_no_closed_form(chain, position_only))
+    if faults:
+        raise OptionError(*faults)
+    begin = _starts(chain, len(targets), start)
+    good = np.array([not reason for reason in reasons], dtype=bool)
+    search = _Search(chain, every, tolerance, restarts, seed)
+    if form is None:
+        found = search.iteratively(targets.rows(good), begin[good])
+    else:
+        near = begin[good] if start is not None or not every else None
+        found = search.by_closed_form(form, targets.rows(good), begin[good], near)
+    return found if good.all() else _spread(found, good, reasons)
+
+
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """What was asked of the solvers."""
+
+    chain: Chain
+    every: bool
+    tolerance: float | None
+    restarts: int
+    seed: int
+
+    def by_closed_form(
+        self, form: ClosedForm, targets: Targets, start: FloatArray, near: FloatArray | None
+    ) -> Solutions:
+        """Return the branches within the limits, or the nearest of them; what is out of reach approached."""
+        found = within_limits(self.chain, form.solve(targets, near), start)
+        if not self.every:
+            found = found.picked(found.nearest_column(start, periods(self.chain)), NEAREST)
+        out = np.asarray(~found.reached.any(axis=1))
+        if self.tolerance is None or not out.any():
+            return found
+        return _approached(found, out, replace(self, every=False).iteratively(targets.rows(out), start[out]))
+
+    def iteratively(self, targets: Targets, start: FloatArray) -> Solutions:
+        """Return what the iterative solver finds."""
+        from urmpipe_models.inverse.restarts import solve_iteratively
+
+        if not len(targets):
+            return no_solutions([], ("1",), len(self.chain.coordinates))
+        return solve_iteratively(
+            self.chain,
+            targets,
+            start=start,
+            every=self.every,
+            restarts=self.restarts,
+            seed=self.seed,
+            tolerance=self.tolerance,
+        )
+
+
+def _approached(found: Solutions, out: BoolArray, nearest: Solutions) -> Solutions:
+    """Return solutions with those of other targets, one each, in the first column where there was none."""
+    near = nearest.reached[:, 0]
+    met = np.flatnonzero(out)[near]
+    q, shortfall = found.q.copy(), found.shortfall.copy()
+    reasons, labels = found.reasons.copy(), found.labels.copy()
+    q[met, 0], shortfall[met, 0] = nearest.q[near, 0], nearest.shortfall[near, 0]
+    reasons[met, 0], labels[met, 0] = "", NEAREST_POINT
+    return replace(found, q=q, reasons=reasons, shortfall=shortfall, labels=labels)
+
+
+def _spread(found: Solutions, good: BoolArray, reasons: list[str]) -> Solutions:
+    """Return solutions of all targets from those of the good ones, the others with their reasons."""
+    every = no_solutions(reasons, found.branches, found.q.shape[2])
+    count, columns = every.q.shape[:2]
+    every.q[good], every.reasons[good] = found.q, found.reasons
+    shortfall, labels = np.zeros((count, columns)), every.labels.copy()
+    shortfall[good], labels[good] = found.shortfall, found.labels
+    return replace(
+        every,
+        singular=tuple(_spread_family(family, good) for family in found.singular),
+        shortfall=shortfall,
+        labels=labels,
+    )
+
+
+def _spread_family(family: Singular, good: BoolArray) -> Singular:
+    """Return a family of all targets from one of the good ones."""
+    where = np.zeros((len(good), family.where.shape[1]), dtype=bool)
+    where[good] = family.where
+    return replace(family, where=where)
+
+
+def _starts(chain: Chain, count: int, start: FloatArray | None) -> FloatArray:
+    """Return the start of each target, shape (n, joints)."""
+    begin = np.atleast_2d(np.array(chain.start if start is None else start, dtype=float))
+    return np.broadcast_to(begin, (count, begin.shape[1]))
+
+
+def _faults(
+    chain: Chain,
+    count: int,
+    start: FloatArray | None,
+    tolerance: float | None,
+    restarts: int,
+    method: Method,
+) -> Iterator[str]:
+    """Yield what is wrong with the options."""
+    joints = len(chain.coordinates)
+    if start is not None:
+        begin = np.asarray(start, dtype=float)
+        if begin.shape not in {(joints,), (count, joints)}:
+            yield (
+                f"start: found values of shape {begin.shape}, allowed: ({joints},), one each of"
+                f" {', '.join(chain.coordinates)}, or ({count}, {joints}), as many for each target"
+            )
+        elif not np.isfinite(begin).all():
+            yield "start: found a value that is not finite, allowed: finite numbers in rad and m"
+    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
+        yield f"tolerance: found {tolerance:g} m, allowed: more than 0, finite"
+    if restarts < 0:
+        yield f"restarts: found {restarts}, allowed: 0 or more"
+    if method not in METHODS:
+        yield f"method: found {method!r}, allowed: {', '.join(METHODS)}"
+
+
+def _no_closed_form(chain: Chain, position_only: bool) -> str:
+    """Say what a closed form would need."""
+    if position_only:
+        return "method closed: found positions with any orientation, allowed: poses; use method iterative"
+    return (
+        f"method closed: robot {chain.name} has no closed form, allowed: six revolute joints whose last three"
+        " axes meet in a point or whose axes 2, 3 and 4 are parallel; use method iterative"
+    )

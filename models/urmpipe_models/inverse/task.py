@@ -1,0 +1,186 @@
+"""What an iterative inverse brings to zero: the tool's distance from its target, and the Jacobian of it."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.chain import Chain
+from urmpipe_models.elementwise import Element, Vector, add, cross, dot, plus, subtract
+from urmpipe_models.inverse.small_systems import dot_product
+from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.kinematics import jacobian_over_log, pose_and_jacobian
+
+FloatArray: TypeAlias = NDArray[np.float64]
+BoolArray: TypeAlias = NDArray[np.bool_]
+IntArray: TypeAlias = NDArray[np.intp]
+
+Columns: TypeAlias = tuple[Vector, Vector, Vector]
+"""The axes x, y, z of a frame: the columns of its rotation matrix."""
+
+HALF_TURN_SINE = 1e-6
+"""Below this sine an angle near pi takes its axis from the symmetric part of the rotation matrix."""
+
+
+def characteristic_length(chain: Chain) -> float:
+    """Return the length l in [m] that a radian of orientation counts as: a quarter of the arm's.
+
+    The arm's length is that of its frames' offsets, one after the other, from the first joint to the tool
+    centre point; l is 1 m of an arm that has none.
+    """
+    offsets = [joint.origin.translation for joint in chain.joints[1:]]
+    offsets += [chain.tip.translation, chain.tool.translation]
+    return sum(math.hypot(*offset) for offset in offsets) / 4.0 or 1.0
+
+
+def redundancy(chain: Chain, targets: Targets) -> int:
+    """Return how many freedoms a target leaves: joints less the rank of the Jacobian off singular poses."""
+    q = np.random.default_rng(0).uniform(-1.0, 1.0, (8, len(chain.coordinates)))
+    J = jacobian_over_log(chain, q)[:, : 3 if targets.rotation is None else 6]
+    return len(chain.coordinates) - int(np.linalg.matrix_rank(J, rtol=1e-9).max())
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Miss:
+    """How far the tool is from its target at joint values q, and how that changes with them.
+
+    Attributes:
+        error: e, shape (3, n) or, of poses, (6, n): target minus tool along x, y, z in [m], then the rotation
+            vector that turns the tool into its target, in the world, in [rad], times l in [m].
+        jacobian: J with de = -J dq, shape (3 or 6, joints, n); the rows of the rotation times l.
+        distance2: |target - tool|^2 in [m2], shape (n,).
+        turn2: The square of l times the angle in [m2], shape (n,); 0 where any orientation will do.
+        length: l in [m].
+    """
+
+    error: FloatArray
+    jacobian: FloatArray
+    distance2: FloatArray
+    turn2: FloatArray
+    length: float
+
+    @property
+    def square(self) -> FloatArray:
+        """|e|^2 in [m2]."""
+        return np.asarray(self.distance2 + self.turn2)
+
+    def within(self, metres: float, radians: float) -> BoolArray:
+        """Return where position and orientation are as near as that, in [m] and [rad]."""
+        return np.asarray((self.distance2 <= metres**2) & (self.turn2 <= (self.length * radians) ** 2))
+
+    def kept(self, rows: IntArray) -> Miss:
+        """Return some of the rows."""
+        error, jacobian = self.error[:, rows], self.jacobian[:, :, rows]
+        return Miss(error, jacobian, self.distance2[rows], self.turn2[rows], self.length)
+
+    def restore(self, rows: IntArray, before: Miss) -> None:
+        """Write another's rows over some of this one's."""
+        for mine, other in (
+            (self.error, before.error),
+            (self.jacobian, before.jacobian),
+            (self.distance2, before.distance2),
+            (self.turn2, before.turn2),
+        ):
+            mine[..., rows] = other[..., rows]
+
+
+@dataclass(frozen=True)
+class Task:
+    """The targets of a block of rows.
+
+    Attributes:
+        chain: The arm.
+        position: x, y, z in [m], shape (3, n).
+        columns: The axes that the tool shall take, shape (3, 3, n), first index: which; None if any
+            orientation will do.
+    """
+
+    chain: Chain
+    position: FloatArray
+    columns: FloatArray | None
+
+    @cached_property
+    def length(self) -> float:
+        """The characteristic length in [m]."""
+        return characteristic_length(self.chain)
+
+    def kept(self, rows: IntArray) -> Task:
+        """Return some of the rows."""
+        columns = None if self.columns is None else self.columns[:, :, rows]
+        return Task(self.chain, self.position[:, rows], columns)
+
+    def miss(self, q: FloatArray) -> Miss:
+        """Return what is missed at joint values q in [rad] or [m], shape (joints, n)."""
+        pose, columns = pose_and_jacobian(self.chain, list(q))
+        size = 3 if self.columns is None else 6
+        error, J = np.empty((size, q.shape[1])), np.empty((size, *q.shape))
+        _fill(error, subtract(tuple(self.position), pose.translation))
+        for i, column in enumerate(columns):
+            _fill(J[:, i], column[:size])
+        if self.columns is not None:
+            error[3:] = turn_between(pose.columns, self.columns)
+            error[3:] *= self.length
+            J[3:] *= self.length
+        turn2 = np.zeros(q.shape[1]) if size == 3 else dot_product(error[3:], error[3:])
+        return Miss(error, J, dot_product(error[:3], error[:3]), turn2, self.length)
+
+
+def task_of(chain: Chain, targets: Targets) -> Task:
+    """Return the targets as one array a coordinate."""
+    position = np.ascontiguousarray(targets.position.T)
+    if targets.rotation is None:
+        return Task(chain, position, None)
+    return Task(chain, position, np.ascontiguousarray(targets.rotation.transpose(2, 1, 0)))
+
+
+def turn_between(columns: Columns, wanted: FloatArray) -> FloatArray:
+    """Return the rotation vector u a, 0 <= a <= pi, in [rad], in the world, of R_wanted R^T: shape (3, n).
+
+    With the columns c_k of R and w_k of R_wanted: u sin(a) = sum_k c_k x w_k / 2 and
+    1 + 2 cos(a) = sum_k c_k . w_k. Near half a turn the sine leaves no digits for u; there it is the largest
+    column of S - cos(a) I with S the symmetric part, which is (1 - cos(a)) u u^T.
+
+    Args:
+        columns: Of R.
+        wanted: The columns of R_wanted, shape (3, 3, n).
+    """
+    twice: Vector = (0.0, 0.0, 0.0)
+    trace: Element = 0.0
+    for column, target in zip(columns, wanted, strict=True):
+        twice = add(twice, cross(column, tuple(target)))
+        trace = plus(trace, dot(column, tuple(target)))
+    cosine = 0.5 * (trace - 1.0)
+    vector = 0.5 * np.stack(twice)
+    size = np.sqrt(dot_product(vector, vector))
+    angle = np.arctan2(size, cosine)
+    vector *= np.divide(angle, size, out=np.ones_like(size), where=size > 0.0)
+    half = np.flatnonzero((size < HALF_TURN_SINE) & (cosine < 0.0))
+    if len(half):
+        vector[:, half] = _half_turns(columns, wanted, half) * angle[half]
+    return vector
+
+
+def _half_turns(columns: Columns, wanted: FloatArray, rows: IntArray) -> FloatArray:
+    """Return the axes u of angles near pi, for which `turn_between` says how: shape (3, rows)."""
+    count = wanted.shape[2]
+    R = np.array([[np.broadcast_to(entry, count)[rows] for entry in column] for column in columns])
+    turn = np.einsum("kin,kjn->nij", wanted[:, :, rows], R)
+    sine = np.stack([turn[:, i - 1, i - 2] - turn[:, i - 2, i - 1] for i in range(3)], axis=1)
+    cosine = 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0)
+    square = 0.5 * (turn + turn.transpose(0, 2, 1)) - cosine[:, None, None] * np.eye(3)
+    largest = np.argmax(np.einsum("nii->ni", square), axis=1)
+    axis = square[np.arange(len(rows)), largest]
+    axis /= np.linalg.norm(axis, axis=1, keepdims=True)
+    axis[(axis * sine).sum(axis=1) < 0.0] *= -1.0
+    return np.asarray(axis.T)
+
+
+def _fill(target: FloatArray, elements: tuple[Element, ...]) -> None:
+    """Write one element a row into target, shape (k, n); constants spread over the columns."""
+    for i, element in enumerate(elements):
+        target[i] = element

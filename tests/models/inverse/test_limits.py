@@ -1,0 +1,123 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+from hypothesis import given
+from hypothesis import strategies as st
+
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.chain import Chain, Joint, Mimic
+from urmpipe_models.inverse.limits import periods, within_limits
+from urmpipe_models.inverse.solutions import Singular, Solutions
+
+TURN = 2.0 * math.pi
+
+
+def arm(*joints: Joint) -> Chain:
+    return Chain("arm", joints)
+
+
+def one_solution(*q: float) -> Solutions:
+    return Solutions(np.array([[q]]), ("only",), np.array([[""]], dtype=np.object_))
+
+
+def test_only_a_joint_without_limits_turns_without_end() -> None:
+    chain = arm(
+        Joint("free"),
+        Joint("limited", lower=-TURN, upper=TURN),
+        Joint("half", upper=3.0),
+        Joint("slides", kind="prismatic"),
+        Joint("leads"),
+        Joint("follows", mimic=Mimic("leads", 0.5)),
+    )
+    assert periods(chain).tolist() == [TURN, math.inf, math.inf, math.inf, math.inf]
+
+
+def test_a_joint_is_shifted_by_turns_into_its_limits_and_then_as_near_as_may_be() -> None:
+    chain = arm(
+        Joint("free"),
+        Joint("two_turns", lower=-TURN, upper=TURN),
+        Joint("aside", lower=0.5, upper=6.0),
+        Joint("slides", kind="prismatic", lower=-9.0, upper=9.0),
+    )
+    raw = one_solution(1.0, -3.0, -1.0, 8.0)
+    at_zero = within_limits(chain, raw).q[0, 0]
+    np.testing.assert_allclose(at_zero, [1.0, -3.0, TURN - 1.0, 8.0], atol=1e-15)
+    near = within_limits(chain, raw, np.array([20.0, 4.0, 0.5, -8.0])).q[0, 0]
+    np.testing.assert_allclose(near, [1.0 + 3 * TURN, TURN - 3.0, TURN - 1.0, 8.0], atol=1e-14)
+    beyond = within_limits(chain, raw, np.array([[0.0, 99.0, 0.5, 0.0]])).q[0, 0]
+    assert beyond[1] == TURN - 3.0  # the last turn that its limits allow, not the nearest to 99
+
+
+def test_what_cannot_be_brought_into_its_limits_has_a_reason_with_figures() -> None:
+    chain = arm(
+        Joint("q1"),
+        Joint("q3", lower=-2.7, upper=2.7),
+        Joint("rail", kind="prismatic", lower=0.0, upper=0.5),
+    )
+    q = np.array([[[0.0, -2.9, 0.25], [0.0, 1.0, 0.75], [0.0, 3.0, -0.1], [0.0, 1.0, 0.25]]])
+    reasons = np.array([["", "", "", ""]], dtype=np.object_)
+    aligned = Singular("wrist aligned", np.ones((1, 4), dtype=bool))
+    found = within_limits(chain, Solutions(q, ("a", "b", "c", "d"), reasons, (aligned,)))
+    assert found.reasons[0].tolist() == [
+        "joint q3 at -2.9 rad, allowed: -2.7 to 2.7 rad",
+        "joint rail at 0.75 m, allowed: 0 to 0.5 m",
+        "joint q3 at 3 rad, allowed: -2.7 to 2.7 rad; joint rail at -0.1 m, allowed: 0 to 0.5 m",
+        "",
+    ]
+    assert found.reached.tolist() == [[False, False, False, True]]
+    assert found.singular[0].where.tolist() == [[False, False, False, True]]
+
+
+def test_the_turn_told_is_the_one_nearest_to_the_limits() -> None:
+    found = within_limits(arm(Joint("q1", lower=3.0, upper=4.0)), one_solution(-1.0))
+    assert found.reason(0) == "joint q1 at 5.283 rad, allowed: 3 to 4 rad"
+
+
+def test_rounding_at_a_limit_is_on_it_and_no_more() -> None:
+    chain = arm(Joint("q1", lower=-1.0, upper=1.0))
+    assert within_limits(chain, one_solution(1.0 + 5e-12)).q[0, 0, 0] == 1.0
+    assert not within_limits(chain, one_solution(1.0 + 5e-11)).reached.any()
+
+
+def test_a_joint_that_another_follows_is_not_turned() -> None:
+    chain = arm(Joint("leads", lower=0.0, upper=7.0), Joint("follows", mimic=Mimic("leads", 0.5)))
+    assert within_limits(chain, one_solution(-1.0)).reason(0) == "joint leads at -1 rad, allowed: 0 to 7 rad"
+
+
+def test_what_there_was_no_solution_for_keeps_its_reason() -> None:
+    nothing = Solutions(np.full((1, 1, 1), np.nan), ("only",), np.array([["too far"]], dtype=np.object_))
+    found = within_limits(arm(Joint("q1", lower=-1.0, upper=1.0)), nothing)
+    assert found.reason(0) == "too far" and np.isnan(found.q).all()
+
+
+@given(
+    st.floats(-math.pi, math.pi),
+    st.floats(-20.0, 20.0),
+    st.floats(0.0, 20.0),
+    st.floats(-30.0, 30.0),
+)
+def test_of_all_turns_within_the_limits_the_nearest_is_taken(
+    value: float, lower: float, width: float, near: float
+) -> None:
+    chain = arm(Joint("q1", lower=lower, upper=lower + width))
+    found = within_limits(chain, one_solution(value), np.array([near]))
+    turns = value + TURN * np.arange(-12, 13)
+    allowed = turns[(turns >= lower) & (turns <= lower + width)]
+    if len(allowed):
+        assert abs(found.q[0, 0, 0] - near) <= np.abs(allowed - near).min() + 1e-9
+        assert lower <= found.q[0, 0, 0] <= lower + width
+        assert abs(math.remainder(found.q[0, 0, 0] - value, TURN)) < 1e-10
+    else:
+        # what is beyond a limit by rounding may count as on it
+        assert not found.reached.any() or np.abs(turns - found.q[0, 0, 0]).min() < 1e-10
+
+
+def test_limits_of_a_catalogue_arm_take_part() -> None:
+    chain = load_robot("ur5e")
+    tight = replace(chain, joints=tuple(replace(one, lower=-3.0, upper=3.0) for one in chain.joints))
+    raw = one_solution(3.1, 0.0, 0.0, 0.0, 0.0, 0.0)
+    assert within_limits(chain, raw).reached.all()
+    assert within_limits(tight, raw).reason(0) == "joint shoulder_pan_joint at 3.1 rad, allowed: -3 to 3 rad"

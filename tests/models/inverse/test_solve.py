@@ -1,0 +1,272 @@
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.chain import Chain
+from urmpipe_models.errors import OptionError
+from urmpipe_models.inverse.solutions import Solutions
+from urmpipe_models.inverse.solve import Method, solve
+from urmpipe_models.inverse.targets import Targets, misses, targets_of
+
+FloatArray = NDArray[np.float64]
+MET = 1e-9
+"""What the iterative solver stops at; the closed forms are at 1e-12."""
+
+
+def poses(chain: Chain, count: int, seed: int = 0) -> tuple[FloatArray, Targets]:
+    joints = chain.moving
+    low = np.maximum([one.lower for one in joints], -math.pi)
+    high = np.minimum([one.upper for one in joints], math.pi)
+    q = np.random.default_rng(seed).uniform(low, high, (count, len(joints)))
+    return q, targets_of(chain, q)
+
+
+def assert_met(chain: Chain, targets: Targets, found: Solutions, within: float = MET) -> None:
+    row, column = np.nonzero(found.reached)
+    position, angle = misses(chain, found.q[row, column], targets.rows(row))
+    assert np.abs(position).max(initial=0.0) < within
+    assert np.abs(angle).max(initial=0.0) < within
+    lower, upper = np.array([(one.lower, one.upper) for one in chain.moving]).T
+    assert ((found.q[row, column] >= lower) & (found.q[row, column] <= upper)).all()
+
+
+def narrow(chain: Chain, lower: float, upper: float) -> Chain:
+    return replace(chain, joints=tuple(replace(one, lower=lower, upper=upper) for one in chain.joints))
+
+
+@pytest.mark.parametrize("name", ["ur5e", "urm6", "arm6"])
+def test_joints_that_a_pose_came_from_are_found_from_near_by(name: str) -> None:
+    chain = load_robot(name)
+    q, targets = poses(chain, 20)
+    found = solve(chain, targets, start=q + 1e-3)
+    assert found.q.shape == (20, 1, 6)
+    assert_met(chain, targets, found)
+    # an iterative solution is the pose's to 1e-9; the joints near singular poses follow to less
+    np.testing.assert_allclose(found.q[:, 0], q, atol=1e-5)
+
+
+def test_one_solution_is_the_nearest_of_all_and_keeps_the_name_of_its_branch() -> None:
+    chain = load_robot("ur5e")
+    _, targets = poses(chain, 50)
+    start = np.full(6, 0.4)
+    one, every = solve(chain, targets, start=start), solve(chain, targets, start=start, every=True)
+    assert one.branches == ("nearest",) and len(every.branches) == 8
+    distance = np.where(every.reached, np.square(every.q - start).sum(axis=2), np.inf)
+    best = distance.argmin(axis=1)
+    np.testing.assert_array_equal(one.q[:, 0], every.q[np.arange(50), best])
+    assert one.labels[:, 0].tolist() == [every.branches[k] for k in best]
+    assert len(set(one.labels[:, 0])) > 2
+
+
+def test_without_a_start_the_one_solution_is_near_the_start_of_the_robot() -> None:
+    chain = load_robot("ur5e")
+    targets = targets_of(chain, np.array([chain.start]))
+    found = solve(chain, targets)
+    np.testing.assert_allclose(found.q[0, 0], chain.start, atol=1e-7)  # three singular families meet there
+
+
+def test_solutions_are_in_the_turn_nearest_to_the_start_that_the_limits_allow() -> None:
+    chain = load_robot("ur5e")
+    q, targets = poses(chain, 20)
+    start = q + np.array([2.0 * math.pi, 0.0, 0.0, 0.0, 0.0, 2.0 * math.pi]) * np.where(q < 0.0, 1.0, -1.0)
+    found = solve(chain, targets, start=start)
+    np.testing.assert_allclose(found.q[:, 0], start, atol=1e-8)
+    beyond = solve(chain, targets, start=start + 4.0 * math.pi)
+    assert_met(chain, targets, beyond)
+    assert beyond.reached.all() and (beyond.q[:, 0] > -1e-9).all()  # the last turn that +-2 pi allows
+
+
+def test_limits_leave_out_branches_and_say_which_joint() -> None:
+    chain = narrow(load_robot("ur5e"), -1.5, 1.5)
+    _, targets = poses(chain, 200)
+    found = solve(chain, targets, every=True)
+    assert_met(chain, targets, found)
+    assert found.reached.any(axis=1).all() and not found.reached.all()
+    texts = {text.split(" at ")[0] for text in found.reasons.ravel() if text.startswith("joint")}
+    assert texts == {f"joint {name}" for name in chain.coordinates}
+
+
+def bad_targets(chain: Chain) -> Targets:
+    """Seven targets of which the first and the last are good."""
+    _, targets = poses(chain, 7)
+    assert targets.rotation is not None
+    position, rotation = targets.position.copy(), targets.rotation.copy()
+    position[1, 2] = np.nan
+    position[2, 0] = np.inf
+    rotation[3] *= 1.01
+    rotation[4, :, 0] *= -1.0
+    rotation[5, 0, 0] = np.nan
+    return Targets(position, rotation)
+
+
+REASONS = [
+    None,
+    "the position is {}, {}, nan m, allowed: finite numbers",
+    "the position is inf, {}, {} m, allowed: finite numbers",
+    "the orientation is no rotation: R^T R differs from 1 by 0.0201, allowed: 1e-06",
+    "the orientation is no rotation: its determinant is -1, a mirror, allowed: 1",
+    "the orientation is not finite, allowed: finite numbers",
+    None,
+]
+
+
+@pytest.mark.parametrize("name", ["ur5e", "urm6"])
+@pytest.mark.parametrize("every", [False, True])
+def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) -> None:
+    chain = load_robot(name)
+    targets = bad_targets(chain)
+    found = solve(chain, targets, every=every, restarts=40 if name == "urm6" else 0)
+    good = targets.rows(np.array([0, 6]))
+    alone = solve(chain, good, every=every, restarts=40 if name == "urm6" else 0)
+    np.testing.assert_allclose(found.q[[0, 6]], alone.q, atol=1e-9)
+    assert alone.reached.any(axis=1).all()
+    x, y, z = (f"{value:g}" for value in (targets.position[1, 0], targets.position[1, 1], 0.0))
+    told = [found.reason(row) for row in range(7)]
+    assert told[1] == f"the position is {x}, {y}, nan m, allowed: finite numbers"
+    y, z = (f"{value:g}" for value in targets.position[2, 1:])
+    assert told[2] == f"the position is inf, {y}, {z} m, allowed: finite numbers"
+    assert [told[0], *told[3:]] == [REASONS[0], *REASONS[3:]]
+    assert len(found) == 7 and found.shortfall.shape == found.labels.shape == found.reasons.shape
+
+
+def test_only_bad_targets_are_no_error() -> None:
+    for name in ("ur5e", "urm6"):
+        found = solve(load_robot(name), Targets(np.full((2, 3), np.nan), np.stack([np.eye(3)] * 2)))
+        assert len(found) == 2 and not found.reached.any()
+        assert found.reason(1) == "the position is nan, nan, nan m, allowed: finite numbers"
+
+
+def test_no_targets_give_no_solutions() -> None:
+    empty = Targets(np.empty((0, 3)), np.empty((0, 3, 3)))
+    for name in ("ur5e", "urm6"):
+        assert len(solve(load_robot(name), empty)) == 0
+
+
+def test_a_rotation_written_with_seven_digits_is_the_nearest_rotation() -> None:
+    chain = load_robot("ur5e")
+    q, targets = poses(chain, 20)
+    assert targets.rotation is not None
+    written = Targets(targets.position, np.round(targets.rotation, 7))
+    found = solve(chain, written, start=q)
+    assert found.reached.all()
+    position, angle = misses(chain, found.q[:, 0], targets)
+    assert np.abs(position).max() < 1e-12  # position is kept exactly, and the orientation to its digits
+    assert 1e-9 < np.abs(angle).max() < 2e-7
+
+
+def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
+    chain = load_robot("ur5e")
+    q = np.array([0.3, -math.pi / 2, 0.0, -math.pi / 2, 1.2, 0.2])  # stretched straight up
+    targets = targets_of(chain, q[None])
+    assert targets.rotation is not None
+    above = targets.position + np.array([[0.0, 0.0, 0.002], [0.0, 0.0, 0.2]])
+    out = Targets(above, np.repeat(targets.rotation, 2, axis=0))
+    refused = solve(chain, out, start=q)
+    assert not refused.reached.any()
+    found = solve(chain, out, start=q, tolerance=0.0035)
+    assert found.reached[:, 0].tolist() == [True, False]
+    assert found.labels[0, 0] == "nearest point"
+    position, _ = misses(chain, found.q[:1, 0], out.rows(slice(0, 1)))
+    assert np.abs(position).max() <= 0.0035
+    np.testing.assert_allclose(found.shortfall[0, 0], np.linalg.norm(position), rtol=1e-6)
+    assert found.shortfall[0, 0] > 1e-4 and found.shortfall[1, 0] == 0.0
+    assert found.reason(1) is not None and "from axis" in str(found.reason(1))
+    every = solve(chain, out, start=q, tolerance=0.0035, every=True)
+    assert every.reached.sum(axis=1).tolist() == [1, 0]
+    assert every.labels[0, 0] == "nearest point"
+
+
+def test_a_tolerance_changes_nothing_where_the_target_is_met() -> None:
+    chain = load_robot("ur5e")
+    _, targets = poses(chain, 20)
+    np.testing.assert_array_equal(solve(chain, targets).q, solve(chain, targets, tolerance=0.01).q)
+
+
+@pytest.mark.parametrize("name", ["ur5e", "arm6"])
+def test_the_iterative_way_finds_what_the_closed_form_finds(name: str) -> None:
+    chain = load_robot(name)
+    q, targets = poses(chain, 10, 4)
+    start = q + 0.01
+    closed = solve(chain, targets, start=start, method="closed")
+    iterative = solve(chain, targets, start=start, method="iterative")
+    np.testing.assert_allclose(iterative.q, closed.q, atol=1e-5)
+    assert iterative.branches == ("1",)
+
+
+def test_positions_alone_are_solved_iteratively() -> None:
+    chain = load_robot("ur5e")
+    _, targets = poses(chain, 10)
+    only = Targets(targets.position)
+    found = solve(chain, only)
+    assert found.reached.all()
+    assert_met(chain, only, found)
+
+
+def test_redundant_arms_are_solved_iteratively() -> None:
+    chain = load_robot("panda")
+    _, targets = poses(chain, 5)
+    found = solve(chain, targets, restarts=40)
+    assert found.reached.all() and found.q.shape == (5, 1, 7)
+    assert_met(chain, targets, found)
+
+
+def test_a_start_outside_the_limits_is_a_place_to_be_near_to() -> None:
+    chain = narrow(load_robot("ur5e"), -2.0, 2.0)
+    _, targets = poses(chain, 5)
+    found = solve(chain, targets, start=np.full(6, 50.0))
+    assert_met(chain, targets, found)
+    assert found.reached.all()
+
+
+def test_everything_wrong_with_the_options_is_told_at_once() -> None:
+    chain = load_robot("urm6")
+    _, targets = poses(chain, 2)
+    odd: Method = "exact"  # type: ignore[assignment]
+    with pytest.raises(OptionError) as caught:
+        solve(chain, targets, start=np.zeros(5), tolerance=-1.0, restarts=-2, method=odd)
+    assert [str(one) for one in caught.value.findings] == [
+        f"start: found values of shape (5,), allowed: (6,), one each of {', '.join(chain.coordinates)},"
+        " or (2, 6), as many for each target",
+        "tolerance: found -1 m, allowed: more than 0, finite",
+        "restarts: found -2, allowed: 0 or more",
+        "method: found 'exact', allowed: auto, closed, iterative",
+    ]
+    with pytest.raises(OptionError) as caught:
+        solve(chain, targets, start=np.array([0, 0, 0, 0, 0, math.nan]), tolerance=math.inf, method="closed")
+    assert [str(one) for one in caught.value.findings] == [
+        "start: found a value that is not finite, allowed: finite numbers in rad and m",
+        "tolerance: found inf m, allowed: more than 0, finite",
+        "method closed: robot urm6 has no closed form, allowed: six revolute joints whose last three axes"
+        " meet in a point or whose axes 2, 3 and 4 are parallel; use method iterative",
+    ]
+
+
+def test_a_closed_form_needs_poses() -> None:
+    with pytest.raises(OptionError) as caught:
+        solve(load_robot("ur5e"), Targets(np.zeros((1, 3))), method="closed")
+    assert str(caught.value) == (
+        "method closed: found positions with any orientation, allowed: poses; use method iterative"
+    )
+
+
+@pytest.mark.parametrize(
+    ("targets", "text"),
+    [
+        (Targets(np.zeros(3)), "targets: found positions of shape (3,), allowed: (n, 3)"),
+        (Targets(np.zeros((2, 2))), "targets: found positions of shape (2, 2), allowed: (n, 3)"),
+        (
+            Targets(np.zeros((2, 3)), np.zeros((3, 3, 3))),
+            "targets: found rotations of shape (3, 3, 3) for 2 positions, allowed: (2, 3, 3)",
+        ),
+    ],
+)
+def test_targets_of_another_shape_are_refused(targets: Targets, text: str) -> None:
+    with pytest.raises(OptionError) as caught:
+        solve(load_robot("ur5e"), targets)
+    assert str(caught.value) == text
