@@ -13,7 +13,7 @@ from urmpipe_models.inverse.polishing import jacobian_determinant, polished
 from urmpipe_models.inverse.postures import Meeting, Postures, leave_out_equal, leave_out_second
 from urmpipe_models.inverse.quartic_arm import quartic_roots
 from urmpipe_models.inverse.reach import Reach
-from urmpipe_models.inverse.solutions import BoolArray, FloatArray, TextArray
+from urmpipe_models.inverse.solutions import BoolArray, FloatArray, SingularFamily, TextArray
 from urmpipe_models.inverse.tracks import ON_AXIS, Roots, circle_roots, is_straight, parabola_roots
 from urmpipe_models.inverse.trigonometric import wrapped
 from urmpipe_models.screws import Screws
@@ -189,9 +189,17 @@ class PositionArm:
             meeting = self._elbow_families(u3, meet3)
             leave_out_second(u1, u3, reasons, meet3, names, 1)
         if meet1.any():
-            meeting["postures meet"] = meet1 | meeting.get("postures meet", np.zeros(shape, dtype=bool))
+            family = self._side_family
+            meeting[family] = meet1 | meeting.get(family, np.zeros(shape, dtype=bool))
             leave_out_second(u1, u3, reasons, meet1, names, 0)
         return u1, u3, meeting
+
+    @property
+    def _side_family(self) -> SingularFamily:
+        """The family of poses where both roots of joint 1 are one."""
+        first, _ = self._combinations
+        sideways = abs(first[1]) <= RANK  # the way along axis 2 alone decides
+        return "wrist beside axis 1" if sideways and self.equations.revolute else "postures meet"
 
     def _elbow_families(self, u3: FloatArray, meet: BoolArray) -> Meeting:
         """Return the families of poses where both roots of joint 3 are one."""
