@@ -163,6 +163,8 @@ ROWS = {
     "0.1,0.2": "found 2 cells, allowed: 3",
     "0.1,0.2,0.3,0.4": "found 4 cells, allowed: 3",
     "0.1,abc,0.5": "column y: found 'abc', allowed: a finite number",
+    "one,two,0.5": "column x: found 'one', allowed: a finite number;"
+    " column y: found 'two', allowed: a finite number",
     "a,b,c": "found 'a,b,c', allowed: a row of numbers",
     "-0.5": "found 1 cell, allowed: 3",
     "to do": "found 1 cell ('to do'), allowed: 3",
@@ -188,6 +190,7 @@ def test_a_good_row_is_read_whatever_stands_around_it(read: Read, count: int) ->
         "\ufeffx;y;z\n0,4;0,1;0,5\n0,4;da;0,5\n",
         "# taught\n# x y z\n0.4 0.1 0.5\n0.4 da 0.5\n",
         "Pick positions\n\nx,y,z\n[m],[m],[m]\n0.4,0.1,0.5\n0.4,da,0.5\n",
+        "x;y;z\n(mm);(mm);(mm)\n400;100;500\n400;da;500\n",
         '"x";"y";"z"\n"0.4";"0.1";"0.5"\n"0.4";"da";"0.5"\n',
         "x,y,z,\n0.4,0.1,0.5,\n0.4,da,0.5,\n",
         "Title of x y z\nx,y,z\n0.4,0.1,0.5\n0.4,da,0.5\n",
@@ -301,6 +304,13 @@ def test_a_row_without_a_time_is_a_fault_and_stands_between_its_neighbours(read:
         True,
         False,
     ]
+
+
+def test_times_of_years_stay_exact_beside_a_row_without_one(read: Read) -> None:
+    """20,000,000.000000001 s is no double."""
+    targets = read("t [s],x,y,z\n0,0.3,0.1,0.5\n,0.3,0.1,0.5\n20000000.000000001,0.3,0.1,0.5\n")
+    assert targets.t_ns is not None
+    assert targets.t_ns.tolist() == [0, 10**16, 2 * 10**16 + 1]
 
 
 def test_dates_that_are_none_are_faults(read: Read) -> None:

@@ -5,8 +5,8 @@ A few targets are typed by hand, and most of their rows may be wrong. How a log 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 
 from urmpipe_pipeline.sources.cells import DECIMALS, DELIMITERS, is_number, split_line
 from urmpipe_pipeline.sources.sniff import COMMENTS, SAMPLED_LINES, Layout, sniff
@@ -15,9 +15,10 @@ from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
 
 
 def sniff_targets(segment: Segment, delimiter: str | None = None, decimal: str | None = None) -> Layout:
-    """Return how a table is written: by the rows that have a cell for each name, if a header names x, y, z.
+    """Return how a table is written: by its soundest rows, if a header names x, y, z.
 
-    All lines below the header are rows then, but for comments and a line of units.
+    These are the rows with a cell for each name and the most numbers for x, y, z. All lines below the header
+    are rows then, but for comments and a line of units.
 
     Args:
         segment: The table's text.
@@ -30,56 +31,68 @@ def sniff_targets(segment: Segment, delimiter: str | None = None, decimal: str |
     """
     lines = head_lines(segment)[:SAMPLED_LINES]
     for place, header in enumerate(lines):
-        widths = _widths(header.text)
+        headers = list(_headers(header.text))
         below = [line for line in lines[place + 1 :] if not _is_comment(line)]
-        whole = [line for line in below if _is_whole(line.text, widths)]
-        if not whole:
+        sound = [max((_numbers(line.text, one) for one in headers), default=0) for line in below]
+        if not any(sound):
             continue
-        units = [line for line in below[:1] if line not in whole and _all_units(line.text, widths)]
-        layout = sniff(segment, delimiter, decimal, [*lines[: place + 1], *units, *whole])
-        if layout.header != header.number:
-            break
-        first = below[len(units)]
-        return replace(layout, first_line=first.number, offset=first.offset)
+        whole = [line for line, numbers in zip(below, sound, strict=True) if numbers == max(sound)]
+        # The first line may tell the delimiter; any other above the header tells nothing.
+        layout = sniff(segment, delimiter, decimal, [*lines[: min(place, 1)], header, *whole])
+        return _from(layout, below) if layout.header == header.number else sniff(segment, delimiter, decimal)
     return sniff(segment, delimiter, decimal)
+
+
+def _from(layout: Layout, below: Sequence[HeadLine]) -> Layout:
+    """Return a layout whose rows begin right below its header, or behind a line of units."""
+    units = split_line(below[0].text, layout.delimiter)
+    told = [vocabulary().unit(cell.strip("[]() ")) for cell in units if cell]
+    has_units = bool(told) and all(told)
+    first = below[1 if has_units else 0]
+    return replace(
+        layout, units=tuple(units) if has_units else (), first_line=first.number, offset=first.offset
+    )
 
 
 def _is_comment(line: HeadLine) -> bool:
     return line.text.lstrip().startswith(COMMENTS)
 
 
-def _widths(text: str) -> dict[str, int]:
-    """Return how many names a line has by the delimiters that make names of x, y and z of it."""
+@dataclass(frozen=True, slots=True)
+class _Header:
+    """A line of names: the sign between them, how many there are, and which are those of x, y, z."""
+
+    delimiter: str
+    width: int
+    position: tuple[int, ...]
+
+
+def _headers(text: str) -> Iterator[_Header]:
+    """Yield what a line is as a header, by each delimiter that makes names of x, y and z of it."""
     for comment in COMMENTS:
         text = text.strip().removeprefix(comment)
-    split = {delimiter: split_line(text, delimiter) for delimiter in DELIMITERS}
-    return {delimiter: len(cells) for delimiter, cells in split.items() if _names_position(cells)}
-
-
-def _names_position(cells: Sequence[str]) -> bool:
-    """Tell whether names are those of x, y and z in one of the forms that are known."""
-    keys = [key(split_unit(cell)[0]) for cell in cells if cell]
-    for pattern in vocabulary().tcp_position:
-        found = [match.groupdict().get("axis") for one in keys if (match := pattern.search(one))]
-        if {"x", "y", "z"} <= set(found):
-            return True
-    return False
-
-
-def _is_whole(text: str, widths: dict[str, int]) -> bool:
-    """Tell whether a line has a cell for each name, one of them a number."""
-    for delimiter, width in widths.items():
+    for delimiter in DELIMITERS:
         cells = split_line(text, delimiter)
-        cells = cells[:width] if not any(cells[width:]) else cells  # delimiters behind the last
-        numbers = any(is_number(cell, decimal) for cell in cells for decimal in DECIMALS)
-        if len(cells) == width and numbers:
-            return True
-    return False
+        position = _position(cells)
+        if position:
+            yield _Header(delimiter, len(cells), position)
 
 
-def _all_units(text: str, widths: dict[str, int]) -> bool:
-    """Tell whether a line holds units below the names."""
-    return any(
-        all(not cell or vocabulary().unit(cell.strip("[]() ")) for cell in split_line(text, delimiter))
-        for delimiter in widths
-    )
+def _position(cells: Sequence[str]) -> tuple[int, ...]:
+    """Return which names are those of x, y and z in one of the forms that are known; none without all."""
+    keys = [key(split_unit(cell)[0]) for cell in cells]
+    for pattern in vocabulary().tcp_position:
+        matches = {
+            k: match.groupdict().get("axis") for k, one in enumerate(keys) if (match := pattern.search(one))
+        }
+        if {"x", "y", "z"} <= set(matches.values()):
+            return tuple(k for k, axis in matches.items() if axis)
+    return ()
+
+
+def _numbers(text: str, header: _Header) -> int:
+    """Return how many numbers a line has for x, y, z; 0 if it has other than a cell for each name."""
+    cells = split_line(text, header.delimiter)
+    if len(cells) < header.width or any(cells[header.width :]):
+        return 0
+    return sum(any(is_number(cells[k], decimal) for decimal in DECIMALS) for k in header.position)

@@ -106,9 +106,6 @@ def target_rotations(
     faults = {row: f"{names}: {said}" for row, said in _no_rotations(values, form)}
     sound = values.copy()
     sound[list(faults)] = np.nan
-    if form == "matrix":
-        sound = quaternions(sound, form)
-        form = "quat_xyzw"
     return matrices(quaternions(sound, form)), faults
 
 
