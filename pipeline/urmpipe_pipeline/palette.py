@@ -36,9 +36,13 @@ RUN_COLOURS = {
 }
 """One a run of a comparison, by the word for it; none like the reference."""
 
-GHOST_COLOURS = {word: RUN_COLOURS[word] for word in list(RUN_COLOURS)[1:]} | {"silver": "#a2bcbc"}
-"""One a further branch of solved joint values, by the word for it: none like the first run, whose arm is the
-solution that was chosen. Seven, as an arm with a spherical wrist has seven further ones."""
+GHOST_COLOURS = {
+    **{word: colour for word, colour in RUN_COLOURS.items() if word != "orange"},
+    "silver": "#a2bcbc",
+    "orange": RUN_COLOURS["orange"],
+}
+"""One a further branch of solved joint values, by the word for it: eight, as many as an arm with a spherical
+wrist has. The first run's, in which the chosen solution has its tip and its path, comes last."""
 
 NEUTRAL_COLOUR = "#c8d0d4"
 """Links, shapes without a colour and lines through all plots: joints and paths stand out in theirs."""

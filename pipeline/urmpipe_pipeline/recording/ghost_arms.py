@@ -39,7 +39,7 @@ class GhostArm:
         start: Where each bone starts in [m], shape (m, bones, 3): the links, then the axes of the joints.
         end: Where it ends.
         links: How many of the bones are links.
-        named: Where the name stands: which of `name_places`.
+        named: Where the name stands in each pose, shape (m,): which of `name_places`.
         thin: True of every second branch. Two that differ in the turn of the wrist alone have all their links
             in common: then one is seen inside the other.
         gone_ns: Times from which on there is no such solution in integer [ns], shape (g,).
@@ -55,7 +55,7 @@ class GhostArm:
     start: FloatArray
     end: FloatArray
     links: int
-    named: int
+    named: IntArray
     thin: bool
     gone_ns: IntArray
     gone_sample: IntArray
@@ -65,15 +65,17 @@ def ghost_arms(run: Run, place: Place) -> tuple[GhostArm, ...]:
     """Return the further branches of a run as arms, thinned out for drawing."""
     if run.robot is None or not run.ghosts:
         return ()
-    named = _names(run, run.robot)
+    from_ns, named = _names(run, run.robot)
     return tuple(
-        _ghost_arm(run, run.robot, ghost, i, branch_entity(place, key), named[i])
+        _ghost_arm(
+            run, run.robot, ghost, i, branch_entity(place, key), named[i][_rows_at(from_ns, ghost.t_ns)]
+        )
         for i, (ghost, key) in enumerate(zip(run.ghosts, branch_keys(run), strict=True))
     )
 
 
-def _ghost_arm(run: Run, robot: Chain, ghost: Ghost, number: int, root: str, named: int) -> GhostArm:
-    """Return a branch as an arm."""
+def _ghost_arm(run: Run, robot: Chain, ghost: Ghost, number: int, root: str, named: IntArray) -> GhostArm:
+    """Return a branch as an arm; `named` tells where its name stands in each of its poses."""
     rows = _drawn_rows(run, ghost.t_ns)
     start, end = bones_of(robot, ghost.q[rows])
     gone = gone_times(run, ghost.t_ns)
@@ -87,7 +89,7 @@ def _ghost_arm(run: Run, robot: Chain, ghost: Ghost, number: int, root: str, nam
         start=start,
         end=end,
         links=len(robot.joints),
-        named=named,
+        named=named[rows],
         thin=bool(number % 2),
         gone_ns=gone,
         gone_sample=samples_at(run, gone),
@@ -137,7 +139,7 @@ def gone_times(run: Run, t_ns: IntArray) -> IntArray:
 
 def samples_at(run: Run, t_ns: IntArray) -> IntArray:
     """Return the last grid sample at or before each time; the first at none."""
-    return np.maximum(np.searchsorted(run.t_ns, t_ns, side="right") - 1, 0)
+    return _rows_at(run.t_ns, t_ns)
 
 
 def _drawn_rows(run: Run, t_ns: IntArray) -> IntArray:
@@ -148,16 +150,25 @@ def _drawn_rows(run: Run, t_ns: IntArray) -> IntArray:
     return np.union1d(begins, drawn[:: math.ceil(len(drawn) / POSES)])
 
 
-def _names(run: Run, robot: Chain) -> list[int]:
-    """Return at which of its places the name of each ghost stands, by their poses at the time of opening."""
-    at = fullest_time(run)
-    ghosts = [ghost.q[[_row_at(ghost.t_ns, at)]] for ghost in run.ghosts]
-    chosen = run.log.q[run.log.t_ns == at]
-    beside = [chosen] if np.isfinite(chosen).all() else []
-    places = [[name_places(*bones_of(robot, q))[0] for q in arms] for arms in (ghosts, beside)]
-    return placed_names(*places)
+def _names(run: Run, robot: Chain) -> tuple[IntArray, IntArray]:
+    """Return at which of its places the name of each ghost stands, and from which times on.
+
+    In a motion it keeps the place that is good in the view that opens; between single poses it may leap.
+
+    Returns:
+        Times in integer [ns], shape (p,), and places, shape (ghosts, p).
+    """
+    t_ns = (
+        run.log.t_ns[:: math.ceil(run.log.rows / POSES)]
+        if run.single_poses
+        else np.array([fullest_time(run)])
+    )
+    ghosts = [ghost.q[_rows_at(ghost.t_ns, t_ns)] for ghost in run.ghosts]
+    chosen = run.log.q[_rows_at(run.log.t_ns, t_ns)]
+    places = [name_places(*bones_of(robot, q)) for q in (*ghosts, chosen)]
+    return t_ns, placed_names(np.array(places[:-1]), places[-1])
 
 
-def _row_at(t_ns: IntArray, at: int) -> int:
-    """Return the last row at or before a time, else the first."""
-    return max(int(np.searchsorted(t_ns, at, side="right")) - 1, 0)
+def _rows_at(t_ns: IntArray, at: IntArray) -> IntArray:
+    """Return the last row at or before each time, else the first."""
+    return np.maximum(np.searchsorted(t_ns, at, side="right") - 1, 0)

@@ -55,7 +55,7 @@ def draw_ghost(stream: RecordingStream, ghost: GhostArm, size: float) -> None:
     send_gone(stream, ghost.entity, ghost.gone_ns, ghost.gone_sample, nothing)
     named = rr.Points3D.from_fields(colors=[colour], radii=[0.0], labels=[ghost.name], show_labels=True)
     stream.log(ghost.label, named, static=True)
-    places = name_places(ghost.start, ghost.end)[:, ghost.named].astype(np.float32)
+    places = name_places(ghost.start, ghost.end)[np.arange(len(ghost.named)), ghost.named].astype(np.float32)
     _send(stream, ghost.label, ghost, rr.Points3D.columns(positions=places), 1)
     send_gone(stream, ghost.label, ghost.gone_ns, ghost.gone_sample, rr.Points3D.columns(positions=[]))
 

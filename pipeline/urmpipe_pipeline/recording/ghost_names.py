@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.recording.eye import seen
 
 NAME_SIZE = (0.3, 0.035)
@@ -29,25 +27,32 @@ def name_places(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.concatenate((end, (start + end) / 2), axis=-2)
 
 
-def placed_names(ghosts: Sequence[FloatArray], chosen: Sequence[FloatArray]) -> list[int]:
+def placed_names(ghosts: FloatArray, chosen: FloatArray) -> IntArray:
     """Return for each ghost the place at which its name can be read, and told from those of the others.
 
     Names must not lie on each other: that comes first. Then a place is the better the further it is from the
     same place of every other arm.
 
     Args:
-        ghosts: The `name_places` of each ghost in one pose in [m], shape (places, 3).
-        chosen: Those of the arms that have no name.
+        ghosts: The `name_places` of each ghost in some poses in [m], shape (ghosts, poses, places, 3).
+        chosen: Those of the arm that has no name, shape (poses, places, 3); NaN where it is not there.
+
+    Returns:
+        Shape (ghosts, poses).
     """
-    every = seen(np.array([*ghosts, *chosen]))
-    extent = float(np.linalg.norm(np.ptp(every.reshape(-1, 3), axis=0))) or 1.0
+    every = seen(np.concatenate((ghosts, chosen[None])))
+    low, high = (reduce.reduce(every, axis=(0, 1, 2)) for reduce in (np.fmin, np.fmax))
+    extent = float(np.linalg.norm(high - low)) or 1.0
     box = np.array(NAME_SIZE) * extent
-    found: list[int] = []
-    for i, mine in enumerate(every[: len(ghosts)]):
-        apart = np.linalg.norm(np.delete(every, i, axis=0) - mine, axis=2).min(axis=0, initial=extent)
-        free = np.ones(len(mine))
-        for k, place in enumerate(found):
-            gap = np.abs(mine[:, :2] - every[k, place, :2]) / box
-            free = np.minimum(free, gap.max(axis=1))
-        found.append(int(np.argmax(free + SECOND * apart / extent)))
-    return found
+    found = np.empty(every.shape[:2], dtype=np.int64)
+    at: list[FloatArray] = []
+    for i in range(len(ghosts)):
+        mine = every[i]
+        apart = np.linalg.norm(np.delete(every, i, axis=0) - mine, axis=3)
+        room = SECOND * np.fmin.reduce(apart, axis=0, initial=extent) / extent
+        free = np.ones(mine.shape[:2])
+        for name in at:
+            free = np.minimum(free, (np.abs(mine[..., :2] - name) / box).max(axis=2))
+        found[i] = np.argmax(free + room, axis=1)
+        at.append(np.take_along_axis(mine[..., :2], found[i][:, None, None], axis=1))
+    return found[: len(ghosts)]

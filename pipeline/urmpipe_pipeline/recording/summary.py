@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections.abc import Iterable, Iterator, Sequence
+from itertools import zip_longest
 
 import numpy as np
 
@@ -49,20 +51,19 @@ def _of_run(run: Run) -> Iterator[str]:
 
 
 def _branches(run: Run) -> Iterator[str]:
-    """Yield which ghost is which branch, and at how many targets it is another solution."""
-    if run.ghosts:
-        yield ""
-        yield table_row(("branch", "drawn", "rows"))
-        yield table_row("---" for _ in range(3))
-        yield table_row(
-            (
-                "chosen",
-                f"solid, its tip {run_colour_word(0)}",
-                str(int(np.isfinite(run.log.q).all(axis=1).sum())),
-            )
-        )
+    """Yield which ghost is which branch, and at how many rows it is another solution: two in a line."""
+    if not run.ghosts:
+        return
+    rows = int(np.isfinite(run.log.q).all(axis=1).sum())
+    cells = [("chosen", f"solid, its tip {run_colour_word(0)}", str(rows))]
     for i, ghost in enumerate(run.ghosts[:BRANCHES]):
-        yield table_row((shown(ghost.name), ghost_colour_word(i), str(len(ghost.t_ns))))
+        cells.append((shown(ghost.name), ghost_colour_word(i), str(len(ghost.t_ns))))
+    half = math.ceil(len(cells) / 2)
+    yield ""
+    yield table_row(("branch", "drawn", "rows") * 2)
+    yield table_row("---" for _ in range(6))
+    for left, right in zip_longest(cells[:half], cells[half:], fillvalue=("",) * 3):
+        yield table_row((*left, *right))
     if len(run.ghosts) > BRANCHES:
         yield ""
         yield f"and {len(run.ghosts) - BRANCHES} more branches"

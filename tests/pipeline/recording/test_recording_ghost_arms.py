@@ -112,7 +112,7 @@ def test_each_ghost_is_drawn_where_its_joints_put_it(
         along = matrices(quat) @ (0.0, 0.0, 1.0) * length[:, None]
         np.testing.assert_allclose(begin, start[row], rtol=0, atol=1e-6)  # single precision over 1 m
         np.testing.assert_allclose(begin + along, end[row], rtol=0, atol=1e-6)
-    named = scene_of(run).ghosts[0].named
+    named = scene_of(run).ghosts[0].named[-1]
     labelled = rows_of(path, f"{FIRST}/name", "Points3D:positions")
     last = int(ghost.t_ns[-1])
     np.testing.assert_allclose(labelled[last], name_places(start, end)[-1:, named], rtol=0, atol=1e-6)
@@ -179,10 +179,11 @@ def test_the_arm_of_a_log_stays_where_a_sample_is_missing(make_solved: MakeSolve
 
 
 def test_each_branch_has_a_colour_of_its_own_and_its_name(make_solved: MakeSolved, tmp_path: Path) -> None:
-    names = tuple(f"branch {k}" for k in range(1, 8))
+    names = tuple(f"branch {k}" for k in range(1, 9))
     run = make_solved(names=names)
     path = write_recording(run, tmp_path / "solved.rrd")
-    assert len({*GHOST_COLOURS.values(), run_colour(0)}) == 8
+    assert len(set(GHOST_COLOURS.values())) == 8
+    assert run_colour(0) == list(GHOST_COLOURS.values())[-1]
     for name, colour in zip(names, GHOST_COLOURS.values(), strict=True):
         entity = f"/branches/{name.replace(' ', chr(92) + ' ')}"
         red, green, blue = rgb(colour)
@@ -191,16 +192,20 @@ def test_each_branch_has_a_colour_of_its_own_and_its_name(make_solved: MakeSolve
         assert static(path, f"{entity}/name", "Points3D:colors") == [packed | 255]
         assert static(path, f"{entity}/name", "Points3D:labels") == [name]
     told = summary(run).splitlines()
-    assert told[told.index("| branch | drawn | rows |") + 2 :][:3] == [
-        "| chosen | solid, its tip orange | 36 |",
-        "| branch 1 | sky blue | 30 |",
-        "| branch 2 | violet | 28 |",
+    table = told.index("| branch | drawn | rows | branch | drawn | rows |")
+    assert told[table + 2 : table + 8] == [
+        "| chosen | solid, its tip orange | 36 | branch 5 | purple | 22 |",
+        "| branch 1 | sky blue | 30 | branch 6 | sand | 20 |",
+        "| branch 2 | violet | 28 | branch 7 | silver | 18 |",
+        "| branch 3 | vermilion | 26 | branch 8 | orange | 16 |",
+        "| branch 4 | green | 24 |  |  |  |",
+        "",
     ]
 
 
 def test_many_branches_are_counted(make_solved: MakeSolved) -> None:
     told = summary(make_solved(names=tuple(f"{k}" for k in range(12)), rows=20))
-    assert "| 7 | sky blue | 13 |" in told
+    assert "| 2 | vermilion | 18 | 7 | orange | 13 |" in told
     assert "| 8 |" not in told
     assert "and 4 more branches" in told
 
@@ -211,19 +216,31 @@ def test_of_two_ghosts_with_the_same_links_one_is_seen_inside_the_other(make_sol
 
 def test_names_do_not_lie_on_each_other_in_the_view() -> None:
     rng = np.random.default_rng(3)
-    places = list(rng.normal(size=(7, 24, 3)))
-    named = placed_names(places, [rng.normal(size=(24, 3))])
-    at = seen(np.array([mine[place] for mine, place in zip(places, named, strict=True)]))[:, :2]
-    box = np.array(NAME_SIZE) * np.linalg.norm(np.ptp(seen(np.concatenate(places)), axis=0))
-    gaps = np.abs(at[:, None] - at[None]) / box
-    np.fill_diagonal(gaps[..., 0], np.inf)
-    assert (gaps.max(axis=2) >= 1.0).all()
+    places, chosen = rng.normal(size=(7, 5, 24, 3)), rng.normal(size=(5, 24, 3))
+    chosen[2] = np.nan  # there the arm has no pose
+    named = placed_names(places, chosen)
+    every = seen(np.concatenate((places, chosen[None])))
+    box = np.array(NAME_SIZE) * np.linalg.norm(
+        np.nanmax(every, axis=(0, 1, 2)) - np.nanmin(every, axis=(0, 1, 2))
+    )
+    for pose in range(5):
+        at = every[np.arange(7), pose, named[:, pose], :2]
+        gaps = np.abs(at[:, None] - at[None]) / box
+        np.fill_diagonal(gaps[..., 0], np.inf)
+        assert (gaps.max(axis=2) >= 1.0).all()
 
 
 def test_the_name_of_a_ghost_stands_where_it_differs_most_from_the_arm() -> None:
-    chosen = np.arange(15.0).reshape(5, 3)
+    chosen = np.arange(15.0).reshape(1, 5, 3)
     ghost = chosen + np.array([0.0, 0.1, 3.0, 0.2, 0.0])[:, None]
-    assert placed_names([ghost], [chosen]) == [2]
+    assert placed_names(ghost[None], chosen).tolist() == [[2]]
+
+
+def test_a_name_keeps_its_place_in_a_motion_and_leaps_between_single_poses(make_solved: MakeSolved) -> None:
+    names = tuple(f"{k}" for k in range(8))
+    motion, poses = (scene_of(make_solved(timed=timed, names=names)).ghosts for timed in (True, False))
+    assert [len(set(ghost.named.tolist())) for ghost in motion] == [1] * 8
+    assert max(len(set(ghost.named.tolist())) for ghost in poses) > 1
 
 
 def test_the_viewer_opens_where_most_branches_are(make_solved: MakeSolved, tmp_path: Path) -> None:
