@@ -225,3 +225,16 @@ def test_the_picture_is_svg_with_all_points() -> None:
     circles = list(root.iter("{http://www.w3.org/2000/svg}circle"))
     assert len(circles) == 2 * 10
     assert all(math.isfinite(float(circle.get("cx", "nan"))) for circle in circles)
+
+
+@pytest.mark.parametrize(
+    ("name", "inverse", "said"),
+    [
+        ("arm6", "spherical wrist", "closed form: spherical wrist"),
+        ("ur5e", "three parallel axes", "closed form: three parallel axes"),
+        ("urm6", "iterative", "iterative"),
+    ],
+)
+def test_show_says_what_its_inverse_is(urmpipe: Any, name: str, inverse: str, said: str) -> None:
+    assert f"Inverse: {said}" in urmpipe("robot", "show", name).out.splitlines()
+    assert json.loads(urmpipe("robot", "show", name, "--json").out)["inverse"] == inverse
