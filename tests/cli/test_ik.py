@@ -216,7 +216,7 @@ def test_targets_without_solution_are_left_out_of_a_log_and_nothing_at_all_is_no
     assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "log.csv", "-q"]) == 1
     table = np.genfromtxt(folder / "log.csv", delimiter=",", names=True)
     assert table["urmpipe_target_row"].tolist() == [1, 4]
-    written = np.array([[row[name] for name in table.dtype.names[:-1]] for row in table])
+    written = np.loadtxt(folder / "log.csv", delimiter=",", skiprows=1)[:, :-1]
     found = answer(capsys, 1, "targets.csv", "--robot", "arm6", "-o", "log.csv")
     assert found["output"] == "log.csv"
     nearest = [one["solutions"][one["nearest"]]["q"] for one in found["targets"] if one["solutions"]]
