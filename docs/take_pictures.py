@@ -73,7 +73,7 @@ def of_page(source: Path, target: Path, width: int, height: int = 1000) -> list[
 
 
 def of_readme() -> list[str]:
-    """Run the demo and a system of blocks, and picture what they made, for the README."""
+    """Run the demo, a system of blocks and a target's inverse, and picture what they made, for the pages."""
     HERE.mkdir(exist_ok=True)
     with tempfile.TemporaryDirectory() as folder:
         demo = Path(folder) / "demo"
@@ -81,10 +81,15 @@ def of_readme() -> list[str]:
         drives = Path(folder) / "six-drives.rrd"
         subprocess.run([*urmpipe, "demo", "-q", "-o", str(demo)], check=True)
         subprocess.run([*urmpipe, "simulate", "six-drives", "-q", "-o", str(drives)], check=True)
+        target, branches = Path(folder) / "one.csv", Path(folder) / "one.rrd"
+        target.write_text("x,y,z,rz,ry,rx\n0.15,0.05,0.2,0.3,0.9,0.1\n", encoding="utf-8")
+        solved = ["ik", str(target), "--robot", "arm6", "--all", "-q", "-o", str(branches)]
+        subprocess.run([*urmpipe, *solved], check=True)
         return [
             *of_recording(demo / "demo.rrd", HERE / "recording.png", None),
             *of_page(demo / "report.html", HERE / "report.png", 1280),
             *of_recording(drives, HERE / "six-drives.png", 1.0),
+            *of_recording(branches, HERE / "ik.png", 0.0),
         ]
 
 
