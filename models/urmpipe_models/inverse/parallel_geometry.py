@@ -18,11 +18,11 @@ MEETING = 1e-11
 """Axes that pass each other by this share of the arm's size meet."""
 
 TILT = 1e-3
-"""The least sine of the angle of axes 1 and 5 to axes 2, 3 and 4, and of axis 6 to axis 5 where these meet."""
+"""The least sine of the angle of axes 1 and 5 to axes 2 to 4, and of axis 6 to axis 5 where these meet."""
 
 PASSING = 1e-3
 """How far axes 5 and 6 must pass each other where they do not meet, t45 and t56 their angles to axes 4 and 5:
-the distance, of the arm's size, times sin(t56) sin(t45)^2. Less takes digits: 1e-5 leaves solutions of 1e-7 m."""
+the distance, of the arm's size, times sin(t56) sin(t45)^2. With 1e-5 a solution may miss by 1e-7 m."""
 
 ROUNDING = 1e-14
 """Less than this, of 1 or of the arm's size, is the rounding of a right angle or of an offset of 0."""

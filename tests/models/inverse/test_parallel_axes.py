@@ -319,12 +319,8 @@ def test_without_a_shoulder_offset_the_wrist_can_be_on_axis_1_which_leaves_q1_fr
     solutions = form_of(chain).solve(targets)
     assert solutions.reached.any()
     assert_every_solution_meets(chain, targets, solutions, EXACT)
-    assert {
-        one.split(",")[0] for one, met in zip(solutions.branches, solutions.reached[0], strict=True) if met
-    } == {
-        "right",
-        "left",
-    }
+    met = [one for one, there in zip(solutions.branches, solutions.reached[0], strict=True) if there]
+    assert {one.split(",")[0] for one in met} == {"right", "left"}
     (on_axis,) = [one for one in solutions.singular if one.family == "wrist on axis 1"]
     assert (on_axis.free, on_axis.chosen) == ("a: any value", "a = 0, and pi more for the left arm")
     np.testing.assert_array_equal(on_axis.where, solutions.reached)
