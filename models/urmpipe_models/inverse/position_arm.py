@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import combinations
 from typing import Literal
 
 import numpy as np
@@ -11,6 +10,7 @@ import numpy as np
 from urmpipe_models.inverse.angles import angle_about
 from urmpipe_models.inverse.loop_equations import LoopEquations, Seen, Track, loop_equations
 from urmpipe_models.inverse.polishing import jacobian_determinant, polished
+from urmpipe_models.inverse.postures import Meeting, Postures, leave_out_equal, leave_out_second
 from urmpipe_models.inverse.quartic_arm import quartic_roots
 from urmpipe_models.inverse.reach import Reach
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, SingularFamily, TextArray
@@ -22,7 +22,7 @@ RANK = 1e-6
 """Axes count as meeting or as parallel where that changes a loop equation by this, relative to the others.
 
 The equations are then solved as if they did, and the joints are polished until the wrist is where it
-shall be; without it a quadric whose roots meet in pairs would be solved, with half the digits.
+shall be. Only where axes are off by 1e-8 to 1e-6 a posture that lies next to a fold may be lost by this.
 """
 
 EXACT = 1e-14
@@ -31,27 +31,7 @@ EXACT = 1e-14
 LEFT = 2e-11
 """Polished joints that leave the wrist centre off by more than this, in units of the arm's size, are none."""
 
-SAME = 1e-5
-"""Polished postures that differ by less than this, in [rad] or the arm's size, are one."""
-
 Order = Literal["first", "third", "both"]
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Postures:
-    """Joints 1 to 3 of n targets in k postures.
-
-    Attributes:
-        q: In [rad] or [m], shape (3, k, n); NaN where there is none.
-        reasons: Why there is none, shape (k, n).
-        meeting: Where two postures are one, shape (k, n), by the family of such poses.
-        on_axis: Where the wrist centre lies on axis 1 and on axis 2, each of shape (k, n).
-    """
-
-    q: FloatArray
-    reasons: TextArray
-    meeting: dict[SingularFamily, BoolArray]
-    on_axis: tuple[BoolArray, BoolArray]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -60,8 +40,8 @@ class PositionArm:
 
     Two equations A1 u1 + b1(w) = A3 u3 + b3 tie joint 1 to joint 3 (`LoopEquations`). Where axes 2 and 3 meet
     or are parallel A3 has rank 1, and a combination of both equations holds joint 1 alone; where axes 1 and
-    2 do, one that holds joint 3 alone. Each joint then has two roots at most. Otherwise joint 1 is eliminated
-    by |u1| = rho, and a quadric of up to four roots is left.
+    2 do, one that holds joint 3 alone. Each joint then has two roots at most. Otherwise one of them is
+    eliminated, and a quadric of up to four roots is left (`quartic_roots`).
 
     Attributes:
         screws: Of the arm, in units of its size.
@@ -137,20 +117,18 @@ class PositionArm:
             u1, u3 = quartic_roots(self.equations, seen)
             reasons: TextArray = np.full(u3[0].shape, "", dtype=np.object_)
             Reach(self.equations, self.size).tell_place(reasons, np.isnan(u3[0]), seen)
-            meeting: dict[SingularFamily, BoolArray] = {}
+            meeting: Meeting = {}
         else:
             u1, u3, reasons, meeting = self._in_order(seen)
         q, on_axis = self._joints(seen, u1, u3, near)
         if not self.exact:
             q = self._polished(q, target, reasons)
-            self._tell_once(q, reasons, meeting)
+            leave_out_equal(q, self.screws.revolute[:3], self.size, self.branches, reasons, meeting)
         found = np.isfinite(q).all(axis=0)
         meeting = {family: where & found for family, where in meeting.items()}
         return Postures(q, reasons, meeting, (on_axis[0] & found, on_axis[1] & found))
 
-    def _in_order(
-        self, seen: Seen
-    ) -> tuple[FloatArray, FloatArray, TextArray, dict[SingularFamily, BoolArray]]:
+    def _in_order(self, seen: Seen) -> tuple[FloatArray, FloatArray, TextArray, Meeting]:
         """Return u1, u3 of one joint after the other, shape (2, k, n), reasons and where postures meet."""
         equations, (first, third) = self.equations, self._combinations
         a1, a3 = equations.first.coefficients, equations.third.coefficients
@@ -201,23 +179,35 @@ class PositionArm:
 
     def _told_once(
         self, u1: FloatArray, u3: FloatArray, meet1: BoolArray, meet3: BoolArray, reasons: TextArray
-    ) -> tuple[FloatArray, FloatArray, dict[SingularFamily, BoolArray]]:
+    ) -> tuple[FloatArray, FloatArray, Meeting]:
         """Return u1 and u3 with NaN in the second one of two equal postures, and where which ones meet."""
         shape = u1.shape[1:]
         meet1, meet3 = np.broadcast_to(meet1, shape), np.broadcast_to(meet3, shape)
         names = np.array(self.branches, dtype=np.object_).reshape(shape[:2])
-        meeting: dict[SingularFamily, BoolArray] = {}
-        _, third = self._combinations
+        meeting: Meeting = {}
         if meet3.any():
-            far = np.tensordot(third, np.tensordot(self.equations.third.coefficients, u3, 1), 1) > 0.0
-            distance = abs(third[0]) <= RANK
-            for family, where in (("arm stretched", meet3 & far), ("arm withdrawn", meet3 & ~far)):
-                meeting[family if distance else "postures meet"] = where if distance else meet3  # type: ignore[index]
-            _blank(u1, u3, reasons, meet3, names, 1)
+            meeting = self._elbow_families(u3, meet3)
+            leave_out_second(u1, u3, reasons, meet3, names, 1)
         if meet1.any():
-            meeting["postures meet"] = meet1 | meeting.get("postures meet", np.zeros(shape, dtype=bool))
-            _blank(u1, u3, reasons, meet1, names, 0)
+            family = self._side_family
+            meeting[family] = meet1 | meeting.get(family, np.zeros(shape, dtype=bool))
+            leave_out_second(u1, u3, reasons, meet1, names, 0)
         return u1, u3, meeting
+
+    @property
+    def _side_family(self) -> SingularFamily:
+        """The family of poses where both roots of joint 1 are one."""
+        first, _ = self._combinations
+        sideways = abs(first[1]) <= RANK  # the way along axis 2 alone decides
+        return "wrist beside axis 1" if sideways and self.equations.revolute else "postures meet"
+
+    def _elbow_families(self, u3: FloatArray, meet: BoolArray) -> Meeting:
+        """Return the families of poses where both roots of joint 3 are one."""
+        _, third = self._combinations
+        if abs(third[0]) > RANK:  # what joint 3 is solved from is no distance alone
+            return {"postures meet": meet}
+        far = np.tensordot(third @ self.equations.third.coefficients, u3, 1) > 0.0
+        return {"arm stretched": meet & far, "arm withdrawn": meet & ~far}
 
     def _joints(
         self, seen: Seen, u1: FloatArray, u3: FloatArray, near: FloatArray | None
@@ -266,20 +256,6 @@ class PositionArm:
             )
         turned = np.where(self.screws.revolute[:3, None, None], wrapped(better), better * unit)
         return np.where(whole & ~missed, turned, np.nan)
-
-    def _tell_once(self, q: FloatArray, reasons: TextArray, meeting: dict[SingularFamily, BoolArray]) -> None:
-        """Make NaN of every posture that an earlier one equals, and tell that they meet."""
-        turning = self.screws.revolute[:3, None]
-        meet = np.zeros(q.shape[1:], dtype=bool)
-        for first, second in combinations(range(q.shape[1]), 2):
-            away = q[:, first] - q[:, second]
-            away = np.where(turning, wrapped(away), away / self.size)
-            same = np.abs(away).max(axis=0) < SAME
-            meet[first] |= same
-            q[:, second, same] = np.nan
-            reasons[second, same] = f"the same as {self.branches[first]}: both meet here"
-        if meet.any():
-            meeting["postures meet"] = meet | meeting.get("postures meet", np.zeros_like(meet))
 
 
 def position_arm(screws: Screws, wrist: FloatArray) -> PositionArm | None:
@@ -330,16 +306,3 @@ def _oriented(vector: FloatArray) -> tuple[FloatArray, FloatArray]:
     single = single * np.sign(lead)
     other = np.array([single[1], -single[0]]) if abs(single[1]) > RANK else np.array([-single[1], single[0]])
     return single, other
-
-
-def _blank(
-    u1: FloatArray, u3: FloatArray, reasons: TextArray, meet: BoolArray, names: TextArray, axis: int
-) -> None:
-    """Leave out the second one, along an axis of the slots, of two postures that are one."""
-    second: tuple[slice | int, ...] = (slice(None), 1) if axis == 1 else (1,)
-    first: tuple[slice | int, ...] = (slice(None), 0) if axis == 1 else (0,)
-    for u in (u1, u3):
-        u[(slice(None), *second)][:, meet[second]] = np.nan
-    same = np.array([f"the same as {name}: both meet here" for name in names[first]], dtype=np.object_)
-    where = meet[second] & (reasons[second] == "")
-    reasons[second] = np.where(where, same[:, None], reasons[second])

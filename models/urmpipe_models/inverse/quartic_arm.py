@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.inverse.loop_equations import LoopEquations, Seen
+from urmpipe_models.inverse.loop_equations import LoopEquations, Seen, Track
 from urmpipe_models.inverse.solutions import FloatArray
-from urmpipe_models.inverse.trigonometric import quadric_roots
+from urmpipe_models.inverse.tracks import ON_AXIS
+from urmpipe_models.inverse.trigonometric import quadric_roots, wrapped
 
 FAR = 1e-3
 """A prismatic joint beyond 1 / FAR arm's sizes is a root at infinity, moved by rounding: none."""
@@ -15,53 +16,67 @@ FAR = 1e-3
 def quartic_roots(equations: LoopEquations, seen: Seen) -> tuple[FloatArray, FloatArray]:
     """Return u1 and u3 of A1 u1 + b1 = A3 u3 + b3, both on their tracks.
 
-    u1 = G u3 + g, put into |u1|^2 = rho^2 (or u1[1] = u1[0]^2 of a prismatic joint 1), leaves a quadric in
-    cos q3 and sin q3, or a quartic in the way of a prismatic joint 3.
+    The equations give one of both as v = G u + g of the other, which put into |v|^2 = radius^2 (or v[1] =
+    v[0]^2 of a prismatic joint) leaves a quadric in the cosine and the sine of the other joint, or a quartic
+    in its way. The one that is given is that with the better matrix: an arm two of whose axes almost meet or
+    almost are parallel loses no digit then.
 
     Returns:
         u1 and u3, shape (2, 4, n), by rising q3 from where the second equation is largest on; NaN where
         there is none.
     """
-    inverse = np.linalg.inv(equations.first.coefficients)
-    g = inverse @ (equations.constant[:, None] - seen.constant)
-    if equations.third.revolute:
-        largest = np.arctan2(*equations.third.coefficients[1, ::-1])
-        turn = np.array([[np.cos(largest), -np.sin(largest)], [np.sin(largest), np.cos(largest)]])
-        matrix = equations.radius * inverse @ equations.third.coefficients @ turn
-        x = quadric_roots(_circle(matrix, g, seen.radius, equations.first.revolute))
-        unit = np.stack((np.cos(x), np.sin(x)))
-        return _u1(matrix, g, unit), equations.radius * np.tensordot(turn, unit, 1)
-    matrix = inverse @ equations.third.coefficients
-    x = quadric_roots(_in_half_angle(_parabola(matrix, g, seen.radius, equations.first.revolute)))
-    t = np.where(np.abs(np.cos(x / 2)) > FAR, np.tan(x / 2), np.nan)
-    u3 = np.stack((t, t * t))
-    return _u1(matrix, g, u3), u3
+    first, third = equations.first, equations.third
+    offset = equations.constant[:, None] - seen.constant
+    radius = np.full_like(seen.radius, equations.radius)
+    if np.linalg.cond(first.coefficients) <= np.linalg.cond(third.coefficients):
+        u1, u3 = _both(first, seen.radius, third, radius, offset)
+    else:
+        u3, u1 = _both(third, radius, first, seen.radius, -offset)
+    order = np.argsort(_from_largest(third, u3), axis=0)[None]  # NaN last
+    return np.take_along_axis(u1, order, axis=1), np.take_along_axis(u3, order, axis=1)
 
 
-def _u1(matrix: FloatArray, g: FloatArray, unit: FloatArray) -> FloatArray:
-    """Return G u + g."""
-    return np.asarray(np.tensordot(matrix, unit, 1) + g[:, None])
+def _both(
+    given: Track, given_radius: FloatArray, other: Track, radius: FloatArray, offset: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return v and u of A v = B u + offset, v on the track of the given joint, u on that of the other."""
+    inverse = np.linalg.inv(given.coefficients)
+    matrix, g = inverse @ other.coefficients, inverse @ offset
+    a, b, c, d, e, f = _conic(matrix, g, given_radius, given.revolute)
+    if other.revolute:
+        square = radius * radius
+        x = quadric_roots((a * square, b * square, c * square, d * radius, e * radius, f))
+        still = (radius <= ON_AXIS) & (np.abs(f) <= ON_AXIS)  # any angle: one is enough
+        x = np.where(still, np.array([0.0, np.nan, np.nan, np.nan])[:, None], x)
+        u = radius * np.stack((np.cos(x), np.sin(x)))
+    else:
+        x = quadric_roots(_in_half_angle((c, b, a + e, d, f)))
+        t = np.where(np.abs(np.cos(x / 2)) > FAR, np.tan(x / 2), np.nan)
+        u = np.stack((t, t * t))
+    return np.asarray(np.tensordot(matrix, u, 1) + g[:, None]), u
 
 
-def _circle(m: FloatArray, g: FloatArray, radius: FloatArray, revolute: bool) -> list[FloatArray]:
-    """Return the quadric's A to F of |M (c, s) + g|^2 = rho^2, or of (M (c, s) + g)[1] = [0]^2."""
+def _conic(m: FloatArray, g: FloatArray, radius: FloatArray, revolute: bool) -> tuple[FloatArray, ...]:
+    """Return A to F of A x^2 + B x y + C y^2 + D x + E y + F = 0: M (x, y) + g is on a circle or parabola."""
     if revolute:
         (a, b), (_, c) = m.T @ m
         (d, e), f = 2.0 * m.T @ g, (g * g).sum(axis=0) - radius**2
     else:
         a, b, c = -(m[0, 0] ** 2), -m[0, 0] * m[0, 1], -(m[0, 1] ** 2)
         (d, e), f = m[1][:, None] - 2.0 * m[0][:, None] * g[0], g[1] - g[0] ** 2
-    return [np.broadcast_to(one, f.shape) for one in (a, 2.0 * b, c, d, e, f)]
+    return tuple(np.broadcast_to(one, f.shape) for one in (a, 2.0 * b, c, d, e, f))
 
 
-def _parabola(m: FloatArray, g: FloatArray, radius: FloatArray, revolute: bool) -> list[FloatArray]:
-    """Return the quartic's coefficients, the highest power first, of the same with (t, t^2) for (c, s)."""
-    a, b, c, d, e, f = _circle(m, g, radius, revolute)
-    return [c, b, a + e, d, f]
-
-
-def _in_half_angle(p: list[FloatArray]) -> list[FloatArray]:
-    """Return the quadric's A to F in the angle x of a quartic in t = tan(x / 2)."""
-    p4, p3, p2, p1, p0 = p
+def _in_half_angle(quartic: tuple[FloatArray, ...]) -> tuple[FloatArray, ...]:
+    """Return the quadric's A to F in the angle x of a quartic in t = tan(x / 2), the highest power first."""
+    p4, p3, p2, p1, p0 = quartic
     a = (p0 + p4) / 2
-    return [a, (p1 - p3) / 4, (p2 + 2.0 * a) / 4, (p0 - p4) / 2, (p1 + p3) / 4, np.zeros_like(a)]
+    return a, (p1 - p3) / 4, (p2 + 2.0 * a) / 4, (p0 - p4) / 2, (p1 + p3) / 4, np.zeros_like(a)
+
+
+def _from_largest(third: Track, u3: FloatArray) -> FloatArray:
+    """Return how far joint 3 is from where the second equation is largest: an angle or a way."""
+    if not third.revolute:
+        return np.asarray(u3[0])
+    largest = float(np.arctan2(third.coefficients[1, 1], third.coefficients[1, 0]))
+    return wrapped(np.arctan2(u3[1], u3[0]) - largest)

@@ -27,7 +27,8 @@ SingularFamily = Literal[
 """The families in which an arm loses a freedom; two can meet in one pose.
 
 "wrist beside axis 1": as near to axis 1 as the offset of the shoulder lets it come, where the right and the
-left arm meet (UR arms).
+left arm meet. "postures meet" and "flips meet": other folds, where two postures of the arm, or both of a
+wrist that is not square, are one.
 """
 
 NEAREST_POINT = "nearest point"

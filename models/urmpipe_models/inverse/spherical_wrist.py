@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.inverse.angles import turned
-from urmpipe_models.inverse.position_arm import PositionArm, Postures, position_arm
+from urmpipe_models.inverse.position_arm import PositionArm, position_arm
+from urmpipe_models.inverse.postures import Postures
 from urmpipe_models.inverse.solutions import (
     BoolArray,
     FloatArray,
@@ -124,15 +125,13 @@ class SphericalWrist:
             angles.angle.reshape(postures.reasons.shape),
             angles.meet.reshape(postures.reasons.shape),
         )
-        for row, slot in np.argwhere(~reached & (reasons == "")):
+        allowed = f"allowed: {self.wrist.least:.6f} to {self.wrist.most:.6f} rad"
+        for row, slot in np.argwhere(~reached & (reasons == "")).tolist():
             posture = slot // 2, row
             if meet[posture]:
                 reasons[row, slot] = f"the same as {self.branches[slot - 1]}: both meet here"
             elif np.isfinite(angle[posture]):
-                reasons[row, slot] = (
-                    f"axis 6 must stand at {angle[posture]:.6f} rad to axis 4,"
-                    f" allowed: {self.wrist.least:.6f} to {self.wrist.most:.6f} rad"
-                )
+                reasons[row, slot] = f"axis 6 must stand at {angle[posture]:.6f} rad to axis 4, {allowed}"
             else:
                 reasons[row, slot] = "the target is not finite, allowed: finite numbers"
         return reasons

@@ -188,7 +188,7 @@ def test_beside_where_right_and_left_meet(distance: float) -> None:
     solutions = solved(chain, q)
     # two solutions that count as one differ by 4e-6 rad of q1, and by as much more in what turns with it
     assert away_from(chain, solutions, q).min(axis=1).max() < 2e-5
-    meeting = [one for one in solutions.singular if one.family == "postures meet"]
+    meeting = [one for one in solutions.singular if one.family == "wrist beside axis 1"]
     if distance == 0.0:
         (one,) = meeting
         assert one.where.any(axis=1).all()
