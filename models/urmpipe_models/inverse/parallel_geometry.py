@@ -17,6 +17,13 @@ PARALLEL = 1e-10
 MEETING = 1e-11
 """Axes that pass each other by this share of the arm's size meet."""
 
+TILT = 1e-3
+"""The least sine of the angle of axes 1 and 5 to axes 2 to 4, and of axis 6 to axis 5 where these meet."""
+
+PASSING = 1e-3
+"""How far axes 5 and 6 must pass each other where they do not meet, t45 and t56 their angles to axes 4 and 5:
+the distance, of the arm's size, times sin(t56) sin(t45)^2. With 1e-5 a solution may already miss by 1e-7 m."""
+
 ROUNDING = 1e-14
 """Less than this, of 1 or of the arm's size, is the rounding of a right angle or of an offset of 0."""
 
@@ -54,22 +61,22 @@ def parallel_geometry(screws: Screws) -> ParallelGeometry | None:
     """Return the geometry of an arm of six revolute joints with axes 2, 3, 4 parallel; None of any other.
 
     None too where axis 1 or 5 is parallel to these, or two of them are one line: such an arm has a joint too
-    many in the plane and one too few out of it.
+    many in the plane and one too few out of it. None where axes 5 and 6 all but meet (`PASSING`).
     """
     if len(screws.direction) != 6 or not screws.revolute.all():
         return None
     k, p, size = screws.direction, screws.point, screws.size
     z = k[1]
-    if max(_sine(z, k[2]), _sine(z, k[3])) > PARALLEL or min(_sine(z, k[0]), _sine(z, k[4])) < PARALLEL:
+    if max(_sine(z, k[2]), _sine(z, k[3])) > PARALLEL or min(_sine(z, k[0]), _sine(z, k[4])) < TILT:
         return None
     if min(_distance(z, p[2] - p[1]), _distance(z, p[3] - p[2])) < MEETING * size:
         return None
     across = k[0] - z * (z @ k[0])
     x = across / np.linalg.norm(across)
     axes = np.array((x, np.cross(z, x), z))
-    if _sine(k[4], k[5]) < PARALLEL and _distance(k[4], p[5] - p[4]) < MEETING * size:
-        return None
     feet = _common_normal(k[4], p[4], k[5], p[5], MEETING * size)
+    if not _is_wrist(z, k[4], k[5], float(np.linalg.norm(feet[1] - feet[0])) / size):
+        return None
     to_frame = Transform(_rows(axes, ROUNDING), _vector(-axes @ p[1], ROUNDING * size))
     tip = Transform(_rows(screws.rotation), _vector(screws.position))
     k1, k5, k6 = _rows(k[[0, 4, 5]] @ axes.T, ROUNDING)
@@ -78,6 +85,16 @@ def parallel_geometry(screws: Screws) -> ParallelGeometry | None:
     signs = (1.0, float(np.sign(z @ k[2])), float(np.sign(z @ k[3])))
     from_tip = (to_frame @ tip).inverse()
     return ParallelGeometry(to_frame, from_tip, k1, k5, k6, p1, p3, p4, p5, p6, signs, size)
+
+
+def _is_wrist(z: FloatArray, k5: FloatArray, k6: FloatArray, passing: float) -> bool:
+    """Return whether joints 5 and 6 turn axis 6 enough, whose distance is `passing` of the arm's size."""
+    t56 = _sine(k5, k6)
+    if passing == 0.0:
+        return t56 >= TILT
+    if t56 < PARALLEL:
+        return passing > MEETING
+    return passing * t56 * _sine(z, k5) ** 2 >= PASSING
 
 
 def _sine(one: FloatArray, other: FloatArray) -> float:

@@ -56,13 +56,27 @@ def apart(solutions: Solutions, q: FloatArray) -> FloatArray:
     return np.asarray(np.where(solutions.reached, away, np.inf).min(axis=1))
 
 
-def random_arm(rng: np.random.Generator, wrist: str, signs: tuple[int, int] = (1, 1)) -> Chain:
-    """An arm with axes 2, 3, 4 parallel, every other twist and length random, on a base, with a tool."""
+def random_arm(
+    rng: np.random.Generator, wrist: str, signs: tuple[int, int] = (1, 1), spread: float = 0.5
+) -> Chain:
+    """An arm with axes 2, 3, 4 parallel, every other twist and length random, on a base, with a tool.
+
+    Of axes 5 and 6 that pass each other it is drawn again while they all but meet, at most 20 times.
+    """
+    for _ in range(20):
+        chain = drawn_arm(rng, wrist, signs, spread)
+        of_chain = screws(chain)
+        if of_chain is not None and parallel_axes(of_chain, chain.coordinates) is not None:
+            break
+    return chain
+
+
+def drawn_arm(rng: np.random.Generator, wrist: str, signs: tuple[int, int], spread: float) -> Chain:
+    """Draw an arm; axes 5 and 6 pass each other about as far as `spread` in [m]."""
     direction = rng.normal(size=(6, 3))
     direction[2], direction[3] = direction[1] * signs[0], direction[1] * signs[1]
     point = rng.uniform(-0.5, 0.5, (6, 3))
-    if wrist == "meet":
-        point[5] = point[4]
+    point[5] = point[4] + (0.0 if wrist == "meet" else rng.uniform(-spread, spread, 3))
     if wrist == "parallel":
         direction[5] = direction[4]
     direction /= np.linalg.norm(direction, axis=1)[:, None]
@@ -95,6 +109,25 @@ def test_random_arms_with_any_twist_base_and_tool_are_solved(wrist: str) -> None
         solutions = form_of(chain).solve(targets)
         assert_every_solution_meets(chain, targets, solutions, EXACT)
         assert apart(solutions, q).max() < 1e-6  # near singular poses: the root of the rounding
+
+
+def test_axes_5_and_6_that_pass_each_other_closely_leave_all_digits() -> None:
+    rng = np.random.default_rng(9)
+    for number in range(60):
+        chain = random_arm(rng, "pass", spread=0.05)
+        q, targets = poses(chain, 100, number)
+        solutions = form_of(chain).solve(targets)
+        assert_every_solution_meets(chain, targets, solutions, 1e-12)  # 1e-11 without the last polish
+        assert apart(solutions, q).max() < 1e-5
+
+
+@pytest.mark.parametrize("passing", [1e-3, 1e-4, 1e-5, 1e-7, 1e-9])
+def test_axes_5_and_6_that_all_but_meet_are_left_to_the_iterative_solver(passing: float) -> None:
+    of_chain = screws(load_robot("ur5e"))
+    assert of_chain is not None
+    point = of_chain.point.copy()
+    point[5] += passing * np.cross(of_chain.direction[4], of_chain.direction[5])
+    assert parallel_axes(replace(of_chain, point=point), ("a",) * 6) is None
 
 
 def eaik_solutions(chain: Chain, targets: Targets, row: int) -> FloatArray:
@@ -194,6 +227,17 @@ def test_at_singular_poses_the_joints_near_by_are_found_again(family: str) -> No
     assert apart(solutions, q).max() < 1e-5  # the root of the rounding of poses where two branches meet
 
 
+@pytest.mark.parametrize("distance", 10.0 ** np.arange(-12, -3))
+def test_near_an_aligned_wrist_a_stretched_arm_stays_in_reach(distance: float) -> None:
+    chain = load_robot("ur5e")
+    q = singular_joints("wrist aligned", distance)
+    q[:, 2] = distance
+    targets = targets_of(chain, q)
+    solutions = form_of(chain).solve(targets, q)
+    assert_every_solution_meets(chain, targets, solutions, EXACT)
+    assert solutions.reached.any(axis=1).all()
+
+
 def test_straight_up_three_families_meet_and_the_start_is_found() -> None:
     chain = load_robot("ur5e")
     q = np.array([chain.start])
@@ -275,6 +319,8 @@ def test_without_a_shoulder_offset_the_wrist_can_be_on_axis_1_which_leaves_q1_fr
     solutions = form_of(chain).solve(targets)
     assert solutions.reached.any()
     assert_every_solution_meets(chain, targets, solutions, EXACT)
+    met = [one for one, there in zip(solutions.branches, solutions.reached[0], strict=True) if there]
+    assert {one.split(",")[0] for one in met} == {"right", "left"}
     (on_axis,) = [one for one in solutions.singular if one.family == "wrist on axis 1"]
     assert (on_axis.free, on_axis.chosen) == ("a: any value", "a = 0, and pi more for the left arm")
     np.testing.assert_array_equal(on_axis.where, solutions.reached)

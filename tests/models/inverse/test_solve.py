@@ -64,6 +64,22 @@ def test_one_solution_is_the_nearest_of_all_and_keeps_the_name_of_its_branch() -
     assert len(set(one.labels[:, 0])) > 2
 
 
+def test_a_joint_that_a_singular_pose_leaves_free_is_taken_from_the_start() -> None:
+    chain = load_robot("ur5e")
+    q = np.array([0.3, -1.0, 1.2, -0.5, 0.0, 0.8])  # an aligned wrist: q6 is free
+    targets = targets_of(chain, q[None])
+    np.testing.assert_allclose(solve(chain, targets, start=q).q[0, 0], q, atol=1e-9)
+    every = solve(chain, targets, start=q, every=True)
+    assert np.abs(every.q[0] - q).max(axis=1)[every.reached[0]].min() < 1e-9
+    assert [one.chosen[:24] for one in every.singular] == ["wrist_3_joint as near, a"]
+    # all solutions without a start: by the convention, not by the robot's own start
+    turned = replace(chain, start=(*chain.start[:5], 0.8))
+    (aligned,) = solve(turned, targets, every=True).singular
+    assert aligned.chosen.startswith("wrist_3_joint = 0, and pi more for the flipped wrist")
+    (aligned,) = solve(turned, targets).singular
+    assert aligned.chosen.startswith("wrist_3_joint as near")
+
+
 def test_without_a_start_the_one_solution_is_near_the_start_of_the_robot() -> None:
     chain = load_robot("ur5e")
     targets = targets_of(chain, np.array([chain.start]))
