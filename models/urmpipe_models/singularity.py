@@ -33,9 +33,10 @@ class SingularityLog:
     """How far an arm is from losing a freedom, over a log; all 0 in a singular pose.
 
     Attributes:
-        smallest: Smallest singular value of the scaled Jacobian [-], shape (n,): at joint rates of length 1
-            (a prismatic joint's in characteristic lengths) the tool moves by no less than this, in the
-            direction in which it moves least. NaN where q is.
+        smallest: Smallest singular value of the scaled Jacobian [-], shape (n,): how fast joint rates of
+            length 1 move the tool in the direction in which they move it least, in characteristic lengths
+            and radians. Of an arm with fewer joints than rows, among the directions that it has. NaN where
+            q is.
         manipulability: sqrt(det(J J^T)), the volume of the velocity ellipsoid but for a constant, of the
             Jacobian in SI units, shape (n,); sqrt(det(J^T J)) of an arm with fewer joints than rows.
         determinant: det J in SI units, shape (n,); None where J is not square.
@@ -55,9 +56,9 @@ def singularity_over_log(
 ) -> SingularityLog:
     """Return how far an arm is from a singular pose at every row of q.
 
-    Metres and radians make no common singular value, so that it depends on the unit. The rows of the
-    velocity are divided by a characteristic length L, and the columns of prismatic joints multiplied by
-    it: diag(1/L, 1) J diag(1 or L) has no unit, and is the same for an arm and its scale model.
+    Singular values of a Jacobian in metres and radians would depend on the unit of length. So the rows of
+    the velocity are divided by a characteristic length L, and the columns of prismatic joints multiplied
+    by it: diag(1/L, 1) J diag(1 or L) has no unit, and is the same for an arm and its scale model.
 
     Args:
         chain: The arm, its tool included.
