@@ -22,7 +22,7 @@ TILT = 1e-3
 
 PASSING = 1e-3
 """How far axes 5 and 6 must pass each other where they do not meet, t45 and t56 their angles to axes 4 and 5:
-the distance, of the arm's size, times sin(t56) sin(t45)^2. With 1e-5 a solution may already miss by 1e-7 m."""
+the distance, of the arm's size, times sin(t56) sin(t45)^2. With 1e-5 a solution may miss by 1e-7 m."""
 
 ROUNDING = 1e-14
 """Less than this, of 1 or of the arm's size, is the rounding of a right angle or of an offset of 0."""
