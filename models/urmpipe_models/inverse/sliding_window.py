@@ -23,7 +23,7 @@ from urmpipe_models.inverse.solutions import BoolArray, FloatArray
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.task import task_of
 
-LONGEST = 256
+LONGEST = 384
 """Samples of a window: NumPy outweighs Python, and the samples at the back are still worth their sweeps."""
 
 MET = 9e-10

@@ -272,6 +272,17 @@ def test_far_apart_samples_are_followed_one_by_one() -> None:
     assert path.jumps == ()
 
 
+def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:
+    arm = planar(3)
+    angles = np.append(np.linspace(0.0, 9.0, 400), [10.5, 12.0])
+    circle = np.column_stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), np.zeros(402)))
+    start = np.array([0.8, -0.9, -0.9])
+    path = follow(arm, Targets(circle), times(402), start=start)
+    assert_met(path, Targets(circle))
+    assert path.q[-1, 0] - path.q[0, 0] > 9.0
+    assert np.abs(np.diff(path.q[-3:], axis=0)).max() < 2.0  # rad: the base turns by about 1.5 a step
+
+
 def test_the_same_seed_gives_the_same_motion_bit_for_bit() -> None:
     arm = planar(3)
     rng = np.random.default_rng(5)
