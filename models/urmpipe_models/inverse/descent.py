@@ -87,7 +87,7 @@ class Progress:
         """Return the progress of rows that have not moved from q, shape (n, joints)."""
         n = len(q)
         return cls(
-            np.ascontiguousarray(q.T),
+            np.array(q.T, order="C"),
             np.full(n, FIRST_GAIN),
             np.zeros(n, np.intp),
             np.full(n, np.nan),
@@ -208,8 +208,10 @@ def _marquardt(rows: Rows, J: FloatArray, settings: Settings) -> Rows:
     foreseen = square - dot_product(left, left)
     new = rows.task.miss(q)
     gained = square - new.square
-    factors = np.where(gained > 0.75 * foreseen, 0.125, np.where(gained < 0.25 * foreseen, 4.0, 1.0))
-    refused = np.flatnonzero(~((gained > LEAST_RATIO * foreseen) & (foreseen > 0.0)))
+    taken = (gained > LEAST_RATIO * foreseen) & (foreseen > 0.0)  # limits can make it less than 0
+    good, poor = taken & (gained > 0.75 * foreseen), ~taken | (gained < 0.25 * foreseen)
+    factors = np.where(good, 0.125, np.where(poor, 4.0, 1.0))
+    refused = np.flatnonzero(~taken)
     if len(refused):
         q[:, refused] = rows.q[:, refused]
         new.restore(refused, now)

@@ -139,7 +139,7 @@ def _run(
     progress: Progress, chain: Chain, targets: Targets, settings: Settings, iterations: int, threads: int
 ) -> None:
     """Take every row to its end, or as many steps as are allowed."""
-    pending = np.arange(len(targets))
+    pending = np.flatnonzero(_finite(targets) & np.isfinite(progress.q).all(axis=0))
 
     def work(index: IntArray) -> None:
         """Take the rows of a block some steps further."""
@@ -151,6 +151,14 @@ def _run(
         pending = pending[~progress.ended[pending]]
         if not len(pending):
             return
+
+
+def _finite(targets: Targets) -> BoolArray:
+    """Return where a target is made of numbers."""
+    finite = np.isfinite(targets.position).all(axis=1)
+    if targets.rotation is not None:
+        finite &= np.isfinite(targets.rotation).all(axis=(1, 2))
+    return np.asarray(finite)
 
 
 def _settled(

@@ -65,7 +65,7 @@ def solve_iteratively(
     search.attempt(begin[None], every)
     starts = random_starts(chain, restarts, seed)[:, None]
     for some in [starts] if every else _growing(starts):
-        if every or search.pending.any():
+        if len(some) and (every or search.pending.any()):
             search.attempt(some, every)
     solutions = within_limits(chain, _solutions(chain, search, begin, every), begin)
     return _told(chain, targets, solutions, search, restarts, tolerance)
@@ -131,11 +131,11 @@ class _Search:
         found[:, rows] = np.where(refined.converged[:, None], refined.q, np.nan).reshape(count, -1, joints)
         self.found.extend(found)
         self.pending[rows] &= ~refined.converged.reshape(count, -1).any(axis=0)
-        self._keep_nearest(rows, refined)
+        self._keep_nearest(rows, refined, count)
 
-    def _keep_nearest(self, rows: IntArray, refined: Refined) -> None:
-        """Keep where the tool came nearest to the targets at `rows`, of as many attempts as there are."""
-        residual = np.where(np.isnan(refined.residual), np.inf, refined.residual).reshape(-1, len(rows))
+    def _keep_nearest(self, rows: IntArray, refined: Refined, count: int) -> None:
+        """Keep where the tool came nearest to the targets at `rows` in as many attempts."""
+        residual = np.where(np.isnan(refined.residual), np.inf, refined.residual).reshape(count, -1)
         best = np.argmin(residual, axis=0)
         nearer = residual.min(axis=0) < self.residual[rows]
         of, to = (best * len(rows) + np.arange(len(rows)))[nearer], rows[nearer]

@@ -28,7 +28,7 @@ def test_a_positive_definite_system_is_solved_as_lapack_solves_it(k: int) -> Non
 @pytest.mark.parametrize("k", SIZES)
 def test_a_damped_system_is_that_with_the_damping_on_the_diagonal(k: int) -> None:
     A, b = gram(matrices(k, 2)), matrices(k, 1)[:, 0]
-    damping = np.random.default_rng(1).uniform(0.1, 1.0, b.shape[1])
+    damping = np.random.default_rng(1).uniform(0.1, 1.0, (b.shape[1],))
     damped = A.transpose(2, 0, 1) + damping[:, None, None] * np.eye(k)
     peer = np.linalg.solve(damped, b.T[..., None])[..., 0].T
     np.testing.assert_allclose(factor(A, damping).solve(b), peer, rtol=1e-10, atol=1e-12)  # condition < 1e3
