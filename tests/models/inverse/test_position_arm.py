@@ -97,3 +97,14 @@ def test_an_arm_that_is_almost_special_loses_no_digit(parameter: str, off: float
         count += len(q)
     # taken for special up to 1e-6, and polished from there: next to a fold a posture may be lost
     assert lost <= (0.01 * count if 1e-8 <= off <= 1e-6 else 0)
+
+
+@pytest.mark.parametrize("off", [1e-7, 1e-8, 1e-10, 1e-12])
+def test_an_arm_that_is_almost_special_twice_loses_no_posture(off: float) -> None:
+    generator = np.random.default_rng(16)
+    chain = random_arm(generator, "plain", "RRR", a1=off, alpha2=off)
+    q = random_joints(generator, chain, 200)
+    targets = targets_of(chain, q)
+    solutions = inverse_of(chain).solve(targets)
+    assert_reached(chain, targets, solutions)
+    assert away_from(chain, solutions, q).min(axis=1).max() < 2e-5

@@ -200,6 +200,22 @@ def _crowded(chain: Chain, q: FloatArray) -> NDArray[np.bool_]:
     return np.asarray(near.any(axis=(1, 2)))
 
 
+@pytest.mark.parametrize("special", ["axes 2 and 3 parallel", "like a PUMA", "anthropomorphic"])
+def test_an_elbow_joint_that_counts_the_other_way_changes_no_branch(special: str) -> None:
+    generator = np.random.default_rng(14)
+    chain = random_arm(generator, special)
+    joints = list(chain.joints)
+    x, y, z = joints[2].axis
+    joints[2] = Joint("other way", "revolute", joints[2].origin, (-x, -y, -z))
+    other = Chain("other way", tuple(joints), tip=chain.tip, base=chain.base, tool=chain.tool)
+    q = random_joints(generator, chain, 50)
+    one, two = (inverse_of(arm).solve(targets_of(chain, q)) for arm in (chain, other))
+    np.testing.assert_array_equal(one.reached, two.reached)
+    away = one.q * [1.0, 1.0, -1.0, 1.0, 1.0, 1.0] - two.q
+    away -= 2 * math.pi * np.round(away / (2 * math.pi))
+    np.testing.assert_allclose(away[one.reached], 0.0, rtol=0, atol=1e-7)
+
+
 def test_a_branch_keeps_its_name_along_a_path_without_singular_poses() -> None:
     generator = np.random.default_rng(11)
     for special in SPECIAL:

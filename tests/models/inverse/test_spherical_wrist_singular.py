@@ -163,6 +163,17 @@ def test_just_beside_a_singular_pose_every_solution_still_reaches(distance: floa
     assert solutions.reached.any(axis=1).all()
 
 
+@pytest.mark.parametrize("distance", [10.0**-k for k in range(3, 13)])
+def test_just_beside_an_aligned_wrist_of_an_arm_askew_every_solution_still_reaches(distance: float) -> None:
+    """Axes along no axis of the world: what is nearly along one is no small coordinate."""
+    generator = np.random.default_rng(15)
+    q = generator.uniform(-3.0, 3.0, (60, 6))
+    chain = random_arm(generator, "like a PUMA", "RRR", theta5=0.0, alpha4=math.pi / 2, alpha5=-math.pi / 2)
+    q[:, 4] = distance * generator.uniform(-1.0, 1.0, 60)
+    solutions = solved(chain, q)
+    assert solutions.reached.any(axis=1).all()
+
+
 def with_offset_shoulder() -> Chain:
     """An arm whose plane passes axis 1 by 0.15 m, on its base."""
     rows = [
