@@ -76,7 +76,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
     show_default=True,
     help="Random starts of the iterative solver where the first fails.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the random starts.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random starts.")
 @strict_option
 @table_options
 @robot_options
