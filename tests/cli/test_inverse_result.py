@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -47,6 +48,19 @@ def test_a_file_matrices_and_targets_are_one_and_the_same(tmp_path: Path) -> Non
     assert (of_file.name, of_targets.name) == ("targets", "targets")
     one = urmpipe.ik(matrices(TARGETS)[1], "arm6")
     assert np.array_equal(one.solutions.q[0], of_targets.solutions.q[1], equal_nan=True)
+
+
+def test_a_transposed_pose_is_none_and_stops_no_other() -> None:
+    poses = matrices(TARGETS)
+    poses[1] = poses[1].T
+    x, y, z = TARGETS.position[1]
+    found = urmpipe.ik(poses, "arm6")
+    assert found.reasons == [
+        None,
+        f"the last row of the matrix is {x:g}, {y:g}, {z:g}, 1, allowed: 0, 0, 0, 1",
+    ]
+    alone = urmpipe.ik(poses[:1], "arm6")
+    assert np.array_equal(found.solutions.q[:1], alone.solutions.q, equal_nan=True)
 
 
 @settings(max_examples=25, deadline=None)
@@ -161,7 +175,26 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
         ),
         ({"targets": np.zeros((0, 3))}, "targets: found none, allowed: one or more"),
         ({"t": [0.0]}, "t: found shape (1,), allowed: (2,), one time for each target, in s"),
-        ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: finite, strictly increasing"),
+        (
+            {"targets": [[0.0, 0.1], [0.0]]},
+            "targets: found a list that is no array of numbers, allowed: (n, 3),",
+        ),
+        ({"targets": {"x": 0.1}}, "targets: found a dict that is no array of numbers, allowed: (n, 3),"),
+        (
+            {"targets": pd.DataFrame({"z": [0.2], "y": [0.0], "x": [0.1]})},
+            "targets: found a table, allowed: an array of shape (n, 3), positions in m, or (n, 4, 4), poses, such"
+            ' as table[["x", "y", "z"]].to_numpy()',
+        ),
+        ({"t": "ab"}, "t: found a str that is no array of numbers, allowed: numbers"),
+        (
+            {"t": [0.0, 1e-12]},
+            "t: found times that do not increase, allowed: strictly increasing, by 1 ns or",
+        ),
+        ({"t": [0.0, 1e12]}, "t: found a time that is not finite or too large, allowed: up to 9e+09 s"),
+        ({"t": [0.0, np.nan]}, "t: found a time that is not finite or too large, allowed: up to 9e+09 s"),
+        ({"tsp": 0.0}, "tsp: found 0.0, allowed: a positive time in s"),
+        ({"tsp": np.nan}, "tsp: found nan, allowed: a positive time in s"),
+        ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: strictly increasing, by 1 ns or"),
         ({"t": [0.0, 1.0], "tsp": 1.0}, "found t and tsp, allowed: one of both"),
         ({"start": [0.0]}, "--start: found 1 values, allowed: 6, one for each of theta1, "),
         ({"start": "zero"}, "--start: found 'zero', allowed: 6, one for each of theta1, "),
