@@ -58,7 +58,12 @@ def _branches(result: InverseResult) -> Iterator[str]:
     first = np.flatnonzero(np.r_[True, branch[1:] != branch[:-1]])
     last = np.append(first[1:], len(branch)) - 1
     for a, b in zip(first, last, strict=True):
-        yield str(branch[a]) + ("" if len(first) == 1 else f" (rows {row[a]}-{row[b]})")
+        yield str(branch[a]) + ("" if len(first) == 1 else f" ({_rows(row[a], row[b])})")
+
+
+def _rows(first: int, last: int) -> str:
+    """Return a stretch of rows in words."""
+    return f"row {first}" if first == last else f"rows {first}-{last}"
 
 
 def _jump(result: InverseResult, jump: Jump) -> str:
