@@ -10,7 +10,13 @@ import numpy as np
 from urmpipe.inverse_asked import Asked
 from urmpipe.inverse_blocks import solve_in_blocks
 from urmpipe.inverse_result import IndexArray, InverseResult, missed_by
-from urmpipe.inverse_wording import far_warnings, shortfall_warnings, singular_warnings
+from urmpipe.inverse_wording import (
+    far_warnings,
+    near_singular_warnings,
+    shortfall_warnings,
+    singular_warnings,
+    start_warnings,
+)
 from urmpipe_models.inverse.joint_path import JointPath
 from urmpipe_models.inverse.limits import periods
 from urmpipe_models.inverse.path import follow
@@ -96,7 +102,9 @@ def _result(
     reached = np.asarray(solutions.reached.any(axis=1))
     warnings = (
         *given.warnings,
+        *start_warnings(asked.arm, asked.start),
         *singular_warnings(solutions, given.row, listed),
+        *(_nearly_singular(asked, solutions, listed) if path is None else ()),
         *shortfall_warnings(solutions, given.row),
         *_far(asked, reached),
     )
@@ -105,6 +113,12 @@ def _result(
         t_ns=given.t_ns, targets=given.targets, solutions=solutions, chosen=chosen, miss=miss, angle=angle,
         path=path, warnings=warnings,
     )  # fmt: skip
+
+
+def _nearly_singular(asked: Asked, solutions: Solutions, listed: BoolArray) -> Iterator[LogWarning]:
+    """Yield a warning of solutions that are nearly singular; of a path its nearest point is printed."""
+    poses = asked.given.targets.rotation is not None
+    return near_singular_warnings(asked.arm, solutions, asked.given.row, listed, orientation=poses)
 
 
 def _far(asked: Asked, reached: BoolArray) -> Iterator[LogWarning]:

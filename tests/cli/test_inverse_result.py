@@ -182,8 +182,8 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
         ({"targets": {"x": 0.1}}, "targets: found a dict that is no array of numbers, allowed: (n, 3),"),
         (
             {"targets": pd.DataFrame({"z": [0.2], "y": [0.0], "x": [0.1]})},
-            "targets: found a table, allowed: an array of shape (n, 3), positions in m, or (n, 4, 4), poses, such"
-            ' as table[["x", "y", "z"]].to_numpy()',
+            "targets: found a table, allowed: an array of shape (n, 3), positions in m, or (n, 4, 4), poses,"
+            ' such as table[["x", "y", "z"]].to_numpy()',
         ),
         ({"t": "ab"}, "t: found a str that is no array of numbers, allowed: numbers"),
         (
