@@ -25,14 +25,15 @@ SHOWN = 10
 
 def print_path(console: Console, result: InverseResult, path: JointPath) -> None:
     """Print how the joints follow a path: a summary, not its samples."""
-    if not result.reached.any():
+    nearest = path.nearest_singularity
+    if nearest is None:
         return
-    for line in _lines(result, path):
+    for line in _lines(result, path, nearest):
         console.print(f"      {line}", soft_wrap=True)
     print_columns(console, "Joints along the path", list(_columns(result)))
 
 
-def _lines(result: InverseResult, path: JointPath) -> Iterator[str]:
+def _lines(result: InverseResult, path: JointPath, nearest: int) -> Iterator[str]:
     """Yield what is to be said of the way."""
     yield f"branch: {'; '.join(_capped(list(_branches(result))))}"
     yield from _capped([_jump(result, one) for one in path.jumps])
@@ -41,7 +42,7 @@ def _lines(result: InverseResult, path: JointPath) -> Iterator[str]:
         f" allowed, {_at(result, one.first)} to row {result.row[one.last]}"
         for one in path.too_fast
     ])  # fmt: skip
-    yield _nearest_singular(result, path)
+    yield _nearest_singular(result, path, nearest)
     yield _furthest(result)
 
 
@@ -73,10 +74,9 @@ def _jump(result: InverseResult, jump: Jump) -> str:
     return f"jump {_at(result, jump.sample)}, at ({text.point(jump.position)}) m: {ways}{steps}"
 
 
-def _nearest_singular(result: InverseResult, path: JointPath) -> str:
+def _nearest_singular(result: InverseResult, path: JointPath, nearest: int) -> str:
     """Return where the path comes nearest to a singular pose, and how near."""
     found = path.singularity
-    nearest = int(np.nanargmin(found.smallest))
     return (
         f"nearest to a singularity {_at(result, nearest)}: smallest singular value"
         f" {found.smallest[nearest]:.4g}, manipulability {found.manipulability[nearest]:.4g}"

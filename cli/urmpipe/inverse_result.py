@@ -134,8 +134,17 @@ class InverseResult:
         return found | {"output": self.output}
 
     def _way(self, path: JointPath) -> dict[str, Any]:
-        """Return the jumps of a path and the joints that are too fast as --json has them."""
+        """Return what --json has of a path: its jumps, joints too fast, and its nearest singularity."""
+        nearest = path.nearest_singularity
         return {
+            "singularity": None
+            if nearest is None
+            else {
+                "row": int(self.row[nearest]),
+                "t": self._time(nearest),
+                "smallest": float(path.singularity.smallest[nearest]),
+                "manipulability": float(path.singularity.manipulability[nearest]),
+            },
             "jumps": [
                 {
                     "row": int(self.row[one.sample]),

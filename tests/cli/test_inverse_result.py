@@ -17,6 +17,7 @@ import urmpipe
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.inverse.targets import misses, targets_of
 from urmpipe_models.orientation import quaternions
+from urmpipe_models.singularity import singularity_over_log
 from urmpipe_pipeline.results import json_ready
 
 FloatArray = NDArray[np.float64]
@@ -149,6 +150,17 @@ def test_arrays_with_times_are_a_path() -> None:
     assert with_times.to_dict()["targets"][0]["t"] == 5.0
     assert with_times.to_frame()["t"].tolist() == pytest.approx((5.0 + 0.01 * np.arange(30)).tolist())
     assert json.loads(json.dumps(json_ready(by_period.to_dict())))["verdict"] == "pass"
+
+
+def test_a_path_tells_where_it_comes_nearest_to_a_singular_pose() -> None:
+    q = np.tile(Q[0], (30, 1))
+    q[:, 4] = 0.3 + np.abs(np.arange(30) - 11) / 30  # sigma falls with sin theta5
+    found = urmpipe.ik(targets_of(ARM, q), ARM, tsp=0.01, start=q[0].tolist()).to_dict()["singularity"]
+    log = singularity_over_log(ARM, q)
+    assert (found["row"], found["t"]) == (12, 0.11)
+    assert found["smallest"] == pytest.approx(log.smallest[11], rel=1e-9)
+    assert found["manipulability"] == pytest.approx(log.manipulability[11], rel=1e-9)
+    assert urmpipe.ik(np.full((2, 3), 9.0), ARM, tsp=0.01, restarts=0).to_dict()["singularity"] is None
 
 
 def test_joints_without_limits_can_be_written_within_pi() -> None:
