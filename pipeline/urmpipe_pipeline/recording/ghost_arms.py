@@ -14,7 +14,7 @@ from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import ghost_colour
 from urmpipe_pipeline.recording.entities import Place, branch_entity, branch_keys, printable
 from urmpipe_pipeline.recording.ghost_names import name_places, placed_names
-from urmpipe_pipeline.recording.ways import thinned
+from urmpipe_pipeline.recording.ways import Gone, thinned
 from urmpipe_pipeline.results import Run
 
 STUB = 0.1
@@ -42,8 +42,7 @@ class GhostArm:
         named: Where the name stands in each pose, shape (m,): which of `name_places`.
         thin: True of every second branch. Two that differ in the turn of the wrist alone have all their links
             in common: then one is seen inside the other.
-        gone_ns: Times from which on there is no such solution in integer [ns], shape (g,).
-        gone_sample: The grid sample at each, shape (g,).
+        gone: From when on there is no such solution.
     """
 
     name: str
@@ -57,8 +56,7 @@ class GhostArm:
     links: int
     named: IntArray
     thin: bool
-    gone_ns: IntArray
-    gone_sample: IntArray
+    gone: Gone
 
 
 def ghost_arms(run: Run, place: Place) -> tuple[GhostArm, ...]:
@@ -78,21 +76,19 @@ def _ghost_arm(run: Run, robot: Chain, ghost: Ghost, number: int, root: str, nam
     """Return a branch as an arm; `named` tells where its name stands in each of its poses."""
     rows = _drawn_rows(run, ghost.t_ns)
     start, end = bones_of(robot, ghost.q[rows])
-    gone = gone_times(run, ghost.t_ns)
     return GhostArm(
         name=printable(ghost.name),
         entity=f"{root}/arm",
         label=f"{root}/name",
         colour=ghost_colour(number),
         t_ns=ghost.t_ns[rows],
-        sample=samples_at(run, ghost.t_ns[rows]),
+        sample=_rows_at(run.t_ns, ghost.t_ns[rows]),
         start=start,
         end=end,
         links=len(robot.joints),
         named=named[rows],
         thin=bool(number % 2),
-        gone_ns=gone,
-        gone_sample=samples_at(run, gone),
+        gone=gone_after(run, ghost.t_ns),
     )
 
 
@@ -131,15 +127,11 @@ def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def gone_times(run: Run, t_ns: IntArray) -> IntArray:
-    """Return the times of the rows of a run at which something that is at other rows has just ended."""
+def gone_after(run: Run, t_ns: IntArray) -> Gone:
+    """Return when something that is at some rows of a run has just ended: at the next row."""
     there = np.isin(run.log.t_ns, t_ns)
-    return run.log.t_ns[1:][there[:-1] & ~there[1:]]
-
-
-def samples_at(run: Run, t_ns: IntArray) -> IntArray:
-    """Return the last grid sample at or before each time; the first at none."""
-    return _rows_at(run.t_ns, t_ns)
+    gone = run.log.t_ns[1:][there[:-1] & ~there[1:]]
+    return Gone(gone, _rows_at(run.t_ns, gone))
 
 
 def _drawn_rows(run: Run, t_ns: IntArray) -> IntArray:

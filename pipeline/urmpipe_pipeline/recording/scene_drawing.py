@@ -57,9 +57,9 @@ def _draw_arm(stream: RecordingStream, arm: Arm, size: float) -> None:
 
     for body in arm.bodies:
         draw_body(stream, body, time_columns(arm.t_ns, "sample", arm.sample))
-        if len(arm.gone_ns):
-            gone = time_columns(arm.gone_ns, "sample", arm.gone_sample)
-            hide_body(stream, body, gone, len(arm.gone_ns))
+        if len(arm.gone.t_ns):
+            gone = time_columns(arm.gone.t_ns, "sample", arm.gone.sample)
+            hide_body(stream, body, gone, len(arm.gone.t_ns))
     skeleton = arm.skeleton.astype(np.float32)
     if arm.bare:
         _draw_links(stream, arm, skeleton, size)
@@ -70,7 +70,7 @@ def _draw_arm(stream: RecordingStream, arm: Arm, size: float) -> None:
     count, points = skeleton.shape[:2]
     columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3)).partition(np.full(count, points))
     stream.send_columns("/robot/joints", time_columns(arm.t_ns, "sample", arm.sample), columns)
-    send_gone(stream, "/robot/joints", arm.gone_ns, arm.gone_sample, rr.Points3D.columns(positions=[]))
+    send_gone(stream, "/robot/joints", arm.gone, rr.Points3D.columns(positions=[]))
 
 
 def _draw_links(stream: RecordingStream, arm: Arm, skeleton: Skeleton, size: float) -> None:
@@ -83,7 +83,7 @@ def _draw_links(stream: RecordingStream, arm: Arm, skeleton: Skeleton, size: flo
         rows = slice(start, start + STRIPS)
         times = time_columns(arm.t_ns[rows], "sample", arm.sample[rows])
         stream.send_columns("/robot/links", times, rr.LineStrips3D.columns(strips=skeleton[rows]))
-    send_gone(stream, "/robot/links", arm.gone_ns, arm.gone_sample, rr.LineStrips3D.columns(strips=[]))
+    send_gone(stream, "/robot/links", arm.gone, rr.LineStrips3D.columns(strips=[]))
 
 
 def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:
@@ -107,6 +107,7 @@ def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:
     for entity in entities:
         columns = rr.Points3D.columns(positions=track.position.astype(np.float32))
         stream.send_columns(entity, times, columns)
+        send_gone(stream, entity, way.gone, rr.Points3D.columns(positions=[]))
 
 
 def _label(text: str) -> Points3D:

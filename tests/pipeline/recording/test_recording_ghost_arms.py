@@ -152,8 +152,12 @@ def test_a_ghost_is_gone_where_there_is_no_such_solution(
 def test_the_arm_is_gone_where_a_target_has_no_solution(make_solved: MakeSolved, tmp_path: Path) -> None:
     path = write_recording(make_solved(), tmp_path / "solved.rrd")
     expected = dict.fromkeys((*range(5), *range(9, 40)), 1) | {5: 0}
-    for entity, name in (("joints", "Points3D:positions"), ("links", "LineStrips3D:strips")):
-        found = {at // STEP_NS: row for at, row in rows_of(path, f"/robot/{entity}", name).items()}
+    for entity, name in (
+        ("robot/joints", "Points3D:positions"),
+        ("robot/links", "LineStrips3D:strips"),
+        ("point/targets", "Points3D:positions"),
+    ):
+        found = {at // STEP_NS: row for at, row in rows_of(path, f"/{entity}", name).items()}
         assert {row: min(len(values), 1) for row, values in found.items()} == expected
 
 
@@ -172,7 +176,7 @@ def test_the_arm_of_a_log_stays_where_a_sample_is_missing(make_solved: MakeSolve
     run = replace(make_solved(), goals=None, ghosts=())
     arm = scene_of(run).arm
     assert arm is not None
-    assert len(arm.gone_ns) == 0
+    assert len(arm.gone.t_ns) == 0
 
 
 # --- which is which --------------------------------------------------------------------------------
@@ -350,7 +354,7 @@ def test_a_branch_of_one_pose_is_drawn() -> None:
         "one", load_robot("ur5e"), None, q, goals=goals, ghosts=[Ghost("b", row_times(1), q + 1)]
     )
     (ghost,) = scene_of(run).ghosts
-    assert (len(ghost.t_ns), len(ghost.gone_ns)) == (1, 0)
+    assert (len(ghost.t_ns), len(ghost.gone.t_ns)) == (1, 0)
 
 
 # --- the plots -------------------------------------------------------------------------------------
