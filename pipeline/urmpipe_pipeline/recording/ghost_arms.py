@@ -108,10 +108,10 @@ def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     Args:
         robot: The arm.
-        q: Joint values in [rad] or [m], shape (m, joints).
+        q: Joint values in [rad] or [m], shape (m, joints); NaN where there is no pose.
 
     Returns:
-        Where each line starts and where it ends in [m], shape (m, lines, 3) each.
+        Where each line starts and where it ends in [m], shape (m, lines, 3) each; NaN where there is no pose.
     """
     points = points_over_log(robot, q)
     position, rotation = frames_over_log(robot, q)
@@ -119,7 +119,8 @@ def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     axes = np.array([robot.joints[k].axis for k in turning])
     moved = np.array(turning) + 1  # frame 0 is the base's
     direction = np.einsum("mkij,kj->mki", rotation[:, moved], axes)
-    reach = float(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1).max(initial=0.0))
+    lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    reach = float(np.fmax.reduce(lengths, initial=0.0))
     stubs = position[:, moved] + STUB * reach * direction
     return (
         np.concatenate((points[:, :-1], position[:, moved]), axis=1),

@@ -94,6 +94,16 @@ def test_the_turn_of_a_wrist_shows_in_the_axes_of_its_joints_alone() -> None:
     np.testing.assert_allclose(apart, expected, rtol=0, atol=1e-15)
 
 
+def test_a_pose_that_is_missing_takes_no_bone_from_the_others() -> None:
+    arm = load_robot("arm6")
+    q = np.array([[0.3, 0.4, 0.5, 0.6, 0.7, 0.8], [np.nan] * 6])
+    for both, alone in zip(bones_of(arm, q), bones_of(arm, q[:1]), strict=True):
+        np.testing.assert_allclose(
+            both[:1], alone, rtol=0, atol=1e-15
+        )  # cos of one value or of two: rounding
+        assert np.isnan(both[1, -1]).all()
+
+
 @pytest.mark.parametrize("timed", [True, False])
 def test_each_ghost_is_drawn_where_its_joints_put_it(
     timed: bool, make_solved: MakeSolved, tmp_path: Path
