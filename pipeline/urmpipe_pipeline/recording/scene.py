@@ -27,8 +27,9 @@ from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.simulation import Result, Simulation
 from urmpipe_pipeline.trajectory import Trajectory
 
-NEAR = 1.5
-"""Targets that are missed are in view if they are not further from the middle than so many radii."""
+NEAR = 3.0
+"""Targets that are missed are in view if they are not further from the middle than so many radii: at that
+place one leaves the arm half of the view, and one that is out of reach by less must be seen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
