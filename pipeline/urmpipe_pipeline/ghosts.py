@@ -55,6 +55,10 @@ class Goals:
         """True where the arm has no pose, shape (n,)."""
         return np.array([bool(reason) for reason in self.reasons], dtype=np.bool_)
 
+    def why(self, index: int) -> str:
+        """Return why the arm has no pose for a target: of several reasons, which "; " joins, the first."""
+        return self.reasons[index].split("; ")[0]
+
 
 def ghosts_of(solutions: Solutions, t_ns: IntArray) -> tuple[Ghost, ...]:
     """Return a ghost a branch that has a solution anywhere.

@@ -131,13 +131,13 @@ def _refuse_misplaced(
 
 
 def _unreachable(present: BoolArray, goals: Goals) -> Iterator[LogWarning]:
-    """Yield how many targets the arm has no pose for, and why it has none for the first."""
+    """Yield how many targets the arm has no pose for, and why it has none for the first, at its row."""
     missed = np.flatnonzero(~present)
     if len(missed):
         first = int(missed[0])
-        reason = goals.reasons[first]
-        where = f"the first in row {first + 1}" + (f" ({reason})" if reason else "")
-        said = f"{len(missed)} of {len(present)} targets have no solution, {where}: the run has no pose there"
+        here = ", here the first" if len(missed) > 1 else ""
+        why = f": {goals.why(first)}" if goals.reasons[first] else ""
+        said = f"no pose of the run for {len(missed)} of {len(present)} targets{here}{why}"
         yield LogWarning("unreachable", said, first + 1)
 
 

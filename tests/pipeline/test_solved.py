@@ -84,14 +84,16 @@ def test_nothing_is_interpolated_across_unreachable_targets(timed: bool) -> None
     q[3:5] = np.nan
     q[7, 2] = np.nan  # a solution lacks a joint: it is none
     times = np.arange(9) * STEP_NS if timed else row_times(9)
-    goals = goals_of(targets_of(UR5E, way(9)), times, [None] * 3 + ["too far", "too far", *([None] * 4)])
+    goals = goals_of(
+        targets_of(UR5E, way(9)), times, [None] * 3 + ["too far; too near", "too far", *([None] * 4)]
+    )
     run = solved("targets", UR5E, times if timed else None, q, goals=goals)
     missing = [3, 4, 7]
     assert run.tcp is not None
     for values in (run.q, run.log.q, run.tcp.position):
         assert np.flatnonzero(np.isnan(values).all(axis=1)).tolist() == missing
         assert np.isfinite(np.delete(values, missing, axis=0)).all()
-    said = "3 of 9 targets have no solution, the first in row 4 (too far): the run has no pose there"
+    said = "no pose of the run for 3 of 9 targets, here the first: too far"
     assert run.warnings == (LogWarning("unreachable", said, 4),)
 
 
@@ -165,8 +167,10 @@ def test_where_nothing_is_reachable_there_is_a_run_without_poses() -> None:
     for times in (None, np.arange(5) * STEP_NS):
         run = solved("far", UR5E, times, np.full((5, 6), np.nan))
         assert np.isnan(run.q).all()
-        said = "5 of 5 targets have no solution, the first in row 1: the run has no pose there"
+        said = "no pose of the run for 5 of 5 targets, here the first"
         assert run.warnings == (LogWarning("unreachable", said, 1),)
+        alone = solved("far", UR5E, None if times is None else times[:1], np.full((1, 6), np.nan))
+        assert [one.message for one in alone.warnings] == ["no pose of the run for 1 of 1 targets"]
 
 
 def test_all_that_does_not_fit_together_is_told_at_once() -> None:
