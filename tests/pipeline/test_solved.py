@@ -10,7 +10,7 @@ import pytest
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
-from urmpipe_models.errors import LogError
+from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.kinematics import positions_over_log
@@ -161,6 +161,28 @@ def test_a_solved_path_compares_with_itself() -> None:
     times = np.arange(50) * STEP_NS
     for run in (solved("path", UR5E, times, way(50)), solved("path", UR5E, None, way(50))):
         assert compare_runs(run, [run], CompareOptions({"axis": 1e-9})).verdict == "pass"
+
+
+def test_single_poses_are_no_motion_to_be_compared_with() -> None:
+    """A second a row is no time: interpolated, two poses would make a way that nobody asked for."""
+    poses = solved("poses", UR5E, None, way(50))
+    motion = solved("motion", UR5E, np.arange(50) * STEP_NS, way(50))
+    said = (
+        "found targets without times, which are no motion; allowed: a log or a path of its own times;"
+        " urmpipe ik --tsp S gives the targets some"
+    )
+    for reference, runs in ((motion, [poses]), (poses, [motion]), (poses, [poses, motion])):
+        with pytest.raises(LogError) as error:
+            compare_runs(reference, runs)
+        assert {one.message for one in error.value.findings} == {said}
+        assert {one.file for one in error.value.findings} == {"poses"}
+    with pytest.raises(OptionError, match=r"^--sync: found 0.5 of targets without times, allowed: start, row"):
+        compare_runs(poses, [poses], CompareOptions(sync=0.5))
+    for k in (0, 7):
+        moved = way(50)
+        moved[k, 0] += 1e-3
+        found = compare_runs(poses, [solved("moved", UR5E, None, moved)])
+        assert found.runs[0].worst == k
 
 
 def test_where_nothing_is_reachable_there_is_a_run_without_poses() -> None:
