@@ -176,7 +176,9 @@ def test_single_poses_are_no_motion_to_be_compared_with() -> None:
             compare_runs(reference, runs)
         assert {one.message for one in error.value.findings} == {said}
         assert {one.file for one in error.value.findings} == {"poses"}
-    with pytest.raises(OptionError, match=r"^--sync: found 0.5 of targets without times, allowed: start, row"):
+    with pytest.raises(
+        OptionError, match=r"^--sync: found 0.5 of targets without times, allowed: start, row"
+    ):
         compare_runs(poses, [poses], CompareOptions(sync=0.5))
     for k in (0, 7):
         moved = way(50)
