@@ -150,7 +150,9 @@ def test_goals_and_ghosts_have_times_from_the_first_row_on() -> None:
     assert targets.rotation is not None
     # A rotation as a quaternion and back: rounding.
     np.testing.assert_allclose(matrices(run.goals.quat_xyzw), targets.rotation, rtol=0, atol=1e-15)
-    assert run.goals.reasons == ("", "", "")
+    assert (run.goals.reasons, run.goals.branches) == (("", "", ""), ())
+    assert goals_of(targets, times, None, ["a", "", "b"]).branches == ("a", "", "b")
+    assert goals_of(targets, times, None, np.array(["", "", ""], dtype=object)).branches == ()
     assert not run.goals.missed.any()
     (other,) = run.ghosts
     np.testing.assert_array_equal(other.t_ns, [STEP_NS, 2 * STEP_NS])

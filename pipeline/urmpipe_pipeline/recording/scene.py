@@ -19,7 +19,7 @@ from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
 from urmpipe_pipeline.recording.bodies import Body, bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import enlarged
 from urmpipe_pipeline.recording.entities import Place, entity_path, places_of, printable
-from urmpipe_pipeline.recording.ghost_arms import GhostArm, ghost_arms, gone_after
+from urmpipe_pipeline.recording.ghost_arms import ArmName, GhostArm, ghost_arms, gone_after
 from urmpipe_pipeline.recording.goal_marks import GoalMarks, goal_marks
 from urmpipe_pipeline.recording.signal_entities import arm_keys
 from urmpipe_pipeline.recording.ways import NEVER, Gone, Way, dashed, lines_of, thinned, track_of
@@ -80,6 +80,7 @@ class Scene:
         worst: Where the largest deviation of all runs stands.
         whose: Name of the log whose arm it is, where there are several; else empty.
         ghosts: The further branches of solved joint values.
+        chosen: The name of the branch that the arm itself is in, where there are others.
         goals: What they were solved for.
     """
 
@@ -89,6 +90,7 @@ class Scene:
     worst: Mark | None = None
     whose: str = ""
     ghosts: tuple[GhostArm, ...] = ()
+    chosen: ArmName | None = None
     goals: GoalMarks | None = None
 
     @property
@@ -161,7 +163,8 @@ def _of_run(run: Run, place: Place) -> Scene:
         gone = gone_after(run, run.log.t_ns[np.isfinite(run.log.q).all(axis=1)])
         arm = None if arm is None else replace(arm, gone=gone)
         ways = tuple(replace(way, gone=gone) for way in ways)
-    return Scene(arm, ways, ghosts=ghost_arms(run, place), goals=goal_marks(run, place))
+    ghosts, chosen = ghost_arms(run, place)
+    return Scene(arm, ways, ghosts=ghosts, chosen=chosen, goals=goal_marks(run, place))
 
 
 def arm_of(result: Comparison) -> Deviation:

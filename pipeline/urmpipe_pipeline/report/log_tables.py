@@ -77,7 +77,7 @@ def audit_table(run: Run) -> Table:
 
 
 def missed_table(run: Run) -> Table | None:
-    """Return the targets of a solved run that the arm has no pose for; None of a log, and where it has all."""
+    """Return the targets of a solved run that the arm has no pose for; None if there are none."""
     goals = run.goals
     if goals is None or not goals.missed.any():
         return None
