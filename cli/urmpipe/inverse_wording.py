@@ -8,8 +8,9 @@ import numpy as np
 
 from urmpipe.inverse_result import InverseResult
 from urmpipe_models.chain import Chain
-from urmpipe_models.inverse.solutions import BoolArray, Solutions
+from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Solutions
 from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.singularity import singularity_over_log
 from urmpipe_pipeline.joint_log import IntArray, LogWarning
 from urmpipe_pipeline.text import DIGITS, SHOWN, counted, enumerated
 
@@ -21,6 +22,14 @@ MILLI = 1e-3
 
 FAR = 10.0
 """A target so many times farther than the arm reaches is no slip of the path, but may be one of the unit."""
+
+
+NEARLY = 1e-4
+"""Smallest singular value [-] below which a pose counts as nearly singular: a spherical wrist is aligned
+within some 0.05 deg, and joints turn ten thousand times as far as the tool."""
+
+MANY_TURNS = 4.0 * np.pi
+"""Joint values beyond two turns in [rad] are hardly meant: they may be in deg."""
 
 
 def rows_text(rows: Sequence[int] | IntArray) -> str:
@@ -99,6 +108,53 @@ def singular_warnings(solutions: Solutions, row: IntArray, listed: BoolArray) ->
         if len(rows):
             said = f"{one.free}; chosen: {one.chosen}" if one.free else "a direction of motion is lost there"
             yield LogWarning("singular", f"{rows_text(rows)}: {one.family}: {said}")
+
+
+def near_singular_warnings(
+    chain: Chain, solutions: Solutions, row: IntArray, listed: BoolArray, *, orientation: bool
+) -> Iterator[LogWarning]:
+    """Yield a warning of solutions that are singular or nearly so, and lie in no family that has a name.
+
+    A wrist that is aligned but for the digits of a file lies in none: nothing is infinite there, and yet
+    the last of those digits turns joints far.
+
+    Args:
+        chain: The arm.
+        solutions: What was found.
+        row: Data row of each target.
+        listed: True of the solutions that a person is shown, shape (n, k).
+        orientation: Whether poses were asked for; False of positions.
+    """
+    named = np.zeros_like(solutions.reached)
+    for one in solutions.singular:
+        named |= one.where
+    asked = listed & solutions.reached & ~named & (solutions.shortfall == 0.0)
+    smallest = np.full(asked.shape, np.inf)
+    if asked.any():
+        smallest[asked] = singularity_over_log(chain, solutions.q[asked], orientation=orientation).smallest
+    least = smallest.min(axis=1)
+    near = least < NEARLY
+    if near.any():
+        worst = int(np.argmin(least))
+        where = f" in row {row[worst]}" if near.sum() > 1 else ""
+        said = (
+            f"{rows_text(row[near])}: singular or nearly so: smallest singular value {least[worst]:.2g}"
+            f"{where}; the least change of the target may turn joints far"
+        )
+        yield LogWarning("near-singular", said)
+
+
+def start_warnings(chain: Chain, start: FloatArray | None) -> Iterator[LogWarning]:
+    """Yield a warning of a start that is hardly in rad, shape (joints,)."""
+    if start is None:
+        return
+    found = [
+        f"{joint.name} = {value:g} rad ({np.degrees(value):.6g} deg)"
+        for joint, value in zip(chain.moving, start.tolist(), strict=True)
+        if joint.kind == "revolute" and abs(value) > MANY_TURNS
+    ]
+    if found:
+        yield LogWarning("start-unit", f"--start: found {', '.join(found)}: in deg? Allowed: rad")
 
 
 def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarning]:

@@ -142,6 +142,15 @@ def test_warnings_are_of_the_solutions_that_are_shown(capsys: Captured) -> None:
     assert capsys.readouterr().err.startswith("warning: row 1: wrist aligned: ")
 
 
+def test_the_papers_four_digits_and_a_start_in_degrees_are_warned_of(capsys: Captured, folder: Path) -> None:
+    (folder / "four.csv").write_text("x,y,z,rz,ry,rx\n-0.069,0,0.112,0.7854,-1.5708,-0.7854\n")
+    assert run(["ik", "four.csv", "--robot", "arm6", "--start", "0,0,-90,0,0,0"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "warning: --start: found theta3 = -90 rad (-5156.62 deg): in deg? Allowed: rad"
+    assert said[1].startswith("warning: row 1: singular or nearly so: smallest singular value ")
+    assert len(said) == 2
+
+
 def test_quiet_prints_nothing(capsys: Captured) -> None:
     assert run(["ik", "targets.csv", "--robot", "arm6", "-q"]) == 1
     assert capsys.readouterr() == ("", "")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -12,13 +14,16 @@ from urmpipe.inverse_wording import (
     far_warnings,
     longest,
     method_words,
+    near_singular_warnings,
     rows_text,
     shortfall_warnings,
     singular_warnings,
+    start_warnings,
 )
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.inverse.solutions import Singular, Solutions
 from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.singularity import singularity_over_log
 from urmpipe_pipeline.joint_log import LogWarning
 
 
@@ -115,3 +120,38 @@ def test_no_pose_is_farther_than_the_longest_reach(name: str) -> None:
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (2000, len(arm.coordinates)))
     away = np.linalg.norm(targets_of(arm, q).position, axis=1).max()
     assert 0.5 * longest(arm) < away <= longest(arm)
+
+
+def test_a_wrist_that_is_aligned_but_for_the_digits_of_a_file_is_told_of() -> None:
+    arm = load_robot("arm6")
+    q = np.array([[0.3, 0.8, -0.6, 0.5, bend, 0.2] for bend in (1e-10, 0.7, 1e-5, 0.0, 1e-2)])
+    flat = Singular("wrist aligned", (q[:, 4] == 0.0)[:, None], "q4 and q6: only their sum", "q4 = 0")
+    found = Solutions(q[:, None], ("1",), np.full((5, 1), "", dtype=object), (flat,))
+    row, every = np.arange(1, 6), np.ones((5, 1), dtype=bool)
+    (said,) = near_singular_warnings(arm, found, row, every, orientation=True)
+    least = singularity_over_log(arm, q[:1]).smallest[0]
+    assert said == LogWarning(
+        "near-singular",
+        f"rows 1, 3: singular or nearly so: smallest singular value {least:.2g} in row 1;"
+        " the least change of the target may turn joints far",
+    )
+    assert 1e-13 < least < 1e-10
+    shown = every & (row == 3)[:, None]
+    (said,) = near_singular_warnings(arm, found, row, shown, orientation=True)
+    assert said.message.startswith("row 3: singular or nearly so: smallest singular value ")
+    assert " in row " not in said.message
+    assert not list(near_singular_warnings(arm, found, row, every, orientation=False))
+    approached = replace(found, shortfall=np.full((5, 1), 1e-3))
+    assert not list(near_singular_warnings(arm, approached, row, every, orientation=True))
+
+
+def test_a_start_in_degrees_is_told_of() -> None:
+    arm = load_robot("urm6")
+    assert not list(start_warnings(arm, None))
+    assert not list(start_warnings(arm, np.full(6, -4.0 * np.pi)))
+    assert list(start_warnings(arm, np.array([0.0, 45.0, -90.0, 3.0, 0.0, 0.0]))) == [
+        LogWarning(
+            "start-unit",
+            "--start: found phi2 = 45 rad (2578.31 deg), phi3 = -90 rad (-5156.62 deg): in deg? Allowed: rad",
+        )
+    ]
