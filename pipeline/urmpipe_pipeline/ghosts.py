@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -81,7 +81,7 @@ def goals_of(
     targets: Targets,
     t_ns: IntArray,
     reasons: Sequence[str | None] | None = None,
-    branches: Sequence[str] | None = None,
+    branches: Iterable[str] = (),
 ) -> Goals:
     """Return targets as the goals of a run.
 
@@ -94,5 +94,5 @@ def goals_of(
     texts = tuple(reason or "" for reason in reasons or [None] * len(targets))
     rotation = None if targets.rotation is None else targets.rotation.reshape(-1, 9)
     quat = None if rotation is None else quaternions(rotation, "matrix")
-    named = tuple(str(name) for name in branches) if branches is not None and any(branches) else ()
-    return Goals(t_ns, targets.position, quat, texts, named)
+    named = tuple(map(str, branches))
+    return Goals(t_ns, targets.position, quat, texts, named if any(named) else ())

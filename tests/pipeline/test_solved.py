@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -209,6 +210,21 @@ def test_all_that_does_not_fit_together_is_told_at_once() -> None:
         ("found a time that is not later than the one before, allowed: increasing times", "path", 3),
         ("found a time of left that no row has, allowed: the times of the rows", "path", None),
         ("found targets at other times than the rows, allowed: one a row", "path", None),
+    ]
+    goals = replace(goals_of(targets_of(UR5E, way(3)), row_times(3), ["", "far"]), branches=("a",))
+    ghosts = (
+        Ghost("short", row_times(3), way(2)),
+        Ghost("holed", row_times(2), np.array([[0.0] * 6, [np.nan] * 6])),
+        Ghost("turned", row_times(2)[::-1], way(2)),
+    )
+    with pytest.raises(LogError) as error:
+        solved("poses", UR5E, None, way(3), ghosts=ghosts, goals=goals)
+    assert [one.message for one in error.value.findings] == [
+        "found 2 x 6 joint values of short, allowed: 3 x 6",
+        "found a joint value missing in holed, allowed: rows that are whole",
+        "found times of turned in disorder, allowed: increasing times",
+        "found 2 reasons of 3 targets, allowed: one each",
+        "found 1 branches chosen of 3 targets, allowed: one each",
     ]
     with pytest.raises(LogError, match="found no target, allowed: one or more"):
         solved("path", UR5E, None, np.empty((0, 6)))
