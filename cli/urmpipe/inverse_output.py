@@ -6,8 +6,6 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
 
-import numpy as np
-
 from urmpipe.inverse_result import InverseResult
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.solutions import Solutions
@@ -16,7 +14,7 @@ from urmpipe_pipeline.joint_file import write_joint_log
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.solved import TARGET_PERIOD_NS, solved_run
+from urmpipe_pipeline.solved import row_times, solved_run
 
 Written = Literal["joints", "recording"]
 """Kinds of outputs."""
@@ -50,15 +48,13 @@ def run_of_solutions(
         file: Where the targets came from.
         options: The options that were given, by name.
     """
-    t_ns = result.t_ns
-    if t_ns is None:
-        t_ns = np.arange(len(result), dtype=np.int64) * TARGET_PERIOD_NS
+    t_ns = row_times(len(result)) if result.t_ns is None else result.t_ns
     return solved_run(
         result.name,
         result.robot,
         result.t_ns,
         result.q,
-        goals=goals_of(result.targets, t_ns, result.reasons),
+        goals=goals_of(result.targets, t_ns, result.reasons, result.branch),
         ghosts=() if branches is None else ghosts_of(branches, t_ns),
         files=() if file is None else (file,),
         warnings=result.warnings,
