@@ -18,9 +18,9 @@ from urmpipe.inverse_wording import (
     start_warnings,
 )
 from urmpipe_models.inverse.joint_path import JointPath
-from urmpipe_models.inverse.limits import periods
+from urmpipe_models.inverse.limits import periods, within_pi
 from urmpipe_models.inverse.path import follow
-from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Singular, Solutions, TextArray
+from urmpipe_models.inverse.solutions import BoolArray, Singular, Solutions, TextArray
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_pipeline.joint_log import IntArray, LogWarning
@@ -54,7 +54,7 @@ def _of_targets(asked: Asked) -> InverseResult:
     solutions = solutions_of(asked, every=asked.every or asked.form is not None)
     chosen = solutions.nearest_column(asked.begin, period)
     if asked.within_pi:
-        solutions = replace(solutions, q=_within_pi(solutions.q, period))
+        solutions = replace(solutions, q=within_pi(solutions.q, period))
     listed = solutions.reached.copy()
     if not asked.every:
         listed &= np.arange(listed.shape[1]) == chosen[:, None]
@@ -132,11 +132,3 @@ def _with_faults(reasons: TextArray, faults: Sequence[str]) -> TextArray:
     """Return the reasons of targets, those of rows that hold none by what is wrong with the row."""
     fault = np.array(faults, dtype=np.object_)[:, None]
     return np.asarray(np.where(fault != "", fault, reasons))
-
-
-def _within_pi(q: FloatArray, period: FloatArray) -> FloatArray:
-    """Return joint values with those that turn without end in -pi to pi."""
-    turns = np.isfinite(period)
-    values = q.copy()
-    values[..., turns] -= period[turns] * np.round(values[..., turns] / period[turns])
-    return values

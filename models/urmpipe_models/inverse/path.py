@@ -19,7 +19,8 @@ from urmpipe_models.inverse.joint_path import JointPath, SingularStretch
 from urmpipe_models.inverse.joint_speeds import too_fast
 from urmpipe_models.inverse.jumps import jump_samples, jumps_at
 from urmpipe_models.inverse.least_motion_path import LeastMotionPath
-from urmpipe_models.inverse.limits import TURN, periods
+from urmpipe_models.inverse.limits import periods
+from urmpipe_models.inverse.limits import within_pi as within_pi_of
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, SingularFamily, TextArray
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.stretches import stretches
@@ -159,7 +160,7 @@ def _told(
         position_only,
         LEAST_MOTION if form is None else form.name,
         t_ns,
-        _wrapped(found.q, periods(chain)) if within_pi else found.q,
+        within_pi_of(found.q, periods(chain)) if within_pi else found.q,
         branch,
         found.reasons,
         found.shortfall,
@@ -190,14 +191,6 @@ def _with_gaps(jumping: NDArray[np.intp], branch: TextArray, reached: NDArray[np
     gap = np.diff(reached, prepend=-1) > 1
     other = np.append(False, branch[reached][1:] != branch[reached][:-1])
     return np.union1d(jumping[~gap[jumping]], np.flatnonzero(gap & other))
-
-
-def _wrapped(q: FloatArray, period: FloatArray) -> FloatArray:
-    """Return joint values with those of joints that turn without end within (-pi, pi]."""
-    turning = np.isfinite(period)
-    wrapped = q.copy()
-    wrapped[:, turning] -= TURN * np.ceil((q[:, turning] - math.pi) / TURN)
-    return wrapped
 
 
 def _before(q: FloatArray, start: FloatArray) -> FloatArray:
