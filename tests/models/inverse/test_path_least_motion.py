@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from urmpipe_datasets import LOGS
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.inverse import sliding_window
 from urmpipe_models.inverse.joint_path import JointPath
 from urmpipe_models.inverse.path import follow
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
@@ -117,6 +118,25 @@ def test_windows_give_what_one_sample_after_the_other_gives(
         expected.append(q)
     # rad: 60 samples, each converged to 1e-10 and damped by 1e-8 m^2 / sigma^2 of a step of 1e-3
     np.testing.assert_allclose(followed.q[rows], expected, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("longest", [96, 1000])
+def test_windows_of_other_sizes_give_the_same_motion(
+    followed: JointPath, demo_path: FloatArray, longest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sliding_window, "LONGEST", longest)
+    count = 1500
+    path = follow(followed.chain, Targets(demo_path[:count]), times(count))
+    # rad: at the singular start the nanometre leaves that open; what comes after goes on from there
+    np.testing.assert_allclose(path.q, followed.q[:count], rtol=0.0, atol=2e-6)
+    steps, expected = np.diff(path.q[1000:], axis=0), np.diff(followed.q[1000:count], axis=0)
+    # rad: where the nanometre is just kept or not, lambda^2 is 1e-8 or 1e-9 m2 of steps of 4e-3 over sigma^2
+    np.testing.assert_allclose(steps, expected, rtol=0.0, atol=2e-8)
+
+
+def test_at_the_singular_start_the_joints_do_not_follow_the_rounding_of_the_file(followed: JointPath) -> None:
+    # rad: 0.053 so; 0.086 by least motion alone, which steps by a nanometre over sigma
+    assert np.linalg.norm(np.diff(followed.q[:200], axis=0), axis=1).sum() < 0.06
 
 
 def test_joints_within_pi_are_unwrapped_by_the_repolarizer(
