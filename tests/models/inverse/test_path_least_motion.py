@@ -14,6 +14,7 @@ from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.inverse import sliding_window
 from urmpipe_models.inverse.joint_path import JointPath
 from urmpipe_models.inverse.path import follow
+from urmpipe_models.inverse.sliding_window import SlidingWindow
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.kinematics import jacobian_over_log
 from urmpipe_models.repolarizer import repolarize
@@ -290,6 +291,39 @@ def test_far_apart_samples_are_followed_one_by_one() -> None:
     path = follow(arm, Targets(circle), times(7), start=np.array([0.8, -0.9, -0.9]))
     assert_met(path, Targets(circle))
     assert path.jumps == ()
+
+
+def test_from_a_nearly_singular_start_no_large_correction_is_trusted() -> None:
+    path = follow(
+        planar(3),
+        Targets(np.array([[1.13985882, -0.51090378, 0.0]])),
+        times(1),
+        start=np.array([0.1, 0.033, -0.049]),
+    )
+    assert_met(path, Targets(np.array([[1.13985882, -0.51090378, 0.0]])))
+    # rad: 2.17 by steps of 0.1; the whole correction overshoots to another bend of the arm, 4.19 away
+    assert np.linalg.norm(path.q[0] - [0.1, 0.033, -0.049]) < 2.5
+
+
+def test_after_a_rescue_no_joint_is_held_where_one_was_before() -> None:
+    free, limited = planar(3), planar(3, upper=0.5)
+    q = np.array([0.45, -0.6, 0.3]) + np.linspace(0.0, 0.3, 40)[:, None] * np.array([1.0, 0.3, 0.0])
+    elsewhere = np.array([-1.0, 1.2, 0.4])
+    targets = targets_of(free, np.vstack((q, elsewhere + np.linspace(0.0, 0.02, 20)[:, None])))
+    asked = []
+
+    def rescue(sample: int, last: FloatArray) -> FloatArray:
+        """The pose that the far samples were made from."""
+        asked.append(sample)
+        assert last[0] == 0.5
+        return elsewhere[None]
+
+    window = SlidingWindow(limited, Targets(targets.position), q[0], rescue)
+    found = window.slide()
+    assert asked == [40]
+    assert (found[30:40, 0] == 0.5).all()
+    # rad: the joints go on from where the rescue brought them, 0.02 in 20 samples
+    assert np.abs(found[40:] - elsewhere).max() < 0.05
 
 
 def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:
