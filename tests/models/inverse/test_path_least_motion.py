@@ -212,6 +212,19 @@ def test_what_is_out_of_reach_has_a_reason_and_the_path_goes_on_after_it() -> No
     assert path.jumps == ()
 
 
+def test_another_bend_after_a_gap_is_told_as_a_jump() -> None:
+    free, arm = planar(2), planar(2, upper=1.0)
+    q = np.array([0.9, -1.0]) + np.linspace(0.0, 0.2, 41)[:, None] * np.array([1.0, 0.0])
+    targets = Targets(targets_of(free, q).position)
+    targets.position[18:22] *= 2.0
+    path = follow(arm, targets, times(41), start=q[0])
+    assert (np.flatnonzero(~path.reached) == np.arange(18, 22)).all()
+    (jump,) = path.jumps
+    assert (jump.last, jump.sample, jump.from_branch, jump.to_branch) == (17, 22, "1", "2")
+    # rad: the mirror image about the line to the target
+    np.testing.assert_allclose(path.q[22], [q[22, 0] - 1.0, 1.0], rtol=0.0, atol=1e-8)
+
+
 def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     arm = planar(3)
     reach = 2.9 + 0.102 * np.sin(np.linspace(0.0, math.pi, 101))
