@@ -151,7 +151,7 @@ def _told(
     if branch is None:
         branch = _numbered(len(found.q), reached, jumping)
     else:
-        jumping = _with_gaps(jumping, branch, reached)
+        jumping = _with_gaps(chain, jumping, found.q, branch, reached)
     jumps = jumps_at(
         chain, reached[jumping], reached[jumping - 1], found.q, seconds, targets.position, branch
     )
@@ -183,14 +183,28 @@ def _numbered(count: int, reached: NDArray[np.intp], jumping: NDArray[np.intp]) 
     return branch
 
 
-def _with_gaps(jumping: NDArray[np.intp], branch: TextArray, reached: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the jumps among reached samples: after ones without a solution, those to another branch.
+def _with_gaps(
+    chain: Chain,
+    jumping: NDArray[np.intp],
+    q: FloatArray,
+    branch: TextArray,
+    reached: NDArray[np.intp],
+) -> NDArray[np.intp]:
+    """Return the jumps among reached samples with others after ones without a solution.
 
-    How the tool would have moved meanwhile is not known, so that its way tells nothing there.
+    How the tool would have moved meanwhile is not known, so that its way tells nothing there: a jump leads
+    to another branch, or moves a revolute joint by more than half a turn since its limits bar the nearer one.
     """
     gap = np.diff(reached, prepend=-1) > 1
     other = np.append(False, branch[reached][1:] != branch[reached][:-1])
-    return np.union1d(jumping[~gap[jumping]], np.flatnonzero(gap & other))
+    turned = np.append(False, _turned(chain, q[reached]))
+    return np.union1d(jumping[~gap[jumping]], np.flatnonzero(gap & (other | turned)))
+
+
+def _turned(chain: Chain, q: FloatArray) -> BoolArray:
+    """Return at which steps a revolute joint moves by more than half a turn, shape (m - 1,)."""
+    revolute = [joint.kind == "revolute" for joint in chain.moving]
+    return np.asarray((np.abs(np.diff(q[:, revolute], axis=0)) > 0.5 * TURN).any(axis=1))
 
 
 def _before(q: FloatArray, start: FloatArray) -> FloatArray:
