@@ -71,7 +71,8 @@ def _jump(result: InverseResult, jump: Jump) -> str:
     """Return a jump with its time, its place and what moves."""
     steps = ", ".join(f"{one.joint} by {_quantity(one.step, one.unit)}" for one in jump.joints)
     ways = "" if jump.from_branch == jump.to_branch else f"{jump.from_branch} → {jump.to_branch}: "
-    return f"jump {_at(result, jump.sample)}, at ({text.point(jump.position)}) m: {ways}{steps}"
+    since = f", since row {result.row[jump.last]}" if jump.last < jump.sample - 1 else ""
+    return f"jump {_at(result, jump.sample)}{since}, at ({text.point(jump.position)}) m: {ways}{steps}"
 
 
 def _nearest_singular(result: InverseResult, path: JointPath, nearest: int) -> str:
@@ -123,8 +124,8 @@ def _speeds(result: InverseResult, joints: tuple[Joint, ...], units: list[str]) 
     t = result.t
     if t is None or len(t) < 2:
         return
-    speed = np.abs(np.diff(result.q, axis=0)) / np.diff(t)[:, None]
-    fastest = np.where(np.isfinite(speed), speed, 0.0).max(axis=0)
+    speed = np.abs(np.diff(result.q[result.reached], axis=0)) / np.diff(t[result.reached])[:, None]
+    fastest = speed.max(axis=0, initial=0.0)
     yield Column(
         "fastest\n[1/s]", [joint_number(value, unit) for value, unit in zip(fastest, units, strict=True)]
     )

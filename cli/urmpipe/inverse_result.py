@@ -148,6 +148,7 @@ class InverseResult:
             "jumps": [
                 {
                     "row": int(self.row[one.sample]),
+                    "from_row": int(self.row[one.last]),
                     "t": self._time(one.sample),
                     "position": list(one.position),
                     "from": one.from_branch,

@@ -19,7 +19,7 @@ from urmpipe_models.inverse.joint_path import JointPath, SingularStretch
 from urmpipe_models.inverse.joint_speeds import too_fast
 from urmpipe_models.inverse.jumps import jump_samples, jumps_at
 from urmpipe_models.inverse.least_motion_path import LeastMotionPath
-from urmpipe_models.inverse.limits import periods
+from urmpipe_models.inverse.limits import TURN, periods
 from urmpipe_models.inverse.limits import within_pi as within_pi_of
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, SingularFamily, TextArray
 from urmpipe_models.inverse.solve import solve
