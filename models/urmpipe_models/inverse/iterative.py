@@ -28,6 +28,7 @@ from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.descent import METHODS, Method, Progress, Settings, descend
 from urmpipe_models.inverse.least_motion import settle
 from urmpipe_models.inverse.limits import periods
+from urmpipe_models.inverse.small_systems import rows_of
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.task import (
     BoolArray,
@@ -141,9 +142,11 @@ def _run(
     """Take every row to its end, or as many steps as are allowed."""
     pending = np.flatnonzero(_finite(targets) & np.isfinite(progress.q).all(axis=0))
 
+    task = task_of(chain, targets)
+
     def work(index: IntArray) -> None:
         """Take the rows of a block some steps further."""
-        descend(progress, task_of(chain, targets.rows(index)), index, settings, steps)
+        descend(progress, task.kept(index), index, settings, steps)
 
     for done in range(0, iterations, ROUND):
         steps = min(ROUND, iterations - done)
@@ -177,7 +180,8 @@ def _settled(
     def work(index: IntArray) -> None:
         """Settle the rows of a block."""
         task = task_of(chain, targets.rows(index))
-        progress.q[:, index], slack[index] = settle(task, progress.q[:, index], home.T[:, index], settings)
+        q, to = rows_of(progress.q, index), np.ascontiguousarray(home[index].T)
+        progress.q[:, index], slack[index] = settle(task, q, to, settings)
 
     each(work, [arrived[i : i + BLOCK] for i in range(0, len(arrived), BLOCK)], threads)
     return slack

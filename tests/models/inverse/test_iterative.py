@@ -271,7 +271,7 @@ def test_the_turn_between_two_frames_is_scipys_rotation_vector(
     vector = angle * np.array(axis) / math.hypot(*axis)
     pose = from_offset((0.0, 0.0, 0.0, 0.4, -1.1, 2.0))
     wanted = Rotation.from_rotvec(vector).as_matrix() @ np.array(pose.rotation)
-    found = turn_between(pose.columns, wanted.T[..., None])[:, 0]
+    found = turn_between(np.array(pose.columns)[..., None], wanted.T[..., None])[:, 0]
     np.testing.assert_allclose(np.linalg.norm(found), angle, atol=1e-14 + 1e-15 / max(math.sin(angle), 1e-7))
     again = Rotation.from_rotvec(found).as_matrix() @ np.array(pose.rotation)
     np.testing.assert_allclose(again, wanted, atol=3e-8)  # within 1e-6 of half a turn the axis has 8 digits
