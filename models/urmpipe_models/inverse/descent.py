@@ -52,6 +52,7 @@ class Settings:
     metres: float = 1e-10
     radians: float = 1e-10
     damping: float = 0.05
+    stationary: float = STATIONARY
 
     @cached_property
     def limited(self) -> bool:
@@ -150,7 +151,7 @@ def _ended(rows: Rows, settings: Settings) -> BoolArray:
     """
     J = _free(rows, settings)
     slope = transposed_product(J, rows.miss.error)
-    moves = slope * slope > STATIONARY**2 * rows.miss.square * column_squares(J)
+    moves = slope * slope > settings.stationary**2 * rows.miss.square * column_squares(J)
     going = _under_way(rows.miss, settings) & np.asarray(moves.any(axis=0))
     return np.asarray(~going | (rows.gain >= GAINS[1]))
 

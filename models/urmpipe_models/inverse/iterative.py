@@ -25,7 +25,14 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.descent import METHODS, Method, Progress, Settings, descend
+from urmpipe_models.inverse.descent import (
+    METHODS,
+    STATIONARY,
+    Method,
+    Progress,
+    Settings,
+    descend,
+)
 from urmpipe_models.inverse.least_motion import settle
 from urmpipe_models.inverse.limits import periods
 from urmpipe_models.inverse.small_systems import rows_of
@@ -43,7 +50,7 @@ from urmpipe_models.kinematics import THREADS
 BLOCK = 4096
 """Rows of a block: its hundred or so arrays stay in a core's cache."""
 
-ROUND = 8
+ROUND = 6
 """Steps after which the rows of all blocks that are still on their way are gathered into new blocks."""
 
 
@@ -82,6 +89,7 @@ def refine(
     radians: float = 1e-10,
     iterations: int = 100,
     damping: float = 0.05,
+    stationary: float = STATIONARY,
     threads: int = THREADS,
 ) -> Refined:
     """Return joint values that bring the tool to its targets, or as near as can be come from the starts.
@@ -96,6 +104,8 @@ def refine(
         radians: The angle from the target that counts as none in [rad].
         iterations: The most steps a row takes.
         damping: Of damped least squares: mu = (damping l)^2.
+        stationary: A row ends where the cosine between e and what any free joint can change of it is less:
+            the smaller, the nearer to the nearest point.
         threads: Blocks worked on side by side.
 
     Raises:
@@ -103,7 +113,7 @@ def refine(
     """
     lower, upper = limits_of(chain)
     begin = np.clip(_starts(chain, targets, q, method), lower, upper)
-    settings = Settings(lower, upper, method, metres, radians, damping)
+    settings = Settings(lower, upper, method, metres, radians, damping, stationary)
     progress = Progress.at(begin)
     _run(progress, chain, targets, settings, iterations, threads)
     slack = np.zeros(len(targets))
