@@ -84,7 +84,7 @@ def solve_iteratively(
         if len(some) and (every or search.pending.any()):
             search.attempt(some, every)
     search.finish()
-    solutions = within_limits(chain, _solutions(chain, search, begin, every), begin)
+    solutions = _solutions(chain, search, begin, every)
     return _told(chain, targets, solutions, search, restarts, tolerance)
 
 
@@ -172,18 +172,21 @@ class _Search:
 
 
 def _solutions(chain: Chain, search: _Search, begin: FloatArray, every: bool) -> Solutions:
-    """Return what was found, each solution once, nearest to the start first."""
-    found = _nearest_first(chain, np.stack(search.found, axis=1), begin, None if every else 1)
-    if every:
-        found = _distinct(chain, found)
-    count = found.shape[1]
-    reasons = np.full(found.shape[:2], "", dtype=np.object_)
-    return Solutions(found, tuple(str(k + 1) for k in range(count)), reasons)
+    """Return what was found, each joint in the allowed turn nearest to the start, nearest solution first."""
+    shifted = within_limits(chain, _listed(np.stack(search.found, axis=1)), begin).q
+    found = _nearest_first(shifted, begin, None if every else 1)
+    return _listed(_distinct(chain, found) if every else found)
 
 
-def _nearest_first(chain: Chain, found: FloatArray, begin: FloatArray, most: int | None) -> FloatArray:
+def _listed(found: FloatArray) -> Solutions:
+    """Return joint values of shape (n, k, joints) as solutions 1, 2, ..."""
+    branches = tuple(str(k + 1) for k in range(found.shape[1]))
+    return Solutions(found, branches, np.full(found.shape[:2], "", dtype=np.object_))
+
+
+def _nearest_first(found: FloatArray, begin: FloatArray, most: int | None) -> FloatArray:
     """Return what was found, shape (n, k, joints), nearest to the start first, NaN last, `most` of each."""
-    distance = np.square(_apart(chain, found, begin[:, None, :])).sum(axis=2)
+    distance = np.square(found - begin[:, None, :]).sum(axis=2)
     order = np.argsort(np.where(np.isnan(distance), np.inf, distance), axis=1, kind="stable")[:, :most]
     return np.take_along_axis(found, order[..., None], axis=1)
 

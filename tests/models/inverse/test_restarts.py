@@ -124,6 +124,17 @@ def test_both_solutions_of_a_planar_arm_are_found_nearest_to_the_start_first() -
     np.testing.assert_allclose(found.q[0], [[0.3, 0.8], [0.3 + angle, -0.8]], atol=1e-8)
 
 
+def test_nearest_counts_the_way_that_limits_leave() -> None:
+    """From 3.0 rad a joint that ends at +-3.1 gets to -2.9 rad by 5.9 rad, not by 0.38."""
+    arm = planar()
+    arm = replace(arm, joints=tuple(replace(joint, lower=-3.1, upper=3.1) for joint in arm.joints))
+    position = Targets(targets_of(arm, np.array([[-2.9, 0.8]])).position)
+    start = np.array([3.0, 0.8])
+    angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
+    found = solve_iteratively(arm, position, start=start, every=True)
+    np.testing.assert_allclose(found.q[0], [[-2.9 + angle, -0.8], [-2.9, 0.8]], atol=1e-8)
+
+
 def test_every_solution_of_a_closed_form_is_found() -> None:
     """Of the UR5e: as many as the three parallel axes have, the same values."""
     chain = load_robot("ur5e")
