@@ -163,6 +163,20 @@ def test_a_path_tells_where_it_comes_nearest_to_a_singular_pose() -> None:
     assert urmpipe.ik(np.full((2, 3), 9.0), ARM, tsp=0.01, restarts=0).to_dict()["singularity"] is None
 
 
+def test_a_path_beyond_the_reach_stays_on_its_branch_at_the_nearest_points() -> None:
+    arm = urmpipe.load_robot("ur5e")
+    poses = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (60, 1, 1))
+    poses[:, 0, 3] = 0.55 + 0.4 * np.sin(np.linspace(0.5, 2.6, 60))  # out beyond the reach, and back
+    poses[:, 2, 3] = 0.2
+    beyond = urmpipe.ik(poses, arm, tsp=0.1).solutions.reached[:, 0]
+    assert 5 < (~beyond).sum() < 50
+    found = urmpipe.ik(poses, arm, tsp=0.1, tolerance=0.1)
+    assert found.reached.all()
+    assert found.path is not None
+    assert not found.path.jumps
+    assert np.abs(np.diff(found.q, axis=0)).max() < 0.5
+
+
 def test_joints_without_limits_can_be_written_within_pi() -> None:
     free = replace(ARM, joints=tuple(replace(one, lower=-np.inf, upper=np.inf) for one in ARM.joints))
     q = Q[0] + np.outer(np.linspace(0.0, 7.0, 200), [1.0, 0, 0, 0, 0, 0])

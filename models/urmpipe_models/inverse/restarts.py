@@ -28,6 +28,13 @@ ROUGH = 1e-2
 It would come no nearer worth the steps. The nearest of all is then brought to the nearest point near it.
 """
 
+CLEARLY = 0.99
+"""An attempt from another start must lead to less than this share of the least miss so far.
+
+Of several branches that come as near, chance would choose else: the one from the start stays, and along a
+path so does the branch.
+"""
+
 ATTEMPT_STEPS = 100
 """The most steps of an attempt."""
 
@@ -141,15 +148,17 @@ class _Search:
         rows = np.flatnonzero(self.pending | every)
         count, joints = len(starts), self.begin.shape[1]
         q = np.broadcast_to(starts, (count, *self.begin.shape))[:, rows].reshape(-1, joints)
-        self._refine(rows, q, count, ROUGH, ATTEMPT_STEPS)
+        refined = self._refine(rows, q, count, ROUGH, ATTEMPT_STEPS)
+        self._keep_nearest(rows, refined, count, CLEARLY)
 
     def finish(self) -> None:
         """Bring the tool from where it came nearest to what is pending to the target or the nearest point."""
         rows = np.flatnonzero(self.pending & np.isfinite(self.residual))
         if len(rows):
-            self._refine(rows, self.q[rows], 1, STATIONARY, LAST_STEPS)
+            refined = self._refine(rows, self.q[rows], 1, STATIONARY, LAST_STEPS)
+            self._keep_nearest(rows, refined, 1, 1.0)
 
-    def _refine(self, rows: IntArray, q: FloatArray, count: int, stationary: float, steps: int) -> None:
+    def _refine(self, rows: IntArray, q: FloatArray, count: int, stationary: float, steps: int) -> Refined:
         """Solve the targets at `rows` in as many attempts, from q, shape (count * rows, joints)."""
         targets, home = self.targets.rows(np.tile(rows, count)), np.tile(self.begin[rows], (count, 1))
         refined = refine(self.chain, targets, q, home=home, stationary=stationary, iterations=steps)
@@ -159,13 +168,13 @@ class _Search:
         )
         self.found.extend(found)
         self.pending[rows] &= ~refined.converged.reshape(count, -1).any(axis=0)
-        self._keep_nearest(rows, refined, count)
+        return refined
 
-    def _keep_nearest(self, rows: IntArray, refined: Refined, count: int) -> None:
-        """Keep where the tool came nearest to the targets at `rows` in as many attempts."""
+    def _keep_nearest(self, rows: IntArray, refined: Refined, count: int, share: float) -> None:
+        """Keep where the tool came nearer to the targets at `rows` than `share` of the least miss so far."""
         residual = np.where(np.isnan(refined.residual), np.inf, refined.residual).reshape(count, -1)
         best = np.argmin(residual, axis=0)
-        nearer = residual.min(axis=0) < self.residual[rows]
+        nearer = residual.min(axis=0) < share * self.residual[rows]
         of, to = (best * len(rows) + np.arange(len(rows)))[nearer], rows[nearer]
         self.q[to], self.residual[to] = refined.q[of], refined.residual[of]
         self.distance[to], self.angle[to] = refined.distance[of], refined.angle[of]
@@ -222,7 +231,8 @@ def _told(
     near = _near_enough(chain, targets, search, tolerance)
     q, reasons, labels = solutions.q.copy(), solutions.reasons.copy(), solutions.labels.copy()
     shortfall = np.zeros(q.shape[:2])
-    q[near, 0], labels[near, 0], shortfall[near, 0] = search.q[near], NEAREST_POINT, search.distance[near]
+    turned = within_limits(chain, _listed(search.q[near][:, None]), search.begin[near])
+    q[near, 0], labels[near, 0], shortfall[near, 0] = turned.q[:, 0], NEAREST_POINT, search.distance[near]
     lacking = np.asarray(~np.isfinite(q).all(axis=2))
     reasons[lacking] = f"no further solution {_tries(restarts)}"
     for row in np.flatnonzero(lacking.all(axis=1)):
