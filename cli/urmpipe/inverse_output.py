@@ -2,22 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Literal
-
-import numpy as np
 
 from urmpipe.inverse_result import InverseResult
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.orientation import quaternions
-from urmpipe_pipeline.ghosts import Ghost, Goals
+from urmpipe_pipeline.ghosts import ghosts_of, goals_of
 from urmpipe_pipeline.joint_file import write_joint_log
-from urmpipe_pipeline.joint_log import IntArray, SourceFile
+from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.solved import TARGET_PERIOD_NS, solved_run
+from urmpipe_pipeline.solved import row_times, solved_run
 
 Written = Literal["joints", "recording"]
 """Kinds of outputs."""
@@ -51,31 +48,18 @@ def run_of_solutions(
         file: Where the targets came from.
         options: The options that were given, by name.
     """
-    t_ns = result.t_ns
-    if t_ns is None:
-        t_ns = np.arange(len(result), dtype=np.int64) * TARGET_PERIOD_NS
-    rotation = result.targets.rotation
-    quat = None if rotation is None else quaternions(rotation.reshape(-1, 9), "matrix")
-    goals = Goals(t_ns, result.targets.position, quat, tuple(one or "" for one in result.reasons))
+    t_ns = row_times(len(result)) if result.t_ns is None else result.t_ns
     return solved_run(
         result.name,
         result.robot,
         result.t_ns,
         result.q,
-        goals=goals,
-        ghosts=tuple(() if branches is None else _ghosts(branches, t_ns)),
+        goals=goals_of(result.targets, t_ns, result.reasons, result.branch),
+        ghosts=() if branches is None else ghosts_of(branches, t_ns),
         files=() if file is None else (file,),
         warnings=result.warnings,
         options=options,
     )
-
-
-def _ghosts(solutions: Solutions, t_ns: IntArray) -> Iterator[Ghost]:
-    """Yield each branch where it exists."""
-    for column, name in enumerate(solutions.branches):
-        there = solutions.reached[:, column]
-        if there.any():
-            yield Ghost(name, t_ns[there], solutions.q[there, column])
 
 
 def write_joints(result: InverseResult, path: Path, inputs: Sequence[Path]) -> None:

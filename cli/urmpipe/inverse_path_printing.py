@@ -25,14 +25,15 @@ SHOWN = 10
 
 def print_path(console: Console, result: InverseResult, path: JointPath) -> None:
     """Print how the joints follow a path: a summary, not its samples."""
-    if not result.reached.any():
+    nearest = path.nearest_singularity
+    if nearest is None:
         return
-    for line in _lines(result, path):
+    for line in _lines(result, path, nearest):
         console.print(f"      {line}", soft_wrap=True)
     print_columns(console, "Joints along the path", list(_columns(result)))
 
 
-def _lines(result: InverseResult, path: JointPath) -> Iterator[str]:
+def _lines(result: InverseResult, path: JointPath, nearest: int) -> Iterator[str]:
     """Yield what is to be said of the way."""
     yield f"branch: {'; '.join(_capped(list(_branches(result))))}"
     yield from _capped([_jump(result, one) for one in path.jumps])
@@ -41,7 +42,7 @@ def _lines(result: InverseResult, path: JointPath) -> Iterator[str]:
         f" allowed, {_at(result, one.first)} to row {result.row[one.last]}"
         for one in path.too_fast
     ])  # fmt: skip
-    yield _nearest_singular(result, path)
+    yield _nearest_singular(result, path, nearest)
     yield _furthest(result)
 
 
@@ -58,20 +59,25 @@ def _branches(result: InverseResult) -> Iterator[str]:
     first = np.flatnonzero(np.r_[True, branch[1:] != branch[:-1]])
     last = np.append(first[1:], len(branch)) - 1
     for a, b in zip(first, last, strict=True):
-        yield str(branch[a]) + ("" if len(first) == 1 else f" (rows {row[a]}-{row[b]})")
+        yield str(branch[a]) + ("" if len(first) == 1 else f" ({_rows(row[a], row[b])})")
+
+
+def _rows(first: int, last: int) -> str:
+    """Return a stretch of rows in words."""
+    return f"row {first}" if first == last else f"rows {first}-{last}"
 
 
 def _jump(result: InverseResult, jump: Jump) -> str:
     """Return a jump with its time, its place and what moves."""
     steps = ", ".join(f"{one.joint} by {_quantity(one.step, one.unit)}" for one in jump.joints)
     ways = "" if jump.from_branch == jump.to_branch else f"{jump.from_branch} → {jump.to_branch}: "
-    return f"jump {_at(result, jump.sample)}, at ({text.point(jump.position)}) m: {ways}{steps}"
+    since = f", since row {result.row[jump.last]}" if jump.last < jump.sample - 1 else ""
+    return f"jump {_at(result, jump.sample)}{since}, at ({text.point(jump.position)}) m: {ways}{steps}"
 
 
-def _nearest_singular(result: InverseResult, path: JointPath) -> str:
+def _nearest_singular(result: InverseResult, path: JointPath, nearest: int) -> str:
     """Return where the path comes nearest to a singular pose, and how near."""
     found = path.singularity
-    nearest = int(np.nanargmin(found.smallest))
     return (
         f"nearest to a singularity {_at(result, nearest)}: smallest singular value"
         f" {found.smallest[nearest]:.4g}, manipulability {found.manipulability[nearest]:.4g}"
@@ -118,8 +124,8 @@ def _speeds(result: InverseResult, joints: tuple[Joint, ...], units: list[str]) 
     t = result.t
     if t is None or len(t) < 2:
         return
-    speed = np.abs(np.diff(result.q, axis=0)) / np.diff(t)[:, None]
-    fastest = np.where(np.isfinite(speed), speed, 0.0).max(axis=0)
+    speed = np.abs(np.diff(result.q[result.reached], axis=0)) / np.diff(t[result.reached])[:, None]
+    fastest = speed.max(axis=0, initial=0.0)
     yield Column(
         "fastest\n[1/s]", [joint_number(value, unit) for value, unit in zip(fastest, units, strict=True)]
     )

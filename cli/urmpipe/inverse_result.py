@@ -113,7 +113,7 @@ class InverseResult:
         if self.angle is not None:
             columns["angle"] = self.angle[target, column]
         columns["nearest"] = reached & (self.chosen[target] == column)
-        columns["reason"] = [self.solutions.reason(one) or "" for one in target]
+        columns["reason"] = [reason or "" for reason in np.array(self.reasons, dtype=np.object_)[target]]
         return pd.DataFrame(columns)
 
     def to_dict(self) -> dict[str, Any]:
@@ -126,7 +126,7 @@ class InverseResult:
             "method": self.method,
             "verdict": self.verdict,
             "reached": int(self.reached.sum()),
-            "targets": [self._target(index) for index in range(len(self))],
+            "targets": [self._target(index, there) for index, there in enumerate(self.solutions.reached)],
         }
         if self.path is not None:
             found |= self._way(self.path)
@@ -134,11 +134,21 @@ class InverseResult:
         return found | {"output": self.output}
 
     def _way(self, path: JointPath) -> dict[str, Any]:
-        """Return the jumps of a path and the joints that are too fast as --json has them."""
+        """Return what --json has of a path: its jumps, joints too fast, and its nearest singularity."""
+        nearest = path.nearest_singularity
         return {
+            "singularity": None
+            if nearest is None
+            else {
+                "row": int(self.row[nearest]),
+                "t": self._time(nearest),
+                "smallest": float(path.singularity.smallest[nearest]),
+                "manipulability": float(path.singularity.manipulability[nearest]),
+            },
             "jumps": [
                 {
                     "row": int(self.row[one.sample]),
+                    "from_row": int(self.row[one.last]),
                     "t": self._time(one.sample),
                     "position": list(one.position),
                     "from": one.from_branch,
@@ -164,9 +174,14 @@ class InverseResult:
         """Return the time of a target in [s]; None where each stands for itself."""
         return None if self.t_ns is None else float(self.t_ns[index]) / 1e9
 
-    def _target(self, index: int) -> dict[str, Any]:
-        """Return a target as --json has it: every solution, and which of them is nearest to the start."""
-        columns = np.flatnonzero(self.solutions.reached[index])
+    def _target(self, index: int, there: BoolArray) -> dict[str, Any]:
+        """Return a target as --json has it: every solution, and which of them is nearest to the start.
+
+        Args:
+            index: Which target, from 0.
+            there: True of its solutions, shape (k,).
+        """
+        columns = np.flatnonzero(there)
         chosen = np.flatnonzero(columns == self.chosen[index]).tolist()
         return {
             "row": int(self.row[index]),

@@ -2,25 +2,38 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from urmpipe.inverse_result import InverseResult
 from urmpipe_models.chain import Chain
-from urmpipe_models.inverse.solutions import BoolArray, Solutions
+from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Solutions
 from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.singularity import singularity_over_log
 from urmpipe_pipeline.joint_log import IntArray, LogWarning
 from urmpipe_pipeline.text import DIGITS, SHOWN, counted, enumerated
 
 NAMED = 6
 """Rows or stretches of rows that are named; the others are counted."""
 
+NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
+"""What may differ in reasons that are one."""
+
 MILLI = 1e-3
 """A target in mm that is read as m is a thousand times too far."""
 
 FAR = 10.0
 """A target so many times farther than the arm reaches is no slip of the path, but may be one of the unit."""
+
+
+NEARLY = 1e-4
+"""Smallest singular value [-] below which a pose counts as nearly singular: a spherical wrist is aligned
+within some 0.05 deg, and joints turn ten thousand times as far as the tool."""
+
+MANY_TURNS = 4.0 * np.pi
+"""Joint values beyond two turns in [rad] are hardly meant: they may be in deg."""
 
 
 def rows_text(rows: Sequence[int] | IntArray) -> str:
@@ -54,7 +67,7 @@ def reach_words(result: InverseResult) -> str:
     said = f"{result.name}: {result.robot.name} reaches {number} ({method_words(result.method)})"
     if result.path is None:
         return said
-    jumps, fast = len(result.path.jumps), len(result.path.too_fast)
+    jumps, fast = len(result.path.jumps), len({one.joint for one in result.path.too_fast})
     others = [counted(jumps, "jump")] * bool(jumps) + [f"{counted(fast, 'joint')} too fast"] * bool(fast)
     return f"{said}, with {enumerated(others)}" if others else said
 
@@ -62,17 +75,26 @@ def reach_words(result: InverseResult) -> str:
 def unreached(result: InverseResult, *, every: bool) -> Iterator[str]:
     """Yield why targets have no solution, and, if all branches are asked for, why single branches have none.
 
-    Rows that follow each other for one reason are one line.
+    Rows that follow each other for one reason, but for its numbers, are one line.
     """
     reasons = [reason or "" for reason in result.reasons]
+    kinds = [NUMBER.sub("#", reason) for reason in reasons]
     start = 0
-    for end in range(1, len(reasons) + 1):
-        if end == len(reasons) or reasons[end] != reasons[start]:
+    for end in range(1, len(kinds) + 1):
+        if end == len(kinds) or kinds[end] != kinds[start]:
             if reasons[start]:
-                yield f"{rows_text(result.row[start:end])} not reached: {reasons[start]}"
+                yield _not_reached(result.row[start:end], reasons[start:end])
             elif every and result.method != "iterative":
                 yield from _branches_unreached(result, start, end)
             start = end
+
+
+def _not_reached(row: IntArray, reasons: Sequence[str]) -> str:
+    """Return why rows are not reached: by the one in the middle where the numbers of the reasons differ."""
+    if len(set(reasons)) == 1:
+        return f"{rows_text(row)} not reached: {reasons[0]}"
+    middle = len(reasons) // 2
+    return f"{rows_text(row)} not reached; row {row[middle]}: {reasons[middle]}"
 
 
 def _branches_unreached(result: InverseResult, start: int, end: int) -> Iterator[str]:
@@ -99,6 +121,53 @@ def singular_warnings(solutions: Solutions, row: IntArray, listed: BoolArray) ->
         if len(rows):
             said = f"{one.free}; chosen: {one.chosen}" if one.free else "a direction of motion is lost there"
             yield LogWarning("singular", f"{rows_text(rows)}: {one.family}: {said}")
+
+
+def near_singular_warnings(
+    chain: Chain, solutions: Solutions, row: IntArray, listed: BoolArray, *, orientation: bool
+) -> Iterator[LogWarning]:
+    """Yield a warning of solutions that are singular or nearly so, and lie in no family that has a name.
+
+    A wrist that is aligned but for the digits of a file lies in none: nothing is infinite there, and yet
+    the last of those digits turns joints far.
+
+    Args:
+        chain: The arm.
+        solutions: What was found.
+        row: Data row of each target.
+        listed: True of the solutions that a person is shown, shape (n, k).
+        orientation: Whether poses were asked for; False of positions.
+    """
+    named = np.zeros_like(solutions.reached)
+    for one in solutions.singular:
+        named |= one.where
+    asked = listed & solutions.reached & ~named & (solutions.shortfall == 0.0)
+    smallest = np.full(asked.shape, np.inf)
+    if asked.any():
+        smallest[asked] = singularity_over_log(chain, solutions.q[asked], orientation=orientation).smallest
+    least = smallest.min(axis=1)
+    near = least < NEARLY
+    if near.any():
+        worst = int(np.argmin(least))
+        where = f" in row {row[worst]}" if near.sum() > 1 else ""
+        said = (
+            f"{rows_text(row[near])}: singular or nearly so: smallest singular value {least[worst]:.2g}"
+            f"{where}; the least change of the target may turn joints far"
+        )
+        yield LogWarning("near-singular", said)
+
+
+def start_warnings(chain: Chain, start: FloatArray | None) -> Iterator[LogWarning]:
+    """Yield a warning of a start that is hardly in rad, shape (joints,)."""
+    if start is None:
+        return
+    found = [
+        f"{joint.name} = {value:g} rad ({np.degrees(value):.6g} deg)"
+        for joint, value in zip(chain.moving, start.tolist(), strict=True)
+        if joint.kind == "revolute" and abs(value) > MANY_TURNS
+    ]
+    if found:
+        yield LogWarning("start-unit", f"--start: found {', '.join(found)}: in deg? Allowed: rad")
 
 
 def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarning]:

@@ -74,43 +74,33 @@ def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple
     Returns:
         One column a coordinate, each vx, vy, vz in [m/s] and wx, wy, wz in [rad/s] per unit rate.
     """
-    return pose_and_jacobian(chain, q, point)[1]
-
-
-def pose_and_jacobian(
-    chain: Chain, q: Sequence[Element], point: int = -1
-) -> tuple[Transform, tuple[tuple[Element, ...], ...]]:
-    """Return the pose of a point as `forward` has it and its `jacobian`, which share the frames.
-
-    Args:
-        chain: The arm.
-        q: One element per coordinate, in [rad] or [m].
-        point: Index of the point, -1 for the tool centre point.
-    """
-    last = range(len(chain.joints))[point]
+    count = len(chain.joints)
+    last = range(count)[point]
     axes: list[tuple[Vector, Vector]] = []
     frame = chain.base
+    target = ZERO
     for k, (joint, value) in enumerate(zip(chain.joints, joint_values(chain, q), strict=True)):
         at_joint = frame @ joint.origin
         if k == last + 1:
-            pose = Transform(frame.rotation, at_joint.translation)
+            target = at_joint.translation
             break
         axes.append((at_joint.rotate(joint.axis), at_joint.translation))
         frame = moved(at_joint, joint, value)
     else:
-        pose = frame @ chain.tip @ chain.tool
+        target = (frame @ chain.tip @ chain.tool).translation
 
     columns: dict[str, tuple[Element, ...]] = dict.fromkeys(chain.coordinates, (0.0,) * 6)
     for joint, (axis, origin) in zip(chain.joints, axes, strict=False):
         if joint.kind == "fixed":
             continue
-        arm = subtract(pose.translation, origin)
-        column = (*cross(axis, arm), *axis) if joint.kind == "revolute" else (*axis, *ZERO)
+        column = (
+            (*cross(axis, subtract(target, origin)), *axis) if joint.kind == "revolute" else (*axis, *ZERO)
+        )
         name, factor = (
             (joint.name, 1.0) if joint.mimic is None else (joint.mimic.joint, joint.mimic.multiplier)
         )
         columns[name] = tuple(plus(a, times(factor, b)) for a, b in zip(columns[name], column, strict=True))
-    return pose, tuple(columns.values())
+    return tuple(columns.values())
 
 
 @dataclass(frozen=True, slots=True)

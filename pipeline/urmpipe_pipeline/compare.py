@@ -81,13 +81,15 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
 
     Raises:
         LogError: If a run has no position to go by, shares no time with the reference, or lacks what a
-            tolerance is for.
+            tolerance is for; if solved targets without times are held against a motion.
+        OptionError: If the clocks of targets without times are to be put together.
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
     chosen = options or CompareOptions()
     if not runs:
         raise OptionError("compare: no log to hold against the reference; at least one is needed")
+    _refuse_poses_as_motion(reference, runs, chosen.sync)
     wanted = trajectory(reference, chosen.tcp if reference.log.joints else "recorded")
     names = text.unique([run.name for run in runs])
     deviations = for_each(
@@ -96,6 +98,20 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     )
     told = [*_told_of(reference), *_differing_robots([reference, *runs], chosen.tcp)]
     return _comparison(wanted, deviations, chosen, told)
+
+
+def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOption) -> None:
+    """Raise if single poses are held against a motion: the second between two of them is no time.
+
+    Single poses are held against single poses row by row; any other offset would interpolate between them.
+    """
+    single = [run for run in (reference, *runs) if run.single_poses]
+    if single and len(single) <= len(runs):
+        said = "found targets without times, which are no motion; allowed: a log or a path of its own times"
+        hint = "urmpipe ik --tsp S gives the targets some"
+        raise LogError(*(lacking(run, f"{said}; {hint}") for run in single))
+    if single and sync != "start":
+        raise OptionError(f"--sync: found {sync} of targets without times, allowed: start, row by row")
 
 
 def _told_of(reference: Run) -> list[LogWarning]:

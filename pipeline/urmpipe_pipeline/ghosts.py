@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TypeAlias
 
@@ -43,17 +43,24 @@ class Goals:
         quat_xyzw: Its orientation as unit quaternions [-], shape (n, 4); None if any will do.
         reasons: Why the arm has no pose there, one line a target; empty where it has one. ("",) * n
             where it has one everywhere.
+        branches: What the solution chosen is called, one a target; empty where there is none, and () where
+            none has a name.
     """
 
     t_ns: IntArray
     position: FloatArray
     quat_xyzw: FloatArray | None
     reasons: tuple[str, ...]
+    branches: tuple[str, ...] = ()
 
     @property
     def missed(self) -> BoolArray:
         """True where the arm has no pose, shape (n,)."""
         return np.array([bool(reason) for reason in self.reasons], dtype=np.bool_)
+
+    def why(self, index: int) -> str:
+        """Return why the arm has no pose for a target: of several reasons, which "; " joins, the first."""
+        return self.reasons[index].split("; ")[0]
 
 
 def ghosts_of(solutions: Solutions, t_ns: IntArray) -> tuple[Ghost, ...]:
@@ -70,14 +77,22 @@ def ghosts_of(solutions: Solutions, t_ns: IntArray) -> tuple[Ghost, ...]:
     )
 
 
-def goals_of(targets: Targets, t_ns: IntArray, reasons: Sequence[str | None] | None = None) -> Goals:
+def goals_of(
+    targets: Targets,
+    t_ns: IntArray,
+    reasons: Sequence[str | None] | None = None,
+    branches: Iterable[str] = (),
+) -> Goals:
     """Return targets as the goals of a run.
 
     Args:
         targets: The targets.
         t_ns: Their times in integer [ns], shape (n,).
         reasons: Why the arm has no pose there, one a target; None or empty where it has one.
+        branches: What the solution chosen is called, one a target; empty where there is none.
     """
     texts = tuple(reason or "" for reason in reasons or [None] * len(targets))
     rotation = None if targets.rotation is None else targets.rotation.reshape(-1, 9)
-    return Goals(t_ns, targets.position, None if rotation is None else quaternions(rotation, "matrix"), texts)
+    quat = None if rotation is None else quaternions(rotation, "matrix")
+    named = tuple(map(str, branches))
+    return Goals(t_ns, targets.position, quat, texts, named if any(named) else ())

@@ -119,25 +119,44 @@ def _refuse_misplaced(
     elif (bad := np.flatnonzero(np.diff(clock.t_ns) <= 0)).size:
         message = "found a time that is not later than the one before, allowed: increasing times"
         found.append(Finding(message, name, row=int(bad[0]) + 2))
+    found += _spoilt(name, chain, ghosts)
     found += [
         Finding(f"found a time of {ghost.name} that no row has, allowed: the times of the rows", name)
         for ghost in ghosts
         if not np.isin(ghost.t_ns - clock.start_ns, clock.t_ns).all()
     ]
+    for told, texts in (("reasons", goals.reasons), ("branches chosen", goals.branches or goals.reasons)):
+        if len(texts) != len(goals.t_ns):
+            said = f"found {len(texts)} {told} of {len(goals.t_ns)} targets, allowed: one each"
+            found.append(Finding(said, name))
     if not np.array_equal(goals.t_ns - clock.start_ns, clock.t_ns):
         found.append(Finding("found targets at other times than the rows, allowed: one a row", name))
     if found:
         raise LogError(*found)
 
 
+def _spoilt(name: str, chain: Chain, ghosts: Sequence[Ghost]) -> Iterator[Finding]:
+    """Yield the ghosts whose joint values are none that an arm can be drawn at."""
+    for ghost in ghosts:
+        wanted = len(ghost.t_ns), len(chain.coordinates)
+        if ghost.q.shape != wanted:
+            found = " x ".join(map(str, ghost.q.shape))
+            said = f"found {found} joint values of {ghost.name}, allowed: {wanted[0]} x {wanted[1]}"
+            yield Finding(said, name)
+        elif (~np.isfinite(ghost.q)).any():
+            yield Finding(f"found a joint value missing in {ghost.name}, allowed: rows that are whole", name)
+        if (np.diff(ghost.t_ns) <= 0).any():
+            yield Finding(f"found times of {ghost.name} in disorder, allowed: increasing times", name)
+
+
 def _unreachable(present: BoolArray, goals: Goals) -> Iterator[LogWarning]:
-    """Yield how many targets the arm has no pose for, and why it has none for the first."""
+    """Yield how many targets the arm has no pose for, and why it has none for the first, at its row."""
     missed = np.flatnonzero(~present)
     if len(missed):
         first = int(missed[0])
-        reason = goals.reasons[first]
-        where = f"the first in row {first + 1}" + (f" ({reason})" if reason else "")
-        said = f"{len(missed)} of {len(present)} targets have no solution, {where}: the run has no pose there"
+        here = ", here the first" if len(missed) > 1 else ""
+        why = f": {goals.why(first)}" if goals.reasons[first] else ""
+        said = f"no pose of the run for {len(missed)} of {len(present)} targets{here}{why}"
         yield LogWarning("unreachable", said, first + 1)
 
 

@@ -142,6 +142,15 @@ def test_warnings_are_of_the_solutions_that_are_shown(capsys: Captured) -> None:
     assert capsys.readouterr().err.startswith("warning: row 1: wrist aligned: ")
 
 
+def test_the_papers_four_digits_and_a_start_in_degrees_are_warned_of(capsys: Captured, folder: Path) -> None:
+    (folder / "four.csv").write_text("x,y,z,rz,ry,rx\n-0.069,0,0.112,0.7854,-1.5708,-0.7854\n")
+    assert run(["ik", "four.csv", "--robot", "arm6", "--start", "0,0,-90,0,0,0"]) == 0
+    said = capsys.readouterr().err.splitlines()
+    assert said[0] == "warning: --start: found theta3 = -90 rad (-5156.62 deg): in deg? Allowed: rad"
+    assert said[1].startswith("warning: row 1: singular or nearly so: smallest singular value ")
+    assert len(said) == 2
+
+
 def test_quiet_prints_nothing(capsys: Captured) -> None:
     assert run(["ik", "targets.csv", "--robot", "arm6", "-q"]) == 1
     assert capsys.readouterr() == ("", "")
@@ -350,6 +359,30 @@ def test_a_joint_that_is_too_fast_fails_the_path(capsys: Captured, folder: Path)
     assert (
         f"      {joint} too fast: 286.5 deg/s of 180 deg/s allowed, at t = 0.000 s (row 1) to row 30" in lines
     )
+
+
+def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
+    capsys: Captured, folder: Path
+) -> None:
+    arm = load_robot("ur5e")
+    q = np.array([0.1, -0.9, 1.2, -0.5, 0.7, 0.2]) + np.linspace(0.0, 0.1, 40)[:, None] * np.eye(6)[0]
+    q[:, 5] = np.linspace(arm.moving[5].upper - 0.1, arm.moving[5].upper + 0.1, 40)  # a turn back in the gap
+    write_path(folder / "path.csv", "ur5e", q)
+    lines = (folder / "path.csv").read_text().splitlines()
+    lines[17:24] = [line.replace(line.split(",")[3], "3.0") for line in lines[17:24]]  # rows 17 to 23: z
+    (folder / "path.csv").write_text("\n".join(lines) + "\n")
+    start = ",".join(map(str, q[0]))
+    found = answer(capsys, 1, "path.csv", "--robot", "ur5e", "--start", start)
+    assert [one["row"] for one in found["targets"] if one["reason"]] == list(range(17, 24))
+    (jump,) = found["jumps"]
+    assert (jump["from_row"], jump["row"]) == (16, 24)
+    assert jump["steps"] == pytest.approx({"wrist_3_joint": q[23, 5] - q[15, 5] - 2 * np.pi}, abs=1e-9)
+    assert run(["ik", "path.csv", "--robot", "ur5e", "--start", start]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("      jump at t = 0.230 s (row 24), since row 16, at (") for line in lines)
+    (last,) = [line.split() for line in lines if line.startswith("wrist_3_joint [deg]")]
+    fastest = np.degrees(abs(jump["steps"]["wrist_3_joint"]) / 0.08)
+    assert float(last[-2]) == pytest.approx(fastest, rel=1e-6)  # over the gap, as the joint that is too fast
 
 
 def test_all_of_a_path_needs_a_recording_and_a_closed_form(capsys: Captured, folder: Path) -> None:

@@ -168,7 +168,16 @@ def test_a_method_that_a_path_does_not_take(capsys: Captured) -> None:
             "norm=3mm",
             "found 'norm=3mm', allowed: a length on each axis, such as 0.0035 or 3.5mm",
         ),
+        *(
+            (
+                "--tolerance",
+                value,
+                f"found {value!r}, allowed: a length on each axis, such as 0.0035 or 3.5mm",
+            )
+            for value in ("0", "-1", "nan", "3.5 km", "angle=1deg")
+        ),
         ("--restarts", "-1", "-1 is not in the range x>=0."),
+        ("--seed", "-1", "-1 is not in the range x>=0."),
         ("--method", "magic", "'magic' is not one of 'auto', 'closed', 'iterative'."),
     ],
 )

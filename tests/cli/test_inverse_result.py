@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -16,6 +17,7 @@ import urmpipe
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.inverse.targets import misses, targets_of
 from urmpipe_models.orientation import quaternions
+from urmpipe_models.singularity import singularity_over_log
 from urmpipe_pipeline.results import json_ready
 
 FloatArray = NDArray[np.float64]
@@ -47,6 +49,19 @@ def test_a_file_matrices_and_targets_are_one_and_the_same(tmp_path: Path) -> Non
     assert (of_file.name, of_targets.name) == ("targets", "targets")
     one = urmpipe.ik(matrices(TARGETS)[1], "arm6")
     assert np.array_equal(one.solutions.q[0], of_targets.solutions.q[1], equal_nan=True)
+
+
+def test_a_transposed_pose_is_none_and_stops_no_other() -> None:
+    poses = matrices(TARGETS)
+    poses[1] = poses[1].T
+    x, y, z = TARGETS.position[1]
+    found = urmpipe.ik(poses, "arm6")
+    assert found.reasons == [
+        None,
+        f"the last row of the matrix is {x:g}, {y:g}, {z:g}, 1, allowed: 0, 0, 0, 1",
+    ]
+    alone = urmpipe.ik(poses[:1], "arm6")
+    assert np.array_equal(found.solutions.q[:1], alone.solutions.q, equal_nan=True)
 
 
 @settings(max_examples=25, deadline=None)
@@ -137,6 +152,31 @@ def test_arrays_with_times_are_a_path() -> None:
     assert json.loads(json.dumps(json_ready(by_period.to_dict())))["verdict"] == "pass"
 
 
+def test_a_path_tells_where_it_comes_nearest_to_a_singular_pose() -> None:
+    q = np.tile(Q[0], (30, 1))
+    q[:, 4] = 0.3 + np.abs(np.arange(30) - 11) / 30  # sigma falls with sin theta5
+    found = urmpipe.ik(targets_of(ARM, q), ARM, tsp=0.01, start=q[0].tolist()).to_dict()["singularity"]
+    log = singularity_over_log(ARM, q)
+    assert (found["row"], found["t"]) == (12, 0.11)
+    assert found["smallest"] == pytest.approx(log.smallest[11], rel=1e-9)
+    assert found["manipulability"] == pytest.approx(log.manipulability[11], rel=1e-9)
+    assert urmpipe.ik(np.full((2, 3), 9.0), ARM, tsp=0.01, restarts=0).to_dict()["singularity"] is None
+
+
+def test_a_path_beyond_the_reach_stays_on_its_branch_at_the_nearest_points() -> None:
+    arm = urmpipe.load_robot("ur5e")
+    poses = np.tile(np.diag([1.0, -1.0, -1.0, 1.0]), (60, 1, 1))
+    poses[:, 0, 3] = 0.55 + 0.4 * np.sin(np.linspace(0.5, 2.6, 60))  # out beyond the reach, and back
+    poses[:, 2, 3] = 0.2
+    beyond = urmpipe.ik(poses, arm, tsp=0.1).solutions.reached[:, 0]
+    assert 5 < (~beyond).sum() < 50
+    found = urmpipe.ik(poses, arm, tsp=0.1, tolerance=0.1)
+    assert found.reached.all()
+    assert found.path is not None
+    assert not found.path.jumps
+    assert np.abs(np.diff(found.q, axis=0)).max() < 0.5
+
+
 def test_joints_without_limits_can_be_written_within_pi() -> None:
     free = replace(ARM, joints=tuple(replace(one, lower=-np.inf, upper=np.inf) for one in ARM.joints))
     q = Q[0] + np.outer(np.linspace(0.0, 7.0, 200), [1.0, 0, 0, 0, 0, 0])
@@ -161,9 +201,35 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
         ),
         ({"targets": np.zeros((0, 3))}, "targets: found none, allowed: one or more"),
         ({"t": [0.0]}, "t: found shape (1,), allowed: (2,), one time for each target, in s"),
-        ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: finite, strictly increasing"),
+        (
+            {"targets": [[0.0, 0.1], [0.0]]},
+            "targets: found a list that is no array of numbers, allowed: (n, 3),",
+        ),
+        ({"targets": {"x": 0.1}}, "targets: found a dict that is no array of numbers, allowed: (n, 3),"),
+        (
+            {"targets": pd.DataFrame({"z": [0.2], "y": [0.0], "x": [0.1]})},
+            "targets: found a table, allowed: an array of shape (n, 3), positions in m, or (n, 4, 4), poses,"
+            ' such as table[["x", "y", "z"]].to_numpy()',
+        ),
+        ({"t": "ab"}, "t: found a str that is no array of numbers, allowed: numbers"),
+        (
+            {"t": [0.0, 1e-12]},
+            "t: found times that do not increase, allowed: strictly increasing, by 1 ns or",
+        ),
+        ({"t": [0.0, 1e12]}, "t: found a time that is not finite or too large, allowed: up to 9e+09 s"),
+        ({"t": [0.0, np.nan]}, "t: found a time that is not finite or too large, allowed: up to 9e+09 s"),
+        ({"tsp": 0.0}, "tsp: found 0.0, allowed: a positive time in s"),
+        ({"tsp": np.nan}, "tsp: found nan, allowed: a positive time in s"),
+        ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: strictly increasing, by 1 ns or"),
         ({"t": [0.0, 1.0], "tsp": 1.0}, "found t and tsp, allowed: one of both"),
         ({"start": [0.0]}, "--start: found 1 values, allowed: 6, one for each of theta1, "),
+        ({"start": "zero"}, "--start: found 'zero', allowed: 6, one for each of theta1, "),
+        ({"start": [np.nan] * 6}, "--start: found a value that is not finite, allowed: 6, one for each of "),
+        ({"seed": -1}, "--seed: found -1, allowed: a whole number, 0 or more"),
+        ({"seed": -1, "tsp": 1.0}, "--seed: found -1, allowed: a whole number, 0 or more"),
+        ({"restarts": 1.5}, "--restarts: found 1.5, allowed: a whole number, 0 or more"),
+        ({"tolerance": np.nan, "tsp": 1.0}, "--tolerance: found nan m, allowed: more than 0, finite"),
+        ({"method": "magic", "tsp": 1.0}, "--method: found 'magic', allowed: auto, closed, iterative"),
         ({"robot": None}, "found no robot; allowed: --robot NAME|FILE, a TOML, a URDF or one of arm6, "),
         (
             {"output": "log.txt"},

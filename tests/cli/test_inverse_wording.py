@@ -2,23 +2,31 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+import urmpipe
 from urmpipe.inverse_wording import (
     NAMED,
     far_warnings,
     longest,
     method_words,
+    near_singular_warnings,
+    reach_words,
     rows_text,
     shortfall_warnings,
     singular_warnings,
+    start_warnings,
+    unreached,
 )
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.inverse.solutions import Singular, Solutions
 from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.singularity import singularity_over_log
 from urmpipe_pipeline.joint_log import LogWarning
 
 
@@ -115,3 +123,68 @@ def test_no_pose_is_farther_than_the_longest_reach(name: str) -> None:
     q = np.random.default_rng(6).uniform(-np.pi, np.pi, (2000, len(arm.coordinates)))
     away = np.linalg.norm(targets_of(arm, q).position, axis=1).max()
     assert 0.5 * longest(arm) < away <= longest(arm)
+
+
+def test_a_wrist_that_is_aligned_but_for_the_digits_of_a_file_is_told_of() -> None:
+    arm = load_robot("arm6")
+    q = np.array([[0.3, 0.8, -0.6, 0.5, bend, 0.2] for bend in (1e-10, 0.7, 1e-5, 0.0, 1e-2)])
+    flat = Singular("wrist aligned", (q[:, 4] == 0.0)[:, None], "q4 and q6: only their sum", "q4 = 0")
+    found = Solutions(q[:, None], ("1",), np.full((5, 1), "", dtype=object), (flat,))
+    row, every = np.arange(1, 6), np.ones((5, 1), dtype=bool)
+    (said,) = near_singular_warnings(arm, found, row, every, orientation=True)
+    least = singularity_over_log(arm, q[:1]).smallest[0]
+    assert said == LogWarning(
+        "near-singular",
+        f"rows 1, 3: singular or nearly so: smallest singular value {least:.2g} in row 1;"
+        " the least change of the target may turn joints far",
+    )
+    assert 1e-13 < least < 1e-10
+    shown = every & (row == 3)[:, None]
+    (said,) = near_singular_warnings(arm, found, row, shown, orientation=True)
+    assert said.message.startswith("row 3: singular or nearly so: smallest singular value ")
+    assert " in row " not in said.message
+    assert not list(near_singular_warnings(arm, found, row, every, orientation=False))
+    approached = replace(found, shortfall=np.full((5, 1), 1e-3))
+    assert not list(near_singular_warnings(arm, approached, row, every, orientation=True))
+
+
+def test_a_start_in_degrees_is_told_of() -> None:
+    arm = load_robot("urm6")
+    assert not list(start_warnings(arm, None))
+    assert not list(start_warnings(arm, np.full(6, -4.0 * np.pi)))
+    assert list(start_warnings(arm, np.array([0.0, 45.0, -90.0, 3.0, 0.0, 0.0]))) == [
+        LogWarning(
+            "start-unit",
+            "--start: found phi2 = 45 rad (2578.31 deg), phi3 = -90 rad (-5156.62 deg): in deg? Allowed: rad",
+        )
+    ]
+
+
+def test_rows_out_of_reach_for_one_reason_are_one_line_whatever_its_numbers() -> None:
+    arm = load_robot("ur5e")
+    poses = np.tile(np.eye(4), (7, 1, 1))
+    poses[:, 0, 3] = [0.3, 1.1, 1.2, 1.3, 0.3, 1.5, 1.5]
+    poses[6, :3, 3] = np.nan
+    found = urmpipe.ik(poses, arm)
+    lines = list(unreached(found, every=False))
+    assert [line.partition(": ")[0] for line in lines] == [
+        "rows 2-4 not reached; row 3",
+        "row 6 not reached",
+        "row 7 not reached",
+    ]
+    assert lines[0] == f"rows 2-4 not reached; row 3: {found.reasons[2]}"
+    assert lines[1] == f"row 6 not reached: {found.reasons[5]}"
+    same = np.repeat(poses[1:2], 3, axis=0)
+    assert list(unreached(urmpipe.ik(same, arm), every=False)) == [
+        f"rows 1-3 not reached: {found.reasons[1]}"
+    ]
+
+
+def test_a_joint_that_is_too_fast_twice_is_one_joint() -> None:
+    arm = load_robot("ur5e")
+    q = np.tile([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], (40, 1))
+    q[:, 0] += np.cumsum(np.where((np.arange(40) // 10) % 2, 0.05, 0.001))
+    found = urmpipe.ik(targets_of(arm, q), arm, tsp=0.01, start=q[0].tolist())
+    assert found.path is not None
+    assert [one.joint for one in found.path.too_fast] == ["shoulder_pan_joint"] * 2
+    assert reach_words(found).endswith(" (closed form: three parallel axes), with 1 joint too fast")

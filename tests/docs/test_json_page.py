@@ -61,7 +61,7 @@ def test_each_key_of_inverse_kinematics_is_named() -> None:
     assert found["jumps"]
     assert found["too_fast"]
     assert keys(found) - NAMED == set()
-    assert {"branch", "nearest", "singular", "last_row", "steps", "miss"} <= keys(found)
+    assert {"branch", "nearest", "singular", "last_row", "steps", "miss", "smallest"} <= keys(found)
     assert keys(urmpipe.ik(poses, arm).to_dict()) <= keys(found)
 
 

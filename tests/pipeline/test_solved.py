@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
-from urmpipe_models.errors import LogError
+from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.kinematics import positions_over_log
@@ -84,14 +85,16 @@ def test_nothing_is_interpolated_across_unreachable_targets(timed: bool) -> None
     q[3:5] = np.nan
     q[7, 2] = np.nan  # a solution lacks a joint: it is none
     times = np.arange(9) * STEP_NS if timed else row_times(9)
-    goals = goals_of(targets_of(UR5E, way(9)), times, [None] * 3 + ["too far", "too far", *([None] * 4)])
+    goals = goals_of(
+        targets_of(UR5E, way(9)), times, [None] * 3 + ["too far; too near", "too far", *([None] * 4)]
+    )
     run = solved("targets", UR5E, times if timed else None, q, goals=goals)
     missing = [3, 4, 7]
     assert run.tcp is not None
     for values in (run.q, run.log.q, run.tcp.position):
         assert np.flatnonzero(np.isnan(values).all(axis=1)).tolist() == missing
         assert np.isfinite(np.delete(values, missing, axis=0)).all()
-    said = "3 of 9 targets have no solution, the first in row 4 (too far): the run has no pose there"
+    said = "no pose of the run for 3 of 9 targets, here the first: too far"
     assert run.warnings == (LogWarning("unreachable", said, 4),)
 
 
@@ -148,7 +151,9 @@ def test_goals_and_ghosts_have_times_from_the_first_row_on() -> None:
     assert targets.rotation is not None
     # A rotation as a quaternion and back: rounding.
     np.testing.assert_allclose(matrices(run.goals.quat_xyzw), targets.rotation, rtol=0, atol=1e-15)
-    assert run.goals.reasons == ("", "", "")
+    assert (run.goals.reasons, run.goals.branches) == (("", "", ""), ())
+    assert goals_of(targets, times, None, ["a", "", "b"]).branches == ("a", "", "b")
+    assert goals_of(targets, times, None, np.array(["", "", ""], dtype=object)).branches == ()
     assert not run.goals.missed.any()
     (other,) = run.ghosts
     np.testing.assert_array_equal(other.t_ns, [STEP_NS, 2 * STEP_NS])
@@ -161,12 +166,38 @@ def test_a_solved_path_compares_with_itself() -> None:
         assert compare_runs(run, [run], CompareOptions({"axis": 1e-9})).verdict == "pass"
 
 
+def test_single_poses_are_no_motion_to_be_compared_with() -> None:
+    """A second a row is no time: interpolated, two poses would make a way that nobody asked for."""
+    poses = solved("poses", UR5E, None, way(50))
+    motion = solved("motion", UR5E, np.arange(50) * STEP_NS, way(50))
+    said = (
+        "found targets without times, which are no motion; allowed: a log or a path of its own times;"
+        " urmpipe ik --tsp S gives the targets some"
+    )
+    for reference, runs in ((motion, [poses]), (poses, [motion]), (poses, [poses, motion])):
+        with pytest.raises(LogError) as error:
+            compare_runs(reference, runs)
+        assert {one.message for one in error.value.findings} == {said}
+        assert {one.file for one in error.value.findings} == {"poses"}
+    with pytest.raises(
+        OptionError, match=r"^--sync: found 0.5 of targets without times, allowed: start, row"
+    ):
+        compare_runs(poses, [poses], CompareOptions(sync=0.5))
+    for k in (0, 7):
+        moved = way(50)
+        moved[k, 0] += 1e-3
+        found = compare_runs(poses, [solved("moved", UR5E, None, moved)])
+        assert found.runs[0].worst == k
+
+
 def test_where_nothing_is_reachable_there_is_a_run_without_poses() -> None:
     for times in (None, np.arange(5) * STEP_NS):
         run = solved("far", UR5E, times, np.full((5, 6), np.nan))
         assert np.isnan(run.q).all()
-        said = "5 of 5 targets have no solution, the first in row 1: the run has no pose there"
+        said = "no pose of the run for 5 of 5 targets, here the first"
         assert run.warnings == (LogWarning("unreachable", said, 1),)
+        alone = solved("far", UR5E, None if times is None else times[:1], np.full((1, 6), np.nan))
+        assert [one.message for one in alone.warnings] == ["no pose of the run for 1 of 1 targets"]
 
 
 def test_all_that_does_not_fit_together_is_told_at_once() -> None:
@@ -179,6 +210,21 @@ def test_all_that_does_not_fit_together_is_told_at_once() -> None:
         ("found a time that is not later than the one before, allowed: increasing times", "path", 3),
         ("found a time of left that no row has, allowed: the times of the rows", "path", None),
         ("found targets at other times than the rows, allowed: one a row", "path", None),
+    ]
+    goals = replace(goals_of(targets_of(UR5E, way(3)), row_times(3), ["", "far"]), branches=("a",))
+    ghosts = (
+        Ghost("short", row_times(3), way(2)),
+        Ghost("holed", row_times(2), np.array([[0.0] * 6, [np.nan] * 6])),
+        Ghost("turned", row_times(2)[::-1], way(2)),
+    )
+    with pytest.raises(LogError) as error:
+        solved("poses", UR5E, None, way(3), ghosts=ghosts, goals=goals)
+    assert [one.message for one in error.value.findings] == [
+        "found 2 x 6 joint values of short, allowed: 3 x 6",
+        "found a joint value missing in holed, allowed: rows that are whole",
+        "found times of turned in disorder, allowed: increasing times",
+        "found 2 reasons of 3 targets, allowed: one each",
+        "found 1 branches chosen of 3 targets, allowed: one each",
     ]
     with pytest.raises(LogError, match="found no target, allowed: one or more"):
         solved("path", UR5E, None, np.empty((0, 6)))

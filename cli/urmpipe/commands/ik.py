@@ -24,11 +24,19 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
     """Return a tolerance on each axis in [m]; of one of several kinds in urmpipe.toml that on an axis."""
     if value is None:
         return None
+    from urmpipe_models.errors import OptionError
     from urmpipe_pipeline.tolerance import parse_tolerance
 
-    kinds = parse_tolerance(value)
-    if set(kinds) != {"axis"} and ctx.get_parameter_source("tolerance") != ParameterSource.DEFAULT_MAP:
-        raise click.BadParameter(f"found {value!r}, allowed: a length on each axis, such as 0.0035 or 3.5mm")
+    said = f"found {value!r}, allowed: a length on each axis, such as 0.0035 or 3.5mm"
+    by_file = ctx.get_parameter_source("tolerance") == ParameterSource.DEFAULT_MAP
+    try:
+        kinds = parse_tolerance(value)
+    except OptionError:
+        if by_file:  # of several kinds, and not all of them lengths on an axis
+            raise
+        raise click.BadParameter(said) from None
+    if set(kinds) != {"axis"} and not by_file:
+        raise click.BadParameter(said)
     return kinds.get("axis")
 
 
@@ -76,7 +84,9 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
     show_default=True,
     help="Random starts of the iterative solver where the first fails.",
 )
-@click.option("--seed", type=int, default=0, show_default=True, help="Of the random starts.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random starts."
+)
 @strict_option
 @table_options
 @robot_options

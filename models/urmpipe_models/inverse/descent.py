@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Literal
 
 import numpy as np
 
 from urmpipe_models.inverse.small_systems import (
+    column_squares,
     dot_product,
     factor,
     gram,
     product,
+    rows_of,
     transposed_product,
 )
 from urmpipe_models.inverse.task import BoolArray, FloatArray, IntArray, Miss, Task
@@ -39,7 +42,7 @@ RANK_CUTOFF = 1e-6
 """Singular values below this part of the largest count as 0 in the pseudoinverse."""
 
 
-@dataclass(frozen=True, slots=True)
+@dataclass(frozen=True, eq=False)
 class Settings:
     """How a descent steps and when it has arrived; see `iterative.refine`."""
 
@@ -49,8 +52,9 @@ class Settings:
     metres: float = 1e-10
     radians: float = 1e-10
     damping: float = 0.05
+    stationary: float = STATIONARY
 
-    @property
+    @cached_property
     def limited(self) -> bool:
         """Whether any joint has a limit."""
         return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
@@ -109,7 +113,7 @@ class Rows:
 
     def kept(self, rows: IntArray) -> Rows:
         """Return some of the rows."""
-        task, q, miss = self.task.kept(rows), self.q[:, rows], self.miss.kept(rows)
+        task, q, miss = self.task.kept(rows), rows_of(self.q, rows), self.miss.kept(rows)
         return Rows(self.index[rows], task, q, self.gain[rows], miss)
 
 
@@ -123,7 +127,7 @@ def descend(progress: Progress, task: Task, index: IntArray, settings: Settings,
         settings: How to step.
         steps: The most to take.
     """
-    q = progress.q[:, index]
+    q = rows_of(progress.q, index)
     rows = Rows(index, task, q, progress.gain[index], task.miss(q))
     rows = _parted(progress, rows, _ended(rows, settings), settings)
     for _ in range(steps):
@@ -132,7 +136,7 @@ def descend(progress: Progress, task: Task, index: IntArray, settings: Settings,
         progress.steps[rows.index] += 1
         rows = _stepped(rows, settings)
         rows = _parted(progress, rows, ~_under_way(rows.miss, settings), settings)
-    _store(progress, rows, settings)
+    _store(progress, rows, np.arange(len(rows.index)), settings)
 
 
 def _under_way(miss: Miss, settings: Settings) -> BoolArray:
@@ -147,7 +151,7 @@ def _ended(rows: Rows, settings: Settings) -> BoolArray:
     """
     J = _free(rows, settings)
     slope = transposed_product(J, rows.miss.error)
-    moves = slope * slope > STATIONARY**2 * rows.miss.square * dot_product(J, J)
+    moves = slope * slope > settings.stationary**2 * rows.miss.square * column_squares(J)
     going = _under_way(rows.miss, settings) & np.asarray(moves.any(axis=0))
     return np.asarray(~going | (rows.gain >= GAINS[1]))
 
@@ -156,20 +160,20 @@ def _parted(progress: Progress, rows: Rows, leaving: BoolArray, settings: Settin
     """Store the rows that leave, and return the others."""
     if not leaving.any():
         return rows
-    gone = rows.kept(np.flatnonzero(leaving))
-    _store(progress, gone, settings)
-    progress.ended[gone.index] = True
+    gone = np.flatnonzero(leaving)
+    _store(progress, rows, gone, settings)
+    progress.ended[rows.index[gone]] = True
     return rows.kept(np.flatnonzero(~leaving))
 
 
-def _store(progress: Progress, rows: Rows, settings: Settings) -> None:
-    """Write how far the rows have come."""
-    at = rows.index
-    progress.q[:, at] = rows.q
-    progress.gain[at] = rows.gain
-    progress.distance[at] = np.sqrt(rows.miss.distance2)
-    progress.angle[at] = np.sqrt(rows.miss.turn2) / rows.miss.length
-    progress.arrived[at] = rows.miss.within(settings.metres, settings.radians)
+def _store(progress: Progress, rows: Rows, which: IntArray, settings: Settings) -> None:
+    """Write how far some of the rows have come."""
+    at, miss = rows.index[which], rows.miss
+    progress.q[:, at] = rows.q[:, which]
+    progress.gain[at] = rows.gain[which]
+    progress.distance[at] = np.sqrt(miss.distance2[which])
+    progress.angle[at] = np.sqrt(miss.turn2[which]) / miss.length
+    progress.arrived[at] = miss.within(settings.metres, settings.radians)[which]
 
 
 def _free(rows: Rows, settings: Settings) -> FloatArray:

@@ -25,9 +25,17 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.descent import METHODS, Method, Progress, Settings, descend
+from urmpipe_models.inverse.descent import (
+    METHODS,
+    STATIONARY,
+    Method,
+    Progress,
+    Settings,
+    descend,
+)
 from urmpipe_models.inverse.least_motion import settle
 from urmpipe_models.inverse.limits import periods
+from urmpipe_models.inverse.small_systems import rows_of
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.task import (
     BoolArray,
@@ -42,7 +50,7 @@ from urmpipe_models.kinematics import THREADS
 BLOCK = 4096
 """Rows of a block: its hundred or so arrays stay in a core's cache."""
 
-ROUND = 8
+ROUND = 6
 """Steps after which the rows of all blocks that are still on their way are gathered into new blocks."""
 
 
@@ -81,6 +89,7 @@ def refine(
     radians: float = 1e-10,
     iterations: int = 100,
     damping: float = 0.05,
+    stationary: float = STATIONARY,
     threads: int = THREADS,
 ) -> Refined:
     """Return joint values that bring the tool to its targets, or as near as can be come from the starts.
@@ -95,6 +104,8 @@ def refine(
         radians: The angle from the target that counts as none in [rad].
         iterations: The most steps a row takes.
         damping: Of damped least squares: mu = (damping l)^2.
+        stationary: A row ends where the cosine between e and what any free joint can change of it is less:
+            the smaller, the nearer to the nearest point.
         threads: Blocks worked on side by side.
 
     Raises:
@@ -102,7 +113,7 @@ def refine(
     """
     lower, upper = limits_of(chain)
     begin = np.clip(_starts(chain, targets, q, method), lower, upper)
-    settings = Settings(lower, upper, method, metres, radians, damping)
+    settings = Settings(lower, upper, method, metres, radians, damping, stationary)
     progress = Progress.at(begin)
     _run(progress, chain, targets, settings, iterations, threads)
     slack = np.zeros(len(targets))
@@ -141,9 +152,11 @@ def _run(
     """Take every row to its end, or as many steps as are allowed."""
     pending = np.flatnonzero(_finite(targets) & np.isfinite(progress.q).all(axis=0))
 
+    task = task_of(chain, targets)
+
     def work(index: IntArray) -> None:
         """Take the rows of a block some steps further."""
-        descend(progress, task_of(chain, targets.rows(index)), index, settings, steps)
+        descend(progress, task.kept(index), index, settings, steps)
 
     for done in range(0, iterations, ROUND):
         steps = min(ROUND, iterations - done)
@@ -177,7 +190,8 @@ def _settled(
     def work(index: IntArray) -> None:
         """Settle the rows of a block."""
         task = task_of(chain, targets.rows(index))
-        progress.q[:, index], slack[index] = settle(task, progress.q[:, index], home.T[:, index], settings)
+        q, to = rows_of(progress.q, index), np.ascontiguousarray(home[index].T)
+        progress.q[:, index], slack[index] = settle(task, q, to, settings)
 
     each(work, [arrived[i : i + BLOCK] for i in range(0, len(arrived), BLOCK)], threads)
     return slack

@@ -88,3 +88,8 @@ class JointPath:
     def singularity(self) -> SingularityLog:
         """How far the arm is from a singular pose at each sample: smallest singular value, manipulability."""
         return singularity_over_log(self.chain, self.q, orientation=not self.position_only)
+
+    @property
+    def nearest_singularity(self) -> int | None:
+        """Index of the sample with the least of the smallest singular values; None where none is reached."""
+        return int(np.nanargmin(self.singularity.smallest)) if self.reached.any() else None

@@ -48,19 +48,21 @@ class TooFast:
 def too_fast(chain: Chain, q: FloatArray, seconds: FloatArray) -> tuple[TooFast, ...]:
     """Return where joints move faster than they can, |q_k - q_{k-1}| / (t_k - t_{k-1}), by sample and joint.
 
+    Over samples without a solution it is the speed that the joint needs at least to be there in time.
+
     Args:
         chain: The arm.
-        q: Joint values in [rad] or [m], shape (n, joints), NaN where there are none: no speed is told of a
-            step from or to them.
+        q: Joint values in [rad] or [m], shape (n, joints), NaN where there are none.
         seconds: Times in [s], rising, shape (n,).
     """
-    speed = np.abs(np.diff(q, axis=0)) / np.diff(seconds)[:, None]
+    reached = np.flatnonzero(np.isfinite(q).all(axis=1))
+    speed = np.abs(np.diff(q[reached], axis=0)) / np.diff(seconds[reached])[:, None]
     found = [
         TooFast(
             joint.name,
-            first,
-            last + 1,
-            float(seconds[first]),
+            int(reached[first]),
+            int(reached[last + 1]),
+            float(seconds[reached[first]]),
             float(speed[first : last + 1, k].max()),
             joint.velocity,
             "m/s" if joint.kind == "prismatic" else "rad/s",

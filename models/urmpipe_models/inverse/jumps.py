@@ -36,6 +36,7 @@ class Jump:
 
     Attributes:
         sample: Index of the sample that it leads to, from 0.
+        last: Index of the sample that it comes from: those between have no solution.
         t: Its time in [s], from the first sample.
         position: Where the tool is then, x, y, z in [m].
         from_branch: What the solution before is called.
@@ -44,6 +45,7 @@ class Jump:
     """
 
     sample: int
+    last: int
     t: float
     position: tuple[float, float, float]
     from_branch: str
@@ -57,8 +59,9 @@ class Jump:
         branches = (
             f" from {self.from_branch} to {self.to_branch}" if self.from_branch != self.to_branch else ""
         )
+        gap = f" since sample {self.last}" if self.last < self.sample - 1 else ""
         steps = ", ".join(map(str, self.joints))
-        return f"sample {self.sample} at {self.t:.3f} s, ({place}) m: a jump{branches}: {steps}"
+        return f"sample {self.sample} at {self.t:.3f} s, ({place}) m: a jump{gap}{branches}: {steps}"
 
 
 def jump_samples(chain: Chain, q: FloatArray, position_only: bool) -> IntArray:
@@ -110,7 +113,8 @@ def jumps_at(
         large = [int(k) for k in np.argsort(-np.abs(steps), kind="stable") if abs(steps[k]) >= SMALL_STEP]
         joints = tuple(JointStep(chain.coordinates[k], float(steps[k]), units[k]) for k in large)
         x, y, z = position[sample].tolist()
-        found.append(Jump(sample, float(seconds[sample]), (x, y, z), branch[last], branch[sample], joints))
+        t = float(seconds[sample])
+        found.append(Jump(sample, last, t, (x, y, z), branch[last], branch[sample], joints))
     return tuple(found)
 
 

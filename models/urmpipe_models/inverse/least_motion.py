@@ -29,6 +29,7 @@ from urmpipe_models.inverse.small_systems import (
     factor,
     gram,
     product,
+    rows_of,
     transposed_product,
 )
 from urmpipe_models.inverse.task import BoolArray, FloatArray, IntArray, Task
@@ -77,7 +78,7 @@ class Tangent:
 
     def kept(self, rows: IntArray) -> Tangent:
         """Return some of the rows."""
-        return Tangent(self.t[:, rows], self.free[:, rows])
+        return Tangent(rows_of(self.t, rows), self.free[:, rows])
 
     def where(self, chosen: BoolArray, other: Tangent) -> Tangent:
         """Return the rows that are chosen, and the other's elsewhere."""
@@ -142,7 +143,7 @@ def settle(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> t
     for _ in range(MOST_MOVES):
         if not len(rows):
             break
-        before, to = q[:, rows], home[:, rows]
+        before, to = rows_of(q, rows), rows_of(home, rows)
         after, kept = _moved(task, before, to, now, length, settings)
         new = tangent(task, after, to, settings)
         length = np.where(kept, _length(after - before, now, new), 0.25 * length)

@@ -55,6 +55,19 @@ def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = 
     )
 
 
+def within_pi(q: FloatArray, period: FloatArray) -> FloatArray:
+    """Return joint values with those of joints that turn without end within (-pi, pi].
+
+    Args:
+        q: In [rad] or [m], shape (..., joints).
+        period: Of each joint, shape (joints,): see `periods`.
+    """
+    turning = np.isfinite(period)
+    values = q.copy()
+    values[..., turning] -= TURN * np.ceil((q[..., turning] - math.pi) / TURN)
+    return values
+
+
 def _limits(chain: Chain) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper limits, each of shape (joints,)."""
     return np.array([one.lower for one in chain.moving]), np.array([one.upper for one in chain.moving])

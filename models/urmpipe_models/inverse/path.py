@@ -20,6 +20,7 @@ from urmpipe_models.inverse.joint_speeds import too_fast
 from urmpipe_models.inverse.jumps import jump_samples, jumps_at
 from urmpipe_models.inverse.least_motion_path import LeastMotionPath
 from urmpipe_models.inverse.limits import TURN, periods
+from urmpipe_models.inverse.limits import within_pi as within_pi_of
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, SingularFamily, TextArray
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.stretches import stretches
@@ -150,7 +151,7 @@ def _told(
     if branch is None:
         branch = _numbered(len(found.q), reached, jumping)
     else:
-        jumping = _with_gaps(jumping, branch, reached)
+        jumping = _with_gaps(chain, jumping, found.q, branch, reached)
     jumps = jumps_at(
         chain, reached[jumping], reached[jumping - 1], found.q, seconds, targets.position, branch
     )
@@ -159,7 +160,7 @@ def _told(
         position_only,
         LEAST_MOTION if form is None else form.name,
         t_ns,
-        _wrapped(found.q, periods(chain)) if within_pi else found.q,
+        within_pi_of(found.q, periods(chain)) if within_pi else found.q,
         branch,
         found.reasons,
         found.shortfall,
@@ -182,22 +183,28 @@ def _numbered(count: int, reached: NDArray[np.intp], jumping: NDArray[np.intp]) 
     return branch
 
 
-def _with_gaps(jumping: NDArray[np.intp], branch: TextArray, reached: NDArray[np.intp]) -> NDArray[np.intp]:
-    """Return the jumps among reached samples: after ones without a solution, those to another branch.
+def _with_gaps(
+    chain: Chain,
+    jumping: NDArray[np.intp],
+    q: FloatArray,
+    branch: TextArray,
+    reached: NDArray[np.intp],
+) -> NDArray[np.intp]:
+    """Return the jumps among reached samples with others after ones without a solution.
 
-    How the tool would have moved meanwhile is not known, so that its way tells nothing there.
+    How the tool would have moved meanwhile is not known, so that its way tells nothing there: a jump leads
+    to another branch, or moves a revolute joint by more than half a turn since its limits bar the nearer one.
     """
     gap = np.diff(reached, prepend=-1) > 1
     other = np.append(False, branch[reached][1:] != branch[reached][:-1])
-    return np.union1d(jumping[~gap[jumping]], np.flatnonzero(gap & other))
+    turned = np.append(False, _turned(chain, q[reached]))
+    return np.union1d(jumping[~gap[jumping]], np.flatnonzero(gap & (other | turned)))
 
 
-def _wrapped(q: FloatArray, period: FloatArray) -> FloatArray:
-    """Return joint values with those of joints that turn without end within (-pi, pi]."""
-    turning = np.isfinite(period)
-    wrapped = q.copy()
-    wrapped[:, turning] -= TURN * np.ceil((q[:, turning] - math.pi) / TURN)
-    return wrapped
+def _turned(chain: Chain, q: FloatArray) -> BoolArray:
+    """Return at which steps a revolute joint moves by more than half a turn, shape (m - 1,)."""
+    revolute = [joint.kind == "revolute" for joint in chain.moving]
+    return np.asarray((np.abs(np.diff(q[:, revolute], axis=0)) > 0.5 * TURN).any(axis=1))
 
 
 def _before(q: FloatArray, start: FloatArray) -> FloatArray:

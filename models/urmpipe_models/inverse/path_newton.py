@@ -26,6 +26,7 @@ A joint held on a limit has no column in J; J_h^T y_k then says which way it wou
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -35,6 +36,9 @@ from urmpipe_models.inverse.task import FloatArray, Miss, Task
 
 DAMPING = 1e-8
 """lambda^2 in [m2/rad2]."""
+
+SHARE = 4
+"""Sections of a recurrence, in multiples of their length: products of matrices cost more than vectors."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,8 +72,8 @@ def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, dam
     free = np.isnan(held)
     J = miss.jacobian * free[:, None]
     system = factor(gram(J), damping)
-    inverse = np.array([system.solve(column) for column in J.transpose(1, 0, 2)])
-    null = np.eye(len(held)) - _rows(inverse) @ _rows(J)
+    columns = Factor(system.lower[:, :, None], system.inverse[:, None]).solve(J)
+    null = np.eye(len(held)) - _rows(columns.transpose(1, 0, 2)) @ _rows(J)
     before = np.vstack((np.where(free, last, held), guess[:-1])) - guess
     q = guess + _in_turn(null, before, transposed_product(J, system.solve(miss.error)).T)
     pull = None if free.all() else _pull(system, miss, J, np.vstack((before[:1], q[:-1] - guess[1:])))
@@ -77,20 +81,40 @@ def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, dam
 
 
 def _in_turn(null: FloatArray, before: FloatArray, towards: FloatArray) -> FloatArray:
-    """Return c_k = N_k c_{k-1} + (N_k (p_{k-1} - p_k) + J_k^# e_k), the corrections q_k - p_k.
+    """Return c_k = N_k c_{k-1} + N_k (p_{k-1} - p_k) + J_k^# e_k, the corrections q_k - p_k.
 
     Args:
         null: N_k, shape (w, joints, joints).
         before: p_{k-1} - p_k, of the first sample q_0 - p_1, shape (w, joints).
         towards: J_k^# e_k, shape (w, joints).
     """
-    alone = (null @ before[:, :, None])[:, :, 0] + towards
-    corrections = []
-    correction = np.zeros(null.shape[1])
-    for matrix, own in zip(null, alone, strict=True):
-        correction = matrix.dot(correction) + own
-        corrections.append(correction)
-    return np.array(corrections)
+    return recurrence(null, (null @ before[:, :, None])[:, :, 0] + towards)
+
+
+def recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
+    """Return c_k = M_k c_{k-1} + a_k with c before the first 0, shape (w, m).
+
+    The samples are cut into sections. Side by side each section becomes one map from what it begins with:
+    the product of its matrices and what its offsets come to. Only from section to section one waits for the
+    other.
+
+    Args:
+        matrices: M_k, shape (w, m, m), of norms of at most about 1: products of them stay small.
+        offsets: a_k, shape (w, m).
+    """
+    count, size = offsets.shape
+    length = max(1, math.isqrt(count // SHARE))
+    sections = -(-count // length)
+    products, sums = np.zeros((sections * length, size, size)), np.zeros((sections * length, size, 1))
+    products[:count], sums[:count, :, 0] = matrices, offsets
+    products, sums = products.reshape(sections, length, size, size), sums.reshape(sections, length, size, 1)
+    for k in range(1, length):
+        sums[:, k] += products[:, k] @ sums[:, k - 1]
+        products[:, k] = products[:, k] @ products[:, k - 1]
+    begins = np.zeros((sections, 1, size, 1))
+    for k in range(1, sections):
+        begins[k, 0] = products[k - 1, -1] @ begins[k - 1, 0] + sums[k - 1, -1]
+    return np.asarray((products @ begins + sums).reshape(-1, size)[:count])
 
 
 def _pull(system: Factor, miss: Miss, J: FloatArray, s: FloatArray) -> FloatArray:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.inverse.descent import STATIONARY
 from urmpipe_models.inverse.iterative import Refined, refine
 from urmpipe_models.inverse.limits import TURN, within_limits
 from urmpipe_models.inverse.solutions import NEAREST_POINT, FloatArray, Solutions
@@ -20,6 +21,25 @@ DISTINCT = 1e-3
 
 At a singular pose a miss of 1e-10 leaves 1e-5 rad: less would tell one solution for several.
 """
+
+ROUGH = 1e-2
+"""An attempt of a search ends where the cosine between miss and motion is less (see `refine`).
+
+It would come no nearer worth the steps. The nearest of all is then brought to the nearest point near it.
+"""
+
+CLEARLY = 0.99
+"""An attempt from another start must lead to less than this share of the least miss so far.
+
+Of several branches that come as near, chance would choose else: the one from the start stays, and along a
+path so does the branch.
+"""
+
+ATTEMPT_STEPS = 100
+"""The most steps of an attempt."""
+
+LAST_STEPS = 500
+"""Of this last attempt: where the target is singular, steps are many and short."""
 
 
 def solve_iteratively(
@@ -35,8 +55,10 @@ def solve_iteratively(
     """Return joint values within limits that bring the tool to its targets, found from several starts.
 
     Each target is solved from `start` first. Those that are not met there are solved from random starts,
-    one after the other, uniform within the limits (see `random_starts`). All targets share these, so that
-    what is found for one does not depend on which others there are, and the same seed finds the same.
+    uniform within the limits (see `random_starts`), roughly: an attempt that leads to no target is soon
+    given up. What none of them meets is brought, from where the tool came nearest, as near as it can. All
+    targets share the starts, so that what is found for one does not depend on which others there are, and
+    the same seed finds the same.
 
     Where a target leaves freedoms, a solution is one of least motion from `start` (see `refine`), wherever
     the search for it began.
@@ -46,9 +68,10 @@ def solve_iteratively(
         targets: n of them; one that is not finite has no solution.
         start: Joint values in [rad] or [m], shape (joints,) or (n, joints); of the chain by default.
         every: Search from all starts and return what differs by more than `DISTINCT`, nearest to `start`
-            first, branches "1", "2", ...; otherwise one solution: the first that is found. That there are no
-            more cannot be known. Where a target leaves freedoms there is a continuum, and what is returned
-            are its points of least motion from `start`.
+            first, branches "1", "2", ...; otherwise one solution: from `start`, or where that meets no
+            target, of the first random starts that do (one, two, four, ... at a time) the nearest to
+            `start`. That there is no other, or none nearer, cannot be known. Where a target leaves freedoms
+            there is a continuum, and what is returned are its points of least motion from `start`.
         restarts: Random starts.
         seed: Of the random starts.
         tolerance: In [m]: a target that is met from no start takes the nearest point found, if the tool is
@@ -67,7 +90,8 @@ def solve_iteratively(
     for some in [starts] if every else _growing(starts):
         if len(some) and (every or search.pending.any()):
             search.attempt(some, every)
-    solutions = within_limits(chain, _solutions(chain, search, begin, every), begin)
+    search.finish()
+    solutions = _solutions(chain, search, begin, every)
     return _told(chain, targets, solutions, search, restarts, tolerance)
 
 
@@ -124,58 +148,74 @@ class _Search:
         rows = np.flatnonzero(self.pending | every)
         count, joints = len(starts), self.begin.shape[1]
         q = np.broadcast_to(starts, (count, *self.begin.shape))[:, rows].reshape(-1, joints)
-        refined = refine(
-            self.chain, self.targets.rows(np.tile(rows, count)), q, home=np.tile(self.begin[rows], (count, 1))
-        )
+        refined = self._refine(rows, q, count, ROUGH, ATTEMPT_STEPS)
+        self._keep_nearest(rows, refined, count, CLEARLY)
+
+    def finish(self) -> None:
+        """Bring the tool from where it came nearest to what is pending to the target or the nearest point."""
+        rows = np.flatnonzero(self.pending & np.isfinite(self.residual))
+        if len(rows):
+            refined = self._refine(rows, self.q[rows], 1, STATIONARY, LAST_STEPS)
+            self._keep_nearest(rows, refined, 1, 1.0)
+
+    def _refine(self, rows: IntArray, q: FloatArray, count: int, stationary: float, steps: int) -> Refined:
+        """Solve the targets at `rows` in as many attempts, from q, shape (count * rows, joints)."""
+        targets, home = self.targets.rows(np.tile(rows, count)), np.tile(self.begin[rows], (count, 1))
+        refined = refine(self.chain, targets, q, home=home, stationary=stationary, iterations=steps)
         found = np.full((count, *self.begin.shape), np.nan)
-        found[:, rows] = np.where(refined.converged[:, None], refined.q, np.nan).reshape(count, -1, joints)
+        found[:, rows] = np.where(refined.converged[:, None], refined.q, np.nan).reshape(
+            count, -1, q.shape[1]
+        )
         self.found.extend(found)
         self.pending[rows] &= ~refined.converged.reshape(count, -1).any(axis=0)
-        self._keep_nearest(rows, refined, count)
+        return refined
 
-    def _keep_nearest(self, rows: IntArray, refined: Refined, count: int) -> None:
-        """Keep where the tool came nearest to the targets at `rows` in as many attempts."""
+    def _keep_nearest(self, rows: IntArray, refined: Refined, count: int, share: float) -> None:
+        """Keep where the tool came nearer to the targets at `rows` than `share` of the least miss so far."""
         residual = np.where(np.isnan(refined.residual), np.inf, refined.residual).reshape(count, -1)
         best = np.argmin(residual, axis=0)
-        nearer = residual.min(axis=0) < self.residual[rows]
+        nearer = residual.min(axis=0) < share * self.residual[rows]
         of, to = (best * len(rows) + np.arange(len(rows)))[nearer], rows[nearer]
         self.q[to], self.residual[to] = refined.q[of], refined.residual[of]
         self.distance[to], self.angle[to] = refined.distance[of], refined.angle[of]
 
 
 def _solutions(chain: Chain, search: _Search, begin: FloatArray, every: bool) -> Solutions:
-    """Return what was found, each solution once, nearest to the start first."""
-    found = np.stack(search.found, axis=1)
-    if not every:
-        first = np.argmax(np.isfinite(found).all(axis=2), axis=1)
-        found = np.take_along_axis(found, first[:, None, None], axis=1)
-    else:
-        found = _distinct(chain, found, begin)
-    count = found.shape[1]
-    reasons = np.full(found.shape[:2], "", dtype=np.object_)
-    return Solutions(found, tuple(str(k + 1) for k in range(count)), reasons)
+    """Return what was found, each joint in the allowed turn nearest to the start, nearest solution first."""
+    shifted = within_limits(chain, _listed(np.stack(search.found, axis=1)), begin).q
+    found = _nearest_first(shifted, begin, None if every else 1)
+    return _listed(_distinct(chain, found) if every else found)
 
 
-def _distinct(chain: Chain, found: FloatArray, begin: FloatArray) -> FloatArray:
-    """Return each solution once, shape (n, k, joints), nearest to the start first, NaN where fewer."""
-    period = np.array([TURN if joint.kind == "revolute" else np.inf for joint in chain.moving])
-    distance = np.square(_apart(found, begin[:, None, :], period)).sum(axis=2)
-    order = np.argsort(np.where(np.isnan(distance), np.inf, distance), axis=1, kind="stable")
-    found = np.take_along_axis(found, order[..., None], axis=1)
+def _listed(found: FloatArray) -> Solutions:
+    """Return joint values of shape (n, k, joints) as solutions 1, 2, ..."""
+    branches = tuple(str(k + 1) for k in range(found.shape[1]))
+    return Solutions(found, branches, np.full(found.shape[:2], "", dtype=np.object_))
+
+
+def _nearest_first(found: FloatArray, begin: FloatArray, most: int | None) -> FloatArray:
+    """Return what was found, shape (n, k, joints), nearest to the start first, NaN last, `most` of each."""
+    distance = np.square(found - begin[:, None, :]).sum(axis=2)
+    order = np.argsort(np.where(np.isnan(distance), np.inf, distance), axis=1, kind="stable")[:, :most]
+    return np.take_along_axis(found, order[..., None], axis=1)
+
+
+def _distinct(chain: Chain, found: FloatArray) -> FloatArray:
+    """Return each solution once, shape (n, k, joints), in the order they have, NaN where fewer."""
     new = np.asarray(np.isfinite(found).all(axis=2))
     for k in range(1, found.shape[1]):
-        apart = np.abs(_apart(found[:, :k], found[:, k : k + 1], period)).max(axis=2) > DISTINCT
+        apart = np.abs(_apart(chain, found[:, :k], found[:, k : k + 1])).max(axis=2) > DISTINCT
         new[:, k] &= (apart | ~new[:, :k]).all(axis=1)
-    found[~new] = np.nan
+    found = np.where(new[..., None], found, np.nan)
     order = np.argsort(~new, axis=1, kind="stable")[:, : max(1, int(new.sum(axis=1).max(initial=1)))]
     return np.take_along_axis(found, order[..., None], axis=1)
 
 
-def _apart(a: FloatArray, b: FloatArray, period: FloatArray) -> FloatArray:
+def _apart(chain: Chain, a: FloatArray, b: FloatArray) -> FloatArray:
     """Return a - b, revolute joints by the shorter way."""
     apart = np.asarray(a - b)
-    turning = np.isfinite(period)
-    apart[..., turning] -= period[turning] * np.round(apart[..., turning] / period[turning])
+    turning = np.array([joint.kind == "revolute" for joint in chain.moving])
+    apart[..., turning] -= TURN * np.round(apart[..., turning] / TURN)
     return apart
 
 
@@ -191,7 +231,8 @@ def _told(
     near = _near_enough(chain, targets, search, tolerance)
     q, reasons, labels = solutions.q.copy(), solutions.reasons.copy(), solutions.labels.copy()
     shortfall = np.zeros(q.shape[:2])
-    q[near, 0], labels[near, 0], shortfall[near, 0] = search.q[near], NEAREST_POINT, search.distance[near]
+    turned = within_limits(chain, _listed(search.q[near][:, None]), search.begin[near])
+    q[near, 0], labels[near, 0], shortfall[near, 0] = turned.q[:, 0], NEAREST_POINT, search.distance[near]
     lacking = np.asarray(~np.isfinite(q).all(axis=2))
     reasons[lacking] = f"no further solution {_tries(restarts)}"
     for row in np.flatnonzero(lacking.all(axis=1)):

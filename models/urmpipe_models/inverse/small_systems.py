@@ -2,8 +2,8 @@
 
 `numpy.linalg.solve` calls LAPACK once a system, which costs more than the Jacobian that a system of six
 unknowns is about. Here a matrix is an array of shape (k, k, n), so that an entry's n values lie side by side
-and each elimination is a few NumPy operations on all systems. Sums are written term by term: their rounding
-must not depend on n, or what one row comes to would depend on which others are solved beside it.
+and each elimination is a few NumPy operations on all systems. Sums run term by term (see `_sum`): their
+rounding must not depend on n, or what one row comes to would depend on which others are solved beside it.
 """
 
 from __future__ import annotations
@@ -61,28 +61,48 @@ def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> Factor:
 
 def gram(M: FloatArray) -> FloatArray:
     """Return M M^T, shape (k, k, n), of matrices of shape (k, p, n)."""
-    square = np.empty((len(M), len(M), M.shape[2]))
-    for i, row in enumerate(M):
-        square[i, : i + 1] = square[: i + 1, i] = product(M[: i + 1], row)
-    return square
+    return _sum("ipn,jpn->ijn", M, M)
 
 
 def product(M: FloatArray, x: FloatArray) -> FloatArray:
     """Return M x, shape (k, n), of matrices of shape (k, p, n) and vectors of shape (p, n)."""
-    total: FloatArray = M[:, 0] * x[0]
-    for p in range(1, len(x)):
-        total += M[:, p] * x[p]
-    return total
+    return _sum("kpn,pn->kn", M, x)
 
 
 def transposed_product(M: FloatArray, x: FloatArray) -> FloatArray:
     """Return M^T x, shape (p, n), of matrices of shape (k, p, n) and vectors of shape (k, n)."""
-    return dot_product(M, x)
+    return _sum("kpn,kn->pn", M, x)
 
 
 def dot_product(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return sum_k a_k b_k, shape (..., n), of a of shape (k, ..., n) and b of shape (k, n) or that of a."""
-    total: FloatArray = a[0] * b[0]
-    for k in range(1, len(a)):
-        total += a[k] * b[k]
-    return total
+    """Return sum_k a_k b_k, shape (n,), of a and b of shape (k, n)."""
+    return _sum("kn,kn->n", a, b)
+
+
+def column_squares(M: FloatArray) -> FloatArray:
+    """Return the squares of the columns' lengths, shape (p, n), of matrices of shape (k, p, n)."""
+    return _sum("kpn,kpn->pn", M, M)
+
+
+def outer_sum(a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return sum_k a_k b_k^T, shape (p, r, n), of a of shape (k, p, n) and b of shape (k, r, n)."""
+    return _sum("kpn,krn->prn", a, b)
+
+
+def rows_of(a: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
+    """Return some of the n of an array of shape (..., n), their values side by side.
+
+    a[..., rows] has them a matrix apart, which makes all that follows several times as slow.
+    """
+    return np.take(a, rows, axis=-1)
+
+
+def _sum(subscripts: str, a: FloatArray, b: FloatArray) -> FloatArray:
+    """Return a sum of products whose inner loop runs over the n systems, term after term for each.
+
+    Such is `numpy.einsum` where the n values lie side by side and are more than one; of one alone it would
+    sum in another order.
+    """
+    if a.shape[-1] == 1:
+        return np.asarray(np.einsum(subscripts, a.repeat(2, -1), b.repeat(2, -1))[..., :1])
+    return np.asarray(np.einsum(subscripts, np.ascontiguousarray(a), np.ascontiguousarray(b)))

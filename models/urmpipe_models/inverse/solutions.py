@@ -92,7 +92,7 @@ class Solutions:
 
     def reason(self, target: int) -> str | None:
         """Return why a target has no solution at all, each reason once; None if it has one."""
-        if self.reached[target].any():
+        if np.isfinite(self.q[target]).all(axis=1).any():  # not `reached`: that looks at every target
             return None
         return "; ".join(dict.fromkeys(text for text in self.reasons[target].tolist() if text))
 

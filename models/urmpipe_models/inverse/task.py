@@ -3,25 +3,22 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
-from urmpipe_models.elementwise import Element, Vector, add, cross, dot, plus, subtract
-from urmpipe_models.inverse.small_systems import dot_product
+from urmpipe_models.inverse.small_systems import dot_product, outer_sum, rows_of
 from urmpipe_models.inverse.targets import Targets
-from urmpipe_models.kinematics import jacobian_over_log, pose_and_jacobian
+from urmpipe_models.inverse.tool_motion import Arm, arm_of, tool_motion
+from urmpipe_models.kinematics import jacobian_over_log
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
 IntArray: TypeAlias = NDArray[np.intp]
-
-Columns: TypeAlias = tuple[Vector, Vector, Vector]
-"""The axes x, y, z of a frame: the columns of its rotation matrix."""
 
 HALF_TURN_SINE = 1e-6
 """Below this sine an angle near pi takes its axis from the symmetric part of the rotation matrix."""
@@ -40,9 +37,14 @@ def characteristic_length(chain: Chain) -> float:
 
 def redundancy(chain: Chain, targets: Targets) -> int:
     """Return how many freedoms a target leaves: joints less the rank of the Jacobian off singular poses."""
+    return len(chain.coordinates) - _rank(chain, 3 if targets.rotation is None else 6)
+
+
+@lru_cache(maxsize=32)
+def _rank(chain: Chain, rows: int) -> int:
+    """Return the rank of the Jacobian's first rows off singular poses."""
     q = np.random.default_rng(0).uniform(-1.0, 1.0, (8, len(chain.coordinates)))
-    J = jacobian_over_log(chain, q)[:, : 3 if targets.rotation is None else 6]
-    return len(chain.coordinates) - int(np.linalg.matrix_rank(J, rtol=1e-9).max())
+    return int(np.linalg.matrix_rank(jacobian_over_log(chain, q)[:, :rows], rtol=1e-9).max())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -75,7 +77,7 @@ class Miss:
 
     def kept(self, rows: IntArray) -> Miss:
         """Return some of the rows."""
-        error, jacobian = self.error[:, rows], self.jacobian[:, :, rows]
+        error, jacobian = rows_of(self.error, rows), rows_of(self.jacobian, rows)
         return Miss(error, jacobian, self.distance2[rows], self.turn2[rows], self.length)
 
     def restore(self, rows: IntArray, before: Miss) -> None:
@@ -89,42 +91,36 @@ class Miss:
             mine[..., rows] = other[..., rows]
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True, eq=False)
 class Task:
     """The targets of a block of rows.
 
     Attributes:
-        chain: The arm.
+        arm: The arm.
+        length: The characteristic length in [m].
         position: x, y, z in [m], shape (3, n).
         columns: The axes that the tool shall take, shape (3, 3, n), first index: which; None if any
             orientation will do.
     """
 
-    chain: Chain
+    arm: Arm
+    length: float
     position: FloatArray
     columns: FloatArray | None
 
-    @cached_property
-    def length(self) -> float:
-        """The characteristic length in [m]."""
-        return characteristic_length(self.chain)
-
     def kept(self, rows: IntArray) -> Task:
         """Return some of the rows."""
-        columns = None if self.columns is None else self.columns[:, :, rows]
-        return Task(self.chain, self.position[:, rows], columns)
+        columns = None if self.columns is None else rows_of(self.columns, rows)
+        return replace(self, position=rows_of(self.position, rows), columns=columns)
 
     def miss(self, q: FloatArray) -> Miss:
         """Return what is missed at joint values q in [rad] or [m], shape (joints, n)."""
-        pose, columns = pose_and_jacobian(self.chain, list(q))
+        tool = tool_motion(self.arm, q)
         size = 3 if self.columns is None else 6
-        error, J = np.empty((size, q.shape[1])), np.empty((size, *q.shape))
-        _fill(error, subtract(tuple(self.position), pose.translation))
-        for i, column in enumerate(columns):
-            _fill(J[:, i], column[:size])
+        error, J = np.empty((size, q.shape[1])), tool.jacobian[:size]
+        np.subtract(self.position, tool.position, out=error[:3])
         if self.columns is not None:
-            error[3:] = turn_between(pose.columns, self.columns)
-            error[3:] *= self.length
+            np.multiply(turn_between(tool.columns, self.columns), self.length, out=error[3:])
             J[3:] *= self.length
         turn2 = np.zeros(q.shape[1]) if size == 3 else dot_product(error[3:], error[3:])
         return Miss(error, J, dot_product(error[:3], error[:3]), turn2, self.length)
@@ -132,13 +128,13 @@ class Task:
 
 def task_of(chain: Chain, targets: Targets) -> Task:
     """Return the targets as one array a coordinate."""
-    position = np.ascontiguousarray(targets.position.T)
-    if targets.rotation is None:
-        return Task(chain, position, None)
-    return Task(chain, position, np.ascontiguousarray(targets.rotation.transpose(2, 1, 0)))
+    position, columns = np.ascontiguousarray(targets.position.T), None
+    if targets.rotation is not None:
+        columns = np.ascontiguousarray(targets.rotation.transpose(2, 1, 0))
+    return Task(arm_of(chain), characteristic_length(chain), position, columns)
 
 
-def turn_between(columns: Columns, wanted: FloatArray) -> FloatArray:
+def turn_between(columns: FloatArray, wanted: FloatArray) -> FloatArray:
     """Return the rotation vector u a, 0 <= a <= pi, in [rad], in the world, of R_wanted R^T: shape (3, n).
 
     With the columns c_k of R and w_k of R_wanted: u sin(a) = sum_k c_k x w_k / 2 and
@@ -146,41 +142,29 @@ def turn_between(columns: Columns, wanted: FloatArray) -> FloatArray:
     column of S - cos(a) I with S the symmetric part, which is (1 - cos(a)) u u^T.
 
     Args:
-        columns: Of R.
-        wanted: The columns of R_wanted, shape (3, 3, n).
+        columns: Of R, shape (3, 3, n), first index: which.
+        wanted: Of R_wanted, likewise.
     """
-    twice: Vector = (0.0, 0.0, 0.0)
-    trace: Element = 0.0
-    for column, target in zip(columns, wanted, strict=True):
-        twice = add(twice, cross(column, tuple(target)))
-        trace = plus(trace, dot(column, tuple(target)))
-    cosine = 0.5 * (trace - 1.0)
-    vector = 0.5 * np.stack(twice)
+    turn = outer_sum(wanted, columns)
+    cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
+    vector = 0.5 * np.stack([turn[k, j] - turn[j, k] for j, k in ((1, 2), (2, 0), (0, 1))])
     size = np.sqrt(dot_product(vector, vector))
     angle = np.arctan2(size, cosine)
     vector *= np.divide(angle, size, out=np.ones_like(size), where=size > 0.0)
     half = np.flatnonzero((size < HALF_TURN_SINE) & (cosine < 0.0))
     if len(half):
-        vector[:, half] = _half_turns(columns, wanted, half) * angle[half]
+        vector[:, half] = _half_turns(rows_of(turn, half)) * angle[half]
     return vector
 
 
-def _half_turns(columns: Columns, wanted: FloatArray, rows: IntArray) -> FloatArray:
-    """Return the axes u of angles near pi, for which `turn_between` says how: shape (3, rows)."""
-    count = wanted.shape[2]
-    R = np.array([[np.broadcast_to(entry, count)[rows] for entry in column] for column in columns])
-    turn = np.einsum("kin,kjn->nij", wanted[:, :, rows], R)
+def _half_turns(turn: FloatArray) -> FloatArray:
+    """Return the axes u of turns by nearly pi, shape (3, 3, n), for which `turn_between` says how: (3, n)."""
+    turn = turn.transpose(2, 0, 1)
     sine = np.stack([turn[:, i - 1, i - 2] - turn[:, i - 2, i - 1] for i in range(3)], axis=1)
     cosine = 0.5 * (np.trace(turn, axis1=1, axis2=2) - 1.0)
     square = 0.5 * (turn + turn.transpose(0, 2, 1)) - cosine[:, None, None] * np.eye(3)
     largest = np.argmax(np.einsum("nii->ni", square), axis=1)
-    axis = square[np.arange(len(rows)), largest]
+    axis = square[np.arange(len(turn)), largest]
     axis /= np.linalg.norm(axis, axis=1, keepdims=True)
     axis[(axis * sine).sum(axis=1) < 0.0] *= -1.0
     return np.asarray(axis.T)
-
-
-def _fill(target: FloatArray, elements: tuple[Element, ...]) -> None:
-    """Write one element a row into target, shape (k, n); constants spread over the columns."""
-    for i, element in enumerate(elements):
-        target[i] = element

@@ -14,7 +14,7 @@ from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import ghost_colour
 from urmpipe_pipeline.recording.entities import Place, branch_entity, branch_keys, printable
 from urmpipe_pipeline.recording.ghost_names import name_places, placed_names
-from urmpipe_pipeline.recording.ways import thinned
+from urmpipe_pipeline.recording.ways import Gone, thinned
 from urmpipe_pipeline.results import Run
 
 STUB = 0.1
@@ -22,7 +22,8 @@ STUB = 0.1
 
 
 POSES = 2_000
-"""Poses of a ghost that are drawn, at most, but for those at which it begins anew."""
+"""Poses of a ghost that are drawn, at most, and as many at which it begins anew. Of single poses the first
+are drawn: between those of every tenth, say, a ghost would stand beside an arm of another target."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,8 +43,7 @@ class GhostArm:
         named: Where the name stands in each pose, shape (m,): which of `name_places`.
         thin: True of every second branch. Two that differ in the turn of the wrist alone have all their links
             in common: then one is seen inside the other.
-        gone_ns: Times from which on there is no such solution in integer [ns], shape (g,).
-        gone_sample: The grid sample at each, shape (g,).
+        gone: From when on there is no such solution.
     """
 
     name: str
@@ -57,20 +57,58 @@ class GhostArm:
     links: int
     named: IntArray
     thin: bool
-    gone_ns: IntArray
-    gone_sample: IntArray
+    gone: Gone
 
 
-def ghost_arms(run: Run, place: Place) -> tuple[GhostArm, ...]:
-    """Return the further branches of a run as arms, thinned out for drawing."""
+@dataclass(frozen=True, slots=True, eq=False)
+class ArmName:
+    """The name of the branch chosen, which stands at the arm itself.
+
+    Attributes:
+        t_ns: Times at which it stands elsewhere or is another in integer [ns], shape (m,).
+        sample: The grid sample at each, shape (m,).
+        position: Where it stands in [m], shape (m, 3).
+        texts: What it says, m of them.
+        gone: From when on there is no arm.
+    """
+
+    t_ns: IntArray
+    sample: IntArray
+    position: FloatArray
+    texts: tuple[str, ...]
+    gone: Gone
+
+
+def ghost_arms(run: Run, place: Place) -> tuple[tuple[GhostArm, ...], ArmName | None]:
+    """Return the further branches of a run as arms, thinned out for drawing, and the name of the chosen.
+
+    The chosen one has a name where there are others to be told from, and a solution anywhere.
+    """
     if run.robot is None or not run.ghosts:
-        return ()
+        return (), None
     from_ns, named = _names(run, run.robot)
-    return tuple(
-        _ghost_arm(
-            run, run.robot, ghost, i, branch_entity(place, key), named[i][_rows_at(from_ns, ghost.t_ns)]
-        )
-        for i, (ghost, key) in enumerate(zip(run.ghosts, branch_keys(run), strict=True))
+    ghosts = (
+        _ghost_arm(run, run.robot, ghost, i, branch_entity(place, key), at[_rows_at(from_ns, ghost.t_ns)])
+        for i, (ghost, key, at) in enumerate(zip(run.ghosts, branch_keys(run), named[1:], strict=True))
+    )
+    return tuple(ghosts), _arm_name(run, run.robot, named[0][_rows_at(from_ns, run.log.t_ns)])
+
+
+def _arm_name(run: Run, robot: Chain, named: IntArray) -> ArmName | None:
+    """Return the name of the branch chosen; `named` tells where it stands in each row of the log."""
+    there = np.flatnonzero(np.isfinite(run.log.q).all(axis=1))
+    if run.goals is None or not run.goals.branches or not len(there):
+        return None
+    t_ns, every = run.log.t_ns[there], np.array(run.goals.branches, dtype=object)[there]
+    others = np.flatnonzero(every[1:] != every[:-1]) + 1
+    rows = np.union1d(_drawn_rows(run, t_ns), others[:POSES])
+    places = name_places(*bones_of(robot, run.log.q[there[rows]]))
+    return ArmName(
+        t_ns=t_ns[rows],
+        sample=_rows_at(run.t_ns, t_ns[rows]),
+        position=places[np.arange(len(rows)), named[there[rows]]],
+        texts=tuple(printable(f"chosen: {name}") for name in every[rows]),
+        gone=gone_after(run, t_ns),
     )
 
 
@@ -78,21 +116,19 @@ def _ghost_arm(run: Run, robot: Chain, ghost: Ghost, number: int, root: str, nam
     """Return a branch as an arm; `named` tells where its name stands in each of its poses."""
     rows = _drawn_rows(run, ghost.t_ns)
     start, end = bones_of(robot, ghost.q[rows])
-    gone = gone_times(run, ghost.t_ns)
     return GhostArm(
         name=printable(ghost.name),
         entity=f"{root}/arm",
         label=f"{root}/name",
         colour=ghost_colour(number),
         t_ns=ghost.t_ns[rows],
-        sample=samples_at(run, ghost.t_ns[rows]),
+        sample=_rows_at(run.t_ns, ghost.t_ns[rows]),
         start=start,
         end=end,
         links=len(robot.joints),
         named=named[rows],
         thin=bool(number % 2),
-        gone_ns=gone,
-        gone_sample=samples_at(run, gone),
+        gone=gone_after(run, ghost.t_ns[rows] if run.single_poses else ghost.t_ns),
     )
 
 
@@ -112,10 +148,10 @@ def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
 
     Args:
         robot: The arm.
-        q: Joint values in [rad] or [m], shape (m, joints).
+        q: Joint values in [rad] or [m], shape (m, joints); NaN where there is no pose.
 
     Returns:
-        Where each line starts and where it ends in [m], shape (m, lines, 3) each.
+        Where each line starts and where it ends in [m], shape (m, lines, 3) each; NaN where there is no pose.
     """
     points = points_over_log(robot, q)
     position, rotation = frames_over_log(robot, q)
@@ -123,7 +159,8 @@ def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     axes = np.array([robot.joints[k].axis for k in turning])
     moved = np.array(turning) + 1  # frame 0 is the base's
     direction = np.einsum("mkij,kj->mki", rotation[:, moved], axes)
-    reach = float(np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1).max(initial=0.0))
+    lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
+    reach = float(np.fmax.reduce(lengths, initial=0.0))
     stubs = position[:, moved] + STUB * reach * direction
     return (
         np.concatenate((points[:, :-1], position[:, moved]), axis=1),
@@ -131,42 +168,38 @@ def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     )
 
 
-def gone_times(run: Run, t_ns: IntArray) -> IntArray:
-    """Return the times of the rows of a run at which something that is at other rows has just ended."""
+def gone_after(run: Run, t_ns: IntArray) -> Gone:
+    """Return when something that is at some rows of a run has just ended: at the next row."""
     there = np.isin(run.log.t_ns, t_ns)
-    return run.log.t_ns[1:][there[:-1] & ~there[1:]]
-
-
-def samples_at(run: Run, t_ns: IntArray) -> IntArray:
-    """Return the last grid sample at or before each time; the first at none."""
-    return _rows_at(run.t_ns, t_ns)
+    gone = run.log.t_ns[1:][there[:-1] & ~there[1:]]
+    return Gone(gone, _rows_at(run.t_ns, gone))
 
 
 def _drawn_rows(run: Run, t_ns: IntArray) -> IntArray:
-    """Return the rows of a ghost that are drawn: those thinned out, and those at which it begins anew."""
+    """Return the rows of something at some rows of a run that are drawn.
+
+    Of single poses the first; else those thinned out, and those at which it begins anew.
+    """
     rows = np.searchsorted(run.log.t_ns, t_ns)
+    if run.single_poses:
+        return np.flatnonzero(rows < POSES)
     begins = np.flatnonzero(np.diff(rows, prepend=-2) > 1)
     drawn = thinned(t_ns, np.zeros((len(t_ns), 1)), None)
-    return np.union1d(begins, drawn[:: math.ceil(len(drawn) / POSES)])
+    return np.union1d(*(some[:: math.ceil(len(some) / POSES)] for some in (begins, drawn)))
 
 
 def _names(run: Run, robot: Chain) -> tuple[IntArray, IntArray]:
-    """Return at which of its places the name of each ghost stands, and from which times on.
+    """Return at which of its places the name of each arm stands, and from which times on.
 
     In a motion it keeps the place that is good in the view that opens; between single poses it may leap.
 
     Returns:
-        Times in integer [ns], shape (p,), and places, shape (ghosts, p).
+        Times in integer [ns], shape (p,), and places, shape (1 + ghosts, p), those of the arm chosen first.
     """
-    t_ns = (
-        run.log.t_ns[:: math.ceil(run.log.rows / POSES)]
-        if run.single_poses
-        else np.array([fullest_time(run)])
-    )
-    ghosts = [ghost.q[_rows_at(ghost.t_ns, t_ns)] for ghost in run.ghosts]
+    t_ns = run.log.t_ns[:POSES] if run.single_poses else np.array([fullest_time(run)])
     chosen = run.log.q[_rows_at(run.log.t_ns, t_ns)]
-    places = [name_places(*bones_of(robot, q)) for q in (*ghosts, chosen)]
-    return t_ns, placed_names(np.array(places[:-1]), places[-1])
+    ghosts = [ghost.q[_rows_at(ghost.t_ns, t_ns)] for ghost in run.ghosts]
+    return t_ns, placed_names(np.array([name_places(*bones_of(robot, q)) for q in (chosen, *ghosts)]))
 
 
 def _rows_at(t_ns: IntArray, at: IntArray) -> IntArray:

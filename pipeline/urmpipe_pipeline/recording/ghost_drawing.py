@@ -10,12 +10,13 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.recording.columns import time_columns
 from urmpipe_pipeline.recording.ghost_arms import GhostArm
 from urmpipe_pipeline.recording.ghost_names import name_places
 from urmpipe_pipeline.recording.goal_marks import GoalMarks
+from urmpipe_pipeline.recording.ways import Gone
 
 if TYPE_CHECKING:
     from rerun import ComponentColumnList, LineStrips3D, Points3D, RecordingStream
@@ -52,12 +53,12 @@ def draw_ghost(stream: RecordingStream, ghost: GhostArm, size: float) -> None:
     )
     _send(stream, ghost.entity, ghost, columns, bones)
     nothing = rr.Capsules3D.columns(lengths=[], radii=[], translations=[], quaternions=[])
-    send_gone(stream, ghost.entity, ghost.gone_ns, ghost.gone_sample, nothing)
+    send_gone(stream, ghost.entity, ghost.gone, nothing)
     named = rr.Points3D.from_fields(colors=[colour], radii=[0.0], labels=[ghost.name], show_labels=True)
     stream.log(ghost.label, named, static=True)
     places = name_places(ghost.start, ghost.end)[np.arange(len(ghost.named)), ghost.named].astype(np.float32)
     _send(stream, ghost.label, ghost, rr.Points3D.columns(positions=places), 1)
-    send_gone(stream, ghost.label, ghost.gone_ns, ghost.gone_sample, rr.Points3D.columns(positions=[]))
+    send_gone(stream, ghost.label, ghost.gone, rr.Points3D.columns(positions=[]))
 
 
 def _send(
@@ -68,13 +69,11 @@ def _send(
     stream.send_columns(entity, time_columns(ghost.t_ns, "sample", ghost.sample), rows)
 
 
-def send_gone(
-    stream: RecordingStream, entity: str, t_ns: IntArray, sample: IntArray, columns: ComponentColumnList
-) -> None:
+def send_gone(stream: RecordingStream, entity: str, gone: Gone, columns: ComponentColumnList) -> None:
     """Send rows without any value: from their times on the viewer shows nothing of what stood there."""
-    if len(t_ns):
-        rows = columns.partition(np.zeros(len(t_ns), dtype=np.int64))
-        stream.send_columns(entity, time_columns(t_ns, "sample", sample), rows)
+    if len(gone.t_ns):
+        rows = columns.partition(np.zeros(len(gone.t_ns), dtype=np.int64))
+        stream.send_columns(entity, time_columns(gone.t_ns, "sample", gone.sample), rows)
 
 
 def capsules(bones: FloatArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:

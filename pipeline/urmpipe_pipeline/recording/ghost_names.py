@@ -27,32 +27,31 @@ def name_places(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.concatenate((end, (start + end) / 2), axis=-2)
 
 
-def placed_names(ghosts: FloatArray, chosen: FloatArray) -> IntArray:
-    """Return for each ghost the place at which its name can be read, and told from those of the others.
+def placed_names(arms: FloatArray) -> IntArray:
+    """Return for each arm the place at which its name can be read, and told from those of the others.
 
     Names must not lie on each other: that comes first. Then a place is the better the further it is from the
     same place of every other arm.
 
     Args:
-        ghosts: The `name_places` of each ghost in some poses in [m], shape (ghosts, poses, places, 3).
-        chosen: Those of the arm that has no name, shape (poses, places, 3); NaN where it is not there.
+        arms: The `name_places` of each arm in some poses in [m], shape (arms, poses, places, 3); NaN where
+            one is not there.
 
     Returns:
-        Shape (ghosts, poses).
+        Shape (arms, poses).
     """
-    every = seen(np.concatenate((ghosts, chosen[None])))
+    every = seen(arms)
     low, high = (reduce.reduce(every, axis=(0, 1, 2)) for reduce in (np.fmin, np.fmax))
     extent = float(np.linalg.norm(high - low)) or 1.0
     box = np.array(NAME_SIZE) * extent
-    found = np.empty(every.shape[:2], dtype=np.int64)
+    found = np.zeros(every.shape[:2], dtype=np.int64)
     at: list[FloatArray] = []
-    for i in range(len(ghosts)):
-        mine = every[i]
+    for i, mine in enumerate(every):
         apart = np.linalg.norm(np.delete(every, i, axis=0) - mine, axis=3)
         room = SECOND * np.fmin.reduce(apart, axis=0, initial=extent) / extent
         free = np.ones(mine.shape[:2])
         for name in at:
-            free = np.minimum(free, (np.abs(mine[..., :2] - name) / box).max(axis=2))
+            free = np.fmin(free, (np.abs(mine[..., :2] - name) / box).max(axis=2))
         found[i] = np.argmax(free + room, axis=1)
         at.append(np.take_along_axis(mine[..., :2], found[i][:, None, None], axis=1))
-    return found[: len(ghosts)]
+    return found

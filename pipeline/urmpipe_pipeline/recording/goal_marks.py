@@ -60,5 +60,5 @@ def goal_marks(run: Run, place: Place) -> GoalMarks | None:
         strips=dashed(lines_of(goals.position)) if not run.single_poses else (),
         reached=goals.position[there & ~goals.missed],
         missed=goals.position[missed],
-        reasons=tuple(f"row {row + 1}: {goals.reasons[row].split('; ')[0]}" for row in missed.tolist()),
+        reasons=tuple(f"row {row + 1}: {goals.why(row)}" for row in missed.tolist()),
     )

@@ -7,8 +7,9 @@ itself lacks stand as NaN and Infinity. Options come back as JSON has them: a tu
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import fields
+from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -139,10 +140,17 @@ def _solved(run: Run, place: Place) -> dict[str, Any]:
         return {}
     keys = zip(run.ghosts, branch_keys(run), strict=True)
     reasons = run.goals.reasons if run.goals else ()
+    chosen = groupby(run.goals.branches if run.goals else ())
     return {
         "ghosts": [{"name": ghost.name, "entity": f"{branch_entity(place, key)}/q"} for ghost, key in keys],
         "missed": {row: reason for row, reason in enumerate(reasons, start=1) if reason},
+        "chosen": [[name, sum(1 for _ in rows)] for name, rows in chosen],
     }
+
+
+def chosen_branches(told: Iterable[tuple[str, int]]) -> tuple[str, ...]:
+    """Return what the solution chosen is called, one a row, from the names and how many rows each lasts."""
+    return tuple(name for name, rows in told for _ in range(rows))
 
 
 def _log(log: JointLog) -> dict[str, Any]:

@@ -124,7 +124,7 @@ def _goals(arrays: _Arrays, data: Data, place: Place) -> Goals | None:
         return None
     t_ns = arrays.chunk(f"{place.prefix}targets/position").t_ns
     reasons = tuple(data["missed"].get(str(row), "") for row in range(1, len(t_ns) + 1))
-    return Goals(t_ns, **found, reasons=reasons)
+    return Goals(t_ns, **found, reasons=reasons, branches=metadata.chosen_branches(data["chosen"]))
 
 
 def _comparison(arrays: _Arrays, data: Data, path: Path) -> Comparison:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from typing import cast
 
 import numpy as np
@@ -19,16 +19,17 @@ from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
 from urmpipe_pipeline.recording.bodies import Body, bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import enlarged
 from urmpipe_pipeline.recording.entities import Place, entity_path, places_of, printable
-from urmpipe_pipeline.recording.ghost_arms import GhostArm, ghost_arms, gone_times, samples_at
+from urmpipe_pipeline.recording.ghost_arms import ArmName, GhostArm, ghost_arms, gone_after
 from urmpipe_pipeline.recording.goal_marks import GoalMarks, goal_marks
 from urmpipe_pipeline.recording.signal_entities import arm_keys
-from urmpipe_pipeline.recording.ways import Way, dashed, lines_of, thinned, track_of
+from urmpipe_pipeline.recording.ways import NEVER, Gone, Way, dashed, lines_of, thinned, track_of
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.simulation import Result, Simulation
 from urmpipe_pipeline.trajectory import Trajectory
 
-NEAR = 1.5
-"""Targets that are missed are in view if they are not further from the middle than so many radii."""
+NEAR = 3.0
+"""Targets that are missed are in view if they are not further from the middle than so many radii: at that
+place one leaves the arm half of the view, and one that is out of reach by less must be seen."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -42,9 +43,8 @@ class Arm:
         colours: One a point: a joint's own, or the reference's where nothing moves.
         bodies: Its links as they look, each with the frame it moves with; none where that is not known.
         bare: True if a moving link has nothing to show: then lines stand for the links.
-        gone_ns: Times from which on there is no pose in integer [ns], shape (g,), where targets have no
-            solution; none of a log, in which a sample that is missing was only not written.
-        gone_sample: The grid sample at each, shape (g,).
+        gone: From when on there is no pose, where targets have no solution; never of a log, in which a
+            sample that is missing was only not written.
     """
 
     t_ns: IntArray
@@ -53,8 +53,7 @@ class Arm:
     colours: tuple[str, ...]
     bodies: tuple[Body, ...]
     bare: bool
-    gone_ns: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
-    gone_sample: IntArray = field(default_factory=lambda: np.empty(0, np.int64))
+    gone: Gone = NEVER
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,6 +80,7 @@ class Scene:
         worst: Where the largest deviation of all runs stands.
         whose: Name of the log whose arm it is, where there are several; else empty.
         ghosts: The further branches of solved joint values.
+        chosen: The name of the branch that the arm itself is in, where there are others.
         goals: What they were solved for.
     """
 
@@ -90,6 +90,7 @@ class Scene:
     worst: Mark | None = None
     whose: str = ""
     ghosts: tuple[GhostArm, ...] = ()
+    chosen: ArmName | None = None
     goals: GoalMarks | None = None
 
     @property
@@ -157,12 +158,13 @@ def scene_of(result: Result) -> Scene:
 
 def _of_run(run: Run, place: Place) -> Scene:
     """Return the arm of a run and its ways; of a solved run also the other branches and the targets."""
-    arm = _arm(run, None, run_colour(0))
-    if arm is not None and run.goals is not None:
-        gone = gone_times(run, run.log.t_ns[np.isfinite(run.log.q).all(axis=1)])
-        arm = replace(arm, gone_ns=gone, gone_sample=samples_at(run, gone))
-    ways = tuple(_run_ways(run, place))
-    return Scene(arm, ways, ghosts=ghost_arms(run, place), goals=goal_marks(run, place))
+    arm, ways = _arm(run, None, run_colour(0)), tuple(_run_ways(run, place))
+    if run.goals is not None:
+        gone = gone_after(run, run.log.t_ns[np.isfinite(run.log.q).all(axis=1)])
+        arm = None if arm is None else replace(arm, gone=gone)
+        ways = tuple(replace(way, gone=gone) for way in ways)
+    ghosts, chosen = ghost_arms(run, place)
+    return Scene(arm, ways, ghosts=ghosts, chosen=chosen, goals=goal_marks(run, place))
 
 
 def arm_of(result: Comparison) -> Deviation:

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from urmpipe_pipeline.palette import DEVIATION_COLOUR, NEUTRAL_COLOUR, rgb
 from urmpipe_pipeline.recording.columns import time_columns
+from urmpipe_pipeline.recording.ghost_arms import ArmName
 from urmpipe_pipeline.recording.ghost_drawing import draw_ghost, draw_goals, send_gone
 from urmpipe_pipeline.recording.scene import Arm, Mark, Scene
 from urmpipe_pipeline.recording.shape_drawing import draw_body, hide_body
@@ -26,6 +27,9 @@ WANTED_RADIUS, DONE_RADIUS = 0.0065, 0.0035
 
 STRIPS = 256
 """Poses of the skeleton sent at a time: decoding a chunk of strips takes time by the square of its rows."""
+
+CHOSEN = "/robot/name"
+"""The entity of the name of the branch that the arm is in."""
 
 LABEL_COLOUR = "#ffffff"
 """Labels: they stand on lines of any colour."""
@@ -47,6 +51,8 @@ def draw_scene(stream: RecordingStream, scene: Scene) -> None:
         draw_goals(stream, scene.goals, size)
     for ghost in scene.ghosts:
         draw_ghost(stream, ghost, size)
+    if scene.chosen is not None:
+        _draw_chosen(stream, scene.chosen)
     if scene.arm is not None:
         _draw_arm(stream, scene.arm, size)
 
@@ -57,9 +63,9 @@ def _draw_arm(stream: RecordingStream, arm: Arm, size: float) -> None:
 
     for body in arm.bodies:
         draw_body(stream, body, time_columns(arm.t_ns, "sample", arm.sample))
-        if len(arm.gone_ns):
-            gone = time_columns(arm.gone_ns, "sample", arm.gone_sample)
-            hide_body(stream, body, gone, len(arm.gone_ns))
+        if len(arm.gone.t_ns):
+            gone = time_columns(arm.gone.t_ns, "sample", arm.gone.sample)
+            hide_body(stream, body, gone, len(arm.gone.t_ns))
     skeleton = arm.skeleton.astype(np.float32)
     if arm.bare:
         _draw_links(stream, arm, skeleton, size)
@@ -70,7 +76,7 @@ def _draw_arm(stream: RecordingStream, arm: Arm, size: float) -> None:
     count, points = skeleton.shape[:2]
     columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3)).partition(np.full(count, points))
     stream.send_columns("/robot/joints", time_columns(arm.t_ns, "sample", arm.sample), columns)
-    send_gone(stream, "/robot/joints", arm.gone_ns, arm.gone_sample, rr.Points3D.columns(positions=[]))
+    send_gone(stream, "/robot/joints", arm.gone, rr.Points3D.columns(positions=[]))
 
 
 def _draw_links(stream: RecordingStream, arm: Arm, skeleton: Skeleton, size: float) -> None:
@@ -83,7 +89,7 @@ def _draw_links(stream: RecordingStream, arm: Arm, skeleton: Skeleton, size: flo
         rows = slice(start, start + STRIPS)
         times = time_columns(arm.t_ns[rows], "sample", arm.sample[rows])
         stream.send_columns("/robot/links", times, rr.LineStrips3D.columns(strips=skeleton[rows]))
-    send_gone(stream, "/robot/links", arm.gone_ns, arm.gone_sample, rr.LineStrips3D.columns(strips=[]))
+    send_gone(stream, "/robot/links", arm.gone, rr.LineStrips3D.columns(strips=[]))
 
 
 def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:
@@ -107,6 +113,18 @@ def _draw_way(stream: RecordingStream, way: Way, size: float) -> None:
     for entity in entities:
         columns = rr.Points3D.columns(positions=track.position.astype(np.float32))
         stream.send_columns(entity, times, columns)
+        send_gone(stream, entity, way.gone, rr.Points3D.columns(positions=[]))
+
+
+def _draw_chosen(stream: RecordingStream, chosen: ArmName) -> None:
+    """Write the name of the branch chosen at the arm."""
+    import rerun as rr
+
+    style = rr.Points3D.from_fields(colors=[rgb(LABEL_COLOUR)], radii=[0.0], show_labels=True)
+    stream.log(CHOSEN, style, static=True)
+    columns = rr.Points3D.columns(positions=chosen.position.astype(np.float32), labels=chosen.texts)
+    stream.send_columns(CHOSEN, time_columns(chosen.t_ns, "sample", chosen.sample), columns)
+    send_gone(stream, CHOSEN, chosen.gone, rr.Points3D.columns(positions=[], labels=[]))
 
 
 def _label(text: str) -> Points3D:

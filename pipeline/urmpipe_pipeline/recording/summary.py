@@ -55,7 +55,9 @@ def _branches(run: Run) -> Iterator[str]:
     if not run.ghosts:
         return
     rows = int(np.isfinite(run.log.q).all(axis=1).sum())
-    cells = [("chosen", f"solid, its tip {run_colour_word(0)}", str(rows))]
+    names = {name for name in run.goals.branches if name} if run.goals else set()
+    chosen = f"chosen: {shown(names.pop())}" if len(names) == 1 else "chosen"
+    cells = [(chosen, f"solid, its tip {run_colour_word(0)}", str(rows))]
     for i, ghost in enumerate(run.ghosts[:BRANCHES]):
         cells.append((shown(ghost.name), ghost_colour_word(i), str(len(ghost.t_ns))))
     half = math.ceil(len(cells) / 2)

@@ -44,6 +44,23 @@ class Track:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
+class Gone:
+    """When something that moves is no longer there: until it has a place again, nothing is drawn of it.
+
+    Attributes:
+        t_ns: Times in integer [ns], shape (g,).
+        sample: The grid sample at each, shape (g,).
+    """
+
+    t_ns: IntArray
+    sample: IntArray
+
+
+NEVER = Gone(np.empty(0, np.int64), np.empty(0, np.int64))
+"""Of what is there from its first place on."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
 class Way:
     """Where a point goes: as lines, and as the point that moves on them.
 
@@ -55,6 +72,7 @@ class Way:
         strips: Lines, each in [m], shape (any, 3).
         track: The moving point.
         label: What the moving point is called in the view; empty for no label.
+        gone: When there is no moving point.
     """
 
     path: str
@@ -64,6 +82,7 @@ class Way:
     strips: tuple[FloatArray, ...]
     track: Track
     label: str = ""
+    gone: Gone = NEVER
 
 
 def track_of(

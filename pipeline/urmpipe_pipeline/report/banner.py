@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.report.facts import Fact
@@ -97,14 +99,19 @@ def _against(comparisons: Sequence[Comparison]) -> tuple[Fact, ...]:
 
 
 def _ingested(runs: Sequence[Run]) -> Banner:
-    """Say what was ingested."""
+    """Say what was ingested, or solved if nothing else was."""
     rows = sum(run.log.rows for run in runs)
     wraps = sum(len(run.repolarizations) for run in runs)
     warnings = sum(len(run.warnings) for run in runs)
     subject = runs[0].name if len(runs) == 1 else text.counted(len(runs), "log")
+    headline = f"{subject}: {text.counted(rows, 'row')}, {text.counted(wraps, 'repolarization')}"
+    solved = all(run.goals is not None for run in runs)
+    if solved:
+        reached = sum(int(np.isfinite(run.log.q).all(axis=1).sum()) for run in runs)
+        headline = f"{subject}: {reached} of {text.counted(rows, 'target')} with a solution"
     return Banner(
         "ingested",
-        "INGESTED",
-        f"{subject}: {text.counted(rows, 'row')}, {text.counted(wraps, 'repolarization')}",
+        "SOLVED" if solved else "INGESTED",
+        headline,
         detail=f"{text.counted(warnings, 'warning')}. Nothing was compared: there is no verdict.",
     )

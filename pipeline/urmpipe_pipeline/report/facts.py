@@ -51,7 +51,7 @@ def _solved_facts(run: Run) -> Iterator[Fact]:
     reached = int(np.isfinite(run.log.q).all(axis=1).sum())
     yield Fact("Targets", f"{reached} of {run.log.rows} with a solution")
     branches = "; ".join(f"{ghost.name}: {len(ghost.t_ns)}" for ghost in run.ghosts)
-    yield Fact("Other branches", branches, "and the rows where each is another solution")
+    yield Fact("Rows of other branches", branches)
 
 
 def comparison_facts(comparison: Comparison) -> tuple[Fact, ...]:

@@ -66,6 +66,26 @@ def motion_figure(run: Run) -> Figure | None:
     )
 
 
+def pose_by_row_figure(run: Run) -> Figure | None:
+    """Return position and orientation of the tool centre point where no motion joins one row and the next."""
+    if run.tcp is None:
+        return None
+    point = point_name(run)
+    singular = shaded(run.t, run.tcp.singular, run.duration, MUTED)
+    panels = [
+        Panel(f"{point} [m]", coordinates(run.t, run.tcp.position, "p", "m", legend=True)),
+        Panel("rz, ry, rx [rad]", _euler_lines(run.t, run.tcp.euler_zyx), singular),
+    ]
+    return Figure(
+        "Poses of the tool centre point",
+        f"{point} and its Euler angles (moving Z-Y-X, in the colours of their axes), by forward kinematics:"
+        " a pose a target, a second apart.",
+        f"Poses of {point} of {run.name} by forward kinematics.",
+        stacked(panels, run.duration),
+        MOTION_PX * len(panels) + AROUND_PX,
+    )
+
+
 def coordinates(
     t: FloatArray,
     values: FloatArray,
@@ -120,9 +140,14 @@ def point_name(run: Run) -> str:
 def _euler(t: FloatArray, motion: PointLog) -> list[Spec]:
     """Return rz, ry and rx without jumps between the names of one rotation, open where they have none."""
     angles = np.where(motion.singular[:, np.newaxis], np.nan, motion.euler_zyx)
+    return _euler_lines(t, continuous_euler(angles))
+
+
+def _euler_lines(t: FloatArray, angles: FloatArray) -> list[Spec]:
+    """Return rz, ry and rx as they are."""
     return [
         line(t, column, name, AXIS_COLOURS[axis], "rad", legendgroup=axis)
-        for (name, axis), column in zip(EULER.items(), continuous_euler(angles).T, strict=True)
+        for (name, axis), column in zip(EULER.items(), angles.T, strict=True)
     ]
 
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.playback import play_back
 from urmpipe_pipeline.report.figures_deviation import deviation_figure, pose_figure, speed_figure
-from urmpipe_pipeline.report.figures_motion import motion_figure
+from urmpipe_pipeline.report.figures_motion import motion_figure, pose_by_row_figure
 from urmpipe_pipeline.report.figures_overview import overview_figure
 from urmpipe_pipeline.report.figures_repolarization import joints_figure, point_figure
 from urmpipe_pipeline.report.figures_signals import signals_figure
@@ -17,7 +17,7 @@ from urmpipe_pipeline.report.paths import (
     repolarized_path_figure,
     run_path_figure,
 )
-from urmpipe_pipeline.report.spec import Figure
+from urmpipe_pipeline.report.spec import Figure, unjoined
 from urmpipe_pipeline.results import Run
 from urmpipe_pipeline.signal_groups import Group
 from urmpipe_pipeline.simulation import Simulation
@@ -43,7 +43,12 @@ def deviation_figures(deviation: Deviation) -> list[Figure]:
 
 
 def run_figures(run: Run) -> list[Figure]:
-    """Return the figures of a log that was only ingested: how it was repolarized, then how it moves."""
+    """Return the figures of a log that was only ingested: how it was repolarized, then how it moves.
+
+    Of single poses the joints and the tool centre point, as points.
+    """
+    if run.single_poses:
+        return [unjoined(one) for one in _those_there([joints_figure(run), pose_by_row_figure(run)])]
     return _those_there([*_repolarization_figures(run), motion_figure(run), run_path_figure(run)])
 
 

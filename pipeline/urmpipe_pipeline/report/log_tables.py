@@ -7,6 +7,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
+
 from urmpipe_pipeline import text
 from urmpipe_pipeline.audit_entry import AuditKind
 from urmpipe_pipeline.joint_log import SourceFile
@@ -72,6 +74,19 @@ def audit_table(run: Run) -> Table:
     kinds = {item.kind for item in run.audit}
     said = (table.note, *(note for kind, note in AUDIT_NOTES.items() if kind in kinds))
     return replace(table, note=" ".join(note for note in said if note))
+
+
+def missed_table(run: Run) -> Table | None:
+    """Return the targets of a solved run that the arm has no pose for; None if there are none."""
+    goals = run.goals
+    if goals is None or not goals.missed.any():
+        return None
+    rows = [
+        (str(k + 1), text.seconds(goals.t_ns[k] / 1e9), text.point(goals.position[k]), goals.reasons[k])
+        for k in np.flatnonzero(goals.missed).tolist()
+    ]
+    columns = (*numbers("Row", "t [s]"), *words("x, y, z [m]", "Why"))
+    return listing(f"Targets without a solution ({len(rows)})", columns, rows)
 
 
 def warnings_table(found: Result) -> Table:

@@ -246,7 +246,8 @@ def _deviation_part(deviation: Deviation, ident: str, reference_samples: int) ->
 
 def _run_part(run: Run, ident: str) -> Part:
     """Return the part of one log that was only ingested."""
-    blocks = (*gallery.run_figures(run), *_run_tables(run))
+    missed = log_tables.missed_table(run)
+    blocks = (*((missed,) if missed else ()), *gallery.run_figures(run), *_run_tables(run))
     return Part(f"Log {run.name}", blocks, (), ident, "", run_facts(run))
 
 

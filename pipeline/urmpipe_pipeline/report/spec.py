@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -114,6 +114,16 @@ def stacked(panels: Sequence[Panel], duration: float, shapes: Sequence[Spec] = (
     }
     layout["shapes"] = drawn
     return {"data": data, "layout": layout}
+
+
+def unjoined(figure: Figure) -> Figure:
+    """Return a figure over time with its samples as points: nothing joins one and the next."""
+    data = [
+        {name: value for name, value in trace.items() if name != "line"}
+        | {"mode": "markers", "marker": {"color": trace["line"]["color"], "size": 7}, "cliponaxis": False}
+        for trace in figure.spec["data"]
+    ]
+    return replace(figure, spec=figure.spec | {"data": data})
 
 
 def base_layout() -> Spec:

@@ -11,10 +11,11 @@ from numpy.typing import NDArray
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.inverse.descent import Settings
 from urmpipe_models.inverse.iterative import limits_of, refine
-from urmpipe_models.inverse.least_motion import AT_LIMIT, LEAST_MOTION
+from urmpipe_models.inverse.least_motion import AT_LIMIT, LEAST_MOTION, settle
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
-from urmpipe_models.inverse.task import characteristic_length
+from urmpipe_models.inverse.task import characteristic_length, task_of
 from urmpipe_models.kinematics import jacobian_over_log
 from urmpipe_models.transform import translation
 
@@ -99,6 +100,17 @@ def test_the_least_motion_of_a_planar_arm_is_that_of_a_search_over_its_freedom()
         distances.append(np.nanmin(np.square(away).sum(axis=0)))
     found = np.square(refined.q[0] - home).sum()
     np.testing.assert_allclose(found, min(distances), atol=1e-6)  # steps of 3e-4: their square
+
+
+@pytest.mark.parametrize(("robot", "pose"), [("urm6", False), ("urm8", True)])
+def test_no_solution_is_left_for_one_that_is_farther_from_home(robot: str, pose: bool) -> None:
+    """Homes anywhere: a step that has overshot may meet the target farther away, turns away even."""
+    chain, targets, home = posed(robot, pose, 200, 2.0)
+    q = posed(robot, pose, 200, 0.0)[2]
+    settings = Settings(*limits_of(chain))
+    after, _ = settle(task_of(chain, targets), q.T.copy(), home.T.copy(), settings)
+    before = np.square(q - home).sum(axis=1)
+    assert (np.square(after.T - home).sum(axis=1) <= before + 1e-12).all()  # rounding of a row at rest
 
 
 def test_least_motion_counts_from_home_wherever_the_search_begins() -> None:

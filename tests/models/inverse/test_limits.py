@@ -4,12 +4,13 @@ import math
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint, Mimic
-from urmpipe_models.inverse.limits import periods, within_limits
+from urmpipe_models.inverse.limits import periods, within_limits, within_pi
 from urmpipe_models.inverse.solutions import Singular, Solutions
 
 TURN = 2.0 * math.pi
@@ -121,3 +122,13 @@ def test_limits_of_a_catalogue_arm_take_part() -> None:
     raw = one_solution(3.1, 0.0, 0.0, 0.0, 0.0, 0.0)
     assert within_limits(chain, raw).reached.all()
     assert within_limits(tight, raw).reason(0) == "joint shoulder_pan_joint at 3.1 rad, allowed: -3 to 3 rad"
+
+
+def test_within_pi_takes_turns_off_joints_without_end_alone_and_minus_pi_is_pi() -> None:
+    period = np.array([TURN, np.inf, TURN, TURN])
+    q = np.array([[-np.pi, -4.0, 3.5, np.pi], [np.pi, 9.0, -3.5, 7.0]])
+    found = within_pi(q, period)
+    assert found == pytest.approx(
+        np.array([[np.pi, -4.0, 3.5 - TURN, np.pi], [np.pi, 9.0, TURN - 3.5, 7.0 - TURN]]), abs=1e-15
+    )
+    assert np.array_equal(within_pi(q[:, None], period), found[:, None])

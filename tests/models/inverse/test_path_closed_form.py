@@ -189,6 +189,25 @@ def test_another_branch_after_a_gap_is_told_as_a_jump() -> None:
     assert jump.from_branch != jump.to_branch
 
 
+def test_a_joint_that_starts_anew_by_a_turn_over_a_gap_is_told_as_a_jump_and_as_too_fast() -> None:
+    arm = load_robot("ur5e")
+    upper = arm.moving[5].upper
+    q = line(UR, UR + np.array([0.1, 0.0, 0.0, 0.0, 0.0, 0.2]), 40)
+    q[:, 5] += upper - UR[5] - 0.1
+    targets = targets_of(arm, q)
+    targets.position[18:22, 2] += 3.0
+    path = follow(arm, targets, times(40), start=q[0])
+    assert path.branch[22] == path.branch[17]
+    (jump,) = path.jumps
+    assert (jump.last, jump.sample, jump.from_branch) == (17, 22, jump.to_branch)
+    (step,) = jump.joints
+    assert step.step == pytest.approx(q[22, 5] - q[17, 5] - 2.0 * math.pi, abs=1e-9)
+    assert "m: a jump since sample 17: " in jump.text
+    (fast,) = path.too_fast
+    assert (fast.joint, fast.first, fast.last, fast.t) == (arm.coordinates[5], 17, 22, 0.085)
+    assert fast.speed == pytest.approx(-step.step / 0.025, rel=1e-9)
+
+
 def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     arm = load_robot("ur5e")
     stretched = np.array([0.3, -0.9, 0.0, -0.7, 1.2, 0.3])

@@ -11,8 +11,10 @@ from numpy.typing import NDArray
 from urmpipe_datasets import LOGS
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.inverse import sliding_window
 from urmpipe_models.inverse.joint_path import JointPath
 from urmpipe_models.inverse.path import follow
+from urmpipe_models.inverse.sliding_window import SlidingWindow
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.kinematics import jacobian_over_log
 from urmpipe_models.repolarizer import repolarize
@@ -119,6 +121,25 @@ def test_windows_give_what_one_sample_after_the_other_gives(
     np.testing.assert_allclose(followed.q[rows], expected, rtol=0.0, atol=1e-6)
 
 
+@pytest.mark.parametrize("longest", [96, 1000])
+def test_windows_of_other_sizes_give_the_same_motion(
+    followed: JointPath, demo_path: FloatArray, longest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sliding_window, "LONGEST", longest)
+    count = 1500
+    path = follow(followed.chain, Targets(demo_path[:count]), times(count))
+    # rad: at the singular start the nanometre leaves that open; what comes after goes on from there
+    np.testing.assert_allclose(path.q, followed.q[:count], rtol=0.0, atol=2e-6)
+    steps, expected = np.diff(path.q[1000:], axis=0), np.diff(followed.q[1000:count], axis=0)
+    # rad: where the nanometre is just kept or not, lambda^2 is 1e-8 or 1e-9 m2 of steps of 4e-3 over sigma^2
+    np.testing.assert_allclose(steps, expected, rtol=0.0, atol=2e-8)
+
+
+def test_at_the_singular_start_the_joints_do_not_follow_the_rounding_of_the_file(followed: JointPath) -> None:
+    # rad: 0.053 so; 0.086 by least motion alone, which steps by a nanometre over sigma
+    assert np.linalg.norm(np.diff(followed.q[:200], axis=0), axis=1).sum() < 0.06
+
+
 def test_joints_within_pi_are_unwrapped_by_the_repolarizer(
     followed: JointPath, demo_path: FloatArray
 ) -> None:
@@ -189,6 +210,19 @@ def test_what_is_out_of_reach_has_a_reason_and_the_path_goes_on_after_it() -> No
     distance, _ = misses(arm, path.q[~out], Targets(line[~out]))
     assert np.abs(distance).max() <= NANOMETRE
     assert path.jumps == ()
+
+
+def test_another_bend_after_a_gap_is_told_as_a_jump() -> None:
+    free, arm = planar(2), planar(2, upper=1.0)
+    q = np.array([0.9, -1.0]) + np.linspace(0.0, 0.2, 41)[:, None] * np.array([1.0, 0.0])
+    targets = Targets(targets_of(free, q).position)
+    targets.position[18:22] *= 2.0
+    path = follow(arm, targets, times(41), start=q[0])
+    assert (np.flatnonzero(~path.reached) == np.arange(18, 22)).all()
+    (jump,) = path.jumps
+    assert (jump.last, jump.sample, jump.from_branch, jump.to_branch) == (17, 22, "1", "2")
+    # rad: the mirror image about the line to the target
+    np.testing.assert_allclose(path.q[22], [q[22, 0] - 1.0, 1.0], rtol=0.0, atol=1e-8)
 
 
 def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
@@ -270,6 +304,36 @@ def test_far_apart_samples_are_followed_one_by_one() -> None:
     path = follow(arm, Targets(circle), times(7), start=np.array([0.8, -0.9, -0.9]))
     assert_met(path, Targets(circle))
     assert path.jumps == ()
+
+
+def test_from_a_nearly_singular_start_no_large_correction_is_trusted() -> None:
+    start = np.array([0.1, 0.02, 0.0])
+    target = Targets(np.array([[0.0, 1.2, 0.0]]))
+    path = follow(planar(3), target, times(1), start=start)
+    assert_met(path, target)
+    # rad: 2.07 by steps of 0.1; the whole first correction ends 8.03 away, after a turn in vain
+    assert np.linalg.norm(path.q[0] - start) < 2.5
+
+
+def test_after_a_rescue_no_joint_is_held_where_one_was_before() -> None:
+    free, limited = planar(3), planar(3, upper=0.5)
+    q = np.array([0.45, -0.6, 0.3]) + np.linspace(0.0, 0.3, 40)[:, None] * np.array([1.0, 0.3, 0.0])
+    elsewhere = np.array([-1.8, 0.4, 0.3])  # out of reach with joint 1 at 0.5 rad
+    targets = targets_of(free, np.vstack((q, elsewhere + np.linspace(0.0, 0.02, 20)[:, None])))
+    asked = []
+
+    def rescue(sample: int, last: FloatArray) -> FloatArray:
+        """The pose that the far samples were made from."""
+        asked.append(sample)
+        assert last[0] == 0.5
+        return elsewhere[None]
+
+    window = SlidingWindow(limited, Targets(targets.position), q[0], rescue)
+    found = window.slide()
+    assert asked == [40]
+    assert (found[30:40, 0] == 0.5).all()
+    # rad: the joints go on from where the rescue brought them, 0.02 in 20 samples
+    assert np.abs(found[40:] - elsewhere).max() < 0.05
 
 
 def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:

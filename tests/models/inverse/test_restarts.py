@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.inverse.closed_form import closed_form
-from urmpipe_models.inverse.iterative import limits_of
+from urmpipe_models.inverse.iterative import limits_of, refine
 from urmpipe_models.inverse.limits import within_limits
-from urmpipe_models.inverse.restarts import DISTINCT, random_starts, solve_iteratively
+from urmpipe_models.inverse.restarts import DISTINCT, ROUGH, random_starts, solve_iteratively
 from urmpipe_models.inverse.solutions import NEAREST_POINT, Solutions
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.transform import translation
@@ -81,6 +81,37 @@ def test_the_solution_from_the_start_is_kept_where_there_is_one() -> None:
     np.testing.assert_allclose(solutions.q[:, 0], q, atol=1e-6)  # poses of conditions up to 1e4
 
 
+def test_a_singular_target_is_met_however_short_the_steps_towards_it() -> None:
+    """The wrist of this pose is aligned to 1e-5: the last of the way takes hundreds of steps."""
+    chain = load_robot("ur5e")
+    q = np.random.default_rng(1).uniform(-math.pi, math.pi, (1000, 6))[958:959]
+    targets = targets_of(chain, q)
+    found = solve_iteratively(chain, targets)
+    assert found.reached.all()
+    assert_solved(chain, targets, found)
+
+
+def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken() -> None:
+    """Attempts come one, two, four, ... at a time; here each is made alone."""
+    chain = load_robot("urm6")
+    targets, start = random_targets(chain, 80), np.array(chain.start)
+    found = solve_iteratively(chain, targets).q[:, 0]
+    restarts, others = random_starts(chain, 7, 0), 0
+    for row in np.flatnonzero(~refine(chain, targets, start).converged):
+        one = targets.rows(np.full(7, row))
+        refined = refine(chain, one, restarts, stationary=ROUGH)
+        for some in (slice(0, 1), slice(1, 3), slice(3, 7)):
+            if refined.converged[some].any():
+                q = refined.q[some][refined.converged[some]]
+                away = np.square(np.remainder(q - start + math.pi, 2 * math.pi) - math.pi).sum(axis=1)
+                nearest = q[np.argmin(away)]
+                turned = np.remainder(found[row] - nearest + math.pi, 2 * math.pi) - math.pi
+                np.testing.assert_allclose(turned, 0.0, atol=1e-9)  # whole turns apart
+                others += int(np.argmin(away) > 0)
+                break
+    assert others > 0  # of some the first is not the nearest
+
+
 # --- every solution ----------------------------------------------------------------------------------
 
 
@@ -91,6 +122,17 @@ def test_both_solutions_of_a_planar_arm_are_found_nearest_to_the_start_first() -
     angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
     assert found.branches == ("1", "2")
     np.testing.assert_allclose(found.q[0], [[0.3, 0.8], [0.3 + angle, -0.8]], atol=1e-8)
+
+
+def test_nearest_counts_the_way_that_limits_leave() -> None:
+    """From 3.0 rad a joint that ends at +-3.1 gets to -2.9 rad by 5.9 rad, not by 0.38."""
+    arm = planar()
+    arm = replace(arm, joints=tuple(replace(joint, lower=-3.1, upper=3.1) for joint in arm.joints))
+    position = Targets(targets_of(arm, np.array([[-2.9, 0.8]])).position)
+    start = np.array([3.0, 0.8])
+    angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
+    found = solve_iteratively(arm, position, start=start, every=True)
+    np.testing.assert_allclose(found.q[0], [[-2.9 + angle, -0.8], [-2.9, 0.8]], atol=1e-8)
 
 
 def test_every_solution_of_a_closed_form_is_found() -> None:

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from urmpipe_models.inverse.small_systems import factor, gram, product, transposed_product
+from urmpipe_models.inverse.small_systems import (
+    column_squares,
+    dot_product,
+    factor,
+    gram,
+    outer_sum,
+    product,
+    rows_of,
+    transposed_product,
+)
 
 FloatArray = NDArray[np.float64]
 
@@ -52,6 +61,11 @@ def test_products_are_those_of_matrices() -> None:
     np.testing.assert_allclose(product(M, x), np.einsum("nij,jn->in", each, x), atol=1e-13)
     np.testing.assert_allclose(transposed_product(M, y), np.einsum("nij,in->jn", each, y), atol=1e-13)
     np.testing.assert_allclose(gram(M), np.einsum("nij,nkj->ikn", each, each), atol=1e-13)
+    np.testing.assert_allclose(column_squares(M), np.square(each).sum(axis=1).T, atol=1e-13)
+    np.testing.assert_allclose(dot_product(y, y), np.square(y).sum(axis=0), atol=1e-13)
+    other = matrices(6, 2)
+    peer = each.transpose(0, 2, 1) @ other.transpose(2, 0, 1)
+    np.testing.assert_allclose(outer_sum(M, other).transpose(2, 0, 1), peer, atol=1e-13)
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 7])
@@ -59,3 +73,19 @@ def test_a_system_has_the_same_solution_to_the_last_bit_beside_any_others(n: int
     A, b = gram(matrices(6, 7, 100)), matrices(6, 1, 100)[:, 0]
     whole, part = factor(A, 0.01).solve(b), factor(A[..., :n], 0.01).solve(b[:, :n])
     np.testing.assert_array_equal(whole[:, :n], part)
+
+
+@pytest.mark.parametrize("rows", [[5], [5, 6], [9, 2, 40], list(range(31))], ids=len)
+def test_a_sum_has_the_same_bits_beside_any_others_however_its_rows_are_stored(rows: list[int]) -> None:
+    M, x, y = matrices(6, 8), matrices(8, 1)[:, 0], matrices(6, 1)[:, 0]
+    for form, a, b in ((product, M, x), (transposed_product, M, y), (outer_sum, M, M), (dot_product, x, x)):
+        whole = form(a, b)[..., rows]
+        np.testing.assert_array_equal(form(rows_of(a, np.array(rows)), rows_of(b, np.array(rows))), whole)
+        np.testing.assert_array_equal(form(a[..., rows], b[..., rows]), whole)  # a matrix apart
+
+
+def test_some_rows_stand_side_by_side() -> None:
+    M = matrices(6, 8)
+    some = rows_of(M, np.array([3, 1, 7]))
+    np.testing.assert_array_equal(some, M[..., [3, 1, 7]])
+    assert some.flags.c_contiguous

@@ -94,6 +94,16 @@ def test_the_turn_of_a_wrist_shows_in_the_axes_of_its_joints_alone() -> None:
     np.testing.assert_allclose(apart, expected, rtol=0, atol=1e-15)
 
 
+def test_a_pose_that_is_missing_takes_no_bone_from_the_others() -> None:
+    arm = load_robot("arm6")
+    q = np.array([[0.3, 0.4, 0.5, 0.6, 0.7, 0.8], [np.nan] * 6])
+    for both, alone in zip(bones_of(arm, q), bones_of(arm, q[:1]), strict=True):
+        np.testing.assert_allclose(
+            both[:1], alone, rtol=0, atol=1e-15
+        )  # cos of one value or of two: rounding
+        assert np.isnan(both[1, -1]).all()
+
+
 @pytest.mark.parametrize("timed", [True, False])
 def test_each_ghost_is_drawn_where_its_joints_put_it(
     timed: bool, make_solved: MakeSolved, tmp_path: Path
@@ -152,8 +162,12 @@ def test_a_ghost_is_gone_where_there_is_no_such_solution(
 def test_the_arm_is_gone_where_a_target_has_no_solution(make_solved: MakeSolved, tmp_path: Path) -> None:
     path = write_recording(make_solved(), tmp_path / "solved.rrd")
     expected = dict.fromkeys((*range(5), *range(9, 40)), 1) | {5: 0}
-    for entity, name in (("joints", "Points3D:positions"), ("links", "LineStrips3D:strips")):
-        found = {at // STEP_NS: row for at, row in rows_of(path, f"/robot/{entity}", name).items()}
+    for entity, name in (
+        ("robot/joints", "Points3D:positions"),
+        ("robot/links", "LineStrips3D:strips"),
+        ("point/targets", "Points3D:positions"),
+    ):
+        found = {at // STEP_NS: row for at, row in rows_of(path, f"/{entity}", name).items()}
         assert {row: min(len(values), 1) for row, values in found.items()} == expected
 
 
@@ -172,7 +186,7 @@ def test_the_arm_of_a_log_stays_where_a_sample_is_missing(make_solved: MakeSolve
     run = replace(make_solved(), goals=None, ghosts=())
     arm = scene_of(run).arm
     assert arm is not None
-    assert len(arm.gone_ns) == 0
+    assert len(arm.gone.t_ns) == 0
 
 
 # --- which is which --------------------------------------------------------------------------------
@@ -215,25 +229,89 @@ def test_of_two_ghosts_with_the_same_links_one_is_seen_inside_the_other(make_sol
 
 
 def test_names_do_not_lie_on_each_other_in_the_view() -> None:
-    rng = np.random.default_rng(3)
-    places, chosen = rng.normal(size=(7, 5, 24, 3)), rng.normal(size=(5, 24, 3))
-    chosen[2] = np.nan  # there the arm has no pose
-    named = placed_names(places, chosen)
-    every = seen(np.concatenate((places, chosen[None])))
+    arms = np.random.default_rng(3).normal(size=(8, 5, 24, 3))
+    arms[0, 2] = np.nan  # there the arm has no pose, and its name no place
+    named = placed_names(arms)
+    every = seen(arms)
     box = np.array(NAME_SIZE) * np.linalg.norm(
         np.nanmax(every, axis=(0, 1, 2)) - np.nanmin(every, axis=(0, 1, 2))
     )
     for pose in range(5):
-        at = every[np.arange(7), pose, named[:, pose], :2]
+        at = every[np.arange(8), pose, named[:, pose], :2]
         gaps = np.abs(at[:, None] - at[None]) / box
         np.fill_diagonal(gaps[..., 0], np.inf)
-        assert (gaps.max(axis=2) >= 1.0).all()
+        there = np.isfinite(at).all(axis=1)
+        assert there.sum() == (7 if pose == 2 else 8)
+        assert (gaps.max(axis=2)[np.ix_(there, there)] >= 1.0).all()
 
 
-def test_the_name_of_a_ghost_stands_where_it_differs_most_from_the_arm() -> None:
+def test_the_name_of_an_arm_stands_where_it_differs_most_from_the_others() -> None:
     chosen = np.arange(15.0).reshape(1, 5, 3)
     ghost = chosen + np.array([0.0, 0.1, 3.0, 0.2, 0.0])[:, None]
-    assert placed_names(ghost[None], chosen).tolist() == [[2]]
+    assert placed_names(np.array([chosen, ghost]))[0].tolist() == [2]
+
+
+def named_run(run: Run, branches: tuple[str, ...]) -> Run:
+    """Return a solved run whose chosen solutions have names."""
+    assert run.goals is not None
+    return replace(run, goals=replace(run.goals, branches=branches))
+
+
+def test_the_name_of_the_branch_chosen_stands_at_the_arm(make_solved: MakeSolved, tmp_path: Path) -> None:
+    branches = ("up",) * 5 + ("",) * 4 + ("up",) * 3 + ("down",) * 28
+    run = named_run(make_solved(timed=False), branches)
+    path = write_recording(run, tmp_path / "solved.rrd")
+    second = 1_000_000_000
+    said = {at // second: row for at, row in rows_of(path, "/robot/name", "Points3D:labels").items()}
+    assert said == {k: [f"chosen: {name}"] for k, name in enumerate(branches) if name} | {5: []}
+    places = rows_of(path, "/robot/name", "Points3D:positions")
+    assert [at // second for at, row in places.items() if not row] == [5]
+    assert run.robot is not None
+    candidates = name_places(*bones_of(run.robot, run.log.q[[12]]))[0]
+    # Single precision over 1 m.
+    assert np.abs(candidates - np.array(places[12 * second])).max(axis=1).min() < 1e-6
+
+
+def test_the_branch_chosen_has_a_name_only_beside_others(make_solved: MakeSolved) -> None:
+    run = named_run(make_solved(), ("up",) * 40)
+    assert scene_of(run).chosen is not None
+    assert scene_of(replace(run, ghosts=())).chosen is None
+    assert scene_of(named_run(run, ())).chosen is None
+    nowhere = replace(run.log, q=np.full_like(run.log.q, np.nan))
+    assert scene_of(replace(run, log=nowhere, q=nowhere.q)).chosen is None
+    assert "| chosen: up | solid, its tip orange | 36 |" in summary(run)
+    assert "| chosen | solid, its tip orange | 36 |" in summary(named_run(run, ("up", "down") * 20))
+
+
+def test_along_a_motion_a_new_branch_is_told_at_its_row(make_solved: MakeSolved) -> None:
+    run = named_run(make_solved(rows=9000), ("up",) * 4001 + ("down",) * 4999)
+    chosen = scene_of(run).chosen
+    assert chosen is not None
+    assert len(chosen.texts) <= POSES + 3
+    told = dict(zip((chosen.t_ns // STEP_NS).tolist(), chosen.texts, strict=True))
+    assert told[4001] == "chosen: down"
+    assert {told[row] for row in told if row < 4001} == {"chosen: up"}
+
+
+def test_of_many_single_poses_the_ghosts_of_the_first_are_drawn(make_solved: MakeSolved) -> None:
+    """Of every tenth, say, a ghost would stand beside the arm of another target."""
+    (ghost, _) = scene_of(make_solved(rows=POSES + 50, timed=False)).ghosts
+    there = [*range(20), *range(30, POSES)]
+    assert (ghost.t_ns // 1_000_000_000).tolist() == there
+    assert (ghost.gone.t_ns // 1_000_000_000).tolist() == [20, POSES]
+
+
+def test_a_ghost_on_every_second_row_is_drawn_there_alone_and_not_without_end(
+    make_solved: MakeSolved,
+) -> None:
+    run = make_solved(rows=9000)
+    ghost = run.ghosts[0]
+    rows = np.arange(0, 9000, 2)
+    sparse = Ghost("sparse", run.log.t_ns[rows], np.resize(ghost.q, (len(rows), 6)))
+    (drawn,) = scene_of(replace(run, ghosts=(sparse,))).ghosts
+    assert POSES // 2 <= len(drawn.t_ns) <= 2 * POSES + 2
+    assert set(drawn.t_ns.tolist()) <= set(sparse.t_ns.tolist())
+    np.testing.assert_array_equal(drawn.gone.t_ns, run.log.t_ns[1::2])
 
 
 def test_a_name_keeps_its_place_in_a_motion_and_leaps_between_single_poses(make_solved: MakeSolved) -> None:
@@ -350,7 +428,7 @@ def test_a_branch_of_one_pose_is_drawn() -> None:
         "one", load_robot("ur5e"), None, q, goals=goals, ghosts=[Ghost("b", row_times(1), q + 1)]
     )
     (ghost,) = scene_of(run).ghosts
-    assert (len(ghost.t_ns), len(ghost.gone_ns)) == (1, 0)
+    assert (len(ghost.t_ns), len(ghost.gone.t_ns)) == (1, 0)
 
 
 # --- the plots -------------------------------------------------------------------------------------

@@ -37,6 +37,16 @@ def test_a_solved_run_comes_back_as_it_was(timed: bool, make_solved: MakeSolved,
     assert_same(read_recording(write_recording(run, tmp_path / "solved.rrd")), run)
 
 
+@pytest.mark.parametrize("branches", [("a",) * 40, ("a", "b") * 20, ("",) * 39 + ("ü, 肘",), ("", "a") * 20])
+def test_the_names_of_the_branches_chosen_come_back(
+    branches: tuple[str, ...], make_solved: MakeSolved, tmp_path: Path
+) -> None:
+    run = make_solved()
+    assert run.goals is not None
+    run = replace(run, goals=replace(run.goals, branches=branches))
+    assert_same(read_recording(write_recording(run, tmp_path / "solved.rrd")), run)
+
+
 def test_positions_alone_and_targets_that_are_none_come_back_as_they_were(
     make_solved: MakeSolved, tmp_path: Path
 ) -> None:

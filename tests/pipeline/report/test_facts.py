@@ -126,7 +126,7 @@ def test_a_solved_run_tells_its_targets_and_its_branches() -> None:
     run = solved_run("targets", robot, None, q, goals=goals, ghosts=ghosts)
     told = {fact.name: fact.value for fact in facts.run_facts(run)}
     assert (told["Source"], told["Targets"]) == ("ik", "2 of 3 with a solution")
-    assert told["Other branches"] == "up: 2; down: 1"
-    assert "Other branches" not in {fact.name for fact in facts.run_facts(replace(run, ghosts=()))}
+    assert told["Rows of other branches"] == "up: 2; down: 1"
+    assert "Rows of other branches" not in {fact.name for fact in facts.run_facts(replace(run, ghosts=()))}
     log = facts.run_facts(replace(run, ghosts=(), goals=None))
-    assert {"Targets", "Other branches"}.isdisjoint(fact.name for fact in log)
+    assert {"Targets", "Rows of other branches"}.isdisjoint(fact.name for fact in log)

@@ -1,0 +1,80 @@
+"""Solved targets on the page: how many were reached, which were not and why, and that poses are no motion."""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import replace
+
+import numpy as np
+import plotly.graph_objects as go
+import pytest
+
+from urmpipe_models.catalogue import load_robot
+from urmpipe_models.inverse.targets import targets_of
+from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.report import gallery
+from urmpipe_pipeline.report.banner import banner
+from urmpipe_pipeline.report.log_tables import missed_table
+from urmpipe_pipeline.report.page import lay_out
+from urmpipe_pipeline.report.spec import Figure
+from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.solved import goals_of, row_times, solved_run
+
+FAR = "axis 4 is 1.174 m from axis 2, allowed: 0.0328 to 0.8172 m"
+
+
+def drawn(figure: Figure, name: str) -> FloatArray:
+    """Return the values of the one trace of a figure that is called so."""
+    (spec,) = [one["y"] for one in figure.spec["data"] if one["name"] == name]
+    return np.frombuffer(base64.b64decode(spec["bdata"]), f"<{spec['dtype']}").astype(np.float64)
+
+
+@pytest.fixture
+def run() -> Run:
+    """Three targets; the second is out of reach."""
+    robot = load_robot("ur5e")
+    q = np.array([[1.7, -1.8, -1.5, -3.5, 1.6, -0.7], [0.3] * 6, [-0.3, 0.1, 1.3, -0.6, 1.1, -2.4]])
+    goals = goals_of(targets_of(robot, q), row_times(3), ["", f"{FAR}; axis 4 is 2 m from axis 2", ""])
+    q[1] = np.nan
+    return solved_run("poses", robot, None, q, goals=goals)
+
+
+def test_the_banner_counts_the_targets_with_a_solution(run: Run) -> None:
+    said = banner([], [run], [])
+    assert (said.word, said.headline) == ("SOLVED", "poses: 2 of 3 targets with a solution")
+    assert said.detail == "1 warning. Nothing was compared: there is no verdict."
+    log = replace(run, goals=None)
+    assert banner([], [run, log], []).word == "INGESTED"
+    assert banner([], [run, run], []).headline == "2 logs: 4 of 6 targets with a solution"
+
+
+def test_each_target_that_was_missed_has_a_row(run: Run) -> None:
+    table = missed_table(run)
+    assert table is not None
+    assert table.title == "Targets without a solution (1)"
+    assert run.goals is not None
+    x, y, z = run.goals.position[1]
+    assert [[cell.text for cell in row] for row in table.rows] == [
+        ["2", "1.000", f"{x:.4f}, {y:.4f}, {z:.4f}", f"{FAR}; axis 4 is 2 m from axis 2"]
+    ]
+    assert missed_table(replace(run, goals=replace(run.goals, reasons=("",) * 3))) is None
+    assert missed_table(replace(run, goals=None)) is None
+
+
+def test_single_poses_are_points_that_nothing_joins(run: Run) -> None:
+    found = gallery.run_figures(run)
+    assert [figure.title for figure in found] == ["Joints", "Poses of the tool centre point"]
+    assert run.tcp is not None
+    for figure in found:
+        go.Figure(figure.spec)  # raises on an unknown word or a wrong value
+        assert {one["mode"] for one in figure.spec["data"]} == {"markers"}
+    for axis, name in enumerate(("px", "py", "pz")):
+        # Single precision.
+        np.testing.assert_allclose(drawn(found[1], name), run.tcp.position[:, axis], rtol=2**-24, atol=0)
+    for axis, name in enumerate(("rz", "ry", "rx")):  # each pose by itself: not another name of its rotation
+        np.testing.assert_allclose(drawn(found[1], name), run.tcp.euler_zyx[:, axis], rtol=2**-24, atol=0)
+
+
+def test_the_targets_missed_stand_before_the_figures(run: Run) -> None:
+    (part,) = [part for part in lay_out([run]).parts if part.title == "Log poses"]
+    assert [block.title for block in part.blocks[:2]] == ["Targets without a solution (1)", "Joints"]
