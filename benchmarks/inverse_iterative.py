@@ -32,6 +32,7 @@ from urmpipe_models.inverse.targets import Targets, misses, targets_of
 FloatArray = NDArray[np.float64]
 
 OURS_NEAR = "near: urmpipe, 1 thread"
+OURS_PARTS = "near: urmpipe, 1 thread, 2000 at a time"
 OURS_RANDOM = "random: urmpipe"
 PEER = "roboticstoolbox ik_LM (C++)"
 CLOSED_LOOP = "near: Pinocchio CLIK in a Python loop"
@@ -43,6 +44,9 @@ NOISE = 0.1
 """Standard deviation of what a start near the solution is beside it, each joint, in [rad]."""
 
 RESTARTS = 20
+
+PART = 2000
+"""Poses of a small batch, in which NumPy's calls count."""
 
 
 def main() -> None:
@@ -97,8 +101,16 @@ def our_jobs(given: Problem) -> dict[str, Callable[[], FloatArray]]:
     """Return this program's solvers."""
     chain, targets = given.chain, given.targets
     half = TOLERANCE / 2
+    parts = [slice(begin, begin + PART) for begin in range(0, len(targets), PART)]
+
+    def part(rows: slice) -> FloatArray:
+        """Solve some of the targets."""
+        near = given.near[rows]
+        return refine(chain, targets.rows(rows), near, threads=1, metres=half, radians=half).q
+
     return {
         OURS_NEAR: lambda: refine(chain, targets, given.near, threads=1, metres=half, radians=half).q,
+        OURS_PARTS: lambda: np.concatenate([part(rows) for rows in parts]),
         "near: urmpipe, 2 threads": lambda: (
             refine(chain, targets, given.near, threads=2, metres=half, radians=half).q
         ),
@@ -178,6 +190,7 @@ def bounds(taken: dict[str, list[Taken]]) -> list[Bound]:
     held = []
     for mine, peer in (
         (OURS_NEAR, f"near: {PEER}"),
+        (OURS_PARTS, f"near: {PEER}"),
         (OURS_NEAR, CLOSED_LOOP),
         (OURS_RANDOM, f"random: {PEER}"),
     ):

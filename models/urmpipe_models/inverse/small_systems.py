@@ -50,7 +50,7 @@ def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> Factor:
         A: Symmetric, shape (k, k, n); positive definite where mu is 0.
         damping: mu, not negative, shape (n,) or one for all.
     """
-    lower, scaled, inverse = np.zeros(A.shape), np.zeros(A.shape), np.empty(A.shape[1:])
+    lower, scaled, inverse = np.empty(A.shape), np.empty(A.shape), np.empty(A.shape[1:])
     for j in range(len(A)):
         column = A[j:, j] - product(lower[j:, :j], scaled[j, :j]) if j else A[:, 0]
         np.divide(1.0, np.maximum(column[0] + damping, damping), out=inverse[j])
@@ -105,4 +105,9 @@ def _sum(subscripts: str, a: FloatArray, b: FloatArray) -> FloatArray:
     """
     if a.shape[-1] == 1:
         return np.asarray(np.einsum(subscripts, a.repeat(2, -1), b.repeat(2, -1))[..., :1])
-    return np.asarray(np.einsum(subscripts, np.ascontiguousarray(a), np.ascontiguousarray(b)))
+    return np.asarray(np.einsum(subscripts, _side_by_side(a), _side_by_side(b)))
+
+
+def _side_by_side(a: FloatArray) -> FloatArray:
+    """Return an array whose n values lie side by side."""
+    return a if a.strides[-1] == a.itemsize else np.ascontiguousarray(a)

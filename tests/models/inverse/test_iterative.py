@@ -223,6 +223,20 @@ def test_joints_stay_within_limits_at_every_step() -> None:
             assert np.abs(q).max() <= 1.0, (method, steps)
 
 
+def test_no_step_leads_away_from_the_target() -> None:
+    """Limits cut steps short: what is left of one may lead away, and may have been foreseen to."""
+    chain = limited(load_robot("urm6"), -2.0, 2.0)
+    rng = np.random.default_rng(2)
+    targets = targets_of(chain, rng.uniform(-2.0, 2.0, (200, 6)))
+    targets = Targets(targets.position + np.array([0.0, 0.0, 1.5]), targets.rotation)
+    start = rng.uniform(-2.0, 2.0, (200, 6))
+    before = np.full(200, np.inf)
+    for steps in range(16):
+        now = refine(chain, targets, start, iterations=steps + 1).residual
+        assert (now <= before).all(), steps
+        before = now
+
+
 # --- rows beside each other --------------------------------------------------------------------------
 
 
