@@ -329,11 +329,25 @@ def test_after_a_rescue_no_joint_is_held_where_one_was_before() -> None:
         return elsewhere[None]
 
     window = SlidingWindow(limited, Targets(targets.position), q[0], rescue)
-    found = window.slide()
+    found = window.slide(lambda share: None)
     assert asked == [40]
     assert (found[30:40, 0] == 0.5).all()
     # rad: the joints go on from where the rescue brought them, 0.02 in 20 samples
     assert np.abs(found[40:] - elsewhere).max() < 0.05
+
+
+@pytest.mark.parametrize("robot", ["urm6", "ur5e"])
+def test_the_share_that_is_done_rises_to_the_whole(robot: str) -> None:
+    arm = load_robot(robot)
+    targets = targets_of(arm, np.array(arm.start) + 0.3 + np.linspace(0.0, 0.5, 900)[:, None])
+    targets.position[300:400] += 9.0
+    told: list[float] = []
+    follow(arm, targets, times(900), start=np.array(arm.start) + 0.3, progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert told[0] >= 0.0
+    if robot == "urm6":
+        assert len(set(told)) > 3  # window after window
 
 
 def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:
