@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from urmpipe_models.chain import Chain
+from urmpipe_models.inverse.nearest_turns import in_nearest_turns
 from urmpipe_models.inverse.sliding_window import SlidingWindow
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, TextArray
 from urmpipe_models.inverse.solve import solve
@@ -77,7 +78,7 @@ class LeastMotionPath:
         self._at_once = min(MOST_AT_ONCE, MORE * self._at_once) if alike == len(met) and not met[0] else 1
         self.reasons[sample : sample + alike] = found.reasons[:alike, 0]
         self.shortfall[sample : sample + alike] = found.shortfall[:alike, 0]
-        return np.asarray(found.q[:alike, 0])
+        return in_nearest_turns(self.chain, found.q[:alike, 0], last)
 
 
 def _alike(met: BoolArray, reached: BoolArray) -> int:

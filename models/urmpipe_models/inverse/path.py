@@ -21,6 +21,7 @@ from urmpipe_models.inverse.joint_speeds import too_fast
 from urmpipe_models.inverse.jumps import jump_samples, jumps_at
 from urmpipe_models.inverse.least_motion_path import LeastMotionPath
 from urmpipe_models.inverse.limits import TURN, periods
+from urmpipe_models.inverse.nearest_turns import in_nearest_turns
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, SingularFamily, TextArray
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.stretches import stretches
@@ -131,16 +132,20 @@ class _Asked:
         out = np.flatnonzero(walked.branch == "")
         if self.tolerance is None or not len(out):
             return found
+        before = _before(walked.q, self.start)
         near = solve(
             self.chain,
             self.targets.rows(out),
-            start=_before(walked.q, self.start)[out],
+            start=before[out],
             tolerance=self.tolerance,
             restarts=self.restarts,
             seed=self.seed,
         )
         met = out[near.reached[:, 0]]
         found.q[out], found.reasons[out] = near.q[:, 0], near.reasons[:, 0]
+        for first, last in stretches(walked.branch == ""):
+            rows = slice(first, last + 1)
+            found.q[rows] = in_nearest_turns(self.chain, found.q[rows], before[first])
         found.shortfall[out] = near.shortfall[:, 0]
         walked.branch[met] = near.labels[near.reached[:, 0], 0]
         return found
