@@ -14,7 +14,7 @@ def in_nearest_turns(chain: Chain, q: FloatArray, last: FloatArray) -> FloatArra
 
     Args:
         chain: The arm.
-        q: Joint values of samples in [rad] or [m], within limits, shape (m, joints); NaN where there are none.
+        q: Joint values in [rad] or [m], within limits, shape (m, joints); NaN where there are none.
         last: Those of the sample before them, shape (joints,).
     """
     turned = q.copy()

@@ -13,6 +13,7 @@ from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.inverse import sliding_window
 from urmpipe_models.inverse.joint_path import JointPath
+from urmpipe_models.inverse.least_motion_path import LeastMotionPath
 from urmpipe_models.inverse.path import follow
 from urmpipe_models.inverse.sliding_window import SlidingWindow
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
@@ -231,10 +232,23 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     line = np.column_stack((reach, np.zeros((101, 2))))
     path = follow(arm, Targets(line), times(101), start=np.array([0.3, -0.5, 0.1]), tolerance=0.003)
     assert path.reached.all()
-    # rad: restarts find other turns of the same points
-    assert np.abs(np.diff(path.q, axis=0)).max() < math.pi
     # m: along x the arm reaches 3 m; the nearest point is found to 1e-6 rad about it, so much better
     np.testing.assert_allclose(path.shortfall, np.maximum(reach - 3.0, 0.0), rtol=0.0, atol=1e-9)
+
+
+def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
+    arm = load_robot("ur5e")
+    stretched = np.array([0.3, -0.9, 0.0, -0.7, 0.3, 0.3])
+    q = stretched + np.linspace(0.4, 0.0, 41)[:, None] * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    targets = targets_of(arm, q)
+    away = targets.position - np.array([0.0, 0.0, 0.1625])
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    targets.position[:] += np.linspace(0.0, 0.004, 41)[:, None] * away
+    path = LeastMotionPath(arm, targets, q[0], 0.0035, 20, 0, lambda share: None)
+    assert np.isfinite(path.q).all()
+    assert (path.shortfall > 0.0).sum() > 10
+    # rad: restarts find other turns of the same points, 6.28 away
+    assert np.abs(np.diff(path.q, axis=0)).max() < 1.0
 
 
 def test_a_sample_that_is_none_stops_no_other() -> None:
