@@ -65,7 +65,7 @@ def _of_path(asked: Asked, t_ns: IntArray) -> InverseResult:
     """Return the solutions of a path, which follow each other."""
     path = follow(
         asked.arm, asked.given.targets, t_ns, start=asked.start, within_pi=asked.within_pi,
-        tolerance=asked.tolerance, restarts=asked.restarts, seed=asked.seed,
+        tolerance=asked.tolerance, restarts=asked.restarts, seed=asked.seed, progress=asked.progress,
     )  # fmt: skip
     solutions = Solutions(
         path.q[:, None], ("path",), path.reasons[:, None], tuple(_families(path)), path.shortfall[:, None],

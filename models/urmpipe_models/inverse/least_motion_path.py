@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
 
 from urmpipe_models.chain import Chain
+from urmpipe_models.inverse.nearest_turns import in_nearest_turns
 from urmpipe_models.inverse.sliding_window import SlidingWindow
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, TextArray
 from urmpipe_models.inverse.solve import solve
@@ -34,6 +36,7 @@ class LeastMotionPath:
         tolerance: In [m] along each axis, of targets out of reach; see `solve`.
         restarts: Random starts for what does not follow from the sample before.
         seed: Of the random starts.
+        progress: Told the share of the samples that is done, 0 to 1.
         q: Joint values found in [rad] or [m], shape (n, joints); NaN where there are none.
         reasons: Why there are none, shape (n,); empty where there are.
         shortfall: How far the tool stays from targets out of reach, in [m], shape (n,).
@@ -45,6 +48,7 @@ class LeastMotionPath:
     tolerance: float | None
     restarts: int
     seed: int
+    progress: Callable[[float], None]
     q: FloatArray = field(init=False)
     reasons: TextArray = field(init=False)
     shortfall: FloatArray = field(init=False)
@@ -54,7 +58,8 @@ class LeastMotionPath:
         self.reasons = np.full(count, "", dtype=np.object_)
         self.shortfall = np.zeros(count)
         self._at_once = 1
-        self.q = SlidingWindow(self.chain, self.targets, self.start, self._look_for).slide()
+        window = SlidingWindow(self.chain, self.targets, self.start, self._look_for)
+        self.q = window.slide(self.progress)
 
     def _look_for(self, sample: int, last: FloatArray) -> FloatArray:
         """Return the joint values of a sample, or of it and those after it that are as much out of reach."""
@@ -73,7 +78,7 @@ class LeastMotionPath:
         self._at_once = min(MOST_AT_ONCE, MORE * self._at_once) if alike == len(met) and not met[0] else 1
         self.reasons[sample : sample + alike] = found.reasons[:alike, 0]
         self.shortfall[sample : sample + alike] = found.shortfall[:alike, 0]
-        return np.asarray(found.q[:alike, 0])
+        return in_nearest_turns(self.chain, found.q[:alike, 0], last)
 
 
 def _alike(met: BoolArray, reached: BoolArray) -> int:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -15,12 +15,14 @@ from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.branch_walk import walk
 from urmpipe_models.inverse.checks import checked
 from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
+from urmpipe_models.inverse.farthest import too_far
 from urmpipe_models.inverse.joint_path import JointPath, SingularStretch
 from urmpipe_models.inverse.joint_speeds import too_fast
 from urmpipe_models.inverse.jumps import jump_samples, jumps_at
 from urmpipe_models.inverse.least_motion_path import LeastMotionPath
 from urmpipe_models.inverse.limits import TURN, periods
 from urmpipe_models.inverse.limits import within_pi as within_pi_of
+from urmpipe_models.inverse.nearest_turns import in_nearest_turns
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, SingularFamily, TextArray
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.stretches import stretches
@@ -52,6 +54,7 @@ def follow(
     tolerance: float | None = None,
     restarts: int = 20,
     seed: int = 0,
+    progress: Callable[[float], None] | None = None,
 ) -> JointPath:
     """Return joint values that lead the tool along a path, limits kept.
 
@@ -79,6 +82,7 @@ def follow(
             to if it is no farther away than this.
         restarts: Random starts of the iterative solver where the motion does not lead on by itself.
         seed: Of the random starts: the same seed, the same motion.
+        progress: Told the share of the samples that is done, 0 to 1.
 
     Raises:
         OptionError: With all that is wrong with the options.
@@ -88,12 +92,19 @@ def follow(
     faults = [*_time_faults(t_ns, len(targets)), *_option_faults(chain, begin, tolerance, restarts)]
     if faults:
         raise OptionError(*faults)
+    form = None if targets.rotation is None else closed_form(chain)
+    if form is None:
+        far = too_far(chain, targets, tolerance)
+        reasons = [fault or reason for fault, reason in zip(reasons, far, strict=True)]
     good = np.array([not reason for reason in reasons], dtype=bool)
-    asked = _Asked(chain, targets.rows(good), begin, tolerance, restarts, seed)
-    position_only = targets.rotation is None
-    form = None if position_only else closed_form(chain)
+    asked = _Asked(chain, targets.rows(good), begin, tolerance, restarts, seed, progress or _untold)
     found = _spread(asked.by_least_motion() if form is None else asked.by_closed_form(form), good, reasons)
+    asked.progress(1.0)
     return _told(chain, targets, np.asarray(t_ns), found, form, within_pi)
+
+
+def _untold(share: float) -> None:
+    """Tell nobody what share is done."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -106,10 +117,13 @@ class _Asked:
     tolerance: float | None
     restarts: int
     seed: int
+    progress: Callable[[float], None]
 
     def by_least_motion(self) -> _Found:
         """Return what least motion finds; its branches have no names of their own."""
-        path = LeastMotionPath(self.chain, self.targets, self.start, self.tolerance, self.restarts, self.seed)
+        path = LeastMotionPath(
+            self.chain, self.targets, self.start, self.tolerance, self.restarts, self.seed, self.progress
+        )
         return _Found(path.q, None, path.reasons, path.shortfall, {})
 
     def by_closed_form(self, form: ClosedForm) -> _Found:
@@ -119,16 +133,20 @@ class _Asked:
         out = np.flatnonzero(walked.branch == "")
         if self.tolerance is None or not len(out):
             return found
+        before = _before(walked.q, self.start)
         near = solve(
             self.chain,
             self.targets.rows(out),
-            start=_before(walked.q, self.start)[out],
+            start=before[out],
             tolerance=self.tolerance,
             restarts=self.restarts,
             seed=self.seed,
         )
         met = out[near.reached[:, 0]]
         found.q[out], found.reasons[out] = near.q[:, 0], near.reasons[:, 0]
+        for first, last in stretches(walked.branch == ""):
+            rows = slice(first, last + 1)
+            found.q[rows] = in_nearest_turns(self.chain, found.q[rows], before[first])
         found.shortfall[out] = near.shortfall[:, 0]
         walked.branch[met] = near.labels[near.reached[:, 0], 0]
         return found

@@ -82,9 +82,14 @@ class SlidingWindow:
         self._reach = LONGEST
         self._empty()
 
-    def slide(self) -> FloatArray:
-        """Go along the whole path and return the joint values, shape (n, joints)."""
+    def slide(self, progress: Callable[[float], None]) -> FloatArray:
+        """Go along the whole path and return the joint values, shape (n, joints).
+
+        Args:
+            progress: Told the share of the samples that is done, 0 to 1.
+        """
         while self._at < len(self.q):
+            progress(self._at / len(self.q))
             if self._sweeps == PATIENCE:
                 self._take_rescue(self.rescue(self._at, self._last))
             else:

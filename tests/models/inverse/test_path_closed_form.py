@@ -224,6 +224,21 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     assert not path.shortfall[:-1].any()
 
 
+def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
+    arm = load_robot("ur5e")
+    stretched = np.array([0.3, -0.9, 0.0, -0.7, 1.2, 0.3])
+    q = line(stretched + np.array([0.0, 0.0, 0.4, 0.0, 0.0, 0.0]), stretched, 41)
+    targets = targets_of(arm, q)
+    away = targets.position - np.array([0.0, 0.0, 0.1625])
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    targets.position[:] += np.linspace(0.0, 0.004, 41)[:, None] * away
+    path = follow(arm, targets, times(41), start=q[0], tolerance=0.0035)
+    assert path.reached.all()
+    assert (path.branch == "nearest point").sum() > 10
+    # rad: restarts find other turns of the same points, up to 12.6 away
+    assert np.abs(np.diff(path.q, axis=0)).max() < math.pi
+
+
 def test_a_branch_that_ends_is_left_by_a_jump_that_is_told() -> None:
     free = load_robot("ur5e")
     arm = limited(free, 0, -3.0, 3.0)

@@ -13,6 +13,7 @@ from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.inverse import sliding_window
 from urmpipe_models.inverse.joint_path import JointPath
+from urmpipe_models.inverse.least_motion_path import LeastMotionPath
 from urmpipe_models.inverse.path import follow
 from urmpipe_models.inverse.sliding_window import SlidingWindow
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
@@ -235,6 +236,21 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     np.testing.assert_allclose(path.shortfall, np.maximum(reach - 3.0, 0.0), rtol=0.0, atol=1e-9)
 
 
+def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
+    arm = load_robot("ur5e")
+    stretched = np.array([0.3, -0.9, 0.0, -0.7, 0.3, 0.3])
+    q = stretched + np.linspace(0.4, 0.0, 41)[:, None] * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    targets = targets_of(arm, q)
+    away = targets.position - np.array([0.0, 0.0, 0.1625])
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    targets.position[:] += np.linspace(0.0, 0.004, 41)[:, None] * away
+    path = LeastMotionPath(arm, targets, q[0], 0.0035, 20, 0, lambda share: None)
+    assert np.isfinite(path.q).all()
+    assert (path.shortfall > 0.0).sum() > 10
+    # rad: restarts find other turns of the same points, 6.28 away
+    assert np.abs(np.diff(path.q, axis=0)).max() < 1.0
+
+
 def test_a_sample_that_is_none_stops_no_other() -> None:
     arm = planar(3)
     line = np.column_stack((np.linspace(2.0, 2.2, 21), np.zeros((21, 2))))
@@ -329,11 +345,25 @@ def test_after_a_rescue_no_joint_is_held_where_one_was_before() -> None:
         return elsewhere[None]
 
     window = SlidingWindow(limited, Targets(targets.position), q[0], rescue)
-    found = window.slide()
+    found = window.slide(lambda share: None)
     assert asked == [40]
     assert (found[30:40, 0] == 0.5).all()
     # rad: the joints go on from where the rescue brought them, 0.02 in 20 samples
     assert np.abs(found[40:] - elsewhere).max() < 0.05
+
+
+@pytest.mark.parametrize("robot", ["urm6", "ur5e"])
+def test_the_share_that_is_done_rises_to_the_whole(robot: str) -> None:
+    arm = load_robot(robot)
+    targets = targets_of(arm, np.array(arm.start) + 0.3 + np.linspace(0.0, 0.5, 900)[:, None])
+    targets.position[300:400] += 9.0
+    told: list[float] = []
+    follow(arm, targets, times(900), start=np.array(arm.start) + 0.3, progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert told[0] >= 0.0
+    if robot == "urm6":
+        assert len(set(told)) > 3  # window after window
 
 
 def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:
