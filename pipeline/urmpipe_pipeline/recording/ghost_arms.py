@@ -156,8 +156,8 @@ def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     points = points_over_log(robot, q)
     position, rotation = frames_over_log(robot, q)
     turning = [k for k, joint in enumerate(robot.joints) if joint.kind == "revolute"]
-    axes = np.array([robot.joints[k].axis for k in turning])
-    moved = np.array(turning) + 1  # frame 0 is the base's
+    axes = np.array([robot.joints[k].axis for k in turning]).reshape(-1, 3)
+    moved = np.array(turning, dtype=np.intp) + 1  # frame 0 is the base's
     direction = np.einsum("mkij,kj->mki", rotation[:, moved], axes)
     lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
     reach = float(np.fmax.reduce(lengths, initial=0.0))

@@ -16,7 +16,8 @@ from hypothesis.extra.numpy import arrays
 from rerun.chunk import RrdReader
 
 from urmpipe_models.catalogue import load_robot
-from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.kinematics import points_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_models.urdf_reader import read_urdf
@@ -419,6 +420,18 @@ def test_a_comparison_draws_no_ghosts(make_solved: MakeSolved) -> None:
     run = make_solved()
     scene = scene_of(compare_runs(run, [run]))
     assert (scene.ghosts, scene.goals) == ((), None)
+
+
+def test_an_arm_that_only_slides_has_ghosts(tmp_path: Path) -> None:
+    gantry = Chain("gantry", (Joint("x", "prismatic", axis=(1.0, 0.0, 0.0)), Joint("z", "prismatic")))
+    q = np.array([[0.1, 0.2], [0.3, 0.4]])
+    ghost = Ghost("b", row_times(2), q + 0.5)
+    run = solved_run(
+        "one", gantry, None, q, goals=goals_of(targets_of(gantry, q), row_times(2)), ghosts=[ghost]
+    )
+    (drawn,) = scene_of(run).ghosts
+    np.testing.assert_array_equal(drawn.end, points_over_log(gantry, ghost.q)[:, 1:])
+    write_recording(run, tmp_path / "gantry.rrd")
 
 
 def test_a_branch_of_one_pose_is_drawn() -> None:
