@@ -160,6 +160,22 @@ def test_a_ghost_is_gone_where_there_is_no_such_solution(
             assert found == dict.fromkeys(there, count) | {20: 0}
 
 
+def test_what_stands_at_rows_between_the_samples_has_the_sample_before() -> None:
+    """The third row, at 45 ms, lies between two samples of the grid, one in 20 ms."""
+    rows = np.array([0, 20, 45, 60, 80, 100]) * 1_000_000
+    q = np.array([0.1, -1.2, 1.3, -0.4, 0.7, 0.3]) + 0.01 * np.arange(6)[:, None]
+    q[5] = np.nan
+    goals = goals_of(Targets(np.zeros((6, 3))), rows, None, ["a", "a", "b", "b", "b", ""])
+    ghost = Ghost("b", rows[1:3], q[1:3] + 0.5)
+    run = solved_run("path", load_robot("ur5e"), rows, q, goals=goals, ghosts=[ghost])
+    assert (run.t_ns // 1_000_000).tolist() == [0, 20, 40, 60, 80, 100]
+    scene = scene_of(run)
+    (drawn,) = scene.ghosts
+    assert (drawn.sample.tolist(), drawn.gone.sample.tolist()) == ([1, 2], [3])
+    assert scene.chosen is not None
+    assert (scene.chosen.sample.tolist(), scene.chosen.gone.sample.tolist()) == ([0, 1, 2, 3, 4], [5])
+
+
 def test_the_arm_is_gone_where_a_target_has_no_solution(make_solved: MakeSolved, tmp_path: Path) -> None:
     path = write_recording(make_solved(), tmp_path / "solved.rrd")
     expected = dict.fromkeys((*range(5), *range(9, 40)), 1) | {5: 0}
@@ -226,7 +242,8 @@ def test_many_branches_are_counted(make_solved: MakeSolved) -> None:
 
 
 def test_of_two_ghosts_with_the_same_links_one_is_seen_inside_the_other(make_solved: MakeSolved) -> None:
-    assert [ghost.thin for ghost in scene_of(make_solved()).ghosts] == [False, True]
+    run = make_solved(names=tuple("abcdefgh"))
+    assert [ghost.thin for ghost in scene_of(run).ghosts] == [False, True] * 4
 
 
 def test_names_do_not_lie_on_each_other_in_the_view() -> None:
