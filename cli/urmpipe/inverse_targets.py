@@ -139,7 +139,7 @@ def _times(count: int, t: ArrayLike | None, tsp: float | None) -> IntArray | Non
     if faults:
         raise OptionError(*faults)
     if tsp is not None:
-        seconds = np.arange(count) * tsp
+        seconds = np.asarray(np.arange(count) * tsp, dtype=float)
     return None if seconds is None else np.round(seconds * 1e9).astype(np.int64)
 
 

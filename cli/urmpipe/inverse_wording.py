@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -16,6 +17,9 @@ from urmpipe_pipeline.text import DIGITS, SHOWN, counted, enumerated
 
 NAMED = 6
 """Rows or stretches of rows that are named; the others are counted."""
+
+NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
+"""What may differ in reasons that are one."""
 
 MILLI = 1e-3
 """A target in mm that is read as m is a thousand times too far."""
@@ -63,7 +67,7 @@ def reach_words(result: InverseResult) -> str:
     said = f"{result.name}: {result.robot.name} reaches {number} ({method_words(result.method)})"
     if result.path is None:
         return said
-    jumps, fast = len(result.path.jumps), len(result.path.too_fast)
+    jumps, fast = len(result.path.jumps), len({one.joint for one in result.path.too_fast})
     others = [counted(jumps, "jump")] * bool(jumps) + [f"{counted(fast, 'joint')} too fast"] * bool(fast)
     return f"{said}, with {enumerated(others)}" if others else said
 
@@ -71,17 +75,26 @@ def reach_words(result: InverseResult) -> str:
 def unreached(result: InverseResult, *, every: bool) -> Iterator[str]:
     """Yield why targets have no solution, and, if all branches are asked for, why single branches have none.
 
-    Rows that follow each other for one reason are one line.
+    Rows that follow each other for one reason, but for its numbers, are one line.
     """
     reasons = [reason or "" for reason in result.reasons]
+    kinds = [NUMBER.sub("#", reason) for reason in reasons]
     start = 0
-    for end in range(1, len(reasons) + 1):
-        if end == len(reasons) or reasons[end] != reasons[start]:
+    for end in range(1, len(kinds) + 1):
+        if end == len(kinds) or kinds[end] != kinds[start]:
             if reasons[start]:
-                yield f"{rows_text(result.row[start:end])} not reached: {reasons[start]}"
+                yield _not_reached(result.row[start:end], reasons[start:end])
             elif every and result.method != "iterative":
                 yield from _branches_unreached(result, start, end)
             start = end
+
+
+def _not_reached(row: IntArray, reasons: Sequence[str]) -> str:
+    """Return why rows are not reached: by the one in the middle where the numbers of the reasons differ."""
+    if len(set(reasons)) == 1:
+        return f"{rows_text(row)} not reached: {reasons[0]}"
+    middle = len(reasons) // 2
+    return f"{rows_text(row)} not reached; row {row[middle]}: {reasons[middle]}"
 
 
 def _branches_unreached(result: InverseResult, start: int, end: int) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """The command line: a group that loads only the command it runs, and the one error boundary.
 
-Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
+Exit codes: 0 within tolerance, 1 out of tolerance or otherwise failed its check (each command says what it
+checks), 2 bad input or usage.
 """
 
 from __future__ import annotations
@@ -102,8 +103,10 @@ def cli() -> None:
       urmpipe compare path.csv log.csv --robot urm6 --tolerance 0.0035
       urmpipe report log-against-path.rrd
       urmpipe view log-against-path.rrd
+      urmpipe ik path.csv --robot urm6 -o log.csv
 
-    Exit codes: 0 within tolerance, 1 out of tolerance, 2 bad input or usage.
+    Exit codes: 0 within tolerance, 1 out of tolerance (ik: a target not reached, a jump, or a joint too
+    fast; fmu check: a problem), 2 bad input or usage.
     """
 
 

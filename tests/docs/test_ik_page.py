@@ -23,6 +23,7 @@ def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """The working folder with the files that the page names."""
     (tmp_path / "path.csv").write_bytes((LOGS / "path.csv").read_bytes())
     (tmp_path / "targets.csv").write_text("x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n")
+    (tmp_path / "poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0.1,0.3,1,0,0,0\n")
     monkeypatch.chdir(tmp_path)
     return tmp_path
 
@@ -46,8 +47,8 @@ def test_the_robots_have_the_inverse_that_the_page_says() -> None:
 @pytest.mark.slow
 def test_the_commands_run(folder: Path) -> None:
     commands = re.findall(r"^    urmpipe (.*?)(?:\s+#.*)?$", PAGE, re.MULTILINE)
-    assert len(commands) == 5
-    assert [run([*command.split(), "-q"]) for command in commands] == [0] * 5
+    assert len(commands) == 6
+    assert [run([*command.split(), "-q"]) for command in commands] == [0] * 6
     assert {"targets.rrd", "log.csv", "log-against-path.rrd"} <= {path.name for path in folder.iterdir()}
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.kinematics import poses_over_log
+from urmpipe_models.orientation import quaternions
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -58,11 +59,17 @@ def misses(chain: Chain, q: FloatArray, targets: Targets) -> tuple[FloatArray, F
 
 
 def _rotation_vector(rotation: FloatArray) -> FloatArray:
-    """Return u a, |a| <= pi, of rotation matrices, shape (n, 3, 3); NaN of matrices with NaN."""
-    from scipy.spatial.transform import Rotation
+    """Return u a, 0 <= a <= pi, of rotation matrices, shape (n, 3, 3); NaN of matrices with NaN.
 
+    By the unit quaternion v = u sin(a / 2), w = cos(a / 2) of either sign: a = 2 atan2(|v|, |w|). Without
+    scipy, which would take longer to import than a thousand targets to be solved.
+    """
     vector = np.full((len(rotation), 3), np.nan)
     whole = np.isfinite(rotation).all(axis=(1, 2))
-    if whole.any():
-        vector[whole] = Rotation.from_matrix(rotation[whole]).as_rotvec()
+    quat = quaternions(rotation[whole].reshape(-1, 9), "matrix")
+    imaginary, real = quat[:, :3], quat[:, 3]
+    length = np.linalg.norm(imaginary, axis=1)
+    angle = 2.0 * np.arctan2(length, np.abs(real))
+    scale = np.divide(angle, length, out=np.full_like(angle, 2.0), where=length > 0.0)
+    vector[whole] = imaginary * (np.copysign(scale, real))[:, None]
     return vector
