@@ -11,10 +11,10 @@ import numpy as np
 from recorded import rows_of, static
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
-from urmpipe_pipeline.recording.eye import seen
+from urmpipe_pipeline.recording.eye import FIELD_OF_VIEW, eye_distance, in_the_picture, seen
 from urmpipe_pipeline.recording.ghost_arms import POSES, bones_of, fullest_time
-from urmpipe_pipeline.recording.ghost_drawing import OPACITY
-from urmpipe_pipeline.recording.ghost_names import NAME_SIZE, name_places, placed_names
+from urmpipe_pipeline.recording.ghost_drawing import AXIS_RADIUS, LINK_RADIUS, OPACITY, THIN
+from urmpipe_pipeline.recording.ghost_names import NAME_SIZE, extent_of, name_places, placed_names
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
@@ -39,6 +39,7 @@ def test_each_branch_has_a_colour_of_its_own_and_its_name(make_solved: MakeSolve
         assert static(path, f"{entity}/arm", "Capsules3D:colors") == [packed | OPACITY]
         assert static(path, f"{entity}/name", "Points3D:colors") == [packed | 255]
         assert static(path, f"{entity}/name", "Points3D:labels") == [name]
+        assert static(path, f"{entity}/name", "Points3D:show_labels") == [True]
     told = summary(run).splitlines()
     table = told.index("| branch | drawn | rows | branch | drawn | rows |")
     assert told[table + 2 : table + 8] == [
@@ -58,26 +59,67 @@ def test_many_branches_are_counted(make_solved: MakeSolved) -> None:
     assert "and 4 more branches" in told
 
 
+def test_the_second_of_two_ghosts_is_half_as_thick_and_axes_are_thinner_than_links(
+    make_solved: MakeSolved, tmp_path: Path
+) -> None:
+    run = make_solved(names=("a", "b"))
+    path = write_recording(run, tmp_path / "solved.rrd")
+    size = scene_of(run).ball()[1]
+    expected = np.repeat((LINK_RADIUS, AXIS_RADIUS), 6) * size  # ur5e: six links, six axes
+    for name, share in (("a", 1.0), ("b", THIN)):
+        radii = rows_of(path, f"/branches/{name}/arm", "Capsules3D:radii")
+        np.testing.assert_allclose(
+            radii[2 * STEP_NS], share * expected, rtol=1e-6, atol=0
+        )  # single precision
+    assert (THIN, LINK_RADIUS > 2 * AXIS_RADIUS) == (0.5, True)
+
+
 def test_of_two_ghosts_with_the_same_links_one_is_seen_inside_the_other(make_solved: MakeSolved) -> None:
     run = make_solved(names=tuple("abcdefgh"))
     assert [ghost.thin for ghost in scene_of(run).ghosts] == [False, True] * 4
+
+
+def test_a_name_may_stand_at_the_end_of_a_bone_or_in_its_middle() -> None:
+    start, end = np.array([[0.0, 0.0, 0.0], [1.0, 0.0, 0.0]]), np.array([[1.0, 0.0, 0.0], [1.0, 0.0, 4.0]])
+    np.testing.assert_array_equal(
+        name_places(start, end), [[1.0, 0.0, 0.0], [1.0, 0.0, 4.0], [0.5, 0.0, 0.0], [1.0, 0.0, 2.0]]
+    )
+
+
+def test_a_name_that_no_view_can_show_is_shown_as_far_as_it_can(make_solved: MakeSolved) -> None:
+    run = named_run(make_solved(names=("a\ud800b", "c")), ("d\ud800",) * 40)
+    scene = scene_of(run)
+    assert [ghost.name for ghost in scene.ghosts] == ["a?b", "c"]
+    assert scene.chosen is not None
+    assert set(scene.chosen.texts) == {"chosen: d?"}
 
 
 def test_names_do_not_lie_on_each_other_in_the_view() -> None:
     arms = np.random.default_rng(3).normal(size=(8, 5, 24, 3))
     arms[0, 2] = np.nan  # there the arm has no pose, and its name no place
     named = placed_names(arms)
-    every = seen(arms)
-    box = np.array(NAME_SIZE) * np.linalg.norm(
-        np.nanmax(every, axis=(0, 1, 2)) - np.nanmin(every, axis=(0, 1, 2))
-    )
+    picture, box = in_the_picture(arms), np.array(NAME_SIZE) * extent_of(arms)
     for pose in range(5):
-        at = every[np.arange(8), pose, named[:, pose], :2]
+        at = picture[np.arange(8), pose, named[:, pose]]
         gaps = np.abs(at[:, None] - at[None]) / box
         np.fill_diagonal(gaps[..., 0], np.inf)
         there = np.isfinite(at).all(axis=1)
         assert there.sum() == (7 if pose == 2 else 8)
         assert (gaps.max(axis=2)[np.ix_(there, there)] >= 1.0).all()
+
+
+def test_what_is_nearer_is_larger_in_the_picture() -> None:
+    """Held against the angles at which the eye sees points, from where it is."""
+    points = np.random.default_rng(4).normal(size=(50, 3))
+    points[7] = np.nan
+    found = seen(points)
+    found -= (np.nanmin(found, axis=0) + np.nanmax(found, axis=0)) / 2
+    distance = eye_distance(found)
+    angles = np.arctan2(found[:, :2], (distance - found[:, 2])[:, None])
+    picture = in_the_picture(points)
+    np.testing.assert_allclose(picture, distance * np.tan(angles), rtol=0, atol=1e-13)  # rounding over 10 m
+    assert np.nanmax(np.abs(angles[:, 1])) < FIELD_OF_VIEW / 2
+    np.testing.assert_array_equal(in_the_picture(points[:1]), [[0.0, 0.0]])
 
 
 def test_the_name_of_an_arm_stands_where_it_differs_most_from_the_others() -> None:
