@@ -15,6 +15,7 @@ from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.orientation import matrices
 from urmpipe_pipeline.compare import compare_runs
 from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.palette import AXIS_COLOURS, rgb
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.scene import NEAR, scene_of
 from urmpipe_pipeline.results import Run
@@ -36,6 +37,10 @@ def test_targets_without_times_are_frames_and_no_way(make_solved: MakeSolved, tm
     length = np.linalg.norm(axes, axis=2)
     expected = matrices(run.goals.quat_xyzw).transpose(0, 2, 1)
     np.testing.assert_allclose(axes / length[..., None], expected, rtol=0, atol=1e-5)  # 1e-7 over 0.1 m
+    packed = [
+        red << 24 | green << 16 | blue << 8 | 255 for red, green, blue in map(rgb, AXIS_COLOURS.values())
+    ]
+    assert static(path, "/targets/frames", "LineStrips3D:colors") == packed[:3] * 40  # x, y, z
     drawn = {chunk.entity_path for chunk in RrdReader(path).store().stream().filter(content="/targets/**")}
     assert drawn == {f"/targets/{leaf}" for leaf in ("frames", "missed", "position", "quat_xyzw")}
     assert scene_of(run).ways[0].strips == ()
