@@ -8,7 +8,7 @@ from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.recording.eye import in_the_picture
 
 NAME_SIZE = (0.3, 0.035)
-"""How wide and how high a name is in the view, as shares of all arms' extent."""
+"""How wide and how high a name is in the view, as shares of the diagonal of all that is in view."""
 
 
 def name_places(start: FloatArray, end: FloatArray) -> FloatArray:
@@ -24,26 +24,27 @@ def name_places(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.concatenate((end, (start + end) / 2), axis=-2)
 
 
-def placed_names(arms: FloatArray) -> IntArray:
+def placed_names(arms: FloatArray, view: float = 0.0) -> IntArray:
     """Return for each arm the place at which its name can be read, and told from those of the others.
 
     Names must not lie on each other: that comes first. Then a place is the better the further it is from the
-    same place of every other arm.
+    same place of the other arms, all taken together.
 
     Args:
         arms: The `name_places` of each arm in some poses in [m], shape (arms, poses, places, 3); NaN where
             one is not there.
+        view: The diagonal of all that is in view in [m], if that is more than the arms: then they are small
+            beside their names.
 
     Returns:
         Shape (arms, poses).
     """
-    extent = extent_of(arms)
-    picture, box = in_the_picture(arms), np.array(NAME_SIZE) * extent
+    picture, box = in_the_picture(arms), np.array(NAME_SIZE) * max(view, extent_of(arms))
     found = np.zeros(arms.shape[:2], dtype=np.int64)
     at: list[FloatArray] = []
     for i, mine in enumerate(arms):
         apart = np.linalg.norm(np.delete(arms, i, axis=0) - mine, axis=3)
-        room = np.fmin.reduce(apart, axis=0, initial=extent)
+        room = np.nansum(apart, axis=0)
         free = np.ones(mine.shape[:2])
         for name in at:
             free = np.fmin(free, (np.abs(picture[i] - name) / box).max(axis=2))

@@ -7,6 +7,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from recorded import rows_of, static
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
@@ -94,17 +95,19 @@ def test_a_name_that_no_view_can_show_is_shown_as_far_as_it_can(make_solved: Mak
     assert set(scene.chosen.texts) == {"chosen: d?"}
 
 
-def test_names_do_not_lie_on_each_other_in_the_view() -> None:
-    arms = np.random.default_rng(3).normal(size=(8, 5, 24, 3))
+@pytest.mark.parametrize(("view", "count"), [(0.0, 8), (30.0, 3)])
+def test_names_do_not_lie_on_each_other_in_the_view(view: float, count: int) -> None:
+    """Where much else is in view, the arms are small beside their names."""
+    arms = np.random.default_rng(3).normal(size=(count, 5, 24, 3))
     arms[0, 2] = np.nan  # there the arm has no pose, and its name no place
-    named = placed_names(arms)
-    picture, box = in_the_picture(arms), np.array(NAME_SIZE) * extent_of(arms)
+    named = placed_names(arms, view)
+    picture, box = in_the_picture(arms), np.array(NAME_SIZE) * (view or extent_of(arms))
     for pose in range(5):
-        at = picture[np.arange(8), pose, named[:, pose]]
+        at = picture[np.arange(count), pose, named[:, pose]]
         gaps = np.abs(at[:, None] - at[None]) / box
         np.fill_diagonal(gaps[..., 0], np.inf)
         there = np.isfinite(at).all(axis=1)
-        assert there.sum() == (7 if pose == 2 else 8)
+        assert there.sum() == (count - 1 if pose == 2 else count)
         assert (gaps.max(axis=2)[np.ix_(there, there)] >= 1.0).all()
 
 
