@@ -156,7 +156,7 @@ def _unreachable(present: BoolArray, goals: Goals) -> Iterator[LogWarning]:
         first = int(missed[0])
         here = ", here the first" if len(missed) > 1 else ""
         why = f": {goals.why(first)}" if goals.reasons[first] else ""
-        said = f"no pose of the run for {len(missed)} of {len(present)} targets{here}{why}"
+        said = f"no solution for {len(missed)} of {len(present)} targets{here}{why}"
         yield LogWarning("unreachable", said, first + 1)
 
 

@@ -94,7 +94,7 @@ def test_nothing_is_interpolated_across_unreachable_targets(timed: bool) -> None
     for values in (run.q, run.log.q, run.tcp.position):
         assert np.flatnonzero(np.isnan(values).all(axis=1)).tolist() == missing
         assert np.isfinite(np.delete(values, missing, axis=0)).all()
-    said = "no pose of the run for 3 of 9 targets, here the first: too far"
+    said = "no solution for 3 of 9 targets, here the first: too far"
     assert run.warnings == (LogWarning("unreachable", said, 4),)
 
 
@@ -194,10 +194,10 @@ def test_where_nothing_is_reachable_there_is_a_run_without_poses() -> None:
     for times in (None, np.arange(5) * STEP_NS):
         run = solved("far", UR5E, times, np.full((5, 6), np.nan))
         assert np.isnan(run.q).all()
-        said = "no pose of the run for 5 of 5 targets, here the first"
+        said = "no solution for 5 of 5 targets, here the first"
         assert run.warnings == (LogWarning("unreachable", said, 1),)
         alone = solved("far", UR5E, None if times is None else times[:1], np.full((1, 6), np.nan))
-        assert [one.message for one in alone.warnings] == ["no pose of the run for 1 of 1 targets"]
+        assert [one.message for one in alone.warnings] == ["no solution for 1 of 1 targets"]
 
 
 def test_all_that_does_not_fit_together_is_told_at_once() -> None:

@@ -10,6 +10,11 @@ EYE = np.array([0.62, -0.66, 0.42]) / np.linalg.norm([0.62, -0.66, 0.42])
 """The way from the middle of the scene to the eye [-]: from the front right, a little above."""
 
 
+FIELD_OF_VIEW, FILLED, WIDE = np.radians(55.0), 0.85, 1.2
+"""What the viewer's eye sees from the bottom to the top of a view in [rad] (re_view_spatial,
+Eye::DEFAULT_FOV_Y), the share of it that the scene fills, and how wide a view is at least, in heights."""
+
+
 def seen(points: FloatArray) -> FloatArray:
     """Return how far points lie to the right, upwards and towards the eye.
 
@@ -22,3 +27,31 @@ def seen(points: FloatArray) -> FloatArray:
     right = np.cross((0.0, 0.0, 1.0), EYE)
     right /= np.linalg.norm(right)
     return np.asarray(points @ np.column_stack((right, np.cross(EYE, right), EYE)))
+
+
+def eye_distance(points: FloatArray) -> float:
+    """Return how far the eye is from the middle of a scene, so that all of it is in view, in [m].
+
+    Args:
+        points: What `seen` returns of points from the middle in [m], shape (..., 3); NaN where there is none.
+    """
+    aside, above, ahead = np.moveaxis(points, -1, 0)
+    distance = ahead + np.maximum(np.abs(above), np.abs(aside) / WIDE) / (FILLED * np.tan(FIELD_OF_VIEW / 2))
+    return float(np.fmax.reduce(distance, axis=None))
+
+
+def in_the_picture(points: FloatArray) -> FloatArray:
+    """Return where points are in the picture that the eye sees of them: what is nearer is larger.
+
+    Args:
+        points: In [m], shape (..., 3); NaN where there is none.
+
+    Returns:
+        To the right and upwards of the middle, as long as in the plane through the middle in [m],
+        shape (..., 2).
+    """
+    found = seen(points)
+    flat = found.reshape(-1, 3)
+    found -= (np.fmin.reduce(flat) + np.fmax.reduce(flat)) / 2.0
+    distance = eye_distance(found) or 1.0
+    return np.asarray(found[..., :2] * (distance / (distance - found[..., 2:])))

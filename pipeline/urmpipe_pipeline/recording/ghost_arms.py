@@ -79,14 +79,19 @@ class ArmName:
     gone: Gone
 
 
-def ghost_arms(run: Run, place: Place) -> tuple[tuple[GhostArm, ...], ArmName | None]:
+def ghost_arms(run: Run, place: Place, view: float = 0.0) -> tuple[tuple[GhostArm, ...], ArmName | None]:
     """Return the further branches of a run as arms, thinned out for drawing, and the name of the chosen.
 
     The chosen one has a name where there are others to be told from, and a solution anywhere.
+
+    Args:
+        run: A solved run.
+        place: Where it stands in the recording.
+        view: The diagonal of all else that is in view in [m].
     """
     if run.robot is None or not run.ghosts:
         return (), None
-    from_ns, named = _names(run, run.robot)
+    from_ns, named = _names(run, run.robot, view)
     ghosts = (
         _ghost_arm(run, run.robot, ghost, i, branch_entity(place, key), at[_rows_at(from_ns, ghost.t_ns)])
         for i, (ghost, key, at) in enumerate(zip(run.ghosts, branch_keys(run), named[1:], strict=True))
@@ -156,8 +161,8 @@ def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
     points = points_over_log(robot, q)
     position, rotation = frames_over_log(robot, q)
     turning = [k for k, joint in enumerate(robot.joints) if joint.kind == "revolute"]
-    axes = np.array([robot.joints[k].axis for k in turning])
-    moved = np.array(turning) + 1  # frame 0 is the base's
+    axes = np.array([robot.joints[k].axis for k in turning]).reshape(-1, 3)
+    moved = np.array(turning, dtype=np.intp) + 1  # frame 0 is the base's
     direction = np.einsum("mkij,kj->mki", rotation[:, moved], axes)
     lengths = np.linalg.norm(np.diff(points, axis=1), axis=2).sum(axis=1)
     reach = float(np.fmax.reduce(lengths, initial=0.0))
@@ -188,7 +193,7 @@ def _drawn_rows(run: Run, t_ns: IntArray) -> IntArray:
     return np.union1d(*(some[:: math.ceil(len(some) / POSES)] for some in (begins, drawn)))
 
 
-def _names(run: Run, robot: Chain) -> tuple[IntArray, IntArray]:
+def _names(run: Run, robot: Chain, view: float) -> tuple[IntArray, IntArray]:
     """Return at which of its places the name of each arm stands, and from which times on.
 
     In a motion it keeps the place that is good in the view that opens; between single poses it may leap.
@@ -199,7 +204,8 @@ def _names(run: Run, robot: Chain) -> tuple[IntArray, IntArray]:
     t_ns = run.log.t_ns[:POSES] if run.single_poses else np.array([fullest_time(run)])
     chosen = run.log.q[_rows_at(run.log.t_ns, t_ns)]
     ghosts = [ghost.q[_rows_at(ghost.t_ns, t_ns)] for ghost in run.ghosts]
-    return t_ns, placed_names(np.array([name_places(*bones_of(robot, q)) for q in (chosen, *ghosts)]))
+    places = np.array([name_places(*bones_of(robot, q)) for q in (chosen, *ghosts)])
+    return t_ns, placed_names(places, view)
 
 
 def _rows_at(t_ns: IntArray, at: IntArray) -> IntArray:

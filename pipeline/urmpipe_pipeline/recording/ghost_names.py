@@ -5,13 +5,10 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
-from urmpipe_pipeline.recording.eye import seen
+from urmpipe_pipeline.recording.eye import in_the_picture
 
 NAME_SIZE = (0.3, 0.035)
-"""How wide and how high a name is in the view, as shares of all arms' extent."""
-
-SECOND = 0.2
-"""How much it counts that a name stands where its arm differs from the others, beside that it can be read."""
+"""How wide and how high a name is in the view, as shares of the diagonal of all that is in view."""
 
 
 def name_places(start: FloatArray, end: FloatArray) -> FloatArray:
@@ -27,31 +24,36 @@ def name_places(start: FloatArray, end: FloatArray) -> FloatArray:
     return np.concatenate((end, (start + end) / 2), axis=-2)
 
 
-def placed_names(arms: FloatArray) -> IntArray:
+def placed_names(arms: FloatArray, view: float = 0.0) -> IntArray:
     """Return for each arm the place at which its name can be read, and told from those of the others.
 
     Names must not lie on each other: that comes first. Then a place is the better the further it is from the
-    same place of every other arm.
+    same place of the other arms, all taken together.
 
     Args:
         arms: The `name_places` of each arm in some poses in [m], shape (arms, poses, places, 3); NaN where
             one is not there.
+        view: The diagonal of all that is in view in [m], if that is more than the arms: then they are small
+            beside their names.
 
     Returns:
         Shape (arms, poses).
     """
-    every = seen(arms)
-    low, high = (reduce.reduce(every, axis=(0, 1, 2)) for reduce in (np.fmin, np.fmax))
-    extent = float(np.linalg.norm(high - low)) or 1.0
-    box = np.array(NAME_SIZE) * extent
-    found = np.zeros(every.shape[:2], dtype=np.int64)
+    picture, box = in_the_picture(arms), np.array(NAME_SIZE) * max(view, extent_of(arms))
+    found = np.zeros(arms.shape[:2], dtype=np.int64)
     at: list[FloatArray] = []
-    for i, mine in enumerate(every):
-        apart = np.linalg.norm(np.delete(every, i, axis=0) - mine, axis=3)
-        room = SECOND * np.fmin.reduce(apart, axis=0, initial=extent) / extent
+    for i, mine in enumerate(arms):
+        apart = np.linalg.norm(np.delete(arms, i, axis=0) - mine, axis=3)
+        room = np.nansum(apart, axis=0)
         free = np.ones(mine.shape[:2])
         for name in at:
-            free = np.fmin(free, (np.abs(mine[..., :2] - name) / box).max(axis=2))
-        found[i] = np.argmax(free + room, axis=1)
-        at.append(np.take_along_axis(mine[..., :2], found[i][:, None, None], axis=1))
+            free = np.fmin(free, (np.abs(picture[i] - name) / box).max(axis=2))
+        found[i] = np.argmax(np.where(free < 1.0, free, 1.0 + room), axis=1)
+        at.append(np.take_along_axis(picture[i], found[i][:, None, None], axis=1))
     return found
+
+
+def extent_of(points: FloatArray) -> float:
+    """Return the diagonal of the box around points in [m]; 1 around one point. NaN is no point."""
+    flat = points.reshape(-1, 3)
+    return float(np.linalg.norm(np.fmax.reduce(flat) - np.fmin.reduce(flat))) or 1.0

@@ -10,12 +10,10 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
-import numpy as np
-
 from urmpipe_pipeline.comparison import Comparison, Deviation
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
-from urmpipe_pipeline.recording.eye import EYE, seen
+from urmpipe_pipeline.recording.eye import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.ghost_arms import fullest_time
 from urmpipe_pipeline.recording.plots import Plots, decisive_plot
 from urmpipe_pipeline.recording.scene import Scene
@@ -29,10 +27,6 @@ if TYPE_CHECKING:
     from rerun.blueprint import Blueprint, Container, Spatial3DView, TextLogView, View
 
     Row: TypeAlias = tuple[View | Container, float]
-
-FIELD_OF_VIEW, FILLED, WIDE = np.radians(55.0), 0.85, 1.2
-"""What the viewer's eye sees from the bottom to the top of a view in [rad] (re_view_spatial,
-Eye::DEFAULT_FOV_Y), the share of it that the scene fills, and how wide a view is at least, in heights."""
 
 HEIGHTS = {"delta": 4, "joints in the file": 3.5, "joints repolarized": 3, "speed": 2, "events": 2.2}
 """Shares of the height that the plots have."""
@@ -111,10 +105,7 @@ def opening_time(result: Result) -> int:
 def eye_and_target(scene: Scene) -> tuple[FloatArray, FloatArray]:
     """Return where the eye is and what it looks at in [m], shape (3,) each: all of the scene is in view."""
     centre, radius = scene.ball()
-    aside, above, ahead = seen(scene.points() - centre).T
-    slope = FILLED * np.tan(FIELD_OF_VIEW / 2)
-    distance = ahead + np.maximum(np.abs(above), np.abs(aside) / WIDE) / slope
-    return centre + max(radius, float(distance.max())) * EYE, centre
+    return centre + max(radius, eye_distance(seen(scene.points() - centre))) * EYE, centre
 
 
 def _scene_view(scene: Scene) -> Spatial3DView:

@@ -58,7 +58,7 @@ def read_recording(path: Path) -> Result:
         if document["kind"] == "simulation":
             return _simulation(arrays, document["result"], path)
         return _comparison(arrays, document["result"], path)
-    except (KeyError, TypeError, AttributeError, CosimulationError) as error:
+    except (KeyError, TypeError, ValueError, AttributeError, CosimulationError) as error:
         raise _damaged(store, error) from error
 
 
@@ -124,7 +124,10 @@ def _goals(arrays: _Arrays, data: Data, place: Place) -> Goals | None:
         return None
     t_ns = arrays.chunk(f"{place.prefix}targets/position").t_ns
     reasons = tuple(data["missed"].get(str(row), "") for row in range(1, len(t_ns) + 1))
-    return Goals(t_ns, **found, reasons=reasons, branches=metadata.chosen_branches(data["chosen"]))
+    branches = metadata.chosen_branches(data["chosen"])
+    if len(branches) not in (0, len(t_ns)):
+        raise ValueError(f"{len(branches)} branches chosen of {len(t_ns)} targets")
+    return Goals(t_ns, **found, reasons=reasons, branches=branches)
 
 
 def _comparison(arrays: _Arrays, data: Data, path: Path) -> Comparison:

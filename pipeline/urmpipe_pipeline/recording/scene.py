@@ -163,8 +163,9 @@ def _of_run(run: Run, place: Place) -> Scene:
         gone = gone_after(run, run.log.t_ns[np.isfinite(run.log.q).all(axis=1)])
         arm = None if arm is None else replace(arm, gone=gone)
         ways = tuple(replace(way, gone=gone) for way in ways)
-    ghosts, chosen = ghost_arms(run, place)
-    return Scene(arm, ways, ghosts=ghosts, chosen=chosen, goals=goal_marks(run, place))
+    alone = Scene(arm, ways, goals=goal_marks(run, place))
+    ghosts, chosen = ghost_arms(run, place, 2.0 * alone.ball()[1]) if run.ghosts else ((), None)
+    return replace(alone, ghosts=ghosts, chosen=chosen)
 
 
 def arm_of(result: Comparison) -> Deviation:

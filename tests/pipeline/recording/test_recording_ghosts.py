@@ -2,20 +2,22 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
 from same_results import assert_same
 from urmpipe_models.catalogue import load_robot
-from urmpipe_models.errors import OutputError
+from urmpipe_models.errors import OutputError, RecordingError
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_pipeline.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.recording import read_recording, write_recording, writer
 from urmpipe_pipeline.recording.entities import blocks
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.store import Store
@@ -98,6 +100,30 @@ def test_a_branch_that_reads_back_otherwise_is_refused(make_solved: MakeSolved, 
         f"reads back otherwise than written: {block.entity}" for block in every if "/branches" in block.entity
     ]
     assert len(error.value.findings) == 2
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "said"),
+    [
+        ("chosen", [["a", 3]], "ValueError('3 branches chosen of 40 targets')"),
+        ("chosen", [["a"]], "ValueError('not enough values to unpack (expected 2, got 1)')"),
+        ("missed", [], "AttributeError(\"'list' object has no attribute 'get'\")"),
+        ("ghosts", [{"name": "a", "entity": "/nowhere"}], "KeyError('/nowhere')"),
+    ],
+)
+def test_damaged_metadata_of_branches_are_one_line(
+    name: str, value: Any, said: str, make_solved: MakeSolved, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    run = make_solved()
+    document = json.loads(to_json(run, blocks(run)))
+    document["result"][name] = value
+    monkeypatch.setattr(writer, "to_json", lambda *_: json.dumps(document))
+    path = write_recording(run, tmp_path / "damaged.rrd")
+    with pytest.raises(RecordingError) as error:
+        read_recording(path)
+    assert [str(one) for one in error.value.findings] == [
+        f"{path}: found damaged metadata ({said}), allowed: what urmpipe wrote"
+    ]
 
 
 def test_the_metadata_of_a_log_say_nothing_of_branches(make_solved: MakeSolved) -> None:

@@ -20,7 +20,8 @@ from urmpipe_pipeline.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.entities import places_of
-from urmpipe_pipeline.recording.layout import FIELD_OF_VIEW, FILLED, WIDE, eye_and_target, viewer_layout
+from urmpipe_pipeline.recording.eye import FIELD_OF_VIEW, FILLED, WIDE
+from urmpipe_pipeline.recording.layout import eye_and_target, viewer_layout
 from urmpipe_pipeline.recording.overview import LONG, ROWS, SPEED_ROWS
 from urmpipe_pipeline.recording.plots import SHARED_AXIS, Plots
 from urmpipe_pipeline.recording.scene import scene_of
