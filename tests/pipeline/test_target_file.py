@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from make_specimens import paths
 from specimen import SPECIMENS, Truth
-from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.errors import LogError, UrmpipeError
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.sources import ReadOptions, read_log, read_map
 from urmpipe_pipeline.target_file import TargetFile, read_targets
@@ -330,9 +330,13 @@ def test_empty_rows_of_a_spreadsheet_at_the_end_are_none(read: Read) -> None:
     assert list(read("x,y,z\n0.3,0.1,0.5\nnan,nan,nan\n").faults) == [2]
 
 
-def test_rows_are_counted_as_ingest_counts_them(read: Read) -> None:
-    targets = read("# taught by hand\nx,y,z\n0.3,0.1,0.5\n# a remark\n\n0.3,x,0.5\n")
-    assert (targets.row.tolist(), list(targets.faults)) == ([1, 2], [2])
+def test_rows_are_counted_as_ingest_counts_them(read: Read, tmp_path: Path) -> None:
+    text = "# taught by hand\nx,y,z\nm,m,m\n0.3,0.1,0.5\n# a remark\n\n0.3,here,0.5\n\n0.3,0.1\n% end\n0.3,0.1,0.5\n"
+    targets = read(text)
+    assert (targets.row.tolist(), list(targets.faults)) == ([1, 2, 3, 4], [2, 3])
+    with pytest.raises(LogError) as caught:
+        read_log([tmp_path / "targets.csv"], ReadOptions(source="path"))
+    assert [finding.row for finding in caught.value.findings] == [2, 3]
 
 
 def test_a_wrong_row_among_many_is_found(read: Read) -> None:
