@@ -238,6 +238,8 @@ def test_rows_with_another_decimal_sign_stop_no_other(read: Read) -> None:
     targets = read("x;y;z\n0.3;0.1;0.5\n0,3;0,1;0,5\n")
     assert targets.position[0].tolist() == [0.3, 0.1, 0.5]
     assert targets.faults == {2: "found '0,3;0,1;0,5', allowed: a row of numbers"}
+    most = read("x;y;z\n0.3;0.1;0.5\n0,3;0,1;0,5\n0,4;0,1;0,5\n")
+    assert most.faults == {1: "found '0.3;0.1;0.5', allowed: a row of numbers"}
 
 
 def test_a_map_that_names_the_columns_finds_rows_that_are_all_wrong(read: Read) -> None:
@@ -272,6 +274,12 @@ def test_a_transform_that_is_none_stops_no_other(read: Read, header: bool, first
     assert targets.position[1].tolist() == [0.3, 0.1, 0.5]
     assert targets.rotation is not None
     assert targets.rotation[1].tolist() == np.eye(3).tolist()
+
+
+def test_a_transform_column_by_column_is_known_by_its_last_row(read: Read) -> None:
+    targets = read("1 0 0 0 0 1 0 0 0 0 1 0 .3 .1 .5 1\n1 0 0 0 0 1 0 0 0 0 2 0 .3 .1 .5 1\n")
+    assert targets.position[0].tolist() == [0.3, 0.1, 0.5]
+    assert list(targets.faults) == [2]
 
 
 def test_numbered_quaternions_of_which_some_are_none_are_asked_for_their_form(
@@ -331,7 +339,8 @@ def test_empty_rows_of_a_spreadsheet_at_the_end_are_none(read: Read) -> None:
 
 
 def test_rows_are_counted_as_ingest_counts_them(read: Read, tmp_path: Path) -> None:
-    text = "# taught by hand\nx,y,z\nm,m,m\n0.3,0.1,0.5\n# a remark\n\n0.3,here,0.5\n\n0.3,0.1\n% end\n0.3,0.1,0.5\n"
+    head = "# taught by hand\nx,y,z\nm,m,m\n0.3,0.1,0.5\n# a remark\n\n"
+    text = f"{head}0.3,here,0.5\n\n0.3,0.1\n% end\n0.3,0.1,0.5\n"
     targets = read(text)
     assert (targets.row.tolist(), list(targets.faults)) == ([1, 2, 3, 4], [2, 3])
     with pytest.raises(LogError) as caught:
