@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.inverse.targets import Targets
-from urmpipe_models.orientation import RotationForm
+from urmpipe_models.orientation import FORMS, RotationForm, width
 from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning, SourceFile
 from urmpipe_pipeline.sources.clock import even_clock
 from urmpipe_pipeline.sources.columns import columns_of, listed
@@ -25,9 +26,6 @@ from urmpipe_pipeline.sources.target_rotation import rotation_units, target_form
 from urmpipe_pipeline.sources.text import fingerprint
 from urmpipe_pipeline.sources.units import LONGEST_REACH, UnitFinder
 from urmpipe_pipeline.sources.vocabulary import Unit
-
-FORMS = "x, y, z alone or with rz, ry, rx or qx, qy, qz, qw; name the columns in a header, or --rotation FORM"
-"""What the columns of targets may be."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -89,10 +87,11 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
     Source: [UrmArm2021]_ eq. 22 (t = i Tsp).
     """
     asked = replace(options or ReadOptions(), joints=(), names=(), signs=(), offsets=())
-    tables = open_tables([Path(file)], asked, sniff_targets)
+    tables = open_tables([Path(file)], asked, partial(sniff_targets, position=asked.position))
     plan = make_plan(tables, replace(asked, source=PATH), None)
     _refuse_unclear(plan, named=bool(asked.position))
-    form, assumed = target_form(plan.roles, columns_of(tables.layouts, tables.titles), str(file))
+    columns = [c for c in columns_of(tables.layouts, tables.titles) if c not in plan.clock.columns]
+    form, assumed = target_form(plan.roles, columns, str(file), asked)
     rows = read_rows(plan)
     poses = _poses(plan, rows, form)
     t_ns, start, said, noticed = _times(rows, tsp, asked.period)
@@ -198,7 +197,19 @@ def _refuse_unclear(plan: Plan, *, named: bool) -> None:
     if layout.header is None and cells > len(used) and not (plan.roles.rotation or named):
         time = " beside the time" if plan.clock.columns else ""
         count = cells - len(plan.clock.columns)
-        raise LogError(Finding(f"found {count} columns without names{time}, allowed: {FORMS}", file))
+        found = f"found {count} columns without names{time}, allowed: x, y, z alone or with an orientation"
+        raise LogError(Finding(f"{found}; {_remedy(count, timed=bool(time))}", file))
+
+
+def _remedy(count: int, *, timed: bool) -> str:
+    """Return what tells so many columns without names: a header, the form of the orientation, the time."""
+    remedies = ["name the columns in a header"]
+    forms = [form for form in FORMS if 3 + width(form) == count]
+    if forms:
+        remedies.append(f"say which with --rotation {'|'.join(forms)}")
+    if not timed and count - 1 in {3, *(3 + width(form) for form in FORMS)}:
+        remedies.append("say --time 1 if the first is the time")
+    return ", or ".join(remedies)
 
 
 def _about_file(plan: Plan) -> Iterator[Inference]:

@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
-from urmpipe_models.errors import OutputError
+from urmpipe_models.errors import LogError, OutputError
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.joint_file import write_joint_log
 from urmpipe_pipeline.joint_log import FloatArray, IntArray
@@ -183,3 +183,13 @@ def test_every_double_comes_back(
     log = read_log([path], robot=robot)
     assert log.q.tobytes() == q.tobytes()
     assert log.t_ns.tolist() == times(len(q)).tolist()
+
+
+def test_the_rows_of_the_targets_are_never_taken_for_a_joint(tmp_path: Path) -> None:
+    """As many columns as the robot has joints are taken where names tell nothing."""
+    path = tmp_path / "solved.csv"
+    write(path, chain_of(("pan", "revolute"), ("lift", "revolute")), motion(20, 2), times(20))
+    log = read_log([path], robot=chain_of(("base", "revolute"), ("arm", "revolute")))
+    assert log.q.tolist() == motion(20, 2).tolist()
+    with pytest.raises(LogError, match="allowed: 3"):
+        read_log([path], robot=chain_of(("base", "revolute"), ("arm", "revolute"), ("hand", "revolute")))

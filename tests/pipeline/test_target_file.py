@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from make_specimens import paths
 from specimen import SPECIMENS, Truth
-from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.errors import LogError, UrmpipeError
 from urmpipe_pipeline.ingest import ingest_log
 from urmpipe_pipeline.sources import ReadOptions, read_log, read_map
 from urmpipe_pipeline.target_file import TargetFile, read_targets
@@ -203,8 +203,100 @@ def test_the_header_may_be_written_as_programs_do(read: Read, text: str) -> None
     assert targets.faults == {2: "column y: found 'da', allowed: a finite number"}
 
 
-def test_the_first_and_only_row_may_be_wrong_if_one_of_its_cells_is_a_number(read: Read) -> None:
-    assert read("x,y,z\n0.3,abc,0.5\n").faults == {1: "column y: found 'abc', allowed: a finite number"}
+MISSING = "columns x, y, z: found no number, allowed: a finite number"
+
+
+@pytest.mark.parametrize(
+    ("text", "faults"),
+    [
+        ("x,y,z\n0.3,abc,0.5\n", ["column y: found 'abc', allowed: a finite number"]),
+        ("x,y,z\na,b,c\n", ["found 'a,b,c', allowed: a row of numbers"]),
+        ("x,y,z\nnan,nan,nan\n-,#N/A,NULL\n", [MISSING, MISSING]),
+        ("x, y, z\na, b, c\n", ["found 'a, b, c', allowed: a row of numbers"]),
+        ("Taught\nx;y;z\n;nan;\n", [MISSING]),
+        ("# taught\nx y z\nto be taught\n", ["found 'to be taught', allowed: a row of numbers"]),
+        ("x,y,z\nmm,mm,mm\n?,?,?\n", ["found '?,?,?', allowed: a row of numbers"]),
+        ("x,y,z\n1,2\n3,4\n5,6\n", ["found 2 cells, allowed: 3"] * 3),
+        ("x,y,z,qx,qy,qz,qw\n1,2,3\n", ["found 3 cells, allowed: 7"]),
+        ("x,y,z\n0,1,0,2,0,3\n", ["found 6 cells, allowed: 3"]),
+        ("x,y,z\n1,0.2,0.3,0.4\n", ["found 4 cells, allowed: 3"]),
+    ],
+)
+def test_all_rows_may_be_wrong(read: Read, text: str, faults: list[str]) -> None:
+    targets = read(text)
+    assert targets.faults == dict(enumerate(faults, start=1))
+    assert np.isnan(targets.position).all()
+
+
+def test_a_column_that_counts_rows_needs_no_name_if_there_are_rows_to_count(read: Read) -> None:
+    """As R's write.table writes them; of a single row the fourth cell may as well be the wrong one."""
+    targets = read("x,y,z\n1,0.3,0.1,0.5\n2,0.4,0.1,0.5\n")
+    assert targets.position.tolist() == [[0.3, 0.1, 0.5], [0.4, 0.1, 0.5]]
+
+
+def test_rows_with_another_decimal_sign_stop_no_other(read: Read) -> None:
+    targets = read("x;y;z\n0.3;0.1;0.5\n0,3;0,1;0,5\n")
+    assert targets.position[0].tolist() == [0.3, 0.1, 0.5]
+    assert targets.faults == {2: "found '0,3;0,1;0,5', allowed: a row of numbers"}
+    most = read("x;y;z\n0.3;0.1;0.5\n0,3;0,1;0,5\n0,4;0,1;0,5\n")
+    assert most.faults == {1: "found '0.3;0.1;0.5', allowed: a row of numbers"}
+
+
+def test_a_map_that_names_the_columns_finds_rows_that_are_all_wrong(read: Read) -> None:
+    targets = read("a,b,c\nu,v,w\n", position=("a", "b", "c"))
+    assert targets.faults == {1: "found 'u,v,w', allowed: a row of numbers"}
+
+
+NINE = ",".join(f"r{i}{j}" for i in "123" for j in "123")
+UNIT, TWICE = "1,0,0,0,1,0,0,0,1", "2,0,0,0,2,0,0,0,2"
+NONE = f"columns {NINE.replace(',', ', ')}: found R R^T off I by 3 and det R = 8,"
+
+
+@pytest.mark.parametrize("rows", [[TWICE, UNIT], [UNIT, TWICE], [TWICE], [TWICE, TWICE, UNIT]])
+def test_matrices_that_are_none_do_not_make_positions_of_the_others(read: Read, rows: list[str]) -> None:
+    targets = read(f"x,y,z,{NINE}\n" + "".join(f"0.3,0.1,0.5,{row}\n" for row in rows))
+    allowed = "allowed: a rotation, 0.01 off at most, det R = 1"
+    assert targets.faults == {k: f"{NONE} {allowed}" for k, row in enumerate(rows, 1) if row == TWICE}
+    assert targets.rotation is not None
+    for rotation, row in zip(targets.rotation, rows, strict=True):
+        assert np.array_equal(
+            rotation, np.full((3, 3), np.nan if row == TWICE else np.eye(3)), equal_nan=True
+        )
+
+
+@pytest.mark.parametrize("first", ["0", "1"])
+@pytest.mark.parametrize("header", [True, False])
+def test_a_transform_that_is_none_stops_no_other(read: Read, header: bool, first: str) -> None:
+    names = ",".join(f"T{i + int(first)}{j + int(first)}" for i in range(4) for j in range(4))
+    sound, wrong_row = "1,0,0,.3,0,1,0,.1,0,0,1,.5,0,0,0,1", "2,0,0,.3,0,1,0,.1,0,0,1,.5,0,0,0,1"
+    targets = read((f"{names}\n" if header else "") + f"{wrong_row}\n{sound}\n{wrong_row}\n")
+    assert list(targets.faults) == [1, 3]
+    assert targets.position[1].tolist() == [0.3, 0.1, 0.5]
+    assert targets.rotation is not None
+    assert targets.rotation[1].tolist() == np.eye(3).tolist()
+
+
+def test_a_transform_column_by_column_is_known_by_its_last_row(read: Read) -> None:
+    targets = read("1 0 0 0 0 1 0 0 0 0 1 0 .3 .1 .5 1\n1 0 0 0 0 1 0 0 0 0 2 0 .3 .1 .5 1\n")
+    assert targets.position[0].tolist() == [0.3, 0.1, 0.5]
+    assert list(targets.faults) == [2]
+
+
+def test_numbered_quaternions_of_which_some_are_none_are_asked_for_their_form(
+    read: Read, wrong: Wrong
+) -> None:
+    text = "x,y,z,q1,q2,q3,q4\n0.3,0.1,0.5,0.5,0,0,0\n0.3,0.1,0.5,1,0,0,0\n"
+    assert wrong(text) == [
+        "targets.csv: found q1, q2, q3, q4, which may be quat_wxyz or quat_xyzw, allowed: one form;"
+        " --rotation quat_wxyz or --rotation quat_xyzw says which"
+    ]
+    targets = read(text, rotation="quat_wxyz")
+    assert list(targets.faults) == [1]
+    assert targets.rotation is not None
+    assert targets.rotation[1].tolist() == np.eye(3).tolist()
+    assert read("x,y,z,q1,q2,q3,q4\n0.3,0.1,0.5,0.5,0,0,0\n", rotation="quat_wxyz").faults == {
+        1: "columns q1, q2, q3, q4: found a quaternion of norm 0.5, allowed: 1 within 0.001"
+    }
 
 
 def test_quaternions_are_normalised_within_a_thousandth_and_else_faults(read: Read) -> None:
@@ -246,9 +338,14 @@ def test_empty_rows_of_a_spreadsheet_at_the_end_are_none(read: Read) -> None:
     assert list(read("x,y,z\n0.3,0.1,0.5\nnan,nan,nan\n").faults) == [2]
 
 
-def test_rows_are_counted_as_ingest_counts_them(read: Read) -> None:
-    targets = read("# taught by hand\nx,y,z\n0.3,0.1,0.5\n# a remark\n\n0.3,x,0.5\n")
-    assert (targets.row.tolist(), list(targets.faults)) == ([1, 2], [2])
+def test_rows_are_counted_as_ingest_counts_them(read: Read, tmp_path: Path) -> None:
+    head = "# taught by hand\nx,y,z\nm,m,m\n0.3,0.1,0.5\n# a remark\n\n"
+    text = f"{head}0.3,here,0.5\n\n0.3,0.1\n% end\n0.3,0.1,0.5\n"
+    targets = read(text)
+    assert (targets.row.tolist(), list(targets.faults)) == ([1, 2, 3, 4], [2, 3])
+    with pytest.raises(LogError) as caught:
+        read_log([tmp_path / "targets.csv"], ReadOptions(source="path"))
+    assert [finding.row for finding in caught.value.findings] == [2, 3]
 
 
 def test_a_wrong_row_among_many_is_found(read: Read) -> None:
@@ -430,6 +527,30 @@ def test_rx_ry_rz_may_be_a_rotation_vector_and_the_option_is_named(read: Read) -
     assert said(vector) == []
 
 
+MAP = 'a map (--map) says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+
+
+@pytest.mark.parametrize("names", ["W,P,R", "alpha,beta,gamma", "r11,r12,r13,r21", "j1,j2,j3,j4,j5,j6"])
+def test_columns_that_may_be_an_orientation_are_not_left_out_in_silence(read: Read, names: str) -> None:
+    cells = ",".join("1" for _ in names.split(","))
+    targets = read(f"nr,note,t,x,y,z,{names}\n1,home,0,0.3,0.1,0.5,{cells}\n")
+    listed = names.replace(",", ", ")
+    told = f"x, y, z are targets without an orientation: {listed} are not used; {MAP}"
+    assert said(targets) == [("columns-not-used", told)]
+    named = read(f"x,y,z,{names}\n0.3,0.1,0.5,{cells}\n", position=("x", "y", "z"))
+    assert (named.rotation, said(named)) == (None, [])
+
+
+def test_a_form_without_an_orientation_is_refused(wrong: Wrong) -> None:
+    assert wrong("x,y,z,W,P,R\n1,2,3,0,0,0\n", rotation="rpy") == [
+        "targets.csv: --rotation: found rpy given for x, y, z and no orientation, allowed: its columns beside"
+        f" them; {MAP}"
+    ]
+    assert wrong("x,y,z,u,v,w\n1,2,3,0,0,0\n", orientation=("u", "v", "w")) == [
+        "orientation: found without a position, allowed: beside x, y, z"
+    ]
+
+
 def test_a_map_names_the_columns(read: Read, tmp_path: Path) -> None:
     (tmp_path / "lab.toml").write_text(
         '[tcp]\nposition = ["a", "b", "c"]\norientation = ["u", "v", "w"]\nform = "zyx"\n'
@@ -459,10 +580,20 @@ def test_more_columns_without_names_need_an_even_time_or_the_form_of_the_orienta
     assert timed.t_ns is not None
     assert (timed.t_ns.tolist(), timed.position[1].tolist()) == ([0, 10**8, 2 * 10**8], [0.3, 0.2, 0.5])
     six = "0.3 0.1 0.5 0.3 -0.2 0.1\n0.4 0.1 0.5 0.3 -0.2 0.1\n"
+    without = (
+        "columns without names, allowed: x, y, z alone or with an orientation; name the columns in a header"
+    )
     assert wrong(six) == [
-        "targets.csv: found 6 columns without names, allowed: x, y, z alone or with rz, ry, rx or"
-        " qx, qy, qz, qw; name the columns in a header, or --rotation FORM"
+        f"targets.csv: found 6 {without}, or say which with --rotation vector|rpy|zyx|xyz|zyz|zxz"
     ]
+    assert wrong("0.3 0.1 0.5 2 0 0 0\n") == [
+        f"targets.csv: found 7 {without}, or say which with --rotation quat_xyzw|quat_wxyz, or say --time 1"
+        " if the first is the time"
+    ]
+    assert wrong("0.3 0.1 0.5 2\n") == [
+        f"targets.csv: found 4 {without}, or say --time 1 if the first is the time"
+    ]
+    assert wrong("0.3 0.1 0.5 0 1\n") == [f"targets.csv: found 5 {without}"]
     assert_turned(read(six, rotation="zyx"), [R, R])
     seven = "".join(
         f"{x} 0.1 0.5 " + " ".join(repr(QUATERNION[a]) for a in "wxyz") + "\n" for x in (0.3, 0.9, 0.4)
@@ -472,6 +603,25 @@ def test_more_columns_without_names_need_an_even_time_or_the_form_of_the_orienta
         " --rotation quat_xyzw or --rotation quat_wxyz says which"
     ]
     assert_turned(read(seven, rotation="quat_wxyz"), [R] * 3)
+    assert wrong(seven.split("\n")[0]) == wrong(seven)
+
+
+def test_of_columns_without_names_the_form_tells_the_time_by_their_number(read: Read, wrong: Wrong) -> None:
+    rows = [f"{t} 0.3 0.1 0.5 0 0 0 1\n" for t in (0.0, 0.1, 0.4)]
+    targets = read("".join(rows), rotation="quat_xyzw")
+    assert targets.t_ns is not None
+    assert targets.t_ns.tolist() == [0, 10**8, 4 * 10**8]
+    assert_turned(targets, [np.eye(3)] * 3)
+    assert wrong("".join(row[:15] + "\n" for row in rows)) == [
+        "targets.csv:1: found a first column that increases from row to row, which may be the time or"
+        " a counter: say --time 1 or --time none"
+    ]
+
+
+def test_wrong_rows_without_names_stop_no_other(read: Read) -> None:
+    targets = read("0.3,0.1,0.5\n0.3,abc,0.5\n0.3,def,0.5\n0.3,,0.5\n")
+    assert targets.position[0].tolist() == [0.3, 0.1, 0.5]
+    assert list(targets.faults) == [2, 3, 4]
 
 
 # Files that are wrong as a whole
@@ -501,8 +651,19 @@ def test_more_columns_without_names_need_an_even_time_or_the_form_of_the_orienta
             "x,y,z,rz,ry\n1,2,3,4,5\n",
             [
                 "targets.csv: found rz, ry as a part of an orientation, allowed: all of rz, ry, rx or of"
-                " qx, qy, qz, qw, or none"
+                f" qx, qy, qz, qw, or none; {MAP}"
             ],
+        ),
+        (
+            "x,y,z,quat_x,quat_y,rotvec_z,A\n1,2,3,4,5,6,7\n",
+            [
+                "targets.csv: found quat_x, quat_y, rotvec_z as a part of an orientation, allowed: all of"
+                f" rz, ry, rx or of qx, qy, qz, qw, or none; {MAP}"
+            ],
+        ),
+        (
+            "x,y,z,rz,ry,rx,rx\n1,2,3,4,5,6,7\n",
+            ["targets.csv:1, column rx: found as columns 6, 7, allowed: once; rename or remove the others"],
         ),
         (
             "x,y,z\n1,2,3\nx,y,z\n1,2,3\n",

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from itertools import pairwise
 
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.orientation import width
 from urmpipe_pipeline.sources.cells import count_up, is_missing, to_float
 from urmpipe_pipeline.sources.columns import Column, find_column
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -40,11 +41,11 @@ def time_columns(
         column = find_column(columns, options.time, "--time")
         return _with_other_half(column, columns, layout), "given as an option"
     if layout.header is None:
-        if options.source == PATH and len(columns) == 3:
-            return (), "three columns are x, y, z"
+        if options.source == PATH and (first := _before_pose(columns, layout, options)) is not None:
+            return first
         found = _without_header(columns, layout, joints) or _texts(columns, layout)
         if not (found or options.joints or len(columns) in (1, joints)):
-            _refuse_unclear(columns, layout, joints)
+            _refuse_unclear(columns, layout, joints, path=options.source == PATH)
         return found or ((), "there is no header")
     return (
         _by_name(columns, layout)
@@ -135,7 +136,25 @@ def _without_header(
     return None
 
 
-def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | None) -> None:
+def _before_pose(
+    columns: Sequence[Column], layout: Layout, options: ReadOptions
+) -> tuple[tuple[Column, ...], str] | None:
+    """Return what stands before x, y, z and the orientation told, if the number of columns says so."""
+    pose = 3 + (width(options.rotation) if options.rotation else 0)
+    if len(columns) == pose:
+        return (), f"the {pose} columns are a pose" if options.rotation else "three columns are x, y, z"
+    first = columns[0]
+    if (
+        options.rotation
+        and len(columns) == pose + 1
+        and not first.text
+        and _increases(layout.cells(0), layout)
+    ):
+        return (first,), f"the {pose} columns behind it are a pose, and it increases"
+    return None
+
+
+def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | None, *, path: bool) -> None:
     """Raise if the first column of a table without a header may be a time, a counter or a joint.
 
     It may if it increases from row to row, and there is one column more than the robot has joints, or it
@@ -147,11 +166,10 @@ def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | Non
         return
     if not one_more and (len(times) < 3 or times[0] != 0.0 or not _keeps_near_a_line(times)):
         return
-    message = (
-        "found a first column that increases from row to row, which may be the time, a counter or a joint:"
-        " say --time 1 or --time none, or name the joint columns with --joints 2,3,..."
-    )
-    raise LogError(Finding(message, str(layout.segment.path), layout.first_line, 1))
+    what = "the time or a counter" if path else "the time, a counter or a joint"
+    message = f"found a first column that increases from row to row, which may be {what}: say --time 1 or"
+    rest = "" if path else ", or name the joint columns with --joints 2,3,..."
+    raise LogError(Finding(f"{message} --time none{rest}", str(layout.segment.path), layout.first_line, 1))
 
 
 def steps_of(cells: Sequence[str], layout: Layout) -> list[float]:

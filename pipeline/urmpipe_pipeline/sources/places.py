@@ -43,7 +43,7 @@ def without_header(
         joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
         check_count(joints, file, robot)
         return _by_place(joints, columns, robot, "given as an option", pose)
-    for column in columns:
+    for column in () if path else columns:  # of a path they are wrong rows
         if column.text:
             shown = layout.cells(column.index)[0]
             message = f"found {shown!r} in a table without a header, allowed: numbers; {OPTION}"
@@ -74,7 +74,7 @@ def _path_by_place(
     form = options.rotation
     if pose is None and form is not None and len(columns) == 3 + width(form):
         pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), "given as an option")
-    behind = _trailing_pose(columns, layout, None) if pose is None else None
+    behind = _trailing_pose(columns, layout, None, some=True) if pose is None else None
     pose = with_form(pose or behind or Pose(tuple(columns[:3]), evidence="there is no header"), form)
     rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
     said = [Inference("path", listed(pose.position), pose.evidence), *about_pose(pose)[1:]]
@@ -83,12 +83,14 @@ def _path_by_place(
     return Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms, inferences=tuple(said))
 
 
-def _trailing_pose(columns: Sequence[Column], layout: Layout, robot: Chain | None) -> Pose | None:
-    """Return the pose that stands behind the joints, or alone in a table, by what its numbers are."""
-    found = trailing_matrix(columns, (layout,))
+def _trailing_pose(
+    columns: Sequence[Column], layout: Layout, robot: Chain | None, *, some: bool = False
+) -> Pose | None:
+    """Return the pose that stands behind the joints, or alone in a table, by what (some of) its rows are."""
+    found = trailing_matrix(columns, (layout,), some=some)
     joints = len(robot.coordinates) if robot else 0
     fits = len(columns) == 7 if robot is None else len(columns) >= joints + 7
-    return found or (trailing_quaternion(columns, (layout,)) if fits else None)
+    return found or (trailing_quaternion(columns, (layout,), some=some) if fits else None)
 
 
 def one_plot_a_file(

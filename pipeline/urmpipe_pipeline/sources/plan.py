@@ -126,7 +126,8 @@ def _roles(
         refuse_twins(
             roles.joints, columns, tables.layouts, "give the numbers of the right ones with --joints"
         )
-    refuse_twins(roles.position, columns, tables.layouts, "rename or remove the others")
+    used = (*roles.position, *roles.rotation)
+    refuse_twins(used, columns, tables.layouts, "rename or remove the others")
     return roles
 
 

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.inverse.solutions import BoolArray
 from urmpipe_models.orientation import FORMS, RotationForm, width
 from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.sources.cells import to_float
@@ -45,13 +46,22 @@ class Pose:
     evidence: str = "their names"
 
 
-def find_pose(numeric: Sequence[Column], layouts: Sequence[Layout], file: str | None = None) -> Pose:
+def find_pose(
+    numeric: Sequence[Column],
+    layouts: Sequence[Layout],
+    file: str | None = None,
+    *,
+    form: RotationForm | None = None,
+    some: bool = False,
+) -> Pose:
     """Return the recorded pose among some columns with names.
 
     Args:
         numeric: Candidates.
         layouts: The tables.
         file: The file, if it is an error that several positions are recorded; else they are left.
+        form: Form of the orientation, if it is told: its columns are not asked then whether they hold it.
+        some: Whether it is enough that some rows hold an orientation: the others are wrong.
 
     Raises:
         LogError: If there are several positions where one is needed.
@@ -61,12 +71,12 @@ def find_pose(numeric: Sequence[Column], layouts: Sequence[Layout], file: str | 
         ordered = vectors[0].ordered()
         return Pose(ordered[:3], ordered[3:], ("vector",))
     for family in families(numeric, vocabulary().tcp_matrix, 0):
-        pose = matrix_pose(family.ordered(), layouts)
+        pose = matrix_pose(family.ordered(), layouts, some=some)
         if pose is not None:
             return pose
     position = _position(numeric, file)
     rest = [column for column in numeric if column not in position]
-    rotation, forms = _rotation(rest, layouts) if position else ((), ())
+    rotation, forms = _rotation(rest, layouts, form, some=some) if position else ((), ())
     return Pose(position, rotation, forms)
 
 
@@ -78,6 +88,8 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
         OptionError: If there are too few or too many for a position or for the form of the orientation.
     """
     if not options.position:
+        if options.orientation:
+            raise OptionError("orientation: found without a position, allowed: beside x, y, z")
         return None
     position = tuple(find_column(columns, text, "position") for text in options.position)
     rotation = tuple(find_column(columns, text, "orientation") for text in options.orientation)
@@ -104,16 +116,18 @@ def with_form(pose: Pose, form: RotationForm | None) -> Pose:
     return replace(pose, forms=(form,))
 
 
-def trailing_matrix(columns: Sequence[Column], layouts: Sequence[Layout]) -> Pose | None:
+def trailing_matrix(
+    columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False
+) -> Pose | None:
     """Return the pose in columns without names of which the last 16 or 12 are a homogeneous transform."""
     for count in (16, 12):
-        pose = matrix_pose(columns[-count:], layouts) if len(columns) >= count else None
+        pose = matrix_pose(columns[-count:], layouts, some=some) if len(columns) >= count else None
         if pose is not None:
             return pose
     return None
 
 
-def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout]) -> Pose | None:
+def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False) -> Pose | None:
     """Return the pose that 16 or 12 columns hold as a homogeneous transform, by what their numbers are.
 
     Row by row, or of 16 also column by column: the entries 0, 0, 0, 1 tell which, and R R^T = I that it
@@ -122,6 +136,7 @@ def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout]) -> Pose | 
     Args:
         columns: The columns, in their order.
         layouts: The tables.
+        some: Whether it is enough that some rows are one: the others are wrong.
     """
     if len(columns) not in (12, 16):
         return None
@@ -130,27 +145,31 @@ def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout]) -> Pose | 
     for order, entries in (("row by row", places), ("column by column", places.T)):
         if len(columns) == 12 and order != "row by row":
             continue
-        if len(columns) == 16 and not (values[:, entries[3]] == (0, 0, 0, 1)).all():
-            continue
         turned = entries[:3, :3].ravel().tolist()
-        if _orthogonal(values[:, turned].reshape(-1, 3, 3)):
+        holds = _orthogonal(values[:, turned].reshape(-1, 3, 3))
+        if len(columns) == 16:
+            holds &= (values[:, entries[3]] == (0, 0, 0, 1)).all(axis=1)
+        if _enough(holds, some=some):
             position = tuple(columns[k] for k in entries[:3, 3].tolist())
             return Pose(position, tuple(columns[k] for k in turned), ("matrix",), f"a transform, {order}")
     return None
 
 
-def trailing_quaternion(columns: Sequence[Column], layouts: Sequence[Layout]) -> Pose | None:
+def trailing_quaternion(
+    columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False
+) -> Pose | None:
     """Return the pose in the last seven columns without names, if four of length 1 follow three others."""
-    if len(columns) < 7 or not _is_unit(columns[-4:], layouts):
+    if len(columns) < 7 or not _is_unit(columns[-4:], layouts, some=some):
         return None
     evidence = "the last four of seven numbers have length 1"
     return Pose(tuple(columns[-7:-4]), tuple(columns[-4:]), ("quat_xyzw", "quat_wxyz"), evidence)
 
 
-def _is_unit(columns: Sequence[Column], layouts: Sequence[Layout]) -> bool:
-    """Return whether the numbers of each of three rows or more have length 1, as those of quaternions."""
+def _is_unit(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool) -> bool:
+    """Return whether the numbers of three rows or more, or of some, have length 1, as quaternions have."""
     values = _sampled(columns, layouts)
-    return len(values) > 2 and bool((np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH).all())
+    holds = np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH
+    return (some or len(values) > 2) and _enough(holds, some=some)
 
 
 def _sampled(columns: Sequence[Column], layouts: Sequence[Layout]) -> FloatArray:
@@ -165,12 +184,16 @@ def _sampled(columns: Sequence[Column], layouts: Sequence[Layout]) -> FloatArray
     return values[np.isfinite(values).all(axis=1)] if len(values) else np.empty((0, len(columns)))
 
 
-def _orthogonal(r: FloatArray) -> bool:
-    """Return whether these are rotation matrices: R R^T = I and det R = 1."""
-    if not len(r):
-        return False
+def _orthogonal(r: FloatArray) -> BoolArray:
+    """Return which of these are rotation matrices: R R^T = I and det R = 1; shape (n,)."""
     gram = r @ r.transpose(0, 2, 1)
-    return bool((np.abs(gram - np.eye(3)) < ORTHOGONAL).all() and (np.linalg.det(r) > 0).all())
+    near = (np.abs(gram - np.eye(3)) < ORTHOGONAL).all(axis=(1, 2))
+    return np.asarray(near & (np.linalg.det(r) > 0))
+
+
+def _enough(holds: BoolArray, *, some: bool) -> bool:
+    """Return whether a law holds in all rows, of which there is one, or in some: the others are wrong."""
+    return bool(holds.any()) if some else len(holds) > 0 and bool(holds.all())
 
 
 def _position(numeric: Sequence[Column], file: str | None) -> tuple[Column, ...]:
@@ -186,7 +209,7 @@ def _position(numeric: Sequence[Column], file: str | None) -> tuple[Column, ...]
 
 
 def _rotation(
-    rest: Sequence[Column], layouts: Sequence[Layout]
+    rest: Sequence[Column], layouts: Sequence[Layout], form: RotationForm | None, *, some: bool
 ) -> tuple[tuple[Column, ...], tuple[RotationForm, ...]]:
     """Return the columns of the only orientation, and the forms that their names allow."""
     for words in vocabulary().tcp_rotations:
@@ -195,11 +218,16 @@ def _rotation(
         if len(found) != 1:
             continue
         columns = found[0].ordered()
-        if not _LIKE_JOINT.fullmatch(columns[0].key) or _is_unit(columns, layouts):
+        told = not _LIKE_JOINT.fullmatch(columns[0].key) or form in words.forms
+        if told or _is_unit(columns, layouts, some=some):
             return columns, words.forms
-    nine = [f.ordered() for f in families(rest, vocabulary().tcp_matrix, 0) if len(f.columns) == 9]
-    if len(nine) == 1 and _orthogonal(_sampled(nine[0], layouts).reshape(-1, 3, 3)):
-        return nine[0], ("matrix",)
+    nine = [family for family in families(rest, vocabulary().tcp_matrix, 0) if len(family.columns) == 9]
+    if len(nine) == 1:
+        columns = nine[0].ordered()
+        holds = _orthogonal(_sampled(columns, layouts).reshape(-1, 3, 3))
+        entries = some and "i" in vocabulary().tcp_matrix[nine[0].rank].groupindex  # r11 is no joint
+        if entries or form == "matrix" or _enough(holds, some=some):
+            return columns, ("matrix",)
     return (), ()
 
 

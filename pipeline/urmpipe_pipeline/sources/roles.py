@@ -84,7 +84,9 @@ def assign(
         pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
     else:
         own = () if path else _called_as_joints(numeric, robot)
-        pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in own], layouts)
+        pose = chosen_pose(columns, options) or find_pose(
+            [c for c in numeric if c not in own], layouts, form=options.rotation if path else None, some=path
+        )
         free = [column for column in numeric if column not in (*pose.position, *pose.rotation)]
         half = bool(pose.position and not pose.rotation)
         found = _Joints(()) if path else _find_joints(free, file, robot, half_pose=half)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
@@ -11,6 +10,7 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.orientation import RotationForm, angles, matrices, quaternions
 from urmpipe_pipeline.joint_log import FloatArray, LogWarning
 from urmpipe_pipeline.sources.columns import Column, listed
+from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.pose import ORTHOGONAL
 from urmpipe_pipeline.sources.roles import Roles
 from urmpipe_pipeline.sources.rotation import PURE
@@ -22,13 +22,18 @@ UNIT_NORM = 1e-3
 MOST_RAD = 2 * np.pi * 1.01
 """Angles of which none is told in a unit and most are beyond a turn in [rad] are hardly in rad."""
 
+MAP = 'a map (--map) says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+"""What helps where the names of columns do not tell an orientation."""
+
 _OURS = frozenset(("rx", "ry", "rz"))
 _KUKA = frozenset("abc")
-_HALF = re.compile(r"(^|_)(r[xyz]|q[xyzw]|roll|pitch|yaw)(_(rad|deg))?\Z")
+
+FEWEST = 3
+"""An orientation has at least so many columns."""
 
 
 def target_form(
-    roles: Roles, columns: Sequence[Column], file: str
+    roles: Roles, columns: Sequence[Column], file: str, options: ReadOptions
 ) -> tuple[RotationForm | None, list[LogWarning]]:
     """Return the form of the targets' orientation, None if they are positions, and what was assumed.
 
@@ -37,22 +42,26 @@ def target_form(
 
     Args:
         roles: The columns of the poses.
-        columns: All columns of the file.
+        columns: All columns of the file without its clock.
         file: The file, for errors.
+        options: What the user says: the columns of the position, the form.
 
     Raises:
-        LogError: If only a part of an orientation is there, or its form cannot be told.
+        LogError: If only a part of an orientation is there, its form cannot be told, or it is told of none.
     """
     found = roles.rotation
     if not found:
-        _refuse_half([column for column in columns if column not in roles.columns], file)
-        return None, []
+        unused = [column for column in columns if column not in roles.columns]
+        if options.rotation:
+            said = f"found {options.rotation} given for {listed(roles.position)} and no orientation"
+            raise LogError(Finding(f"--rotation: {said}, allowed: its columns beside them; {MAP}", file))
+        return None, [] if options.position else _without_orientation(roles, unused, file)
     if len(roles.forms) == 1:
         return roles.forms[0], []
     if not all(column.words & _OURS for column in found):
-        options = " or ".join(f"--rotation {form}" for form in roles.forms)
+        hint = " or ".join(f"--rotation {form}" for form in roles.forms)
         said = f"found {listed(found)}, which may be {' or '.join(roles.forms)}, allowed: one form"
-        raise LogError(Finding(f"{said}; {options} says which", file))
+        raise LogError(Finding(f"{said}; {hint} says which", file))
     if found[0].index > found[1].index > found[2].index:
         return "rpy", []
     said = "are taken as angles about the moving axes Z, Y, X (rz, ry, rx)"
@@ -118,15 +127,35 @@ def _no_rotations(values: FloatArray, form: RotationForm) -> Iterator[tuple[int,
     elif form == "matrix":
         r = values.reshape(-1, 3, 3)
         off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
-        det = np.linalg.det(r)
+        with np.errstate(invalid="ignore"):  # rows with NaN, which are told of already
+            det = np.linalg.det(r)
         for row in np.flatnonzero((off > ORTHOGONAL) | (det < 0)).tolist():
             found = f"R R^T off I by {off[row]:.3g} and det R = {det[row]:.3g}"
             yield row, f"found {found}, allowed: a rotation, {ORTHOGONAL:g} off at most, det R = 1"
 
 
-def _refuse_half(unused: Sequence[Column], file: str) -> None:
-    """Raise if some columns look like a part of an orientation: it would be left out in silence."""
-    half = [column for column in unused if _HALF.search(column.key)]
+def _without_orientation(roles: Roles, unused: Sequence[Column], file: str) -> list[LogWarning]:
+    """Return a warning if enough columns are left for an orientation: else it would be left out in silence.
+
+    Raises:
+        LogError: If some are called as a part of an orientation is.
+    """
+    half = [column for column in unused if _is_part(column)]
     if half:
-        allowed = "all of rz, ry, rx or of qx, qy, qz, qw, or none"
+        allowed = f"all of rz, ry, rx or of qx, qy, qz, qw, or none; {MAP}"
         raise LogError(Finding(f"found {listed(half)} as a part of an orientation, allowed: {allowed}", file))
+    numbers = [column for column in unused if not column.text and not column.counts_rows]
+    if len(numbers) < FEWEST:
+        return []
+    said = (
+        f"{listed(roles.position)} are targets without an orientation: {listed(numbers, most=8)} are not used"
+    )
+    return [LogWarning("columns-not-used", f"{said}; {MAP}")]
+
+
+def _is_part(column: Column) -> bool:
+    """Return whether a column is called as one of an orientation; KUKA's A, B, C may be anything."""
+    patterns = (
+        one for words in vocabulary().tcp_rotations if words.forms != ("zyx",) for one in words.patterns
+    )
+    return any("axis" in one.groupindex and one.search(column.key) for one in patterns)
