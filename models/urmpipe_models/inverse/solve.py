@@ -68,7 +68,7 @@ def solve(
     position_only = targets.rotation is None
     targets, reasons = checked(targets)
     form = None if position_only or method == "iterative" else closed_form(chain)
-    faults = list(_faults(chain, len(targets), start, tolerance, restarts, method))
+    faults = list(_faults(chain, len(targets), start, tolerance, restarts, seed, method))
     if method == "closed" and form is None:
         faults.append(_no_closed_form(chain, position_only))
     if faults:
@@ -168,6 +168,7 @@ def _faults(
     start: FloatArray | None,
     tolerance: float | None,
     restarts: int,
+    seed: int,
     method: Method,
 ) -> Iterator[str]:
     """Yield what is wrong with the options."""
@@ -185,6 +186,8 @@ def _faults(
         yield f"tolerance: found {tolerance:g} m, allowed: more than 0, finite"
     if restarts < 0:
         yield f"restarts: found {restarts}, allowed: 0 or more"
+    if seed < 0:
+        yield f"seed: found {seed}, allowed: 0 or more"
     if method not in METHODS:
         yield f"method: found {method!r}, allowed: {', '.join(METHODS)}"
 

@@ -151,6 +151,21 @@ def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) ->
     assert len(found) == 7 and found.shortfall.shape == found.labels.shape == found.reasons.shape
 
 
+@pytest.mark.parametrize("far", [1.1e9, 1e160, -1e308])
+@pytest.mark.parametrize("name", ["ur5e", "arm6", "urm6"])
+def test_a_position_beyond_all_digits_stops_no_other(name: str, far: float) -> None:
+    chain = load_robot(name)
+    q, targets = poses(chain, 1)
+    assert targets.rotation is not None
+    position = np.vstack((targets.position, [0.1, far, 0.3]))
+    both = Targets(position, np.repeat(targets.rotation, 2, axis=0))
+    found = solve(chain, both, start=q[0])
+    assert found.reached[:, 0].tolist() == [True, False]
+    assert found.reason(1) == (
+        f"the position is 0.1, {far:g}, 0.3 m, allowed: up to 1e+09 m along each axis"
+    )
+
+
 def test_only_bad_targets_are_no_error() -> None:
     for name in ("ur5e", "urm6"):
         found = solve(load_robot(name), Targets(np.full((2, 3), np.nan), np.stack([np.eye(3)] * 2)))
@@ -245,12 +260,13 @@ def test_everything_wrong_with_the_options_is_told_at_once() -> None:
     _, targets = poses(chain, 2)
     odd: Method = "exact"  # type: ignore[assignment]
     with pytest.raises(OptionError) as caught:
-        solve(chain, targets, start=np.zeros(5), tolerance=-1.0, restarts=-2, method=odd)
+        solve(chain, targets, start=np.zeros(5), tolerance=-1.0, restarts=-2, seed=-1, method=odd)
     assert [str(one) for one in caught.value.findings] == [
         f"start: found values of shape (5,), allowed: (6,), one each of {', '.join(chain.coordinates)},"
         " or (2, 6), as many for each target",
         "tolerance: found -1 m, allowed: more than 0, finite",
         "restarts: found -2, allowed: 0 or more",
+        "seed: found -1, allowed: 0 or more",
         "method: found 'exact', allowed: auto, closed, iterative",
     ]
     with pytest.raises(OptionError) as caught:
