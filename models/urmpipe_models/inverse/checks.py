@@ -16,7 +16,7 @@ ROTATION_TOLERANCE = 1e-6
 """A matrix of a file with 7 digits is a rotation within this, and the nearest one is taken [-]."""
 
 FARTHEST = 1e9
-"""A coordinate beyond this, in [m], is no place of a tool: its square would leave no digit of an arm's length."""
+"""A coordinate beyond this, in [m], is no place of a tool: its square leaves no digit of an arm's length."""
 
 
 def checked(targets: Targets) -> tuple[Targets, list[str]]:

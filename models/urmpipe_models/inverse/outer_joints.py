@@ -202,6 +202,7 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     q5 = np.arctan2(d * np.cos(q1) + e * np.sin(q1) + f, a * np.cos(q1) + b * np.sin(q1) + c)
     for _ in range(2):
         q1, q5 = _newton_step(left, right[:, 1:], q1, q5)
+    q1, q5 = _in_order(arm, motion, q1, q5)
     q1, q5 = wrapped(q1)[:, None], wrapped(q5)[:, None]
     found = np.isfinite(q1).sum(axis=0)
     reasons = texts_where(
@@ -211,10 +212,8 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
         np.arange(1.0, 5.0)[:, None, None],
     )
     slope = left[0, 1] * np.cos(q1) - left[0, 0] * np.sin(q1)
-    meet = np.zeros(q1.shape, dtype=bool)
-    near = np.diff(q1, axis=0) < NEAR_ROOTS
-    meet[1:] |= near
-    meet[:-1] |= near
+    others = [np.roll(q1, shift, axis=0) for shift in (1, 2, 3)]
+    meet = np.any([np.abs(wrapped(q1 - other)) < NEAR_ROOTS for other in others], axis=0)
     singular = (Singular("postures meet", meet),)
     return OuterJoints(
         q1,
@@ -248,6 +247,19 @@ def _newton_step(
     step1, step5 = (f * g5 - f5 * g) / det, (f1 * g - f * g1) / det
     good = np.abs(step1) + np.abs(step5) < NEAR_ROOTS
     return np.where(good, q1 - step1, q1), np.where(good, q5 - step5, q5)
+
+
+def _in_order(
+    arm: ParallelGeometry, motion: Transform, q1: FloatArray, q5: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return pairs of q1 and q5, shape (4, n), by how far axis 2 is turned from the wrist, both about axis 1.
+
+    Counted so, and not by q1 itself, the order is the same whatever the zero of joint 1 is, and stays while
+    the arm turns about axis 1.
+    """
+    cosine, sine, _ = _shoulder(arm.k1, subtract(motion.point(arm.p6), arm.p1), 0.0)
+    order = np.argsort(wrapped(q1 - np.arctan2(sine, cosine)), axis=0)  # NaN last
+    return np.take_along_axis(q1, order, axis=0), np.take_along_axis(q5, order, axis=0)
 
 
 def _turned(k: Vector, v: Vector) -> tuple[Element, Element, Element]:

@@ -19,7 +19,8 @@ from urmpipe_models.inverse.parallel_axes import parallel_axes
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.screws import screws
-from urmpipe_models.transform import Transform, from_offset
+from urmpipe_models.singularity import singularity_over_log
+from urmpipe_models.transform import Transform, from_offset, rotation_about
 
 FloatArray = NDArray[np.float64]
 
@@ -365,6 +366,45 @@ def test_branches_are_where_they_say() -> None:
         line = elbow * along - fore * (-0.425 * np.cos(q2))  # above the line from axis 2 to axis 4, outwards
         assert (np.sign(line) == (1 if ("up" in branch) == ("right" in branch) else -1)).all()
         assert (np.sign(q5) == (-1 if branch.endswith(", flipped") else 1)).all()
+
+
+def with_other_zeros(chain: Chain, shift: FloatArray) -> Chain:
+    """Return the same arm with joints that count from elsewhere: q is the chain's less the shift."""
+    joints = tuple(
+        replace(joint, origin=joint.origin @ rotation_about(joint.axis, by))
+        for joint, by in zip(chain.joints, shift.tolist(), strict=True)
+    )
+    return replace(chain, joints=joints, visuals=())
+
+
+@pytest.mark.parametrize("wrist", ["ur", *WRISTS])
+def test_names_of_branches_do_not_depend_on_where_joints_count_from(wrist: str) -> None:
+    rng = np.random.default_rng(21)
+    for number in range(6):
+        chain = load_robot("ur5e") if wrist == "ur" else random_arm(rng, wrist, ((1, 1), (-1, 1))[number % 2])
+        shift = rng.uniform(-3.0, 3.0, 6)
+        _, targets = poses(chain, 50, number)
+        one = form_of(chain).solve(targets)
+        other = form_of(with_other_zeros(chain, shift)).solve(targets)
+        np.testing.assert_array_equal(other.reached, one.reached)
+        away = np.remainder(other.q + shift - one.q + math.pi, 2.0 * math.pi) - math.pi
+        np.testing.assert_allclose(away[one.reached], 0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("wrist", ["ur", "meet", "parallel"])
+def test_a_branch_keeps_its_name_along_a_path_between_singular_poses(wrist: str) -> None:
+    rng, looked_at = np.random.default_rng(22), 0
+    for _ in range(6):
+        chain = load_robot("ur5e") if wrist == "ur" else random_arm(rng, wrist)
+        q = rng.uniform(-math.pi, math.pi, 6) + np.linspace(0.0, 1.0, 400)[:, None] * rng.uniform(-1, 1, 6)
+        solutions = form_of(chain).solve(targets_of(chain, q))
+        away = np.abs(np.remainder(solutions.q - q[:, None] + math.pi, 2.0 * math.pi) - math.pi).max(axis=2)
+        column = np.where(solutions.reached, away, np.inf).argmin(axis=1)
+        smallest = singularity_over_log(chain, q).smallest
+        clear = np.minimum(smallest[1:], smallest[:-1]) > 0.01
+        assert not (np.diff(column) != 0)[clear].any()
+        looked_at += int(clear.sum())
+    assert looked_at > 500
 
 
 @settings(max_examples=30, deadline=None)

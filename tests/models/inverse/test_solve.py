@@ -161,9 +161,7 @@ def test_a_position_beyond_all_digits_stops_no_other(name: str, far: float) -> N
     both = Targets(position, np.repeat(targets.rotation, 2, axis=0))
     found = solve(chain, both, start=q[0])
     assert found.reached[:, 0].tolist() == [True, False]
-    assert found.reason(1) == (
-        f"the position is 0.1, {far:g}, 0.3 m, allowed: up to 1e+09 m along each axis"
-    )
+    assert found.reason(1) == (f"the position is 0.1, {far:g}, 0.3 m, allowed: up to 1e+09 m along each axis")
 
 
 def test_only_bad_targets_are_no_error() -> None:
