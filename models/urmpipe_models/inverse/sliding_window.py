@@ -27,7 +27,7 @@ LONGEST = 384
 """Samples of a window: NumPy outweighs Python, and the samples at the back are still worth their sweeps."""
 
 MET = 9e-10
-"""A target is met within this, in [m]; rotations as arcs of the characteristic length: a nanometre less what
+"""A target is met within this, in [m]; rotations times `turn_length`: a nanometre less what
 a converged sample may still move."""
 
 STILL = 1e-10

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 from functools import cached_property
 from typing import TypeAlias
@@ -15,6 +14,7 @@ from urmpipe_models.elementwise import Element, Vector, add, cross, dot, plus, s
 from urmpipe_models.inverse.small_systems import dot_product
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.kinematics import jacobian_over_log, pose_and_jacobian
+from urmpipe_models.singularity import characteristic_length
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
@@ -27,15 +27,13 @@ HALF_TURN_SINE = 1e-6
 """Below this sine an angle near pi takes its axis from the symmetric part of the rotation matrix."""
 
 
-def characteristic_length(chain: Chain) -> float:
+def turn_length(chain: Chain) -> float:
     """Return the length l in [m] that a radian of orientation counts as: a quarter of the arm's.
 
-    The arm's length is that of its frames' offsets, one after the other, from the first joint to the tool
-    centre point; l is 1 m of an arm that has none.
+    A turn of the tool by a radian is then weighed as a way that the arm makes with ease; the arm's length is
+    its `characteristic_length`, which does not depend on where a description puts its frames.
     """
-    offsets = [joint.origin.translation for joint in chain.joints[1:]]
-    offsets += [chain.tip.translation, chain.tool.translation]
-    return sum(math.hypot(*offset) for offset in offsets) / 4.0 or 1.0
+    return characteristic_length(chain) / 4.0
 
 
 def redundancy(chain: Chain, targets: Targets) -> int:
@@ -106,8 +104,8 @@ class Task:
 
     @cached_property
     def length(self) -> float:
-        """The characteristic length in [m]."""
-        return characteristic_length(self.chain)
+        """The length l in [m] that a radian counts as."""
+        return turn_length(self.chain)
 
     def kept(self, rows: IntArray) -> Task:
         """Return some of the rows."""
