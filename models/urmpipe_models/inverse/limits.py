@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.inverse.figures import figures
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Solutions, TextArray
 
 LIMIT_ROUNDING = 1e-11
@@ -86,5 +87,5 @@ def _fault(joint: Joint, value: float, turns: bool) -> str:
     if turns:
         value += TURN * round((0.5 * (joint.lower + joint.upper) - value) / TURN)
     unit = "m" if joint.kind == "prismatic" else "rad"
-    allowed = f"{joint.lower:.4g} to {joint.upper:.4g} {unit}"
-    return f"joint {joint.name} at {value:.4g} {unit}, allowed: {allowed}"
+    found, lower, upper = figures(value, joint.lower, joint.upper)
+    return f"joint {joint.name} at {found} {unit}, allowed: {lower} to {upper} {unit}"

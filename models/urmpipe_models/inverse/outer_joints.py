@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.elementwise import Element, Vector, cross, dot, subtract
+from urmpipe_models.inverse.figures import figures
 from urmpipe_models.inverse.parallel_geometry import PARALLEL, ParallelGeometry
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Singular, TextArray
 from urmpipe_models.inverse.trigonometric import linear_roots, quadric_roots, wrapped
@@ -94,14 +95,15 @@ def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> Oute
     sine = float(np.hypot(arm.k1[0], arm.k1[1]))
     reasons = texts_where(
         np.broadcast_to(np.isnan(q1), q5.shape),
-        "the wrist is {:.4g} m from axis 1, allowed: at least {:.4g} m",
+        "the wrist is {} m from axis 1, allowed: at least {} m",
         r / sine,
         np.abs(c) / sine,
     )
     reasons += texts_where(
         np.isnan(q5) & ~np.isnan(q1),
-        "axis 6 is at {:.4g} rad to axis 4, allowed: " + "{:.4g} to {:.4g} rad".format(*allowed),
+        "axis 6 is at {} rad to axis 4, allowed: {} to {} rad",
         theta,
+        *allowed,
     )
     singular = (
         Singular("wrist beside axis 1", _everywhere(meet & ~free, q5)),
@@ -158,13 +160,13 @@ def _parallel(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     q5 = np.concatenate((rising, falling), axis=1)
     reasons = texts_where(
         np.broadcast_to(np.isnan(q1), q5.shape),
-        "axis 6 cannot be turned into its direction: {:.4g} of its unit along axis 2, allowed: up to {:.4g}",
+        "axis 6 cannot be turned into its direction: {} of its unit along axis 2, allowed: up to {}",
         np.abs(c),
         r,
     )
     reasons += texts_where(
         np.isnan(q5) & ~np.isnan(q1),
-        "axis 6 is {:.4g} m along axis 2 from where axis 5 holds it, allowed: up to {:.4g} m",
+        "axis 6 is {} m along axis 2 from where axis 5 holds it, allowed: up to {} m",
         np.abs(height),
         np.full_like(height, reach),
     )
@@ -207,7 +209,7 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     found = np.isfinite(q1).sum(axis=0)
     reasons = texts_where(
         np.isnan(q1),
-        "joints 1 and 5 put axis 6 into its place in {:.0f} ways, allowed for this branch: at least {:.0f}",
+        "joints 1 and 5 put axis 6 into its place in {} ways, allowed for this branch: at least {}",
         found,
         np.arange(1.0, 5.0)[:, None, None],
     )
@@ -298,9 +300,9 @@ def _everywhere(where: BoolArray, like: FloatArray) -> BoolArray:
     return np.broadcast_to(where, like.shape)
 
 
-def texts_where(where: BoolArray, text: str, *figures: FloatArray) -> TextArray:
-    """Return a text with figures where it holds, empty elsewhere."""
+def texts_where(where: BoolArray, text: str, found: FloatArray, *allowed: FloatArray | float) -> TextArray:
+    """Return a text with what was found and is allowed (see `figures`) where it holds, empty elsewhere."""
     texts = np.full(where.shape, "", dtype=np.object_)
-    spread = [np.broadcast_to(one, where.shape)[where].tolist() for one in figures]
-    texts[where] = [text.format(*each) for each in zip(*spread, strict=True)]
+    spread = [np.broadcast_to(one, where.shape)[where].tolist() for one in (found, *allowed)]
+    texts[where] = [text.format(*figures(*each)) for each in zip(*spread, strict=True)]
     return texts

@@ -57,8 +57,10 @@ def two_links(
     q2 = np.where(free, near * arm.signs[0], to_place - first - bend)
     reasons = texts_where(
         ~reached & np.isfinite(r),
-        f"axis 4 is {{:.4g}} m from axis 2, allowed: {short:.4g} to {long:.4g} m",
+        "axis 4 is {} m from axis 2, allowed: {} to {} m",
         r,
+        short,
+        long,
     )
     return TwoLinks(
         q2 + np.zeros_like(psi),

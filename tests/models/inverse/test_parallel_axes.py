@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -10,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.optimize import brentq
+from scipy.spatial.transform import Rotation
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
@@ -347,6 +349,54 @@ def test_reasons_say_what_was_found_and_what_is_allowed() -> None:
     assert solutions.reason(0) == "the wrist is 0.05 m from axis 1, allowed: at least 0.1333 m"
     reason = solutions.reason(1)
     assert reason is not None and reason.endswith(" m from axis 2, allowed: 0.0328 to 0.8172 m")
+
+
+def test_a_target_barely_out_of_reach_is_told_with_the_digits_that_say_so() -> None:
+    chain = load_robot("ur5e")
+    targets = targets_of(chain, np.array([[0.3, -math.pi / 2, 0.0, -math.pi / 2, math.pi / 2, 0.2]]))
+    above = Targets(targets.position + np.array([0.0, 0.0, 1e-7]), targets.rotation)
+    reason = str(form_of(chain).solve(above).reason(0)).split("; ")[0]
+    # from axis 2 to axis 4 the stretched arm is 0.425 m + 0.3922 m long
+    assert reason == "axis 4 is 0.8172001 m from axis 2, allowed: 0.0328 to 0.8172 m"
+
+
+def turned_range(chain: Chain) -> tuple[float, float]:
+    """Return the least and the largest angle between axes 4 and 6 in [rad], over a turn of joint 5."""
+    of_chain = screws(chain)
+    assert of_chain is not None
+    k4, k5, k6 = of_chain.direction[3:]
+    axis6 = Rotation.from_rotvec(np.linspace(-math.pi, math.pi, 20_001)[:, None] * k5).apply(k6)
+    angles = np.arccos(axis6 @ k4 * np.sign(k4 @ of_chain.direction[1]))
+    return float(angles.min()), float(angles.max())
+
+
+def test_the_limits_that_reasons_tell_are_those_of_the_arm() -> None:
+    """What joints 2, 3 and 5 can do at all, over a turn of each, bounds what a reason says is allowed."""
+    rng = np.random.default_rng(31)
+    told: set[str] = set()
+    for number in range(10):
+        chain = random_arm(rng, "meet", ((1, 1), (-1, 1), (1, -1), (-1, -1))[number % 4])
+        of_chain = screws(chain)
+        assert of_chain is not None
+        z, p = of_chain.direction[1], of_chain.point
+        upper, fore = (float(np.linalg.norm(np.cross(z, p[k + 1] - p[k]))) for k in (1, 2))
+        bounds = {
+            "from axis 2": (abs(upper - fore), upper + fore),
+            "to axis 4": turned_range(chain),
+        }
+        _, targets = poses(chain, 100, number)
+        texts = set(form_of(chain).solve(targets).reasons.ravel().tolist())
+        for text in texts:
+            for what, (least, most) in bounds.items():
+                if what in text:
+                    figures = [
+                        float(one) for one in re.findall(r"[0-9.]+(?:e-[0-9]+)?(?= (?:m|rad|to))", text)
+                    ]
+                    found, *limits = figures
+                    np.testing.assert_allclose(limits, (least, most), rtol=6e-4, atol=2e-4)  # four digits
+                    assert not limits[0] <= found <= limits[1]
+                    told.add(what)
+    assert told == {"from axis 2", "to axis 4"}
 
 
 def test_branches_are_where_they_say() -> None:
