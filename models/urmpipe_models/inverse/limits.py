@@ -56,6 +56,14 @@ def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = 
     )
 
 
+def nearest_to_limits(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return joint values in [rad] or [m], shape (n, joints), each in the turn nearest to its limits."""
+    lower, upper = _limits(chain)
+    limited = _turns(chain) & np.isfinite(lower) & np.isfinite(upper)
+    middle = np.where(limited, 0.5 * (lower + upper), 0.0)
+    return np.where(limited, q + TURN * np.round((middle - q) / TURN), q)
+
+
 def _limits(chain: Chain) -> tuple[FloatArray, FloatArray]:
     """Return the lower and upper limits, each of shape (joints,)."""
     return np.array([one.lower for one in chain.moving]), np.array([one.upper for one in chain.moving])

@@ -13,7 +13,8 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.checks import checked
 from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
-from urmpipe_models.inverse.limits import periods, within_limits
+from urmpipe_models.inverse.free_joints import within_limits_by_choice
+from urmpipe_models.inverse.limits import periods
 from urmpipe_models.inverse.solutions import (
     NEAREST_POINT,
     BoolArray,
@@ -54,10 +55,12 @@ def solve(
         start: Joint values in [rad] or [m], shape (joints,) or (n, joints), that solutions are to be near to;
             of the chain by default. They may lie outside the limits of the joints; solutions do not. Where a
             singular pose leaves a joint free it is taken from here if `start` is given or one solution asked.
-        every: Return all solutions, one column a branch; otherwise the one nearest to `start`, whose branch
-            stands in `labels`.
+        every: Return all solutions, one column a branch, each joint in the turn nearest to `start` that its
+            limits allow: what differs from it by whole turns is not listed. Otherwise the one nearest to
+            `start`, whose branch stands in `labels`.
         tolerance: In [m] along each axis: a target out of reach takes the nearest point that the tool can get
-            to if it is no farther away than this; `shortfall` says how far it is.
+            to if it is no farther away than this, and turned by no more than tolerance / l with l of
+            `turn_length`; `shortfall` says how far it is.
         restarts: Random starts of the iterative solver for what it does not reach from `start`.
         seed: Of the random starts: the same seed, the same solutions.
         method: "closed" or "iterative" to allow only one of them.
@@ -98,7 +101,7 @@ class _Search:
         self, form: ClosedForm, targets: Targets, start: FloatArray, near: FloatArray | None
     ) -> Solutions:
         """Return the branches within the limits, or the nearest of them; what is out of reach approached."""
-        found = within_limits(self.chain, form.solve(targets, near), start)
+        found = within_limits_by_choice(self.chain, targets, form.solve(targets, near), start)
         if not self.every:
             found = found.picked(found.nearest_column(start, periods(self.chain)), NEAREST)
         out = np.asarray(~found.reached.any(axis=1))

@@ -98,6 +98,41 @@ def test_solutions_are_in_the_turn_nearest_to_the_start_that_the_limits_allow() 
     assert beyond.reached.all() and (beyond.q[:, 0] > -1e-9).all()  # the last turn that +-2 pi allows
 
 
+@pytest.mark.parametrize(
+    ("name", "q", "limit"),
+    [
+        ("arm6", [0.4, 0.6, 0.5, 1.2, 0.0, 1.8], 2.0),  # q4 = 0 would need q6 = 3
+        ("arm6", [0.4, 0.6, 0.5, -1.9, 0.0, -1.0], 2.0),
+        ("ur5e", [0.3, -1.0, 1.2, -0.5, 0.0, 1.9], 2.0),
+        ("ur5e", [0.3, -1.0, 1.2, 1.9, 0.0, 0.1], 1.95),
+    ],
+)
+def test_where_limits_refuse_the_choice_of_a_free_joint_they_choose(
+    name: str, q: list[float], limit: float
+) -> None:
+    chain = narrow(load_robot(name), -limit, limit)
+    targets = targets_of(chain, np.array([q]))
+    for start in (None, np.zeros(6), np.array(q)):
+        found = solve(chain, targets, start=start, every=True)
+        assert found.reached.any()
+        assert_met(chain, targets, found)
+        assert ((found.reasons != "") == ~found.reached).all()
+        aligned = [one for one in found.singular if one.family == "wrist aligned"]
+        assert aligned and (aligned[0].where & found.reached).any()
+        distinct = np.round(found.q[0][found.reached[0]], 4)
+        assert len(np.unique(distinct, axis=0)) == len(distinct)
+    here = solve(chain, targets, start=np.array(q))
+    np.testing.assert_allclose(here.q[0, 0], q, atol=1e-9)
+
+
+def test_limits_that_chose_a_free_joint_are_told() -> None:
+    chain = narrow(load_robot("arm6"), -2.0, 2.0)
+    (aligned,) = solve(
+        chain, targets_of(chain, np.array([[0.4, 0.6, 0.5, 1.2, 0.0, 1.8]])), every=True
+    ).singular
+    assert aligned.chosen.endswith(", or what the limits of the joints allow")
+
+
 def test_limits_leave_out_branches_and_say_which_joint() -> None:
     chain = narrow(load_robot("ur5e"), -1.5, 1.5)
     _, targets = poses(chain, 200)
