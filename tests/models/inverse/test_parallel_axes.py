@@ -215,9 +215,9 @@ def test_poses_at_and_near_singular_ones_are_met(family: str, distance: float) -
         solutions = form_of(chain).solve(targets, near)
         assert_every_solution_meets(chain, targets, solutions, EXACT)
         assert solutions.reached.any(axis=1).all()
-    named = {one.family for one in solutions.singular}
+    named = {one.family: one.where.any(axis=1) for one in solutions.singular}
     if distance <= 1e-12:
-        assert family.removesuffix(" backwards") in named
+        assert named[family.removesuffix(" backwards")].all()
     if distance >= 1e-4:
         assert not named
 
@@ -416,6 +416,24 @@ def test_branches_are_where_they_say() -> None:
         line = elbow * along - fore * (-0.425 * np.cos(q2))  # above the line from axis 2 to axis 4, outwards
         assert (np.sign(line) == (1 if ("up" in branch) == ("right" in branch) else -1)).all()
         assert (np.sign(q5) == (-1 if branch.endswith(", flipped") else 1)).all()
+
+
+def test_where_axes_5_and_6_are_parallel_right_is_where_axis_6_points() -> None:
+    rng = np.random.default_rng(23)
+    for number in range(4):
+        chain = random_arm(rng, "parallel", ((1, 1), (1, -1), (-1, 1), (-1, -1))[number])
+        of_chain = screws(chain)
+        _, targets = poses(chain, 50, number)
+        solutions = form_of(chain).solve(targets)
+        assert of_chain is not None and targets.rotation is not None
+        axis1, axis2, *_, axis6 = of_chain.direction
+        row, column = np.nonzero(solutions.reached)
+        turned2 = Rotation.from_rotvec(solutions.q[row, column, :1] * axis1).apply(axis2)
+        turned6 = targets.rotation[row] @ of_chain.rotation.T @ axis6
+        side = (np.cross(axis1, turned2) * turned6).sum(axis=1)
+        right = np.array(["right" in one for one in solutions.branches])[column]
+        np.testing.assert_array_equal(side > 0.0, right)
+        assert 0 < right.sum() < len(right)
 
 
 def with_other_zeros(chain: Chain, shift: FloatArray) -> Chain:

@@ -199,6 +199,17 @@ def test_a_position_beyond_all_digits_stops_no_other(name: str, far: float) -> N
     assert found.reason(1) == (f"the position is 0.1, {far:g}, 0.3 m, allowed: up to 1e+09 m along each axis")
 
 
+def test_a_bad_target_before_a_singular_one_leaves_the_family_where_it_is() -> None:
+    chain = load_robot("ur5e")
+    targets = targets_of(
+        chain, np.array([[0.3, -1.0, 1.2, -0.5, 1.0, 0.8], [0.3, -1.0, 1.2, -0.5, 0.0, 0.8]])
+    )
+    position = np.vstack((np.full((1, 3), math.nan), targets.position))
+    assert targets.rotation is not None
+    found = solve(chain, Targets(position, np.vstack((np.eye(3)[None], targets.rotation))), every=True)
+    assert [found.families(row) for row in range(3)] == [[], [], ["wrist aligned"]]
+
+
 def test_only_bad_targets_are_no_error() -> None:
     for name in ("ur5e", "urm6"):
         found = solve(load_robot(name), Targets(np.full((2, 3), np.nan), np.stack([np.eye(3)] * 2)))
