@@ -4,7 +4,7 @@ import math
 from dataclasses import replace
 
 import numpy as np
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.catalogue import load_robot
@@ -103,6 +103,7 @@ def test_what_there_was_no_solution_for_keeps_its_reason() -> None:
     assert found.reason(0) == "too far" and np.isnan(found.q).all()
 
 
+@settings(deadline=None)
 @given(
     st.floats(-math.pi, math.pi),
     st.floats(-20.0, 20.0),

@@ -215,7 +215,7 @@ def test_poses_at_and_near_singular_ones_are_met(family: str, distance: float) -
         solutions = form_of(chain).solve(targets, near)
         assert_every_solution_meets(chain, targets, solutions, EXACT)
         assert solutions.reached.any(axis=1).all()
-    named = {one.family: one.where.any(axis=1) for one in solutions.singular}
+    named = {str(one.family): one.where.any(axis=1) for one in solutions.singular}
     if distance <= 1e-12:
         assert named[family.removesuffix(" backwards")].all()
     if distance >= 1e-4:
