@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import NamedTuple, TypeAlias
 
@@ -82,6 +83,7 @@ def singularity_over_log(
     )
 
 
+@lru_cache(maxsize=32)
 def characteristic_length(chain: Chain) -> float:
     """Return the length of an arm in [m] from its first axis along its links to the tool centre point.
 

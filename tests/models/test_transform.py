@@ -223,6 +223,15 @@ def test_both_conventions_tell_the_same_rotation(rz: float, ry: float, rx: float
     np.testing.assert_allclose(turned, 0.0, atol=225 * ROUNDING)
 
 
+def test_a_zero_of_either_sign_gives_the_angle_pi() -> None:
+    """C and NumPy would else tell pi and -pi of the same rotation."""
+    for zero in (0.0, -0.0):
+        z1, _, z2, _ = euler_zxz(((-1.0, 0.0, zero), (0.0, 0.0, 1.0), (zero, 1.0, 0.0)))
+        assert (z1, z2) == (math.pi, 0.0)
+        z1, _, z2, _ = euler_zxz(((1.0, 0.0, zero), (0.0, 0.0, -1.0), (zero, -1.0, 0.0)))
+        assert (z1, z2) == (0.0, math.pi)
+
+
 def test_zxz_angles_of_a_column_of_rotations() -> None:
     x = np.array([0.0, 0.3, math.pi])
     z1, got, z2, singular = euler_zxz((rotation_z(0.5) @ rotation_x(x) @ rotation_z(0.2)).rotation)

@@ -1,4 +1,4 @@
-"""Targets that are none: not finite, or turned by what is no rotation."""
+"""Targets that are none: not finite, farther than any tool gets, or turned by what is no rotation."""
 
 from __future__ import annotations
 
@@ -14,6 +14,9 @@ FloatArray: TypeAlias = NDArray[np.float64]
 
 ROTATION_TOLERANCE = 1e-6
 """A matrix of a file with 7 digits is a rotation within this, and the nearest one is taken [-]."""
+
+FARTHEST = 1e9
+"""A coordinate beyond this, in [m], is no place of a tool: its square leaves no digit of an arm's length."""
 
 
 def checked(targets: Targets) -> tuple[Targets, list[str]]:
@@ -48,9 +51,11 @@ def checked(targets: Targets) -> tuple[Targets, list[str]]:
 def _of_positions(position: FloatArray) -> list[str]:
     """Return why positions in [m], shape (n, 3), are none."""
     reasons = [""] * len(position)
-    for row in np.flatnonzero(~np.isfinite(position).all(axis=1)):
+    for row in np.flatnonzero(~(np.abs(position) <= FARTHEST).all(axis=1)):
         found = ", ".join(f"{value:g}" for value in position[row])
-        reasons[row] = f"the position is {found} m, allowed: finite numbers"
+        finite = np.isfinite(position[row]).all()
+        allowed = f"up to {FARTHEST:g} m along each axis" if finite else "finite numbers"
+        reasons[row] = f"the position is {found} m, allowed: {allowed}"
     return reasons
 
 

@@ -1,6 +1,6 @@
 """Inverse kinematics of any chain, iteratively: many targets at once, each from a start of its own.
 
-With e the miss (target minus tool; the rotation vector times the characteristic length l) and J its
+With e the miss (target minus tool; the rotation vector times a length l, `turn_length`) and J its
 Jacobian, both in the world, a step is
 
     Levenberg-Marquardt      dq = J^T (J J^T + mu I)^-1 e, mu = g |e|^2, g by the gain ratio of each row
@@ -41,9 +41,9 @@ from urmpipe_models.inverse.task import (
     BoolArray,
     FloatArray,
     IntArray,
-    characteristic_length,
     redundancy,
     task_of,
+    turn_length,
 )
 from urmpipe_models.kinematics import THREADS
 
@@ -120,7 +120,7 @@ def refine(
     if redundancy(chain, targets):
         goal = begin if home is None else np.clip(_starts(chain, targets, home, method), lower, upper)
         slack = _settled(progress, chain, targets, goal, settings, threads)
-    residual = np.hypot(progress.distance, characteristic_length(chain) * progress.angle)
+    residual = np.hypot(progress.distance, turn_length(chain) * progress.angle)
     return Refined(
         progress.q.T, progress.arrived, progress.steps, progress.distance, progress.angle, residual, slack
     )

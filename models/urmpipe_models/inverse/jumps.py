@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from urmpipe_models.chain import Chain
 from urmpipe_models.inverse.solutions import FloatArray, TextArray
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
-from urmpipe_models.inverse.task import characteristic_length
+from urmpipe_models.inverse.task import turn_length
 
 SMALL_STEP = 0.1
 """A step by less, in [rad] or [m] of every joint, is never a jump."""
@@ -69,7 +69,7 @@ def jump_samples(chain: Chain, q: FloatArray, position_only: bool) -> IntArray:
 
     A step of `SMALL_STEP` or more is a jump if half of it leads off the path: the tool at the mean of the
     two joint values is farther from both samples than they are from one another, in
-    |p - p'| + l angle(R, R') with the characteristic length l. Along a path of smooth motion it lies between
+    |p - p'| + l angle(R, R') with l of `turn_length`. Along a path of smooth motion it lies between
     them, however fast a joint turns: near an aligned wrist q4 and q6 may turn far against each other, and
     the tool hardly moves.
 
@@ -122,5 +122,5 @@ def _apart(chain: Chain, one: FloatArray, other: FloatArray, position_only: bool
     """Return |p - p'| + l angle(R, R') of the tool at joint values, shape (m,), in [m]."""
     there = targets_of(chain, other)
     distance, turn = misses(chain, one, Targets(there.position) if position_only else there)
-    length = characteristic_length(chain)
+    length = turn_length(chain)
     return np.asarray(np.linalg.norm(distance, axis=1) + length * np.linalg.norm(turn, axis=1))

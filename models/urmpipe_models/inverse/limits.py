@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.inverse.figures import figures
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Solutions, TextArray
 
 LIMIT_ROUNDING = 1e-11
@@ -66,6 +67,12 @@ def within_pi(q: FloatArray, period: FloatArray) -> FloatArray:
     values = q.copy()
     values[..., turning] -= TURN * np.ceil((q[..., turning] - math.pi) / TURN)
     return values
+def nearest_to_limits(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return joint values in [rad] or [m], shape (n, joints), each in the turn nearest to its limits."""
+    lower, upper = _limits(chain)
+    limited = _turns(chain) & np.isfinite(lower) & np.isfinite(upper)
+    middle = np.where(limited, 0.5 * (lower + upper), 0.0)
+    return np.where(limited, q + TURN * np.round((middle - q) / TURN), q)
 
 
 def _limits(chain: Chain) -> tuple[FloatArray, FloatArray]:
@@ -99,5 +106,5 @@ def _fault(joint: Joint, value: float, turns: bool) -> str:
     if turns:
         value += TURN * round((0.5 * (joint.lower + joint.upper) - value) / TURN)
     unit = "m" if joint.kind == "prismatic" else "rad"
-    allowed = f"{joint.lower:.4g} to {joint.upper:.4g} {unit}"
-    return f"joint {joint.name} at {value:.4g} {unit}, allowed: {allowed}"
+    found, lower, upper = figures(value, joint.lower, joint.upper)
+    return f"joint {joint.name} at {found} {unit}, allowed: {lower} to {upper} {unit}"

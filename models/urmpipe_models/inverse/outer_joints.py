@@ -16,6 +16,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.elementwise import Element, Vector, cross, dot, subtract
+from urmpipe_models.inverse.figures import figures
 from urmpipe_models.inverse.parallel_geometry import PARALLEL, ParallelGeometry
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Singular, TextArray
 from urmpipe_models.inverse.trigonometric import linear_roots, quadric_roots, wrapped
@@ -94,14 +95,15 @@ def _meeting(arm: ParallelGeometry, motion: Transform, near: FloatArray) -> Oute
     sine = float(np.hypot(arm.k1[0], arm.k1[1]))
     reasons = texts_where(
         np.broadcast_to(np.isnan(q1), q5.shape),
-        "the wrist is {:.4g} m from axis 1, allowed: at least {:.4g} m",
+        "the wrist is {} m from axis 1, allowed: at least {} m",
         r / sine,
         np.abs(c) / sine,
     )
     reasons += texts_where(
         np.isnan(q5) & ~np.isnan(q1),
-        "axis 6 is at {:.4g} rad to axis 4, allowed: " + "{:.4g} to {:.4g} rad".format(*allowed),
+        "axis 6 is at {} rad to axis 4, allowed: {} to {} rad",
         theta,
+        *allowed,
     )
     singular = (
         Singular("wrist beside axis 1", _everywhere(meet & ~free, q5)),
@@ -158,13 +160,13 @@ def _parallel(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     q5 = np.concatenate((rising, falling), axis=1)
     reasons = texts_where(
         np.broadcast_to(np.isnan(q1), q5.shape),
-        "axis 6 cannot be turned into its direction: {:.4g} of its unit along axis 2, allowed: up to {:.4g}",
+        "axis 6 cannot be turned into its direction: {} of its unit along axis 2, allowed: up to {}",
         np.abs(c),
         r,
     )
     reasons += texts_where(
         np.isnan(q5) & ~np.isnan(q1),
-        "axis 6 is {:.4g} m along axis 2 from where axis 5 holds it, allowed: up to {:.4g} m",
+        "axis 6 is {} m along axis 2 from where axis 5 holds it, allowed: up to {} m",
         np.abs(height),
         np.full_like(height, reach),
     )
@@ -202,19 +204,18 @@ def _passing(arm: ParallelGeometry, motion: Transform) -> OuterJoints:
     q5 = np.arctan2(d * np.cos(q1) + e * np.sin(q1) + f, a * np.cos(q1) + b * np.sin(q1) + c)
     for _ in range(2):
         q1, q5 = _newton_step(left, right[:, 1:], q1, q5)
+    q1, q5 = _in_order(arm, motion, q1, q5)
     q1, q5 = wrapped(q1)[:, None], wrapped(q5)[:, None]
     found = np.isfinite(q1).sum(axis=0)
     reasons = texts_where(
         np.isnan(q1),
-        "joints 1 and 5 put axis 6 into its place in {:.0f} ways, allowed for this branch: at least {:.0f}",
+        "joints 1 and 5 put axis 6 into its place in {} ways, allowed for this branch: at least {}",
         found,
         np.arange(1.0, 5.0)[:, None, None],
     )
     slope = left[0, 1] * np.cos(q1) - left[0, 0] * np.sin(q1)
-    meet = np.zeros(q1.shape, dtype=bool)
-    near = np.diff(q1, axis=0) < NEAR_ROOTS
-    meet[1:] |= near
-    meet[:-1] |= near
+    others = [np.roll(q1, shift, axis=0) for shift in (1, 2, 3)]
+    meet = np.any([np.abs(wrapped(q1 - other)) < NEAR_ROOTS for other in others], axis=0)
     singular = (Singular("postures meet", meet),)
     return OuterJoints(
         q1,
@@ -248,6 +249,19 @@ def _newton_step(
     step1, step5 = (f * g5 - f5 * g) / det, (f1 * g - f * g1) / det
     good = np.abs(step1) + np.abs(step5) < NEAR_ROOTS
     return np.where(good, q1 - step1, q1), np.where(good, q5 - step5, q5)
+
+
+def _in_order(
+    arm: ParallelGeometry, motion: Transform, q1: FloatArray, q5: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Return pairs of q1 and q5, shape (4, n), by how far axis 2 is turned from the wrist, both about axis 1.
+
+    Counted so, and not by q1 itself, the order is the same whatever the zero of joint 1 is, and stays while
+    the arm turns about axis 1.
+    """
+    cosine, sine, _ = _shoulder(arm.k1, subtract(motion.point(arm.p6), arm.p1), 0.0)
+    order = np.argsort(wrapped(q1 - np.arctan2(sine, cosine)), axis=0)  # NaN last
+    return np.take_along_axis(q1, order, axis=0), np.take_along_axis(q5, order, axis=0)
 
 
 def _turned(k: Vector, v: Vector) -> tuple[Element, Element, Element]:
@@ -286,9 +300,9 @@ def _everywhere(where: BoolArray, like: FloatArray) -> BoolArray:
     return np.broadcast_to(where, like.shape)
 
 
-def texts_where(where: BoolArray, text: str, *figures: FloatArray) -> TextArray:
-    """Return a text with figures where it holds, empty elsewhere."""
+def texts_where(where: BoolArray, text: str, found: FloatArray, *allowed: FloatArray | float) -> TextArray:
+    """Return a text with what was found and is allowed (see `figures`) where it holds, empty elsewhere."""
     texts = np.full(where.shape, "", dtype=np.object_)
-    spread = [np.broadcast_to(one, where.shape)[where].tolist() for one in figures]
-    texts[where] = [text.format(*each) for each in zip(*spread, strict=True)]
+    spread = [np.broadcast_to(one, where.shape)[where].tolist() for one in (found, *allowed)]
+    texts[where] = [text.format(*figures(*each)) for each in zip(*spread, strict=True)]
     return texts

@@ -11,8 +11,9 @@ Up to eight solutions. Axes 2, 3, 4 that are not parallel to 1e-10 rad, as those
 were calibrated, have no such form: they are for the iterative solver.
 
 Near one family of singular poses, and near an aligned wrist of a stretched arm, every pose is met to 1e-10.
-Within 1e-5 rad of both the stretched arm and the least distance of the wrist from axis 1 the rounding of q1
-can put a pose that is in reach out of it: it then has a reason.
+Within 1e-5 rad of both the stretched arm and the least distance of the wrist from axis 1, and within 1e-4 rad
+if the wrist is aligned as well, the rounding of q1 can put a pose that is in reach out of it: it then has a
+reason.
 
 Source: [EliasWen2022]_ for the case; the steps are ours.
 """
@@ -66,11 +67,14 @@ def parallel_axes(screws: Screws, names: tuple[str, ...]) -> ParallelAxes | None
 class ParallelAxes:
     """A closed form, see `ClosedForm`.
 
-    The branches, where axes 5 and 6 meet or are parallel: `right` | `left`, the side of axis 1 on which the
-    wrist is, right being where axis 1 x axis 2 points; `elbow up` | `elbow down`, up being along axis 1 for
-    an arm that reaches outwards; `not flipped` | `flipped`, by the sign of q5, counted from where axis 6 is
-    nearest to axis 4. Where axes 5 and 6 pass each other `shoulder 1` to `shoulder 4`, q1 ascending, stand
-    for the first and the last of these.
+    The branches, where axes 5 and 6 meet: `right` | `left`, the side of axis 1 on which the wrist is, right
+    being where axis 1 x axis 2 points; `elbow up` | `elbow down`, up being along axis 1 for an arm that
+    reaches outwards; `not flipped` | `flipped`, by the sign of q5, counted from where axis 6 is nearest to
+    axis 4. Where axes 5 and 6 are parallel, right is where axis 6 points along axis 1 x axis 2, wherever
+    the wrist is, and the flips part at the ends of the wrist's way along axis 2. Where they pass
+    each other `shoulder 1` to `shoulder 4` stand for the sides and flips: by how far axis 2 is turned about
+    axis 1 from pointing to the wrist; where two of them meet and are lost, the others are numbered anew. The
+    names change with the senses in which joints count, not with their zeros, the base or the tool.
 
     Attributes:
         arm: Its geometry.

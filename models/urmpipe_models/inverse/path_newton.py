@@ -47,8 +47,8 @@ class Swept:
 
     Attributes:
         q: Joint values in [rad] or [m], shape (w, joints).
-        miss: |x - FK| at the guess that it was linearised at, in [m], rotations as arcs of the
-            characteristic length, shape (w,).
+        miss: |x - FK| at the guess that it was linearised at, in [m], rotations times
+            `turn_length`, shape (w,).
         pull: J^T y: where each joint would move if it were free, in [rad] or [m], shape (w, joints); None
             where all are.
     """

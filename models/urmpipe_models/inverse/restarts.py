@@ -14,7 +14,8 @@ from urmpipe_models.inverse.iterative import Refined, refine
 from urmpipe_models.inverse.limits import TURN, within_limits
 from urmpipe_models.inverse.solutions import NEAREST_POINT, FloatArray, Solutions
 from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.inverse.task import BoolArray, IntArray, characteristic_length
+from urmpipe_models.inverse.task import BoolArray, IntArray, turn_length
+from urmpipe_models.singularity import characteristic_length
 
 DISTINCT = 1e-3
 """Solutions are two if a joint differs by more than this in [rad] or [m], revolute joints by the shorter way.
@@ -76,7 +77,7 @@ def solve_iteratively(
         seed: Of the random starts.
         tolerance: In [m]: a target that is met from no start takes the nearest point found, if the tool is
             no farther away than this along each axis and turned by no more than tolerance / l, l the
-            `characteristic_length`; `shortfall` says how far it stays.
+            `turn_length`; `shortfall` says how far it stays.
 
     Returns:
         Solutions, each joint in the turn nearest to `start` that its limits allow.
@@ -102,7 +103,7 @@ def random_starts(chain: Chain, count: int, seed: int) -> FloatArray:
     prismatic one from as far as the arm is long: from its only limit, or to both sides. The first draws do
     not depend on how many follow.
     """
-    ranges = np.array([_range(joint, 4.0 * characteristic_length(chain)) for joint in chain.moving])
+    ranges = np.array([_range(joint, characteristic_length(chain)) for joint in chain.moving])
     draws = np.random.default_rng(seed).uniform(size=(count, len(ranges)))
     return np.asarray(ranges[:, 0] + draws * (ranges[:, 1] - ranges[:, 0]))
 
@@ -247,7 +248,7 @@ def _near_enough(chain: Chain, targets: Targets, search: _Search, tolerance: flo
         return np.zeros(len(targets), np.bool_)
     position, turn = misses(chain, search.q[near], targets.rows(near))
     within = np.abs(position).max(axis=1) <= tolerance
-    near[near] = within & (np.linalg.norm(turn, axis=1) <= tolerance / characteristic_length(chain))
+    near[near] = within & (np.linalg.norm(turn, axis=1) <= tolerance / turn_length(chain))
     return near
 
 

@@ -30,7 +30,7 @@ What is found depends on it by 1e-8 rad a step, and by 1e-5 rad near singular po
 open, as how much is damped depends on the sweeps that a sample took."""
 
 MET = 9e-10
-"""A target is met within this, in [m]; rotations as arcs of the characteristic length: a nanometre less what
+"""A target is met within this, in [m]; rotations times `turn_length`: a nanometre less what
 a converged sample may still move."""
 
 STILL = 1e-10

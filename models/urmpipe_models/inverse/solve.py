@@ -13,7 +13,8 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.checks import checked
 from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
-from urmpipe_models.inverse.limits import periods, within_limits
+from urmpipe_models.inverse.free_joints import within_limits_by_choice
+from urmpipe_models.inverse.limits import periods
 from urmpipe_models.inverse.solutions import (
     NEAREST_POINT,
     BoolArray,
@@ -54,10 +55,12 @@ def solve(
         start: Joint values in [rad] or [m], shape (joints,) or (n, joints), that solutions are to be near to;
             of the chain by default. They may lie outside the limits of the joints; solutions do not. Where a
             singular pose leaves a joint free it is taken from here if `start` is given or one solution asked.
-        every: Return all solutions, one column a branch; otherwise the one nearest to `start`, whose branch
-            stands in `labels`.
+        every: Return all solutions, one column a branch, each joint in the turn nearest to `start` that its
+            limits allow: what differs from it by whole turns is not listed. Otherwise the one nearest to
+            `start`, whose branch stands in `labels`.
         tolerance: In [m] along each axis: a target out of reach takes the nearest point that the tool can get
-            to if it is no farther away than this; `shortfall` says how far it is.
+            to if it is no farther away than this, and turned by no more than tolerance / l with l of
+            `turn_length`; `shortfall` says how far it is.
         restarts: Random starts of the iterative solver for what it does not reach from `start`.
         seed: Of the random starts: the same seed, the same solutions.
         method: "closed" or "iterative" to allow only one of them.
@@ -68,7 +71,7 @@ def solve(
     position_only = targets.rotation is None
     targets, reasons = checked(targets)
     form = None if position_only or method == "iterative" else closed_form(chain)
-    faults = list(_faults(chain, len(targets), start, tolerance, restarts, method))
+    faults = list(_faults(chain, len(targets), start, tolerance, restarts, seed, method))
     if method == "closed" and form is None:
         faults.append(_no_closed_form(chain, position_only))
     if faults:
@@ -98,7 +101,7 @@ class _Search:
         self, form: ClosedForm, targets: Targets, start: FloatArray, near: FloatArray | None
     ) -> Solutions:
         """Return the branches within the limits, or the nearest of them; what is out of reach approached."""
-        found = within_limits(self.chain, form.solve(targets, near), start)
+        found = within_limits_by_choice(self.chain, targets, form.solve(targets, near), start)
         if not self.every:
             found = found.picked(found.nearest_column(start, periods(self.chain)), NEAREST)
         out = np.asarray(~found.reached.any(axis=1))
@@ -168,6 +171,7 @@ def _faults(
     start: FloatArray | None,
     tolerance: float | None,
     restarts: int,
+    seed: int,
     method: Method,
 ) -> Iterator[str]:
     """Yield what is wrong with the options."""
@@ -185,6 +189,8 @@ def _faults(
         yield f"tolerance: found {tolerance:g} m, allowed: more than 0, finite"
     if restarts < 0:
         yield f"restarts: found {restarts}, allowed: 0 or more"
+    if seed < 0:
+        yield f"seed: found {seed}, allowed: 0 or more"
     if method not in METHODS:
         yield f"method: found {method!r}, allowed: {', '.join(METHODS)}"
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from typing import TypeAlias
@@ -15,6 +14,7 @@ from urmpipe_models.inverse.small_systems import dot_product, outer_sum, rows_of
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.tool_motion import Arm, arm_of, tool_motion
 from urmpipe_models.kinematics import jacobian_over_log
+from urmpipe_models.singularity import characteristic_length
 
 FloatArray: TypeAlias = NDArray[np.float64]
 BoolArray: TypeAlias = NDArray[np.bool_]
@@ -24,15 +24,13 @@ HALF_TURN_SINE = 1e-6
 """Below this sine an angle near pi takes its axis from the symmetric part of the rotation matrix."""
 
 
-def characteristic_length(chain: Chain) -> float:
+def turn_length(chain: Chain) -> float:
     """Return the length l in [m] that a radian of orientation counts as: a quarter of the arm's.
 
-    The arm's length is that of its frames' offsets, one after the other, from the first joint to the tool
-    centre point; l is 1 m of an arm that has none.
+    A turn of the tool by a radian is then weighed as a way that the arm makes with ease; the arm's length is
+    its `characteristic_length`, which does not depend on where a description puts its frames.
     """
-    offsets = [joint.origin.translation for joint in chain.joints[1:]]
-    offsets += [chain.tip.translation, chain.tool.translation]
-    return sum(math.hypot(*offset) for offset in offsets) / 4.0 or 1.0
+    return characteristic_length(chain) / 4.0
 
 
 def redundancy(chain: Chain, targets: Targets) -> int:
@@ -97,7 +95,7 @@ class Task:
 
     Attributes:
         arm: The arm.
-        length: The characteristic length in [m].
+        length: l in [m]: see `turn_length`.
         position: x, y, z in [m], shape (3, n).
         columns: The axes that the tool shall take, shape (3, 3, n), first index: which; None if any
             orientation will do.
@@ -131,7 +129,7 @@ def task_of(chain: Chain, targets: Targets) -> Task:
     position, columns = np.ascontiguousarray(targets.position.T), None
     if targets.rotation is not None:
         columns = np.ascontiguousarray(targets.rotation.transpose(2, 1, 0))
-    return Task(arm_of(chain), characteristic_length(chain), position, columns)
+    return Task(arm_of(chain), turn_length(chain), position, columns)
 
 
 def turn_between(columns: FloatArray, wanted: FloatArray) -> FloatArray:

@@ -54,11 +54,13 @@ def two_links(
     free = reached & (r <= REACH * arm.size)
     to_place = np.arctan2(place[1], place[0])
     bend = np.arctan2(fore * np.sin(psi), upper + fore * np.cos(psi))
-    q2 = np.where(free, near * arm.signs[0], to_place - first - bend)
+    q2 = np.where(free, near, to_place - first - bend)
     reasons = texts_where(
         ~reached & np.isfinite(r),
-        f"axis 4 is {{:.4g}} m from axis 2, allowed: {short:.4g} to {long:.4g} m",
+        "axis 4 is {} m from axis 2, allowed: {} to {} m",
         r,
+        short,
+        long,
     )
     return TwoLinks(
         q2 + np.zeros_like(psi),

@@ -18,8 +18,9 @@ from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.descent import METHODS, Method
 from urmpipe_models.inverse.iterative import limits_of, refine
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
-from urmpipe_models.inverse.task import characteristic_length, redundancy, task_of, turn_between
+from urmpipe_models.inverse.task import redundancy, task_of, turn_between, turn_length
 from urmpipe_models.kinematics import jacobian_over_log
+from urmpipe_models.singularity import characteristic_length
 from urmpipe_models.transform import from_offset, translation
 
 FloatArray = NDArray[np.float64]
@@ -100,12 +101,21 @@ def test_the_pseudoinverse_and_marquardt_take_quadratic_steps() -> None:
     assert steps["dls"] > 2 * steps["pinv"]
 
 
+def test_what_a_radian_counts_as_does_not_depend_on_where_a_description_puts_frames() -> None:
+    chain = load_robot("ur5e")
+    there = Joint("aside", "fixed", translation(0.0, 0.0, 100.0))  # axis 2 of a calibrated arm
+    back = replace(chain.joints[2], origin=translation(0.0, 0.0, -100.0) @ chain.joints[2].origin)
+    other = replace(chain, joints=(*chain.joints[:2], there, back, *chain.joints[3:]), visuals=())
+    assert turn_length(other) == pytest.approx(turn_length(chain), rel=1e-12)
+    assert turn_length(chain) == characteristic_length(chain) / 4.0
+
+
 def test_a_pseudoinverse_step_is_the_moore_penrose_one() -> None:
     chain = load_robot("urm8")
     q = within(chain, 20)
     start = q + 1e-3
     targets = targets_of(chain, q)
-    length = characteristic_length(chain)
+    length = turn_length(chain)
     weights = np.array([1.0, 1.0, 1.0, length, length, length])
     distance, turn = misses(chain, start, targets)
     J = weights[:, None] * jacobian_over_log(chain, start)
@@ -173,7 +183,7 @@ def test_the_nearest_pose_is_that_of_another_solver() -> None:
     targets = targets_of(chain, rng.uniform(-2.0, 2.0, (8, 6)))
     targets = Targets(targets.position + np.array([0.0, 0.0, 1.5]), targets.rotation)
     refined = refine(chain, targets, rng.uniform(-2.0, 2.0, (8, 6)), iterations=400)
-    length = characteristic_length(chain)
+    length = turn_length(chain)
     assert not refined.converged.any()
     for row in range(8):
 

@@ -15,7 +15,7 @@ from urmpipe_models.inverse.descent import Settings
 from urmpipe_models.inverse.iterative import limits_of, refine
 from urmpipe_models.inverse.least_motion import AT_LIMIT, LEAST_MOTION, settle
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
-from urmpipe_models.inverse.task import characteristic_length, task_of
+from urmpipe_models.inverse.task import task_of, turn_length
 from urmpipe_models.kinematics import jacobian_over_log
 from urmpipe_models.transform import translation
 
@@ -35,7 +35,7 @@ def posed(robot: str, pose: bool, count: int, noise: float) -> tuple[Chain, Targ
 
 def weighted_jacobian(chain: Chain, q: FloatArray, pose: bool) -> FloatArray:
     J = jacobian_over_log(chain, q)
-    J[:, 3:] *= characteristic_length(chain)
+    J[:, 3:] *= turn_length(chain)
     return J if pose else J[:, :3]
 
 

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.catalogue import load_robot
@@ -83,6 +83,16 @@ def test_rounding_at_a_limit_is_on_it_and_no_more() -> None:
     assert not within_limits(chain, one_solution(1.0 + 5e-11)).reached.any()
 
 
+def test_what_is_barely_outside_is_told_with_the_digits_that_say_so() -> None:
+    chain = arm(Joint("q1", lower=-2.7, upper=2.7))
+    assert within_limits(chain, one_solution(2.7 + 1e-7)).reason(0) == (
+        "joint q1 at 2.7000001 rad, allowed: -2.7 to 2.7 rad"
+    )
+    assert within_limits(chain, one_solution(-2.7 - 2e-11)).reason(0) == (
+        "joint q1 at -2.70000000002 rad, allowed: -2.7 to 2.7 rad"
+    )
+
+
 def test_a_joint_that_another_follows_is_not_turned() -> None:
     chain = arm(Joint("leads", lower=0.0, upper=7.0), Joint("follows", mimic=Mimic("leads", 0.5)))
     assert within_limits(chain, one_solution(-1.0)).reason(0) == "joint leads at -1 rad, allowed: 0 to 7 rad"
@@ -94,6 +104,7 @@ def test_what_there_was_no_solution_for_keeps_its_reason() -> None:
     assert found.reason(0) == "too far" and np.isnan(found.q).all()
 
 
+@settings(deadline=None)
 @given(
     st.floats(-math.pi, math.pi),
     st.floats(-20.0, 20.0),

@@ -98,6 +98,41 @@ def test_solutions_are_in_the_turn_nearest_to_the_start_that_the_limits_allow() 
     assert beyond.reached.all() and (beyond.q[:, 0] > -1e-9).all()  # the last turn that +-2 pi allows
 
 
+@pytest.mark.parametrize(
+    ("name", "q", "limit"),
+    [
+        ("arm6", [0.4, 0.6, 0.5, 1.2, 0.0, 1.8], 2.0),  # q4 = 0 would need q6 = 3
+        ("arm6", [0.4, 0.6, 0.5, -1.9, 0.0, -1.0], 2.0),
+        ("ur5e", [0.3, -1.0, 1.2, -0.5, 0.0, 1.9], 2.0),
+        ("ur5e", [0.3, -1.0, 1.2, 1.9, 0.0, 0.1], 1.95),
+    ],
+)
+def test_where_limits_refuse_the_choice_of_a_free_joint_they_choose(
+    name: str, q: list[float], limit: float
+) -> None:
+    chain = narrow(load_robot(name), -limit, limit)
+    targets = targets_of(chain, np.array([q]))
+    for start in (None, np.zeros(6), np.array(q)):
+        found = solve(chain, targets, start=start, every=True)
+        assert found.reached.any()
+        assert_met(chain, targets, found)
+        assert ((found.reasons != "") == ~found.reached).all()
+        aligned = [one for one in found.singular if one.family == "wrist aligned"]
+        assert aligned and (aligned[0].where & found.reached).any()
+        distinct = np.round(found.q[0][found.reached[0]], 4)
+        assert len(np.unique(distinct, axis=0)) == len(distinct)
+    here = solve(chain, targets, start=np.array(q))
+    np.testing.assert_allclose(here.q[0, 0], q, atol=1e-9)
+
+
+def test_limits_that_chose_a_free_joint_are_told() -> None:
+    chain = narrow(load_robot("arm6"), -2.0, 2.0)
+    (aligned,) = solve(
+        chain, targets_of(chain, np.array([[0.4, 0.6, 0.5, 1.2, 0.0, 1.8]])), every=True
+    ).singular
+    assert aligned.chosen.endswith(", or what the limits of the joints allow")
+
+
 def test_limits_leave_out_branches_and_say_which_joint() -> None:
     chain = narrow(load_robot("ur5e"), -1.5, 1.5)
     _, targets = poses(chain, 200)
@@ -149,6 +184,30 @@ def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) ->
     assert told[2] == f"the position is inf, {y}, {z} m, allowed: finite numbers"
     assert [told[0], *told[3:]] == [REASONS[0], *REASONS[3:]]
     assert len(found) == 7 and found.shortfall.shape == found.labels.shape == found.reasons.shape
+
+
+@pytest.mark.parametrize("far", [1.1e9, 1e160, -1e308])
+@pytest.mark.parametrize("name", ["ur5e", "arm6", "urm6"])
+def test_a_position_beyond_all_digits_stops_no_other(name: str, far: float) -> None:
+    chain = load_robot(name)
+    q, targets = poses(chain, 1)
+    assert targets.rotation is not None
+    position = np.vstack((targets.position, [0.1, far, 0.3]))
+    both = Targets(position, np.repeat(targets.rotation, 2, axis=0))
+    found = solve(chain, both, start=q[0])
+    assert found.reached[:, 0].tolist() == [True, False]
+    assert found.reason(1) == (f"the position is 0.1, {far:g}, 0.3 m, allowed: up to 1e+09 m along each axis")
+
+
+def test_a_bad_target_before_a_singular_one_leaves_the_family_where_it_is() -> None:
+    chain = load_robot("ur5e")
+    targets = targets_of(
+        chain, np.array([[0.3, -1.0, 1.2, -0.5, 1.0, 0.8], [0.3, -1.0, 1.2, -0.5, 0.0, 0.8]])
+    )
+    position = np.vstack((np.full((1, 3), math.nan), targets.position))
+    assert targets.rotation is not None
+    found = solve(chain, Targets(position, np.vstack((np.eye(3)[None], targets.rotation))), every=True)
+    assert [found.families(row) for row in range(3)] == [[], [], ["wrist aligned"]]
 
 
 def test_only_bad_targets_are_no_error() -> None:
@@ -245,12 +304,13 @@ def test_everything_wrong_with_the_options_is_told_at_once() -> None:
     _, targets = poses(chain, 2)
     odd: Method = "exact"  # type: ignore[assignment]
     with pytest.raises(OptionError) as caught:
-        solve(chain, targets, start=np.zeros(5), tolerance=-1.0, restarts=-2, method=odd)
+        solve(chain, targets, start=np.zeros(5), tolerance=-1.0, restarts=-2, seed=-1, method=odd)
     assert [str(one) for one in caught.value.findings] == [
         f"start: found values of shape (5,), allowed: (6,), one each of {', '.join(chain.coordinates)},"
         " or (2, 6), as many for each target",
         "tolerance: found -1 m, allowed: more than 0, finite",
         "restarts: found -2, allowed: 0 or more",
+        "seed: found -1, allowed: 0 or more",
         "method: found 'exact', allowed: auto, closed, iterative",
     ]
     with pytest.raises(OptionError) as caught:
