@@ -19,7 +19,7 @@ from urmpipe.inverse_wording import far_warnings, shortfall_warnings, singular_w
 from urmpipe_models.catalogue import robot_names
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError, for_each
-from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
+from urmpipe_models.inverse.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.joint_path import JointPath
 from urmpipe_models.inverse.limits import periods
 from urmpipe_models.inverse.path import follow
@@ -161,8 +161,9 @@ class _Asked:
     @property
     def form(self) -> ClosedForm | None:
         """The closed form by which the targets are solved, if they are."""
-        poses = self.given.targets.rotation is not None
-        return closed_form(self.arm) if poses and self.method != "iterative" else None
+        if self.given.targets.rotation is None or self.method == "iterative":
+            return None
+        return closed_form(self.arm) if self.given.t_ns is None else exact_form(self.arm)
 
     @property
     def begin(self) -> FloatArray:

@@ -14,7 +14,7 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.branch_walk import walk
 from urmpipe_models.inverse.checks import checked
-from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
+from urmpipe_models.inverse.closed_form import ClosedForm, exact_form
 from urmpipe_models.inverse.joint_path import JointPath, SingularStretch
 from urmpipe_models.inverse.joint_speeds import too_fast
 from urmpipe_models.inverse.jumps import jump_samples, jumps_at
@@ -90,7 +90,7 @@ def follow(
     good = np.array([not reason for reason in reasons], dtype=bool)
     asked = _Asked(chain, targets.rows(good), begin, tolerance, restarts, seed)
     position_only = targets.rotation is None
-    form = None if position_only else closed_form(chain)
+    form = None if position_only else exact_form(chain)
     found = _spread(asked.by_least_motion() if form is None else asked.by_closed_form(form), good, reasons)
     return _told(chain, targets, np.asarray(t_ns), found, form, within_pi)
 

@@ -174,7 +174,7 @@ def spherical_wrist(screws: Screws, names: tuple[str, ...]) -> SphericalWrist | 
     axes = screws.direction[3:]
     if min(np.linalg.norm(np.cross(axes[0], axes[1])), np.linalg.norm(np.cross(axes[1], axes[2]))) <= TILT:
         return None
-    centre = _meeting_point(axes, screws.point[3:])
+    centre = meeting_point(axes, screws.point[3:])
     passing = np.linalg.norm(np.cross(centre - screws.point[3:], axes), axis=1)
     if passing.max() > MEETING_POINT * screws.size:
         return None
@@ -182,7 +182,7 @@ def spherical_wrist(screws: Screws, names: tuple[str, ...]) -> SphericalWrist | 
     return None if arm is None else SphericalWrist(arm, Wrist(axes), screws, centre, names)
 
 
-def _meeting_point(axes: FloatArray, points: FloatArray) -> FloatArray:
+def meeting_point(axes: FloatArray, points: FloatArray) -> FloatArray:
     """Return the point nearest to lines: the least squares of its distances from them."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     return np.asarray(np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points)))
