@@ -38,11 +38,9 @@ def rounded(chain: Chain, folder: Path, digits: int) -> Chain:
     text = urdf_text(replace(chain, visuals=()))
     for attribute, decimals in (("rpy", digits), ("xyz", 6)):
         pattern = rf'(<origin [^>]*{attribute}=")([^"]*)'
-        text = re.sub(
-            pattern,
-            lambda found, d=decimals: found[1] + " ".join(f"{float(one):.{d}f}" for one in found[2].split()),
-            text,
-        )
+        for before, numbers in set(re.findall(pattern, text)):
+            fewer = " ".join(f"{float(one):.{decimals}f}" for one in numbers.split())
+            text = text.replace(before + numbers, before + fewer)
     file.write_text(text, encoding="utf-8")
     return read_urdf(file)
 
