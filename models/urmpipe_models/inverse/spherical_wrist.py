@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.inverse.angles import turned
 from urmpipe_models.inverse.position_arm import PositionArm, position_arm
 from urmpipe_models.inverse.postures import Postures
 from urmpipe_models.inverse.solutions import (
@@ -20,6 +19,7 @@ from urmpipe_models.inverse.solutions import (
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.wrist_joints import Wrist, WristAngles
 from urmpipe_models.screws import Screws
+from urmpipe_models.transform import rotation_about
 
 MEETING_POINT = 1e-11
 """Axes 4 to 6 meet in one point if none passes it by more than this, in units of the arm's size.
@@ -99,10 +99,13 @@ class SphericalWrist:
 
     def _wrist_angles(self, rotation: FloatArray, q: FloatArray, near: FloatArray | None) -> WristAngles:
         """Return joints 4 to 6 of every posture, shape (3, 2, k * n)."""
-        seen = [rotation @ self.wrist.axes[2], rotation @ self.wrist.across_tool]
+        seen = [tuple((rotation @ one).T) for one in (self.wrist.axes[2], self.wrist.across_tool)]
         for joint in np.flatnonzero(self.screws.revolute[:3]):
-            seen = [turned(self.screws.direction[joint], -q[joint], one) for one in _columns(seen)]
-        tool_axis, across = (np.broadcast_to(one, q.shape).reshape(3, -1) for one in _columns(seen))
+            turn = rotation_about(self.screws.direction[joint].tolist(), -q[joint])
+            seen = [turn.rotate(one) for one in seen]
+        tool_axis, across = (
+            np.stack([np.broadcast_to(part, q.shape[1:]) for part in one]).reshape(3, -1) for one in seen
+        )
         free = np.zeros(q.shape[1:]) if near is None else np.broadcast_to(near, q.shape[1:])
         return self.wrist.solve(tool_axis, across, free.reshape(-1))
 
@@ -186,11 +189,6 @@ def meeting_point(axes: FloatArray, points: FloatArray) -> FloatArray:
     """Return the point nearest to lines: the least squares of its distances from them."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     return np.asarray(np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points)))
-
-
-def _columns(seen: list[FloatArray]) -> list[FloatArray]:
-    """Return vectors, one a row (n, 3), as columns (3, 1, n); columns as they are."""
-    return [one.T[:, None] if one.ndim == 2 else one for one in seen]
 
 
 def _chosen(joint: str, near: bool, more: str) -> str:
