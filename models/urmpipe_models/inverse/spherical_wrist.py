@@ -112,12 +112,14 @@ class SphericalWrist:
     def _solutions(self, postures: Postures, angles: WristAngles, near: bool) -> Solutions:
         """Return postures and wrist angles, put together target by target."""
         k, n = postures.reasons.shape
+        last = angles.q.reshape(3, 2, k, n)
+        whole = (np.isfinite(postures.q).all(axis=0) & np.isfinite(last).all(axis=0)).transpose(2, 1, 0)
         parted = np.empty((n, k, 2, 6))
         parted[..., :3] = postures.q.transpose(2, 1, 0)[:, :, None]
-        parted[..., 3:] = angles.q.reshape(3, 2, k, n).transpose(3, 2, 1, 0)
-        parted[~np.isfinite(parted).all(axis=3)] = np.nan
-        q = parted.reshape(n, 2 * k, 6) + 0.0  # no -0.0
-        reached = np.isfinite(q[:, :, 0])
+        parted[..., 3:] = last.transpose(3, 2, 1, 0)
+        parted[~whole] = np.nan
+        parted += 0.0  # no -0.0
+        q, reached = parted.reshape(n, 2 * k, 6), whole.reshape(n, 2 * k)
         reasons = self._reasons(postures, angles, reached)
         return Solutions(q, self.branches, reasons, tuple(self._singular(postures, angles, reached, near)))
 
