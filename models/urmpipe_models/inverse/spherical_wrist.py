@@ -15,9 +15,11 @@ from urmpipe_models.inverse.solutions import (
     SingularFamily,
     Solutions,
     TextArray,
+    joined,
 )
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.wrist_joints import Wrist, WristAngles
+from urmpipe_models.kinematics import THREADS
 from urmpipe_models.screws import Screws
 from urmpipe_models.transform import rotation_about
 
@@ -30,6 +32,9 @@ form keeps. An arm whose description is rounded more coarsely has no closed form
 
 TILT = 1e-6
 """Axes 4 and 5, and 5 and 6, must stand at an angle whose sine is larger than this."""
+
+BLOCK = 5000
+"""Targets worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
 
 FLIPS = "not flipped", "flipped"
 
@@ -87,12 +92,27 @@ class SphericalWrist:
         if targets.rotation is None:
             raise ValueError("targets without orientation; allowed: poses")
         count = len(targets)
-        chosen = None if near is None else np.broadcast_to(near, (count, 6)).T
-        rotation = targets.rotation @ self.screws.rotation.T
+        wish = None if near is None else np.broadcast_to(near, (count, 6))
+        if count <= BLOCK:
+            return self._block(targets.position, targets.rotation, wish)
+        blocks = [slice(start, start + BLOCK) for start in range(0, count, BLOCK)]
+        positions, rotations = targets.position, targets.rotation
+
+        def work(rows: slice) -> Solutions:
+            """Return the solutions of the targets of a block."""
+            return self._block(positions[rows], rotations[rows], None if wish is None else wish[rows])
+
+        from concurrent.futures import ThreadPoolExecutor
+
+        with ThreadPoolExecutor(THREADS) as pool:  # NumPy computes without Python's lock
+            return joined(list(pool.map(work, blocks)))
+
+    def _block(self, positions: FloatArray, rotations: FloatArray, near: FloatArray | None) -> Solutions:
+        """Return the solutions of some targets, near of shape (n, joints)."""
+        chosen = None if near is None else near.T
+        rotation = rotations @ self.screws.rotation.T
         with np.errstate(invalid="ignore", over="ignore"):
-            position = targets.position.T + np.einsum(
-                "nij,j->in", rotation, self.centre - self.screws.position
-            )
+            position = positions.T + np.einsum("nij,j->in", rotation, self.centre - self.screws.position)
             postures = self.arm.solve(position, None if chosen is None else chosen[:3])
             angles = self._wrist_angles(rotation, postures.q, None if chosen is None else chosen[3])
         return self._solutions(postures, angles, chosen is not None)
@@ -113,7 +133,8 @@ class SphericalWrist:
         """Return postures and wrist angles, put together target by target."""
         k, n = postures.reasons.shape
         last = angles.q.reshape(3, 2, k, n)
-        whole = (np.isfinite(postures.q).all(axis=0) & np.isfinite(last).all(axis=0)).transpose(2, 1, 0)
+        both = np.asarray(np.isfinite(last).all(axis=0) & np.isfinite(postures.q).all(axis=0))
+        whole = both.transpose(2, 1, 0)
         parted = np.empty((n, k, 2, 6))
         parted[..., :3] = postures.q.transpose(2, 1, 0)[:, :, None]
         parted[..., 3:] = last.transpose(3, 2, 1, 0)
