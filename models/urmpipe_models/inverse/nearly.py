@@ -37,6 +37,9 @@ NUDGE = 2.0
 BLOCK = 4096
 """Targets that are worked on at once."""
 
+FEW = 8
+"""Steps that joint values wished for may take: what is farther away is not near."""
+
 SAME = 1e-6
 """Solutions that differ by less than this in every joint, in [rad] or [m], are one."""
 
@@ -84,7 +87,7 @@ class NearlyClosedForm:
         Args:
             targets: Poses.
             near: Joint values in [rad] or [m], shape (joints,) or (n, joints), taken where the idealised
-                arm leaves a joint free.
+                arm leaves a joint free, and where the arm has a solution nearer to them than all others.
         """
         count = len(targets)
         wish = None if near is None else np.broadcast_to(near, (count, len(self.chain.coordinates)))
@@ -97,6 +100,9 @@ class NearlyClosedForm:
             beside = list(self._nudged(targets.rows(rows)))
             starts = [self.form.solve(one, None if wish is None else wish[rows]).q for one in beside]
             self._find(q, rows, targets.rows(rows), starts)
+            if wish is not None:
+                rows = np.arange(i, min(i + BLOCK, count))
+                self._find_near(q, rows, targets.rows(rows), ideal.q[rows], wish[rows])
         own = np.isfinite(q[:, :, 0])
         reasons = np.where(own, "", np.where(ideal.reached, LOST, ideal.reasons))
         singular = (replace(one, where=one.where & own) for one in ideal.singular)
@@ -131,6 +137,32 @@ class NearlyClosedForm:
                 same = np.abs(self._apart(one[new][:, [k]], q[rows[new]])).max(axis=2) < SAME
                 new = new[~same.any(axis=1)]
                 q[rows[new], k] = one[new, k]
+
+    def _find_near(
+        self, q: FloatArray, rows: IntArray, targets: Targets, ideal: FloatArray, wish: FloatArray
+    ) -> None:
+        """Write the solution that wished joint values lead to, if it is nearer to them than any known one.
+
+        It takes the place of the branch that it is nearest to: beside a singular pose an arm
+        can have more solutions than the idealised one, and is to stay where it is.
+
+        Args:
+            q: Of all targets, shape (n, k, joints); written.
+            rows: Of the targets that are asked, m of them.
+            targets: Their poses.
+            ideal: Solutions of the idealised arm, shape (m, k, joints).
+            wish: Joint values in [rad] or [m], shape (m, joints).
+        """
+        came = refine(self.chain, targets, wish, metres=MET, radians=MET, iterations=FEW)
+        found, known = self._within_turn(came.q), q[rows]
+        lost = np.isnan(known[:, :, 0])
+        far = np.square(self._apart(known, wish[:, None])).sum(axis=2)
+        nearer = np.square(self._apart(found, wish)).sum(axis=1) < np.where(lost, np.inf, far).min(axis=1)
+        same = np.abs(self._apart(found[:, None], known)).max(axis=2) < SAME
+        away = np.square(self._apart(found[:, None], np.where(lost[..., None], ideal, known))).sum(axis=2)
+        branch = np.argmin(np.where(np.isnan(away), np.inf, away), axis=1)
+        new = came.converged & nearer & ~same.any(axis=1)
+        q[rows[new], branch[new]] = found[new]
 
     def _refined(self, targets: Targets, start: FloatArray, row: IntArray, slot: IntArray) -> FloatArray:
         """Return what starts lead to, shape (m, k, joints).
