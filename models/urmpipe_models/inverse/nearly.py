@@ -101,8 +101,12 @@ class NearlyClosedForm:
             starts = [self.form.solve(one, None if wish is None else wish[rows]).q for one in beside]
             self._find(q, rows, targets.rows(rows), starts)
             if wish is not None:
-                rows = np.arange(i, min(i + BLOCK, count))
-                self._find_near(q, rows, targets.rows(rows), ideal.q[rows], wish[rows])
+                begun = ideal.q[i : i + BLOCK].copy()
+                for one in starts:
+                    begun[rows - i] = np.where(np.isnan(begun[rows - i]), one, begun[rows - i])
+                near_any = np.flatnonzero(np.isfinite(begun).any(axis=(1, 2)))
+                rows = i + near_any
+                self._find_near(q, rows, targets.rows(rows), begun[near_any], wish[rows])
         own = np.isfinite(q[:, :, 0])
         reasons = np.where(own, "", np.where(ideal.reached, LOST, ideal.reasons))
         singular = (replace(one, where=one.where & own) for one in ideal.singular)
@@ -139,7 +143,7 @@ class NearlyClosedForm:
                 q[rows[new], k] = one[new, k]
 
     def _find_near(
-        self, q: FloatArray, rows: IntArray, targets: Targets, ideal: FloatArray, wish: FloatArray
+        self, q: FloatArray, rows: IntArray, targets: Targets, start: FloatArray, wish: FloatArray
     ) -> None:
         """Write the solution that wished joint values lead to, if it is nearer to them than any known one.
 
@@ -150,7 +154,7 @@ class NearlyClosedForm:
             q: Of all targets, shape (n, k, joints); written.
             rows: Of the targets that are asked, m of them.
             targets: Their poses.
-            ideal: Solutions of the idealised arm, shape (m, k, joints).
+            start: Of each branch, shape (m, k, joints); NaN where there is none.
             wish: Joint values in [rad] or [m], shape (m, joints).
         """
         came = refine(self.chain, targets, wish, metres=MET, radians=MET, iterations=FEW)
@@ -159,7 +163,7 @@ class NearlyClosedForm:
         far = np.square(self._apart(known, wish[:, None])).sum(axis=2)
         nearer = np.square(self._apart(found, wish)).sum(axis=1) < np.where(lost, np.inf, far).min(axis=1)
         same = np.abs(self._apart(found[:, None], known)).max(axis=2) < SAME
-        away = np.square(self._apart(found[:, None], np.where(lost[..., None], ideal, known))).sum(axis=2)
+        away = np.square(self._apart(found[:, None], np.where(lost[..., None], start, known))).sum(axis=2)
         branch = np.argmin(np.where(np.isnan(away), np.inf, away), axis=1)
         new = came.converged & nearer & ~same.any(axis=1)
         q[rows[new], branch[new]] = found[new]

@@ -155,6 +155,8 @@ def test_a_target_out_of_reach_or_not_finite_has_a_reason_and_stops_no_other() -
         solutions.reasons[1, 0],
     )
     assert solutions.reason(2) == "the target is not finite, allowed: finite numbers"
+    stays = nearly(chain).solve(Targets(position, good.rotation), np.zeros(6))
+    assert stays.reached.any(axis=1).tolist() == [True, False, False]
     alone = nearly(chain).solve(good)
     np.testing.assert_array_equal(solutions.q[0], alone.q[0])
 
@@ -169,10 +171,16 @@ def test_a_branch_that_is_lost_beside_a_singular_pose_says_so() -> None:
     assert (solutions.reasons == LOST).any()
 
 
-def test_no_targets_have_no_solutions() -> None:
+@pytest.mark.parametrize("near", [None, np.zeros(6)])
+def test_no_targets_have_no_solutions(near: FloatArray | None) -> None:
     chain = as_built(load_robot("arm6"), 1e-4)
-    solutions = nearly(chain).solve(Targets(np.empty((0, 3)), np.empty((0, 3, 3))))
+    solutions = nearly(chain).solve(Targets(np.empty((0, 3)), np.empty((0, 3, 3))), near)
     assert solutions.q.shape == (0, 8, 6)
+
+
+def test_positions_with_any_orientation_are_refused() -> None:
+    with pytest.raises(ValueError, match="allowed: poses"):
+        nearly(as_built(load_robot("arm6"), 1e-4)).solve(Targets(np.zeros((1, 3))))
 
 
 @pytest.mark.parametrize("name", ["arm6", "ur5e"])
