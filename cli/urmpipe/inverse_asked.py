@@ -15,7 +15,7 @@ from urmpipe.inverse_targets import GivenTargets
 from urmpipe_models.catalogue import robot_names
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
+from urmpipe_models.inverse.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.solutions import FloatArray
 from urmpipe_models.inverse.solve import METHODS, Method
 from urmpipe_models.transform import Transform
@@ -53,8 +53,9 @@ class Asked:
     @property
     def form(self) -> ClosedForm | None:
         """The closed form by which the targets are solved, if they are."""
-        poses = self.given.targets.rotation is not None
-        return closed_form(self.arm) if poses and self.method != "iterative" else None
+        if self.given.targets.rotation is None or self.method == "iterative":
+            return None
+        return closed_form(self.arm) if self.given.t_ns is None else exact_form(self.arm)
 
     @property
     def begin(self) -> FloatArray:

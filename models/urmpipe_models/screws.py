@@ -8,9 +8,10 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.frames import frames
 from urmpipe_models.kinematics import tip_pose
+from urmpipe_models.transform import Transform
 
 FloatArray: TypeAlias = NDArray[np.float64]
 
@@ -67,3 +68,32 @@ def screws(chain: Chain) -> Screws | None:
         np.array(tip.rotation, dtype=float),
         np.array(tip.translation, dtype=float),
     )
+
+
+def chain_of(screws: Screws, names: tuple[str, ...]) -> Chain:
+    """Return a chain that has these screws: each joint's frame on a point of its axis, turned as the world.
+
+    Args:
+        screws: Of its joints.
+        names: Of its joints.
+    """
+    offsets = np.diff(np.vstack((np.zeros(3), screws.point)), axis=0)
+    joints = tuple(
+        Joint(
+            name,
+            "revolute" if revolute else "prismatic",
+            Transform(translation=_vector(offset)),
+            _vector(direction),
+        )
+        for name, revolute, offset, direction in zip(
+            names, screws.revolute, offsets, screws.direction, strict=True
+        )
+    )
+    x, y, z = (_vector(row) for row in screws.rotation)
+    return Chain("screws", joints, Transform((x, y, z), _vector(screws.position - screws.point[-1])))
+
+
+def _vector(values: FloatArray) -> tuple[float, float, float]:
+    """Return three numbers as a tuple."""
+    x, y, z = (float(one) for one in values)
+    return x, y, z

@@ -7,19 +7,6 @@ import numpy as np
 from urmpipe_models.elementwise import cross, dot
 from urmpipe_models.inverse.solutions import FloatArray
 from urmpipe_models.inverse.trigonometric import wrapped
-from urmpipe_models.transform import rotation_about
-
-
-def turned(axis: FloatArray, angle: FloatArray, vector: FloatArray) -> FloatArray:
-    """Return vectors turned about an axis: R(axis, angle) vector, shape (3, ...).
-
-    Args:
-        axis: Unit vector, shape (3,).
-        angle: In [rad], shape (...).
-        vector: Shape (3, ...), each of its coordinates broadcasts with the angle.
-    """
-    parts = rotation_about(axis.tolist(), angle).rotate((vector[0], vector[1], vector[2]))
-    return np.stack(np.broadcast_arrays(*parts, angle)[:3])
 
 
 def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:

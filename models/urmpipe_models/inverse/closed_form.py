@@ -6,6 +6,7 @@ from functools import lru_cache
 from typing import Protocol
 
 from urmpipe_models.chain import Chain
+from urmpipe_models.inverse.nearly import nearly_closed_form
 from urmpipe_models.inverse.parallel_axes import parallel_axes
 from urmpipe_models.inverse.solutions import FloatArray, Solutions
 from urmpipe_models.inverse.spherical_wrist import spherical_wrist
@@ -17,13 +18,14 @@ class ClosedForm(Protocol):
     """The inverse of one arm, written down.
 
     Attributes:
-        name: What makes it possible: "spherical wrist" or "three parallel axes".
+        name: What makes it possible: "spherical wrist" or "three parallel axes"; of an arm that
+            deviates a little from that with ", nearly" behind it.
         branches: What its solutions are called, in their order.
     """
 
     @property
     def name(self) -> str:
-        """What makes it possible."""
+        """What makes it possible, such as "spherical wrist"."""
         ...
 
     @property
@@ -46,8 +48,23 @@ class ClosedForm(Protocol):
 def closed_form(chain: Chain) -> ClosedForm | None:
     """Return the closed form of an arm, recognised from its geometry alone; None if it has none.
 
-    Six revolute joints, whatever they are described by, on any base and with any tool, of which the axes of
-    the last three meet in a point, or those of joints 2, 3 and 4 are parallel.
+    Six joints, whatever they are described by, on any base and with any tool, of which the axes of the last
+    three meet in a point, or those of joints 2, 3 and 4 are parallel: exactly (`exact_form`) or nearly
+    (`nearly.NearlyClosedForm`).
+    """
+    exact = exact_form(chain)
+    of_chain = screws(chain)
+    if exact is not None or of_chain is None:
+        return exact
+    return nearly_closed_form(chain, of_chain)
+
+
+@lru_cache(maxsize=32)
+def exact_form(chain: Chain) -> ClosedForm | None:
+    """Return the closed form of an arm that has it to the rounding; None if it has none.
+
+    Paths are followed by these alone: beside singular poses the branches of an arm that only nearly has one
+    are not those of the idealised arm.
     """
     of_chain = screws(chain)
     if of_chain is None:

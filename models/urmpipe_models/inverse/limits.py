@@ -67,6 +67,8 @@ def within_pi(q: FloatArray, period: FloatArray) -> FloatArray:
     values = q.copy()
     values[..., turning] -= TURN * np.ceil((q[..., turning] - math.pi) / TURN)
     return values
+
+
 def nearest_to_limits(chain: Chain, q: FloatArray) -> FloatArray:
     """Return joint values in [rad] or [m], shape (n, joints), each in the turn nearest to its limits."""
     lower, upper = _limits(chain)

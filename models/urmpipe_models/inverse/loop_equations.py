@@ -111,7 +111,7 @@ def loop_equations(screws: Screws, wrist: FloatArray) -> LoopEquations:
     """Return the equations of the first three screws for the wrist centre at q = 0, both in one unit."""
     (k1, k2, k3), (o1, o2, o3) = screws.direction[:3], screws.point[:3]
     r1, r2, r3 = (bool(one) for one in screws.revolute[:3])
-    origin = _nearest_point(o2, k2, o1, k1) if r1 and r2 else _foot(wrist, o2, k2)
+    origin = nearest_point(o2, k2, o1, k1) if r1 and r2 else _foot(wrist, o2, k2)
     across = np.stack(_across(k2, k1, k3))
     if r3:
         centre = _foot(wrist, o3, k3)
@@ -171,7 +171,7 @@ def _foot(point: FloatArray, origin: FloatArray, axis: FloatArray) -> FloatArray
     return np.asarray(origin + axis * (axis @ (point - origin)))
 
 
-def _nearest_point(origin: FloatArray, axis: FloatArray, other: FloatArray, along: FloatArray) -> FloatArray:
+def nearest_point(origin: FloatArray, axis: FloatArray, other: FloatArray, along: FloatArray) -> FloatArray:
     """Return the point of a line that is nearest to another line; to the other's point where parallel."""
     normal = np.cross(axis, along)
     square = float(normal @ normal)

@@ -8,7 +8,7 @@ as an arm of two links in their plane:
 with P a motion in the plane, which takes a point of axis 4 to where the two links have to reach.
 
 Up to eight solutions. Axes 2, 3, 4 that are not parallel to 1e-10 rad, as those of a UR arm whose kinematics
-were calibrated, have no such form: they are for the iterative solver.
+were calibrated, have no such form; `nearly` solves them from that of the arm with its axes made parallel.
 
 Near one family of singular poses, and near an aligned wrist of a stretched arm, every pose is met to 1e-10.
 Within 1e-5 rad of both the stretched arm and the least distance of the wrist from axis 1, and within 1e-4 rad

@@ -14,7 +14,7 @@ from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.branch_walk import walk
 from urmpipe_models.inverse.checks import checked
-from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
+from urmpipe_models.inverse.closed_form import ClosedForm, exact_form
 from urmpipe_models.inverse.farthest import too_far
 from urmpipe_models.inverse.joint_path import JointPath, SingularStretch
 from urmpipe_models.inverse.joint_speeds import too_fast
@@ -92,7 +92,7 @@ def follow(
     faults = [*_time_faults(t_ns, len(targets)), *_option_faults(chain, begin, tolerance, restarts)]
     if faults:
         raise OptionError(*faults)
-    form = None if targets.rotation is None else closed_form(chain)
+    form = None if targets.rotation is None else exact_form(chain)
     if form is None:
         far = too_far(chain, targets, tolerance)
         reasons = [fault or reason for fault, reason in zip(reasons, far, strict=True)]

@@ -14,6 +14,9 @@ from urmpipe_models.inverse.solutions import BoolArray, FloatArray, TextArray
 PURE = 1e-6
 """A combination of the equations holds one of them alone if the other's share is smaller than this."""
 
+CLEAR = 1e-3
+"""What is outside by more than this, in [m], is told to the millimetre."""
+
 NOT_FINITE = "the target is not finite, allowed: finite numbers"
 
 
@@ -62,7 +65,8 @@ class Reach:
         """
         found, what = self._measured(share, value[missed])
         (least, most), _ = self._measured(share, np.array(self._range(share)))
-        reasons[missed] = [_outside(one, least, most, what) for one in found.tolist()]
+        figures, which = np.unique(found, return_inverse=True)  # both elbows have one
+        reasons[missed] = _outside_range(figures, float(least), float(most), what)[which]
 
     def tell_place(self, reasons: TextArray, missed: BoolArray, seen: Seen) -> None:
         """Tell where a wrist centre is that no further posture reaches, by its cylinder coordinates."""
@@ -104,14 +108,27 @@ class Reach:
         return bool(np.linalg.norm(np.cross(self.equations.axis, self.equations.third.axis)) <= PURE)
 
 
+def _outside_range(found: FloatArray, least: float, most: float, what: str) -> TextArray:
+    """Return `_outside` of many figures and one range; what they share is written once."""
+    clear = np.isfinite(found) & (np.maximum(least - found, found - most) > CLEAR)
+    ending = f" m {what}, {_allowed(least, most, 3)}"
+    texts: TextArray = np.empty(len(found), dtype=np.object_)
+    texts[clear] = [f"the wrist centre is {one:.3f}{ending}" for one in found[clear].tolist()]
+    texts[~clear] = [_outside(one, least, most, what) for one in found[~clear].tolist()]
+    return texts
+
+
 def _outside(found: float, least: float, most: float, what: str) -> str:
     """Return what was found and what is allowed, with as many digits as tell found and limit apart."""
     if not math.isfinite(found):
         return NOT_FINITE
     away = max(least - found, found - most)
-    digits = 3 if away > 1e-3 else min(13, 1 - math.floor(math.log10(max(away, 1e-12))))
+    digits = 3 if away > CLEAR else min(13, 1 - math.floor(math.log10(max(away, 1e-12))))
+    return f"the wrist centre is {found:.{digits}f} m {what}, {_allowed(least, most, digits)}"
+
+
+def _allowed(least: float, most: float, digits: int) -> str:
+    """Return a range in words."""
     if math.isinf(most):
-        return f"the wrist centre is {found:.{digits}f} m {what}, allowed: {least:.{digits}f} m or more"
-    return (
-        f"the wrist centre is {found:.{digits}f} m {what}, allowed: {least:.{digits}f} to {most:.{digits}f} m"
-    )
+        return f"allowed: {least:.{digits}f} m or more"
+    return f"allowed: {least:.{digits}f} to {most:.{digits}f} m"

@@ -158,3 +158,31 @@ def no_solutions(reasons: Sequence[str], branches: tuple[str, ...], joints: int)
     count = len(reasons)
     texts = np.repeat(np.array(reasons, dtype=np.object_)[:, None], len(branches), axis=1)
     return Solutions(np.full((count, len(branches), joints), np.nan), branches, texts)
+
+
+def joined(parts: Sequence[Solutions]) -> Solutions:
+    """Return solutions of targets one after the other from those of parts of them, one part at least.
+
+    All have the same branches; a family of singular poses is one where its name and its texts are.
+    """
+    families = dict.fromkeys((one.family, one.free, one.chosen) for part in parts for one in part.singular)
+    return Solutions(
+        np.concatenate([part.q for part in parts]),
+        parts[0].branches,
+        np.concatenate([part.reasons for part in parts]),
+        tuple(Singular(family, _where(parts, (family, *texts)), *texts) for family, *texts in families),
+        np.concatenate([part.shortfall for part in parts]),
+        np.concatenate([part.labels for part in parts]),
+    )
+
+
+def _where(parts: Sequence[Solutions], family: tuple[str, ...]) -> BoolArray:
+    """Return where the solutions of all parts lie in a family of singular poses."""
+    where = []
+    for part in parts:
+        of_part = np.zeros(part.q.shape[:2], dtype=bool)
+        for one in part.singular:
+            if (one.family, one.free, one.chosen) == family:
+                of_part |= one.where
+        where.append(of_part)
+    return np.concatenate(where)

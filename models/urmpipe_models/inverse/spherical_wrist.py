@@ -6,7 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.inverse.angles import turned
 from urmpipe_models.inverse.position_arm import PositionArm, position_arm
 from urmpipe_models.inverse.postures import Postures
 from urmpipe_models.inverse.solutions import (
@@ -16,10 +15,13 @@ from urmpipe_models.inverse.solutions import (
     SingularFamily,
     Solutions,
     TextArray,
+    joined,
 )
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.wrist_joints import Wrist, WristAngles
+from urmpipe_models.kinematics import THREADS
 from urmpipe_models.screws import Screws
+from urmpipe_models.transform import rotation_about
 
 MEETING_POINT = 1e-11
 """Axes 4 to 6 meet in one point if none passes it by more than this, in units of the arm's size.
@@ -30,6 +32,9 @@ form keeps. An arm whose description is rounded more coarsely has no closed form
 
 TILT = 1e-6
 """Axes 4 and 5, and 5 and 6, must stand at an angle whose sine is larger than this."""
+
+BLOCK = 5000
+"""Targets worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
 
 FLIPS = "not flipped", "flipped"
 
@@ -87,34 +92,55 @@ class SphericalWrist:
         if targets.rotation is None:
             raise ValueError("targets without orientation; allowed: poses")
         count = len(targets)
-        chosen = None if near is None else np.broadcast_to(near, (count, 6)).T
-        rotation = targets.rotation @ self.screws.rotation.T
+        wish = None if near is None else np.broadcast_to(near, (count, 6))
+        if count <= BLOCK:
+            return self._block(targets.position, targets.rotation, wish)
+        blocks = [slice(start, start + BLOCK) for start in range(0, count, BLOCK)]
+        positions, rotations = targets.position, targets.rotation
+
+        def work(rows: slice) -> Solutions:
+            """Return the solutions of the targets of a block."""
+            return self._block(positions[rows], rotations[rows], None if wish is None else wish[rows])
+
+        from concurrent.futures import ThreadPoolExecutor
+
+        with ThreadPoolExecutor(THREADS) as pool:  # NumPy computes without Python's lock
+            return joined(list(pool.map(work, blocks)))
+
+    def _block(self, positions: FloatArray, rotations: FloatArray, near: FloatArray | None) -> Solutions:
+        """Return the solutions of some targets, near of shape (n, joints)."""
+        chosen = None if near is None else near.T
+        rotation = rotations @ self.screws.rotation.T
         with np.errstate(invalid="ignore", over="ignore"):
-            position = targets.position.T + np.einsum(
-                "nij,j->in", rotation, self.centre - self.screws.position
-            )
+            position = positions.T + np.einsum("nij,j->in", rotation, self.centre - self.screws.position)
             postures = self.arm.solve(position, None if chosen is None else chosen[:3])
             angles = self._wrist_angles(rotation, postures.q, None if chosen is None else chosen[3])
         return self._solutions(postures, angles, chosen is not None)
 
     def _wrist_angles(self, rotation: FloatArray, q: FloatArray, near: FloatArray | None) -> WristAngles:
         """Return joints 4 to 6 of every posture, shape (3, 2, k * n)."""
-        seen = [rotation @ self.wrist.axes[2], rotation @ self.wrist.across_tool]
+        seen = [tuple((rotation @ one).T) for one in (self.wrist.axes[2], self.wrist.across_tool)]
         for joint in np.flatnonzero(self.screws.revolute[:3]):
-            seen = [turned(self.screws.direction[joint], -q[joint], one) for one in _columns(seen)]
-        tool_axis, across = (np.broadcast_to(one, q.shape).reshape(3, -1) for one in _columns(seen))
+            turn = rotation_about(self.screws.direction[joint].tolist(), -q[joint])
+            seen = [turn.rotate(one) for one in seen]
+        tool_axis, across = (
+            np.stack([np.broadcast_to(part, q.shape[1:]) for part in one]).reshape(3, -1) for one in seen
+        )
         free = np.zeros(q.shape[1:]) if near is None else np.broadcast_to(near, q.shape[1:])
         return self.wrist.solve(tool_axis, across, free.reshape(-1))
 
     def _solutions(self, postures: Postures, angles: WristAngles, near: bool) -> Solutions:
         """Return postures and wrist angles, put together target by target."""
         k, n = postures.reasons.shape
+        last = angles.q.reshape(3, 2, k, n)
+        both = np.asarray(np.isfinite(last).all(axis=0) & np.isfinite(postures.q).all(axis=0))
+        whole = both.transpose(2, 1, 0)
         parted = np.empty((n, k, 2, 6))
         parted[..., :3] = postures.q.transpose(2, 1, 0)[:, :, None]
-        parted[..., 3:] = angles.q.reshape(3, 2, k, n).transpose(3, 2, 1, 0)
-        parted[~np.isfinite(parted).all(axis=3)] = np.nan
-        q = parted.reshape(n, 2 * k, 6) + 0.0  # no -0.0
-        reached = np.isfinite(q[:, :, 0])
+        parted[..., 3:] = last.transpose(3, 2, 1, 0)
+        parted[~whole] = np.nan
+        parted += 0.0  # no -0.0
+        q, reached = parted.reshape(n, 2 * k, 6), whole.reshape(n, 2 * k)
         reasons = self._reasons(postures, angles, reached)
         return Solutions(q, self.branches, reasons, tuple(self._singular(postures, angles, reached, near)))
 
@@ -174,7 +200,7 @@ def spherical_wrist(screws: Screws, names: tuple[str, ...]) -> SphericalWrist | 
     axes = screws.direction[3:]
     if min(np.linalg.norm(np.cross(axes[0], axes[1])), np.linalg.norm(np.cross(axes[1], axes[2]))) <= TILT:
         return None
-    centre = _meeting_point(axes, screws.point[3:])
+    centre = meeting_point(axes, screws.point[3:])
     passing = np.linalg.norm(np.cross(centre - screws.point[3:], axes), axis=1)
     if passing.max() > MEETING_POINT * screws.size:
         return None
@@ -182,15 +208,10 @@ def spherical_wrist(screws: Screws, names: tuple[str, ...]) -> SphericalWrist | 
     return None if arm is None else SphericalWrist(arm, Wrist(axes), screws, centre, names)
 
 
-def _meeting_point(axes: FloatArray, points: FloatArray) -> FloatArray:
+def meeting_point(axes: FloatArray, points: FloatArray) -> FloatArray:
     """Return the point nearest to lines: the least squares of its distances from them."""
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     return np.asarray(np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points)))
-
-
-def _columns(seen: list[FloatArray]) -> list[FloatArray]:
-    """Return vectors, one a row (n, 3), as columns (3, 1, n); columns as they are."""
-    return [one.T[:, None] if one.ndim == 2 else one for one in seen]
 
 
 def _chosen(joint: str, near: bool, more: str) -> str:

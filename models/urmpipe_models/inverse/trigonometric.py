@@ -25,8 +25,12 @@ POLISHING = 4
 
 def wrapped(angle: FloatArray) -> FloatArray:
     """Return the angle in (-pi, pi], in [rad]."""
-    turned = angle - 2 * np.pi * np.round(angle / (2 * np.pi))
-    return np.where(turned <= -np.pi, turned + 2 * np.pi, turned)
+    turns = np.asarray(angle / (2 * np.pi))
+    np.round(turns, out=turns)
+    turns *= 2 * np.pi
+    turned = np.subtract(angle, turns, out=turns)
+    turned[turned <= -np.pi] += 2 * np.pi
+    return turned
 
 
 def linear_roots(a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[FloatArray, FloatArray]:

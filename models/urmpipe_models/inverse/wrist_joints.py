@@ -6,10 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.inverse.angles import angle_about, angle_between, turned
+from urmpipe_models.inverse.angles import angle_about, angle_between
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray
 from urmpipe_models.inverse.tracks import MEETING
 from urmpipe_models.inverse.trigonometric import BOUNDARY, wrapped
+from urmpipe_models.transform import rotation_about
 
 ALIGNED = 1e-11
 """Axes 4 and 6 at a smaller angle than this, in [rad], count as one line.
@@ -88,10 +89,13 @@ class Wrist:
         level = float(angle_about(k5, k6, k4))
         in_line = (np.sin(angle) <= ALIGNED) & np.isfinite(away)
         q5 = wrapped(level + np.stack((away, -away)))
-        raised = turned(k5, q5, k6)
+        fifth = rotation_about(k5.tolist(), q5)
+        raised = np.stack(np.broadcast_arrays(*fifth.rotate(tuple(k6.tolist())), q5)[:3])
         q4 = angle_about(k4, raised, np.broadcast_to(tool_axis[:, None], raised.shape))
         q4 = np.where(in_line, wrapped(chosen + np.array([[0.0], [np.pi]])), q4)
-        q6 = angle_about(k6, self.across_tool, turned(k5, -q5, turned(k4, -q4, across[:, None])))
+        before_fifth = rotation_about(k4.tolist(), -q4).rotate(tuple(across[:, None]))
+        before_sixth = np.stack(fifth.inverse().rotate(before_fifth))
+        q6 = angle_about(k6, self.across_tool, before_sixth)
         q = np.where(np.isfinite(away), np.stack((q4, q5, q6)), np.nan)
         meet = meet & (np.abs(wrapped(q4[0] - q4[1])) < SAME_ANGLE)
         q[:, 1, meet] = np.nan

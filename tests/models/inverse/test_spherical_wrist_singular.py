@@ -13,6 +13,7 @@ from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain
 from urmpipe_models.dh import DHRow, dh_chain
 from urmpipe_models.inverse.solutions import Solutions
+from urmpipe_models.inverse.spherical_wrist import BLOCK
 from urmpipe_models.inverse.targets import targets_of
 from urmpipe_models.kinematics import jacobian_over_log
 
@@ -260,3 +261,25 @@ def test_beside_where_the_flips_of_a_wrist_that_is_not_square_meet(distance: flo
         assert "the same as right, elbow down, not flipped: both meet here" in solutions.reasons
     if distance >= 1e-4:
         assert meeting == []
+
+
+def test_blocks_of_targets_are_as_single_ones_with_their_singular_poses() -> None:
+    q = np.random.default_rng(8).uniform(-math.pi, math.pi, (2 * BLOCK + 3, 6))
+    aligned = [0, BLOCK - 1, BLOCK, 2 * BLOCK + 1]
+    q[aligned, 4] = 0.0
+    stretched = BLOCK + 7  # in the second block alone
+    q[stretched, 2] = ELBOW
+    targets = targets_of(ARM, q)
+    targets.position[2 * BLOCK + 2] = np.nan
+    every = FORM.solve(targets, q)
+    assert [(one.family, one.free) for one in every.singular] == [
+        ("wrist aligned", "theta4 and theta6: only their sum is determined"),
+        ("arm stretched", ""),
+    ]
+    assert np.flatnonzero(every.singular[0].where.any(axis=1)).tolist() == aligned
+    assert np.flatnonzero(every.singular[1].where.any(axis=1)).tolist() == [stretched]
+    for row in (*aligned, stretched, 2 * BLOCK + 2):
+        alone = FORM.solve(targets.rows(slice(row, row + 1)), q[row])
+        np.testing.assert_array_equal(every.q[row], alone.q[0])
+        assert every.reasons[row].tolist() == alone.reasons[0].tolist()
+        assert every.families(row) == alone.families(0)
