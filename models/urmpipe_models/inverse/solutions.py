@@ -34,6 +34,9 @@ wrist that is not square, are one.
 NEAREST_POINT = "nearest point"
 """What a solution is called that comes as near as it can to a target out of reach."""
 
+NO_BRANCH = "found by search"
+"""What a solution is called that none of the branches of an arm with a closed form leads to."""
+
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Singular:

@@ -12,11 +12,12 @@ import numpy as np
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.checks import checked
-from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
+from urmpipe_models.inverse.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.free_joints import within_limits_by_choice
 from urmpipe_models.inverse.limits import periods
 from urmpipe_models.inverse.solutions import (
     NEAREST_POINT,
+    NO_BRANCH,
     BoolArray,
     FloatArray,
     Singular,
@@ -78,7 +79,8 @@ def solve(
         raise OptionError(*faults)
     begin = _starts(chain, len(targets), start)
     good = np.array([not reason for reason in reasons], dtype=bool)
-    search = _Search(chain, every, tolerance, restarts, seed)
+    rest = tolerance is not None or (method == "auto" and form is not None and form != exact_form(chain))
+    search = _Search(chain, every, tolerance, restarts, seed, rest)
     if form is None:
         found = search.iteratively(targets.rows(good), begin[good])
     else:
@@ -96,16 +98,19 @@ class _Search:
     tolerance: float | None
     restarts: int
     seed: int
+    rest: bool
+    """Whether what a closed form does not reach is searched for: the nearest points, or what one that holds
+    nearly may have lost."""
 
     def by_closed_form(
         self, form: ClosedForm, targets: Targets, start: FloatArray, near: FloatArray | None
     ) -> Solutions:
-        """Return the branches within the limits, or the nearest of them; what is out of reach approached."""
+        """Return the branches within limits, or the nearest; what they do not reach is searched for."""
         found = within_limits_by_choice(self.chain, targets, form.solve(targets, near), start)
         if not self.every:
             found = found.picked(found.nearest_column(start, periods(self.chain)), NEAREST)
         out = np.asarray(~found.reached.any(axis=1))
-        if self.tolerance is None or not out.any():
+        if not self.rest or not out.any():
             return found
         return _approached(found, out, replace(self, every=False).iteratively(targets.rows(out), start[out]))
 
@@ -133,7 +138,8 @@ def _approached(found: Solutions, out: BoolArray, nearest: Solutions) -> Solutio
     q, shortfall = found.q.copy(), found.shortfall.copy()
     reasons, labels = found.reasons.copy(), found.labels.copy()
     q[met, 0], shortfall[met, 0] = nearest.q[near, 0], nearest.shortfall[near, 0]
-    reasons[met, 0], labels[met, 0] = "", NEAREST_POINT
+    reasons[met, 0] = ""
+    labels[met, 0] = np.where(shortfall[met, 0] > 0.0, NEAREST_POINT, NO_BRANCH)
     return replace(found, q=q, reasons=reasons, shortfall=shortfall, labels=labels)
 
 
@@ -200,6 +206,6 @@ def _no_closed_form(chain: Chain, position_only: bool) -> str:
     if position_only:
         return "method closed: found positions with any orientation, allowed: poses; use method iterative"
     return (
-        f"method closed: robot {chain.name} has no closed form, allowed: six revolute joints whose last three"
-        " axes meet in a point or whose axes 2, 3 and 4 are parallel; use method iterative"
+        f"method closed: robot {chain.name} has no closed form, allowed: six joints whose last three axes"
+        " meet in a point or whose axes 2, 3 and 4 are parallel, exactly or nearly; use method iterative"
     )

@@ -18,6 +18,7 @@ from urmpipe_models.inverse.closed_form import closed_form, exact_form
 from urmpipe_models.inverse.idealised import compact
 from urmpipe_models.inverse.nearly import LOST, NearlyClosedForm
 from urmpipe_models.inverse.solutions import Solutions
+from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.inverse.trigonometric import wrapped
 from urmpipe_models.kinematics import jacobian_over_log, poses_over_log
@@ -235,3 +236,17 @@ def test_beside_a_singular_pose_an_arm_stays_where_it_is_wished(name: str) -> No
     assert_reached(chain, targets, solutions)
     assert away_from(chain, solutions, q).min(axis=1).max() < 1e-4
     assert away_from(chain, nearly(chain).solve(targets), q).min(axis=1).max() > 0.1  # unasked
+
+
+def test_where_no_branch_is_left_a_target_is_searched_for_unless_only_a_closed_form_is_allowed() -> None:
+    chain = as_built(load_robot("ur5e"), 2e-3, seed=1)
+    q = np.random.default_rng(2).uniform(-np.pi, np.pi, (20000, 6))[[0, 14555]]
+    targets = targets_of(chain, q)
+    found = solve(chain, targets)
+    assert_reached(chain, targets, found)
+    assert found.reached[:, 0].all()
+    only = solve(chain, targets, method="closed")
+    assert only.reached[:, 0].tolist() == [True, False]  # else the second is no example any more
+    assert found.labels[:, 0].tolist() == [only.labels[0, 0], "found by search"]
+    assert np.array_equal(found.q[0], only.q[0])
+    assert found.reasons[:, 0].tolist() == ["", ""]

@@ -318,8 +318,8 @@ def test_everything_wrong_with_the_options_is_told_at_once() -> None:
     assert [str(one) for one in caught.value.findings] == [
         "start: found a value that is not finite, allowed: finite numbers in rad and m",
         "tolerance: found inf m, allowed: more than 0, finite",
-        "method closed: robot urm6 has no closed form, allowed: six revolute joints whose last three axes"
-        " meet in a point or whose axes 2, 3 and 4 are parallel; use method iterative",
+        "method closed: robot urm6 has no closed form, allowed: six joints whose last three axes meet in a"
+        " point or whose axes 2, 3 and 4 are parallel, exactly or nearly; use method iterative",
     ]
 
 
