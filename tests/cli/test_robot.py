@@ -13,28 +13,14 @@ import numpy as np
 import pytest
 
 from urmpipe.chain_drawing import chain_svg, chain_text
-from urmpipe_models.catalogue import load_robot
+from urmpipe_models.catalogue import load_robot, robot_names
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.kinematics import points_over_log
 from urmpipe_models.robot_file import chain_from_dict
 from urmpipe_models.urdf_reader import read_urdf
 from urmpipe_models.urdf_writer import write_urdf
 
-NAMES = [
-    "arm6",
-    "articulated6r",
-    "iiwa14",
-    "panda",
-    "ur3",
-    "ur5",
-    "ur10",
-    "ur3e",
-    "ur5e",
-    "ur10e",
-    "urm4",
-    "urm6",
-    "urm8",
-]
+NAMES = list(robot_names())
 
 
 def skeleton(name: str) -> Any:

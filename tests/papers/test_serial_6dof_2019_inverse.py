@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from serial_6dof_rows import INVERSE
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.spherical_wrist import SphericalWrist, spherical_wrist
@@ -73,20 +74,7 @@ def test_6_1_default_position_has_eight_solutions_in_the_papers_order(inverse: S
     pose = target(-69, 0, 112, *DEFAULT)
     solutions = inverse.solve(pose)
     assert_all_reached(solutions, pose)
-    assert_rows(
-        solutions,
-        0,
-        [
-            [-3.1416, -1.1547, -0.4276, 3.1416, 1.5593, 0.0],
-            [-3.1416, -1.1547, -0.4276, 0.0, -1.5593, 3.1416],
-            [-3.1416, 1.7113, 0.7329, 0.0, 0.6974, 3.1416],
-            [-3.1416, 1.7113, 0.7329, -3.1416, -0.6974, 0.0],
-            [0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-            [0.0, 0.0, 0.0, 3.1416, 0.0, 3.1416],
-            [0.0, 4.0689, 0.3053, 0.0, 1.9090, 0.0],
-            [0.0, 4.0689, 0.3053, 3.1416, -1.9090, 3.1416],
-        ],
-    )
+    assert_rows(solutions, 0, INVERSE["6.1"][1])
     assert inverse.branches == (
         "right, elbow down, not flipped",
         "right, elbow down, flipped",
@@ -109,16 +97,7 @@ def test_6_2_stretched_forward_the_right_arm_is_out_of_reach(inverse: SphericalW
     solutions = inverse.solve(pose)
     assert_all_reached(solutions, pose)
     assert solutions.reached.tolist() == [[False] * 4 + [True] * 4]
-    assert_rows(
-        solutions,
-        4,
-        [
-            [0.0, -3.1416, -2.8363, -3.1416, 0.3053, 3.1416],
-            [0.0, -3.1416, -2.8363, 0.0, -0.3053, 0.0],
-            [0.0, -2.9819, 3.1416, -3.1416, 0.1597, 3.1416],
-            [0.0, -2.9819, 3.1416, 0.0, -0.1597, 0.0],
-        ],
-    )
+    assert_rows(solutions, 4, INVERSE["6.2"][1][4:])
     # the wrist is 280 mm from axis 1, the shoulder 30 mm behind it, 20 mm above; a2 = 120, hypot(20, 130)
     assert set(solutions.reasons[0, :4]) == {
         "the wrist centre is 0.311 m from axis 2, allowed: 0.012 to 0.252 m"
@@ -131,20 +110,7 @@ def test_6_3_wrist_on_axis_1_takes_0_and_pi(inverse: SphericalWrist) -> None:
     pose = target(0, 0, 300)
     solutions = inverse.solve(pose)
     assert_all_reached(solutions, pose)
-    assert_rows(
-        solutions,
-        0,
-        [
-            [0.0, 0.5950, -1.4575, 3.1416, 0.7083, -3.1416],
-            [0.0, 0.5950, -1.4575, 0.0, -0.7083, 0.0],
-            [0.0, 2.2145, 1.7628, 0.0, 0.7351, 0.0],
-            [0.0, 2.2145, 1.7628, -3.1416, -0.7351, 3.1416],
-            [3.1416, 0.5950, -1.4575, 3.1416, 0.7083, 0.0],
-            [3.1416, 0.5950, -1.4575, 0.0, -0.7083, -3.1416],
-            [3.1416, 2.2145, 1.7628, 0.0, 0.7351, -3.1416],
-            [3.1416, 2.2145, 1.7628, -3.1416, -0.7351, 0.0],
-        ],
-    )
+    assert_rows(solutions, 0, INVERSE["6.3"][1])
     (on_axis,) = solutions.singular
     assert on_axis.family == "wrist on axis 1"
     assert on_axis.where.all()
@@ -157,14 +123,7 @@ def test_6_4_aligned_wrist_has_four_solutions_two_of_them_of_many(inverse: Spher
     solutions = inverse.solve(pose)
     assert_all_reached(solutions, pose)
     assert solutions.reached.tolist() == [[False] * 4 + [True] * 4]
-    assert_rows(
-        solutions,
-        4,
-        [
-            [6.2832, 1.4111, -2.8363, 3.1416, 0.1456, -3.1416],
-            [6.2832, 1.4111, -2.8363, 0.0, -0.1456, 0.0],
-        ],
-    )
+    assert_rows(solutions, 4, INVERSE["6.4"][1][4:6])
     # at theta5 = 0 the paper splits the sum of theta4 and theta6 otherwise: the first three are unique
     for slot, printed in (
         (6, [6.2832, 1.5708, 3.1416, 0.2450, 0.0, -0.2450]),

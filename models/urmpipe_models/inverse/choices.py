@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_models.chain import Chain
-from urmpipe_models.inverse.iterative import limits_of
-from urmpipe_models.inverse.limits import LIMIT_ROUNDING, TURN
+from urmpipe_models.inverse.limits import LIMIT_ROUNDING, TURN, limits_of
 from urmpipe_models.inverse.solutions import FloatArray, Solutions
 
 

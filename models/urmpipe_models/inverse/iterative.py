@@ -34,7 +34,7 @@ from urmpipe_models.inverse.descent import (
     descend,
 )
 from urmpipe_models.inverse.least_motion import settle
-from urmpipe_models.inverse.limits import periods
+from urmpipe_models.inverse.limits import limits_of, periods
 from urmpipe_models.inverse.small_systems import rows_of
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.inverse.task import (
@@ -123,13 +123,6 @@ def refine(
     residual = np.hypot(progress.distance, turn_length(chain) * progress.angle)
     return Refined(
         progress.q.T, progress.arrived, progress.steps, progress.distance, progress.angle, residual, slack
-    )
-
-
-def limits_of(chain: Chain) -> tuple[FloatArray, FloatArray]:
-    """Return the least and the largest value of every coordinate in [rad] or [m], each of shape (joints,)."""
-    return np.array([joint.lower for joint in chain.moving]), np.array(
-        [joint.upper for joint in chain.moving]
     )
 
 

@@ -25,7 +25,7 @@ def periods(chain: Chain) -> FloatArray:
     turns is allowed and nearest, `within_limits` knows.
     """
     free = [not (math.isfinite(joint.lower) or math.isfinite(joint.upper)) for joint in chain.moving]
-    return np.where(_turns(chain) & np.array(free), TURN, np.inf)
+    return np.where(turning(chain) & np.array(free), TURN, np.inf)
 
 
 def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = None) -> Solutions:
@@ -40,11 +40,11 @@ def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = 
     Returns:
         The solutions; one with a joint that cannot be brought into its limits is NaN and has a reason.
     """
-    lower, upper = _limits(chain)
+    lower, upper = limits_of(chain)
     least = np.ceil((lower - LIMIT_ROUNDING - solutions.q) / TURN)
     most = np.floor((upper + LIMIT_ROUNDING - solutions.q) / TURN)
     wish = 0.0 if near is None else np.atleast_2d(near)[:, None, :]
-    turns = np.where(_turns(chain), np.clip(np.round((wish - solutions.q) / TURN), least, most), 0.0)
+    turns = np.where(turning(chain), np.clip(np.round((wish - solutions.q) / TURN), least, most), 0.0)
     shifted = solutions.q + turns * TURN
     outside = (shifted < lower - LIMIT_ROUNDING) | (shifted > upper + LIMIT_ROUNDING)
     refused = np.asarray(outside.any(axis=2))
@@ -71,18 +71,18 @@ def within_pi(q: FloatArray, period: FloatArray) -> FloatArray:
 
 def nearest_to_limits(chain: Chain, q: FloatArray) -> FloatArray:
     """Return joint values in [rad] or [m], shape (n, joints), each in the turn nearest to its limits."""
-    lower, upper = _limits(chain)
-    limited = _turns(chain) & np.isfinite(lower) & np.isfinite(upper)
+    lower, upper = limits_of(chain)
+    limited = turning(chain) & np.isfinite(lower) & np.isfinite(upper)
     middle = np.where(limited, 0.5 * (lower + upper), 0.0)
     return np.where(limited, q + TURN * np.round((middle - q) / TURN), q)
 
 
-def _limits(chain: Chain) -> tuple[FloatArray, FloatArray]:
-    """Return the lower and upper limits, each of shape (joints,)."""
+def limits_of(chain: Chain) -> tuple[FloatArray, FloatArray]:
+    """Return the least and the largest value of every coordinate in [rad] or [m], each of shape (joints,)."""
     return np.array([one.lower for one in chain.moving]), np.array([one.upper for one in chain.moving])
 
 
-def _turns(chain: Chain) -> BoolArray:
+def turning(chain: Chain) -> BoolArray:
     """Return true of the joints that a whole turn leaves where they were, shape (joints,).
 
     The one that another follows (mimic) is none of them: the other one turns by a multiple.
@@ -96,7 +96,9 @@ def _reasons(chain: Chain, solutions: Solutions, outside: BoolArray) -> TextArra
     texts = solutions.reasons.copy()
     for target, column in zip(*np.nonzero(outside.any(axis=2)), strict=True):
         faults = [
-            _fault(chain.moving[joint], float(solutions.q[target, column, joint]), bool(_turns(chain)[joint]))
+            _fault(
+                chain.moving[joint], float(solutions.q[target, column, joint]), bool(turning(chain)[joint])
+            )
             for joint in np.flatnonzero(outside[target, column])
         ]
         texts[target, column] = "; ".join(faults)

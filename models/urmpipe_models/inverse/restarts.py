@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.inverse.descent import STATIONARY
 from urmpipe_models.inverse.iterative import Refined, refine
-from urmpipe_models.inverse.limits import TURN, within_limits
+from urmpipe_models.inverse.limits import TURN, turning, within_limits
 from urmpipe_models.inverse.solutions import NEAREST_POINT, FloatArray, Solutions
 from urmpipe_models.inverse.targets import Targets, misses
 from urmpipe_models.inverse.task import BoolArray, IntArray, turn_length
@@ -213,10 +213,10 @@ def _distinct(chain: Chain, found: FloatArray) -> FloatArray:
 
 
 def _apart(chain: Chain, a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return a - b, revolute joints by the shorter way."""
+    """Return a - b, joints that a whole turn leaves where they were by the shorter way."""
     apart = np.asarray(a - b)
-    turning = np.array([joint.kind == "revolute" for joint in chain.moving])
-    apart[..., turning] -= TURN * np.round(apart[..., turning] / TURN)
+    turns = turning(chain)
+    apart[..., turns] -= TURN * np.round(apart[..., turns] / TURN)
     return apart
 
 

@@ -17,7 +17,7 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.inverse import holding
-from urmpipe_models.inverse.iterative import limits_of
+from urmpipe_models.inverse.limits import limits_of
 from urmpipe_models.inverse.path_newton import DAMPING, sweep
 from urmpipe_models.inverse.solutions import BoolArray, FloatArray
 from urmpipe_models.inverse.targets import Targets

@@ -16,7 +16,8 @@ from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint, Mimic
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.descent import METHODS, Method
-from urmpipe_models.inverse.iterative import limits_of, refine
+from urmpipe_models.inverse.iterative import refine
+from urmpipe_models.inverse.limits import limits_of
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.inverse.task import redundancy, task_of, turn_between, turn_length
 from urmpipe_models.kinematics import jacobian_over_log

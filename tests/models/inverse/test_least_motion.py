@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.inverse.descent import Settings
-from urmpipe_models.inverse.iterative import limits_of, refine
+from urmpipe_models.inverse.iterative import refine
 from urmpipe_models.inverse.least_motion import AT_LIMIT, LEAST_MOTION, settle
+from urmpipe_models.inverse.limits import limits_of
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.inverse.task import task_of, turn_length
 from urmpipe_models.kinematics import jacobian_over_log

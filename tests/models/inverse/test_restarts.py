@@ -12,8 +12,8 @@ from numpy.typing import NDArray
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain, Joint
 from urmpipe_models.inverse.closed_form import closed_form
-from urmpipe_models.inverse.iterative import limits_of, refine
-from urmpipe_models.inverse.limits import within_limits
+from urmpipe_models.inverse.iterative import refine
+from urmpipe_models.inverse.limits import limits_of, within_limits
 from urmpipe_models.inverse.restarts import DISTINCT, ROUGH, random_starts, solve_iteratively
 from urmpipe_models.inverse.solutions import NEAREST_POINT, Solutions
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
