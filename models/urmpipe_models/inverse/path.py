@@ -89,7 +89,7 @@ def follow(
     """
     targets, reasons = checked(targets)
     begin = np.array(chain.start if start is None else start, dtype=float)
-    faults = [*_time_faults(t_ns, len(targets)), *_option_faults(chain, begin, tolerance, restarts)]
+    faults = [*_time_faults(t_ns, len(targets)), *_option_faults(chain, begin, tolerance, restarts, seed)]
     if faults:
         raise OptionError(*faults)
     form = None if targets.rotation is None else exact_form(chain)
@@ -266,7 +266,9 @@ def _time_faults(t_ns: IntArray, count: int) -> Iterator[str]:
         )
 
 
-def _option_faults(chain: Chain, start: FloatArray, tolerance: float | None, restarts: int) -> Iterator[str]:
+def _option_faults(
+    chain: Chain, start: FloatArray, tolerance: float | None, restarts: int, seed: int
+) -> Iterator[str]:
     """Yield what is wrong with the other options."""
     joints = len(chain.coordinates)
     if start.shape != (joints,) or not np.isfinite(start).all():
@@ -278,3 +280,5 @@ def _option_faults(chain: Chain, start: FloatArray, tolerance: float | None, res
         yield f"tolerance: found {tolerance:g} m, allowed: more than 0, finite"
     if restarts < 0:
         yield f"restarts: found {restarts}, allowed: 0 or more"
+    if seed < 0:
+        yield f"seed: found {seed}, allowed: 0 or more"

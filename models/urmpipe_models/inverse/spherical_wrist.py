@@ -27,7 +27,7 @@ MEETING_POINT = 1e-11
 """Axes 4 to 6 meet in one point if none passes it by more than this, in units of the arm's size.
 
 The tool is then off by no more: 1e-11 of an arm of some metres is well below the 1e-10 m that the closed
-form keeps. An arm whose description is rounded more coarsely has no closed form.
+form keeps. An arm whose description is rounded more coarsely has this closed form nearly (`nearly`).
 """
 
 TILT = 1e-6

@@ -116,7 +116,7 @@ def lay_out(results: Sequence[Result]) -> Page:
         summaries.append(_simulations_summary(simulations, simulated))
     if runs:
         table = log_tables.ingest_table(runs, [f"#r{i}" for i in range(1, len(runs) + 1)])
-        summaries.append(Summary("Ingested logs", (), (table,)))
+        summaries.append(Summary(_logs_title(runs), (), (table,)))
     return Page(
         title=", ".join(result.name for result in results),
         banner=_banner(comparisons, simulations, runs, links, simulated),
@@ -127,6 +127,12 @@ def lay_out(results: Sequence[Result]) -> Page:
             *(_run_part(run, f"r{i}") for i, run in enumerate(runs, start=1)),
         ),
     )
+
+
+def _logs_title(runs: Sequence[Run]) -> str:
+    """Return what is above runs that were not compared: logs, targets of inverse kinematics, or both."""
+    kinds = ("Ingested logs" if run.goals is None else "Solved targets" for run in runs)
+    return " and ".join(sorted(set(kinds))).replace("and Solved", "and solved")
 
 
 def _banner(

@@ -341,6 +341,7 @@ def test_all_that_is_wrong_with_the_options_is_told_at_once() -> None:
             start=np.zeros(5),
             tolerance=-1.0,
             restarts=-1,
+            seed=-1,
         )
     assert [str(one) for one in caught.value.findings] == [
         "t_ns: found 5 ns at sample 2 after 5 ns, allowed: times that rise",
@@ -348,6 +349,7 @@ def test_all_that_is_wrong_with_the_options_is_told_at_once() -> None:
         f" {', '.join(arm.coordinates)}",
         "tolerance: found -1 m, allowed: more than 0, finite",
         "restarts: found -1, allowed: 0 or more",
+        "seed: found -1, allowed: 0 or more",
     ]
     with pytest.raises(
         OptionError, match=r"t_ns: found float64 of shape \(2,\), allowed: integer ns of shape \(3,\)"

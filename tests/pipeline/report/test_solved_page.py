@@ -78,3 +78,10 @@ def test_single_poses_are_points_that_nothing_joins(run: Run) -> None:
 def test_the_targets_missed_stand_before_the_figures(run: Run) -> None:
     (part,) = [part for part in lay_out([run]).parts if part.title == "Log poses"]
     assert [block.title for block in part.blocks[:2]] == ["Targets without a solution (1)", "Joints"]
+
+
+def test_the_heading_says_whether_logs_were_ingested_or_targets_solved(run: Run) -> None:
+    log = replace(run, goals=None)
+    assert [one.title for one in lay_out([run]).summaries] == ["Solved targets"]
+    assert [one.title for one in lay_out([log]).summaries] == ["Ingested logs"]
+    assert [one.title for one in lay_out([run, log]).summaries] == ["Ingested logs and solved targets"]
