@@ -10,14 +10,13 @@ import os
 import statistics
 import sys
 import tempfile
-import time
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from pathlib import Path
 
 import numpy as np
 from bare_fmu import FloatArray, opened, run_bare
-from pairs import Bound, machine, measure, median, rounds, write_results
+from pairs import Bound, machine, measure, median, rounds, timed, write_results
 from pairs import table as process_table
 
 from urmpipe.system_blocks import Blocks
@@ -53,19 +52,12 @@ def chain_unit() -> Unit:
     return make_unit("kinematic_chain", robot=load_robot("urm6"))
 
 
-def seconds(job: Callable[[], object]) -> float:
-    """Return how long a job takes in [s]."""
-    start = time.perf_counter()
-    job()
-    return time.perf_counter() - start
-
-
 def in_turn(jobs: Mapping[str, Callable[[], object]], count: int) -> dict[str, list[float]]:
     """Return how long jobs take in [s], run in turn, after one round that does not count."""
     taken: dict[str, list[float]] = {name: [] for name in jobs}
     for number in range(count + 1):
         for name, job in jobs.items():
-            found = seconds(job)
+            found = timed(job)
             if number:
                 taken[name].append(found)
     return taken
@@ -240,8 +232,8 @@ def cross_part(count: int, folder: Path) -> Part:
         target = folder / f"cross{number}.fmu"
         return build_fmu(chain_unit(), target, platforms=["linux64", "win64"]).path
 
-    first = seconds(partial(build, -1))
-    taken = {"linux64 and win64 by zig": [seconds(partial(build, number)) for number in range(count)]}
+    first = timed(partial(build, -1))
+    taken = {"linux64 and win64 by zig": [timed(partial(build, number)) for number in range(count)]}
     size = (folder / "cross0.fmu").stat().st_size / 1e3
     lines = [
         "## The same chain built by zig for Linux and Windows",

@@ -7,14 +7,13 @@ from __future__ import annotations
 
 import argparse
 import statistics
-import time
 from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 from eaik.IK_HP import HPRobot
 from numpy.typing import NDArray
-from pairs import Bound, machine, write_results
+from pairs import Bound, machine, timed, write_results
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain
@@ -124,13 +123,6 @@ def exact(found: Any) -> FloatArray:
 def same(one: FloatArray, other: FloatArray) -> bool:
     """Tell whether two sets of solutions are one."""
     return one.shape == other.shape and bool(np.abs(one - other).max(initial=0.0) < 1e-5)
-
-
-def timed(job: Callable[[], object]) -> float:
-    """Return how long a job takes in [s]."""
-    start = time.perf_counter()
-    job()
-    return time.perf_counter() - start
 
 
 def main() -> None:

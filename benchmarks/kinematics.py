@@ -7,13 +7,12 @@ from __future__ import annotations
 
 import argparse
 import statistics
-import time
 from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
-from pairs import Bound, machine, write_results
+from pairs import Bound, machine, timed, write_results
 
 from urmpipe_models.catalogue import load_robot
 from urmpipe_models.chain import Chain
@@ -41,13 +40,6 @@ def peer_model(chain: Chain) -> tuple[pin.Model, int]:
             frame = pin.SE3.Identity()
     tip = pin.Frame("tip", parent, 0, frame * placement(chain.tip), pin.FrameType.OP_FRAME)
     return model, model.addFrame(tip)
-
-
-def timed(job: Callable[[], object]) -> float:
-    """Return how long a job takes in [s]."""
-    start = time.perf_counter()
-    job()
-    return time.perf_counter() - start
 
 
 def main() -> None:

@@ -8,7 +8,7 @@ import platform
 import statistics
 import subprocess
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from importlib.metadata import PackageNotFoundError, version
@@ -44,6 +44,13 @@ class Bound:
         """Return the line of the table."""
         allowed = f"under {self.under:g}" if self.under < math.inf else f"at least {self.least:g}"
         return f"| {self.what} | {self.found:.2f} | {allowed} | {'held' if self.held else 'MISSED'} |"
+
+
+def timed(job: Callable[[], object]) -> float:
+    """Return how long a job takes in [s]."""
+    start = time.perf_counter()
+    job()
+    return time.perf_counter() - start
 
 
 def measure(command: Sequence[str]) -> Usage:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -13,7 +12,7 @@ from numpy.typing import NDArray
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.branch_walk import walk
-from urmpipe_models.inverse.checks import checked
+from urmpipe_models.inverse.checks import checked, search_faults
 from urmpipe_models.inverse.closed_form import ClosedForm, exact_form
 from urmpipe_models.inverse.farthest import too_far
 from urmpipe_models.inverse.joint_path import JointPath, SingularStretch
@@ -276,9 +275,4 @@ def _option_faults(
             f"start: found {np.array2string(start, separator=', ')}, allowed: {joints} finite numbers,"
             f" in rad or m, one each of {', '.join(chain.coordinates)}"
         )
-    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
-        yield f"tolerance: found {tolerance:g} m, allowed: more than 0, finite"
-    if restarts < 0:
-        yield f"restarts: found {restarts}, allowed: 0 or more"
-    if seed < 0:
-        yield f"seed: found {seed}, allowed: 0 or more"
+    yield from search_faults(tolerance, restarts, seed)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -11,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.chain import Chain
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.checks import checked
+from urmpipe_models.inverse.checks import checked, search_faults
 from urmpipe_models.inverse.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.free_joints import within_limits_by_choice
 from urmpipe_models.inverse.limits import periods
@@ -191,12 +190,7 @@ def _faults(
             )
         elif not np.isfinite(begin).all():
             yield "start: found a value that is not finite, allowed: finite numbers in rad and m"
-    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
-        yield f"tolerance: found {tolerance:g} m, allowed: more than 0, finite"
-    if restarts < 0:
-        yield f"restarts: found {restarts}, allowed: 0 or more"
-    if seed < 0:
-        yield f"seed: found {seed}, allowed: 0 or more"
+    yield from search_faults(tolerance, restarts, seed)
     if method not in METHODS:
         yield f"method: found {method!r}, allowed: {', '.join(METHODS)}"
 
