@@ -376,7 +376,7 @@ def head(options: argparse.Namespace, seconds: float) -> list[str]:
         "are no change, each with its reason in equivalent_mutants.toml. mutmut changes neither decorated",
         "functions (properties, cached ones) nor what stands outside of functions, nor docstrings.",
         "",
-        f"Tests: of {' and '.join(options.tests)} those of the module's own files, and of the others the",
+        f"Tests: of {' and '.join(options.tests)} those of the module's own files, of the others the",
         f"quickest that reach the function, {BUDGET:g} s of them; none that is slow; with the cases that",
         f"Hypothesis draws for CI. Samples are random (seed {options.seed}), with the 95 % interval. It took",
         f"{seconds / 60:.0f} minutes on {options.processes} processes.",
