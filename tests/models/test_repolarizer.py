@@ -130,7 +130,7 @@ NAN, TURNS = math.nan, FULL_TURN * np.arange(9.0)
 @pytest.mark.parametrize("max_speed", [math.inf, 1.0])
 def test_pairs_of_steps_and_gaps_are_the_same_in_the_batch(q: list[FloatArray], max_speed: float) -> None:
     values = np.array(q).T
-    dt = 0.01 * (1.0 + np.arange(len(values)) % 3)
+    dt = 0.01 * (1.0 + np.arange(len(values), dtype=np.float64) % 3)
     dt[0] = NAN  # is not used
     assert_batch_is_the_steps(values, dt, np.array([FULL_TURN, FULL_TURN])[: len(q)], max_speed)
 
@@ -139,7 +139,7 @@ def test_pairs_of_steps_and_gaps_are_the_same_in_the_batch(q: list[FloatArray], 
 def test_all_the_time_of_a_gap_counts_for_what_a_joint_can_have_moved(gap: int) -> None:
     """Over the gap the joint moves 0.5 rad beyond a whole turn, and has just time for that at its speed."""
     q = np.array([[2.0], [2.0], *[[NAN]] * gap, [2.0 - FULL_TURN + 0.5], [2.0 - FULL_TURN + 0.5]])
-    dt = 0.01 * 2.0 ** np.arange(len(q))  # each row's time is told apart from all others'
+    dt = np.ldexp(0.01, np.arange(len(q)))  # each row's time is told apart from all others'
     just = 0.5 / dt[2 : 3 + gap].sum()
     assert repolarize(q, dt, max_speed=just * (1.0 + 1e-9)).rows.tolist() == [2 + gap]
     assert repolarize(q, dt, max_speed=just * (1.0 - 1e-9)).rows.tolist() == []
