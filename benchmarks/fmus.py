@@ -19,7 +19,7 @@ from bare_fmu import FloatArray, opened, run_bare
 from pairs import Bound, machine, measure, median, rounds, timed, write_results
 from pairs import table as process_table
 
-from urmpipe.system_blocks import Blocks
+from urmpipe.systems.blocks import Blocks
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.cosim import Plan, load_system, prepare
@@ -30,8 +30,8 @@ from urmpipe_fmus.cosim.worker import Log
 from urmpipe_fmus.fmu_process import callbacks_with
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.kinematics import positions_over_log
+from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_models.robots.catalogue import load_robot
 
 STEP = 0.005
 """Communication step in [s]: the period of the sample log."""

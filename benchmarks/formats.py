@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from pairs import Bound, Usage, machine, ratio, rounds, table, write_results
 from pyarrow import csv
 
-FloatArray = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
 
 PERIOD_MS = 5
 NAMES = ["t", *(f"q{j}" for j in range(1, 7))]

@@ -15,14 +15,13 @@ from eaik.IK_HP import HPRobot
 from numpy.typing import NDArray
 from pairs import Bound, machine, timed, write_results
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain
-from urmpipe_models.inverse.closed_form import ClosedForm, closed_form
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.targets import Targets, targets_of
-from urmpipe_models.screws import screws
-
-FloatArray = NDArray[np.float64]
+from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.robots.catalogue import load_robot
 
 ALONE = 500
 """Poses that the slow jobs solve in a round; their time is scaled to all."""

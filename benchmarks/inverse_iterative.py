@@ -20,16 +20,14 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pairs import Bound, machine, write_results
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain
-from urmpipe_models.inverse.iterative import refine
-from urmpipe_models.inverse.restarts import solve_iteratively
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.iterative.refine import refine
+from urmpipe_models.inverse.iterative.restarts import solve_iteratively
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
-
-FloatArray = NDArray[np.float64]
+from urmpipe_models.robots.catalogue import load_robot
 
 OURS_NEAR = "near: urmpipe, 1 thread"
 OURS_PARTS = "near: urmpipe, 1 thread, 2000 at a time"

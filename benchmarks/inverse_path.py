@@ -22,13 +22,12 @@ from numpy.typing import NDArray
 from pairs import Bound, machine, write_results
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain
-from urmpipe_models.inverse.path import follow
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.along_path.path import follow
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform
-
-FloatArray = NDArray[np.float64]
 
 PEER = Path(__file__).parent / "inverse_path_peer.py"
 PERIOD = 5_000_000

@@ -11,15 +11,12 @@ from collections.abc import Callable
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 from pairs import Bound, machine, timed, write_results
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain
-from urmpipe_models.kinematics import poses_over_log
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform
-
-FloatArray = NDArray[np.float64]
 
 TRIES = 3
 

@@ -17,9 +17,10 @@ from pathlib import Path
 
 import numpy as np
 from samples.environments import ENVIRONMENTS, follow, urm6
-from samples.path import PERIOD, SAMPLES, TIMES, FloatArray, SamplePath, arc_length
+from samples.path import PERIOD, SAMPLES, TIMES, SamplePath, arc_length
 
-from urmpipe_models.kinematics import positions_over_log
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import positions_over_log
 
 SHIPPED = Path(__file__).resolve().parents[1] / "datasets" / "urmpipe_datasets" / "logs"
 SOLIDWORKS = tuple(f"solidworks/phi{k}.csv" for k in range(1, 7))

@@ -14,18 +14,17 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 from pairs import Bound, machine, write_results
 from scipy.signal import butter, lfilter
 
 from urmpipe_datasets import LOGS
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.kinematics import positions_over_log
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.repolarizer import repolarize
-from urmpipe_pipeline.audit import audit_log
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
+from urmpipe_pipeline.repolarization.audit import audit_log
 
-FloatArray = NDArray[np.float64]
 Method = Callable[[FloatArray], FloatArray]
 
 TSP = 0.005

@@ -12,16 +12,14 @@ import sys
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.units.dc_drive import dc_drive
 from urmpipe_fmus.units.drive_controller import drive_controller
 from urmpipe_fmus.units.inertia import inertia
 from urmpipe_fmus.units.set_point import set_point
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.elementwise import Element
-
-FloatArray = NDArray[np.float64]
 
 PICTURE = Path(__file__).resolve().parent / "pictures" / "drives.svg"
 PERIOD = 5e-3

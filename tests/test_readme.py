@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe_models.robot_file import read_robot_file
+from urmpipe_models.robots.robot_file import read_robot_file
 
 ROOT = Path(__file__).resolve().parents[1]
 README = (ROOT / "README.md").read_text(encoding="utf-8")

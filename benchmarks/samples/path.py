@@ -10,9 +10,9 @@ from collections.abc import Callable
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
-FloatArray: TypeAlias = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
+
 Curve: TypeAlias = Callable[[FloatArray], tuple[FloatArray, FloatArray, FloatArray]]
 """Radius [m], azimuth [turns] and height [m] about the arm's first axis, of a parameter 0..1."""
 

@@ -53,7 +53,7 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
     from difflib import get_close_matches
 
     from urmpipe_models.errors import Finding, OptionError
-    from urmpipe_models.toml_text import parse_toml
+    from urmpipe_models.files.toml_text import parse_toml
 
     data = parse_toml(path, OptionError)
     every = sorted({name for one in commands.values() for name in _options(one)})

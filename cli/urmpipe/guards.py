@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import OutputKind

@@ -166,7 +166,7 @@ def _print_findings(findings: Sequence[Finding], as_json: bool) -> None:
     if len(findings) > SHOWN_FINDINGS:
         click.echo(f"error: and {len(findings) - SHOWN_FINDINGS} more", err=True)
     if as_json:
-        from urmpipe.printing import echo_json
+        from urmpipe.printing.terminal import echo_json
 
         errors = [
             {name: getattr(one, name) for name in ("file", "line", "row", "column", "message")}

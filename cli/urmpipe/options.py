@@ -15,7 +15,7 @@ from click.shell_completion import CompletionItem
 from urmpipe import __version__
 
 if TYPE_CHECKING:
-    from urmpipe_models.chain import Chain
+    from urmpipe_models.chains.chain import Chain
     from urmpipe_pipeline.sources import ReadOptions
 
 Command = TypeVar("Command", bound=Callable[..., Any])
@@ -30,7 +30,7 @@ class RobotType(click.ParamType[str]):
         self, ctx: click.Context, param: click.Parameter, incomplete: str
     ) -> list[CompletionItem]:
         """Offer the catalogue's names and then files."""
-        from urmpipe_models.catalogue import robot_names
+        from urmpipe_models.robots.catalogue import robot_names
 
         names = [CompletionItem(name) for name in robot_names() if name.startswith(incomplete)]
         return [*names, CompletionItem(incomplete, type="file")]
@@ -43,7 +43,7 @@ class OffsetType(click.ParamType[Any]):
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the transform."""
-        from urmpipe_models.catalogue import parse_offset
+        from urmpipe_models.robots.catalogue import parse_offset
 
         return parse_offset(value) if isinstance(value, str) else value
 
@@ -155,7 +155,7 @@ def take_robot(options: dict[str, Any]) -> Chain | None:
         RobotError: If there is no such robot, or with everything that is wrong with its file.
         OptionError: If an option needs a robot and none is given.
     """
-    from urmpipe.api import place_robot
+    from urmpipe.guards import place_robot
 
     names = ("robot", "base", "tool", "base_link", "tip")
     robot, base, tool, base_link, tip = (options.pop(name) for name in names)
@@ -181,9 +181,9 @@ def take_log_options(options: dict[str, Any]) -> tuple[Chain | None, ReadOptions
     Raises:
         UrmpipeError: With everything that is wrong with the robot or the map.
     """
-    from urmpipe.api import read_options
     from urmpipe_models.transform import from_offset
     from urmpipe_pipeline.sources import LogMap, read_map
+    from urmpipe_pipeline.sources.options import read_options
 
     path = options.pop("log_map")
     log_map = read_map(path) if path else LogMap()
@@ -262,7 +262,7 @@ def log_options(command: Command) -> Command:
 def _tell_defaults(ctx: click.Context, param: click.Parameter, quiet: bool) -> bool:
     """Tell what urmpipe.toml says for the command, before anything in it can be found to be wrong."""
     if ctx.obj and not quiet:
-        from urmpipe.printing import say
+        from urmpipe.printing.terminal import say
 
         say(ctx.obj, err=True)
     return quiet

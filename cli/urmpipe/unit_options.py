@@ -74,7 +74,7 @@ def argument_names(ctx: click.Context) -> Iterable[str]:
 
 def option_names(ctx: click.Context) -> Iterable[str]:
     """Return the options of the unit on the line that -s gives: not its robot or log."""
-    from urmpipe.fmu_printing import options_of
+    from urmpipe.printing.fmu import options_of
 
     unit = _operand(ctx, "unit")
     return [name for name in options_of(unit) if name not in ("robot", "log")] if unit else ()

@@ -6,16 +6,14 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_fmus.equations import named
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Variable
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError
-
-FloatArray = NDArray[np.float64]
 
 
 def run(

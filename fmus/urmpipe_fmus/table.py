@@ -10,10 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_fmus.variable import LARGEST_INTEGER
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError
-
-FloatArray = NDArray[np.float64]
 
 LAST_NS = 2**63 - 1
 """The last time that 64 bits hold."""

@@ -13,7 +13,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from urmpipe_models.kinematics import FloatArray
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.orientation import RotationForm
 from urmpipe_models.repolarizer import FULL_TURN
 

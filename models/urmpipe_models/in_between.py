@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.kinematics import FloatArray
-from urmpipe_models.repolarizer import IntArray
+from urmpipe_models.arrays import FloatArray, IntArray
 
 FAR = 4.0
 """A sample lies off the line of its neighbours if by more than this times the motion around it ..."""

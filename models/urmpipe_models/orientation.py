@@ -6,7 +6,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from urmpipe_models.kinematics import FloatArray
+from urmpipe_models.arrays import FloatArray
 
 RotationForm = Literal["vector", "rpy", "zyx", "xyz", "zyz", "zxz", "quat_xyzw", "quat_wxyz", "matrix"]
 """vector     x, y, z of the axis times the angle (UR's RX, RY, RZ)

@@ -21,8 +21,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.elementwise import Element
-from urmpipe_models.kinematics import FloatArray, row_blocks
+from urmpipe_models.row_blocks import row_blocks
 
 FULL_TURN = 2.0 * np.pi
 """Period of an angle in [rad]."""
@@ -35,8 +36,6 @@ LARGEST_VALUE = 1e300
 
 LEAST_REST = 0.01
 """Share of P by which a wrap may always miss the whole period: clocks jitter, and joints overshoot limits."""
-
-IntArray = NDArray[np.int64]
 
 
 class State(NamedTuple):

@@ -5,14 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError
-from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.derivatives import Method
-from urmpipe_pipeline.ingest import OF_ROBOT, ingest_log, kinematics
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_recording, read_recording
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.runs.derivatives import Method
+from urmpipe_pipeline.runs.ingest import OF_ROBOT, ingest_log, kinematics
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources import ReadOptions
 
 COMPARISON = (

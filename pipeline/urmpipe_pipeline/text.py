@@ -7,8 +7,8 @@ import math
 from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
-from urmpipe_pipeline.comparison import AXES, Statistics
-from urmpipe_pipeline.results import json_ready
+from urmpipe_pipeline.comparison.comparison import AXES, Statistics
+from urmpipe_pipeline.runs.results import json_ready
 
 NOTHING = "–"
 """Stands where there is no value."""

@@ -15,7 +15,7 @@ import pytest
 
 from urmpipe_datasets import LOGS
 from urmpipe_pipeline.recording import read_recording
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.results import Run
 
 PATH, COPPELIA, MATLAB = LOGS / "path.csv", LOGS / "coppeliasim.csv", LOGS / "matlab.csv"
 

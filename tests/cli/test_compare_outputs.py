@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 import urmpipe
 from urmpipe.main import cli, run
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.comparison import Comparison, Statistics
+from urmpipe_pipeline.comparison.comparison import Comparison, Statistics
 from urmpipe_pipeline.recording import read_recording
 
 Captured = pytest.CaptureFixture[str]

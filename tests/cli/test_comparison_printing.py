@@ -11,14 +11,14 @@ import pytest
 from rich.cells import cell_len
 
 import urmpipe
-from urmpipe import printing
-from urmpipe.comparison_printing import print_comparison
-from urmpipe.printing import new_console
+from urmpipe.printing import terminal as printing
+from urmpipe.printing.comparison import print_comparison
+from urmpipe.printing.terminal import new_console
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.transform import from_rpy
-from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.text import limit, number
-from urmpipe_pipeline.trajectory import Alignment, Sync
 
 Captured = pytest.CaptureFixture[str]
 

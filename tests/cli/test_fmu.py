@@ -13,13 +13,13 @@ import numpy as np
 import pytest
 
 import urmpipe
-from urmpipe.building import build_fmu
+from urmpipe.api.build_fmu import build_fmu
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.native import native_missing
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import UrmpipeError
-from urmpipe_models.kinematics import points_over_log
+from urmpipe_models.kinematics.forward import points_over_log
+from urmpipe_models.robots.catalogue import load_robot
 
 RunCommand = Callable[..., Any]
 

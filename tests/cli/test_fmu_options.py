@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe.building import unit_of
-from urmpipe.log_tables import read_table
+from urmpipe.systems.log_tables import read_table
+from urmpipe.systems.units import unit_of
 from urmpipe.unit_options import option_value
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.units import unit_names
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.robots.catalogue import load_robot
 
 
 def refusal(*arguments: object, **options: object) -> list[str]:

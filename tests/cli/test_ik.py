@@ -9,18 +9,17 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
-from urmpipe_models.catalogue import load_robot
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import misses, targets_of
 from urmpipe_models.orientation import quaternions
-from urmpipe_pipeline.ingest import ingest_log
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.recording import read_recording
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.runs.results import Run
 
-FloatArray = NDArray[np.float64]
 Captured = pytest.CaptureFixture[str]
 
 HALF_PI = "1.5707963267948966"

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import urmpipe
-from urmpipe.inverse_wording import (
+from urmpipe.inverse.wording import (
     NAMED,
     far_warnings,
     longest,
@@ -23,10 +23,10 @@ from urmpipe.inverse_wording import (
     start_warnings,
     unreached,
 )
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.inverse.solutions import Singular, Solutions
 from urmpipe_models.inverse.targets import Targets, targets_of
-from urmpipe_models.singularity import singularity_over_log
+from urmpipe_models.kinematics.singularity import singularity_over_log
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from urmpipe.printing import print_recording, progress_bar
+from urmpipe.printing.terminal import print_recording, progress_bar
 
 
 def test_the_command_that_opens_a_recording_works_without_an_activated_environment(

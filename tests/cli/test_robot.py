@@ -12,13 +12,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe.chain_drawing import chain_svg, chain_text
-from urmpipe_models.catalogue import load_robot, robot_names
-from urmpipe_models.chain import Chain, Joint
-from urmpipe_models.kinematics import points_over_log
-from urmpipe_models.robot_file import chain_from_dict
-from urmpipe_models.urdf_reader import read_urdf
-from urmpipe_models.urdf_writer import write_urdf
+from urmpipe.printing.chain_drawing import chain_svg, chain_text
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.kinematics.forward import points_over_log
+from urmpipe_models.robots.catalogue import load_robot, robot_names
+from urmpipe_models.robots.robot_file import chain_from_dict
+from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.urdf_writer import write_urdf
 
 NAMES = list(robot_names())
 

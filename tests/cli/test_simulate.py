@@ -16,13 +16,13 @@ import pytest
 from click.shell_completion import ShellComplete
 
 import urmpipe
+from urmpipe.api.simulate import simulate
 from urmpipe.commands.simulate import simulate as command
 from urmpipe.main import cli
-from urmpipe.simulating import simulate
 from urmpipe.unit_options import UnitType
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 RunCommand = Callable[..., Any]
 
@@ -328,7 +328,7 @@ def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
 def test_no_import_meets_those_of_rerun(following: Path, tmp_path: Path) -> None:
     """While a system is prepared and run Rerun is imported beside: see `load_rerun`."""
     code = (
-        "import sys, urmpipe.simulating as s, urmpipe.process as p\n"
+        "import sys, urmpipe.api.simulate as s, urmpipe.process as p\n"
         "p.tune_pyarrow()\n"
         "before = set(sys.modules)\n"
         f"s.simulate({str(following)!r})\n"

@@ -9,12 +9,11 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 import urmpipe
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import LogError
 
-FloatArray = NDArray[np.float64]
 Spoil = Callable[[FloatArray], FloatArray]
 
 

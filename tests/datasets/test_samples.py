@@ -11,10 +11,9 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from urmpipe_models.kinematics import jacobian_over_log, positions_over_log
-from urmpipe_models.urm import urm_chain
-
-FloatArray = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.kinematics.forward import jacobian_over_log, positions_over_log
 
 ROOT = Path(__file__).resolve().parents[2]
 LOGS = ROOT / "datasets" / "urmpipe_datasets" / "logs"

@@ -14,14 +14,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe.fmu_printing import units_dict
-from urmpipe.simulating import simulate
+from urmpipe.api.simulate import simulate
+from urmpipe.printing.fmu import units_dict
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.cosim import system_names
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.units import unit_names
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.kinematics import points_over_log
+from urmpipe_models.kinematics.forward import points_over_log
+from urmpipe_models.robots.catalogue import load_robot
 
 DOCS = Path(__file__).parents[2] / "docs"
 NAMED = set(re.findall(r"`(\w+)`", (DOCS / "json.md").read_text(encoding="utf-8")))

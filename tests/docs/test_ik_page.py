@@ -10,9 +10,9 @@ import pytest
 
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.inverse.closed_form import closed_form
+from urmpipe_models.inverse.closed.closed_form import closed_form
 from urmpipe_models.inverse.solutions import NEAREST_POINT, SingularFamily
+from urmpipe_models.robots.catalogue import load_robot
 
 PAGE = (Path(__file__).parents[2] / "docs" / "ik.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"`([^`]+)`", PAGE))

@@ -12,12 +12,12 @@ import pytest
 
 import urmpipe
 from urmpipe_datasets import LOGS
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.inverse.targets import targets_of
-from urmpipe_pipeline.delta_verdict import delta_verdict
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.simulation import Signal, SimulatedBlock, Simulation
+from urmpipe_pipeline.simulations.simulation import Signal, SimulatedBlock, Simulation
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"`(\w+)`", PAGE))

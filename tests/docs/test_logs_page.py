@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from urmpipe.defaults import defaults_for
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import UrmpipeError
-from urmpipe_pipeline.ingest import ingest_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.sources import read_map
 
 ROOT = Path(__file__).parents[2]

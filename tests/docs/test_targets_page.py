@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from urmpipe_pipeline.inverse.target_file import TargetFile, read_targets
 from urmpipe_pipeline.outputs import TARGET_ROW
 from urmpipe_pipeline.sources import read_log
-from urmpipe_pipeline.target_file import TargetFile, read_targets
 
 PAGE = (Path(__file__).parents[2] / "docs" / "targets.md").read_text(encoding="utf-8")
 POSES, GERMAN, PATH, WRONG, LOG = re.findall(r"```csv\n(.*?)```", PAGE, re.DOTALL)

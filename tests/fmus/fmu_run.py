@@ -10,13 +10,11 @@ from types import TracebackType
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from loaded_fmu import Loaded
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Variable
-
-FloatArray = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
 
 
 class FmuRun:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urmpipe_models.chain import Chain, Joint, Mimic
+from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.transform import from_offset
 
 

@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from urmpipe_fmus.cosim import Block, Recorded, load_system, prepare, simulate
@@ -18,11 +17,10 @@ from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import native_missing
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.kinematics import forward
-from urmpipe_models.set_point import trapezoid
-
-FloatArray = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.drives.set_point import trapezoid
+from urmpipe_models.kinematics.forward import forward
+from urmpipe_models.robots.catalogue import load_robot
 
 PERIOD = 5e-3
 SAMPLES = 120

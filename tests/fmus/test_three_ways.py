@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from fmu_run import FmuRun
 from random_units import PATIENT, random_columns, random_starts, random_units
@@ -26,9 +25,9 @@ from urmpipe_fmus.unit import INTERNAL_STEP, Unit
 from urmpipe_fmus.units import make_unit, unit_names
 from urmpipe_fmus.user_unit import load_unit_file
 from urmpipe_fmus.variable import Variable
-from urmpipe_models.catalogue import load_robot
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.robots.catalogue import load_robot
 
-FloatArray = NDArray[np.float64]
 Backend = Literal["native", "python"]
 
 SAME = 1e-12

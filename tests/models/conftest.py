@@ -9,8 +9,8 @@ import pytest
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
-from urmpipe_models.chain import Chain, Joint, JointKind, Mimic
-from urmpipe_models.dh import DHRow
+from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.chains.dh import DHRow
 from urmpipe_models.transform import Transform, from_offset
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"

@@ -7,13 +7,13 @@ import pytest
 from hypothesis import example, given
 from hypothesis import strategies as st
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.continuity import (
     continuous_euler,
     continuous_quaternions,
     continuous_rotations,
     continuous_vectors,
 )
-from urmpipe_models.kinematics import FloatArray
 from urmpipe_models.orientation import FORMS, RotationForm, quaternions
 from urmpipe_models.transform import from_rpy
 

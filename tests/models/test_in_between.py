@@ -9,9 +9,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.in_between import FAR, PERCEPTIBLE, beside_wraps, repair
-from urmpipe_models.kinematics import FloatArray
-from urmpipe_models.repolarizer import FULL_TURN, IntArray, repolarize
+from urmpipe_models.repolarizer import FULL_TURN, repolarize
 
 TSP = 0.005
 MOVE = 0.01  # rad a sample, 2 rad/s

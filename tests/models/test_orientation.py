@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation, Slerp
 
-from urmpipe_models.kinematics import FloatArray
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.orientation import (
     FORMS,
     RotationForm,

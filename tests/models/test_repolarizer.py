@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_np
 from numpy.typing import NDArray
 
-from urmpipe_models.kinematics import FloatArray
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.repolarizer import FULL_TURN, State, max_step, repolarize, step
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"

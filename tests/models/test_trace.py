@@ -8,18 +8,16 @@ from typing import Any
 import casadi
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.drive import Drive, current_rate, shaft_acceleration, shaft_torque
-from urmpipe_models.drive_controller import Gains, next_voltage, sample_number
-from urmpipe_models.kinematics import forward, jacobian
-from urmpipe_models.motion import motions
-from urmpipe_models.set_point import JointMotion, set_point
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.drives.controller import Gains, next_voltage, sample_number
+from urmpipe_models.drives.drive import Drive, current_rate, shaft_acceleration, shaft_torque
+from urmpipe_models.drives.set_point import JointMotion, set_point
+from urmpipe_models.kinematics.forward import forward, jacobian
+from urmpipe_models.kinematics.motion import motions
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import euler_zxz, euler_zyx, from_zxz, rotation_z
-from urmpipe_models.urm import urm_chain
-
-FloatArray = NDArray[np.float64]
 
 TRACED = 1e-14
 """The same operations on values of about 1; CasADi may take another sine and simplify, each some 1e-16."""

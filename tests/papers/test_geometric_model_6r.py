@@ -12,14 +12,12 @@ from typing import Any, NamedTuple
 import numpy as np
 import pytest
 from numpy import cos, sin
-from numpy.typing import NDArray
 
-from urmpipe_models.articulated_6r import articulated_6r, articulated_6r_rows
-from urmpipe_models.geometric_model import GeometricModel, GeometricRow, geometric_model
-from urmpipe_models.kinematics import forward
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.articulated_6r import articulated_6r, articulated_6r_rows
+from urmpipe_models.chains.geometric_model import GeometricModel, GeometricRow, geometric_model
+from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.transform import euler_zxz, from_zxz
-
-FloatArray = NDArray[np.float64]
 
 ROUNDING = 1e-14
 """Sums of some ten products of up to 6 sines and cosines, each step rounded to 1.1e-16."""

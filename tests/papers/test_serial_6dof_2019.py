@@ -11,15 +11,13 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from serial_6dof_rows import INVERSE, UPSIDE
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.frames import frames
-from urmpipe_models.kinematics import poses_over_log, tip_pose
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import poses_over_log, tip_pose
+from urmpipe_models.kinematics.frames import frames
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform, euler_zyx, from_rpy
-
-FloatArray = NDArray[np.float64]
 
 ARM = load_robot("arm6")
 

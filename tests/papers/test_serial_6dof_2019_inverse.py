@@ -10,17 +10,15 @@ import math
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from serial_6dof_rows import INVERSE
-from urmpipe_models.catalogue import load_robot
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.inverse.closed.spherical_wrist import SphericalWrist, spherical_wrist
 from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.spherical_wrist import SphericalWrist, spherical_wrist
 from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.screws import screws
+from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import from_rpy
-
-FloatArray = NDArray[np.float64]
 
 ARM = load_robot("arm6")
 PRINTED = 5.1e-5

@@ -8,12 +8,12 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from urmpipe_models.kinematics import positions_over_log
-from urmpipe_models.urm import urm_chain
-from urmpipe_pipeline.delta_verdict import delta_verdict
+from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.simulation import Arm, Setting, Signal, SimulatedBlock, Simulation
+from urmpipe_pipeline.simulations.simulation import Arm, Setting, Signal, SimulatedBlock, Simulation
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
 STEP = 0.005

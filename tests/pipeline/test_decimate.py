@@ -83,7 +83,7 @@ def test_what_is_no_array_in_a_row_is_decimated_alike() -> None:
 
 def test_the_library_is_loaded_by_a_drawing_and_not_by_the_reader() -> None:
     code = (
-        "import sys\nfrom urmpipe_datasets import LOGS\nfrom urmpipe_pipeline.ingest import ingest_log\n"
+        "import sys\nfrom urmpipe_datasets import LOGS\nfrom urmpipe_pipeline.runs.ingest import ingest_log\n"
         "import urmpipe_pipeline.recording\nimport urmpipe_pipeline.report\n"
         "ingest_log([LOGS / 'coppeliasim.csv'])\nprint('tsdownsample' in sys.modules)"
     )

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import Statistics
+from urmpipe_pipeline.comparison.comparison import Statistics
 
 
 @pytest.mark.parametrize(

@@ -6,17 +6,15 @@ import math
 from collections.abc import Mapping
 
 import numpy as np
-from numpy.typing import NDArray
 
-from urmpipe_models.chain import Chain, Joint, JointKind
-from urmpipe_models.dh import DHRow, dh_chain
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain, Joint, JointKind
+from urmpipe_models.chains.dh import DHRow, dh_chain
+from urmpipe_models.inverse.closed.spherical_wrist import SphericalWrist, spherical_wrist
 from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.spherical_wrist import SphericalWrist, spherical_wrist
 from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.screws import screws
+from urmpipe_models.kinematics.screws import screws
 from urmpipe_models.transform import Transform, from_offset
-
-FloatArray = NDArray[np.float64]
 
 SPECIAL: Mapping[str, Mapping[str, float]] = {
     "plain": {},

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 import pandas as pd
 
-from specimen import DEG, FloatArray, Made, Truth, degrees, made, motion, rounding, specimen
+from specimen import DEG, Made, Truth, degrees, made, motion, rounding, specimen
+from urmpipe_models.arrays import FloatArray
 
 Q6 = tuple(f"q{k}" for k in range(1, 7))
 

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from by_python import comma, writer
-from specimen import DEG, EXACT, FloatArray, Made, Truth, degrees, made, motion, rounding, specimen
+from specimen import DEG, EXACT, Made, Truth, degrees, made, motion, rounding, specimen
+from urmpipe_models.arrays import FloatArray
 
 UR = (
     "shoulder_pan_joint",

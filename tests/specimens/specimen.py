@@ -4,16 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.kinematics import poses_over_log
-
-FloatArray: TypeAlias = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.robots.catalogue import load_robot
 
 # q_j(t) = START_j + SLOPE_j t + WIDTH_j sin(RATE_j t + j): no two joints alike, none still, none faster than
 # 3 rad/s. Within 0.6 s the fifth passes +pi upwards and the sixth -pi downwards.

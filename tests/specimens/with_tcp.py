@@ -9,9 +9,10 @@ import numpy as np
 
 from by_python import Q6, writer
 from by_robots import poses
-from specimen import DEG, FloatArray, Made, Truth, degrees, made, motion, rounding, specimen
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.kinematics import positions_over_log
+from specimen import DEG, Made, Truth, degrees, made, motion, rounding, specimen
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_models.robots.catalogue import load_robot
 
 
 def _arm(rows: int = 16) -> tuple[Truth, FloatArray]:

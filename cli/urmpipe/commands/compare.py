@@ -9,12 +9,13 @@ from typing import TYPE_CHECKING, Any
 import click
 from click.core import ParameterSource
 
+import urmpipe
 from urmpipe.options import Command, about_recordings, log_options, output_options, take_log_options
 from urmpipe.process import tune_pyarrow
-from urmpipe_pipeline.tolerance import DEFAULT_TOLERANCE
+from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.comparison import Comparison
+    from urmpipe_pipeline.comparison.comparison import Comparison
 
 OF_RESULTS = {"baseline", "noise", "junit", "statistics", "strict", "as_json", "quiet", "debug"}
 """Parameters that a comparison takes that was made before; the others say how one is made."""
@@ -32,14 +33,14 @@ def _sync(ctx: click.Context, param: click.Parameter, value: str) -> str | float
 
 def _tolerance(ctx: click.Context, param: click.Parameter, value: str) -> dict[str, float]:
     """Return what is allowed, by kind."""
-    from urmpipe_pipeline.tolerance import parse_tolerance
+    from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
     return parse_tolerance(value)
 
 
 def _noise(ctx: click.Context, param: click.Parameter, value: str | None) -> dict[str, float] | None:
     """Return what of a change means nothing, by kind."""
-    from urmpipe_pipeline.baseline import parse_noise
+    from urmpipe_pipeline.comparison.baseline import parse_noise
 
     return None if value is None else parse_noise(value)
 
@@ -130,9 +131,8 @@ def compare(
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
     """
     tune_pyarrow()
-    from urmpipe.comparing import compare as compare_logs
-    from urmpipe.comparison_printing import print_comparison
-    from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar, say
+    from urmpipe.printing.comparison import print_comparison
+    from urmpipe.printing.terminal import print_json, print_recording, print_warnings, progress_bar, say
 
     said = about_recordings(ctx, (reference, *logs))
     if said and not quiet:
@@ -148,7 +148,7 @@ def compare(
     shared = {name: options.pop(name) for name in names}
     target = None if made else output or Path(default_name(reference, logs))
     with progress_bar(f"Writing {target}", quiet=quiet or made is not None) as progress:
-        result = compare_logs(
+        result = urmpipe.compare(
             made or reference,
             logs,
             robot=robot,

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+import urmpipe
 from urmpipe.options import output_options
 from urmpipe.process import tune_pyarrow
 
@@ -39,10 +40,8 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
       urmpipe demo -o somewhere --json
     """
     tune_pyarrow()
-    from urmpipe import api
-    from urmpipe.comparing import compare
-    from urmpipe.comparison_printing import print_comparison
-    from urmpipe.printing import print_json, print_recording, progress_bar, say
+    from urmpipe.printing.comparison import print_comparison
+    from urmpipe.printing.terminal import print_json, print_recording, progress_bar, say
     from urmpipe_datasets import LOGS
 
     output.mkdir(parents=True, exist_ok=True)
@@ -51,13 +50,13 @@ def demo(output: Path, as_json: bool, quiet: bool) -> int:
     with progress_bar("Demo", quiet=quiet) as progress:
         for number, name in enumerate(EXPECTED, start=1):
             source = LOGS / name if (LOGS / name).is_dir() else LOGS / f"{name}.csv"
-            runs.append(api.ingest(source, robot="urm6", output=output / f"{name}.rrd"))
+            runs.append(urmpipe.ingest(source, robot="urm6", output=output / f"{name}.rrd"))
             if progress:
                 progress(number / steps)
-        result = compare(LOGS / "path.csv", runs, output=output / "demo.rrd")
+        result = urmpipe.compare(LOGS / "path.csv", runs, output=output / "demo.rrd")
         if progress:
             progress((steps - 1) / steps)
-        report = api.report([result], output / "report.html")
+        report = urmpipe.report([result], output / "report.html")
     got = {one.name: one.verdict for one in result.runs}
     as_expected = list(got.values()) == list(EXPECTED.values())
     if as_json:

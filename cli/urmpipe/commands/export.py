@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+import urmpipe
 from urmpipe.options import output_options
 from urmpipe.process import tune_pyarrow
 
@@ -54,10 +55,9 @@ def export(recording: Path, output: Path | None, as_json: bool, quiet: bool, **o
       urmpipe export one-drive.rrd -o one-drive.csv
     """
     tune_pyarrow()
-    from urmpipe import api
-    from urmpipe.printing import print_json, print_warnings, say
+    from urmpipe.printing.terminal import print_json, print_warnings, say
 
-    result = api.export(recording, output, **options)
+    result = urmpipe.export(recording, output, **options)
     if not quiet:
         print_warnings(result.warnings)
     if as_json:

@@ -7,6 +7,7 @@ from typing import Literal
 
 import click
 
+import urmpipe
 from urmpipe.options import NamesType, RobotType, output_options
 from urmpipe.unit_options import NamedType, UnitType, named_values, option_names, option_value
 
@@ -43,8 +44,8 @@ def list_(as_json: bool, quiet: bool) -> int:
       urmpipe fmu list
       urmpipe fmu list --json
     """
-    from urmpipe.fmu_printing import print_units, units_dict
-    from urmpipe.printing import print_json
+    from urmpipe.printing.fmu import print_units, units_dict
+    from urmpipe.printing.terminal import print_json
 
     if as_json:
         print_json(units_dict())
@@ -122,11 +123,11 @@ def build(
       urmpipe fmu build log_source --log log.csv -o fmus
       urmpipe fmu build my_unit.py
     """
-    from urmpipe.building import build_fmu, column_names
-    from urmpipe.fmu_printing import built_dict, print_built
     from urmpipe.guards import place_robot
-    from urmpipe.log_tables import read_table
-    from urmpipe.printing import print_json, print_warnings, prints_apart, say
+    from urmpipe.printing.fmu import built_dict, print_built
+    from urmpipe.printing.terminal import print_json, print_warnings, prints_apart, say
+    from urmpipe.systems.log_tables import read_table
+    from urmpipe.systems.units import column_names
     from urmpipe_fmus.native import this_platform
     from urmpipe_pipeline.sources import read_map
 
@@ -142,7 +143,7 @@ def build(
         said = f"compiling for {', '.join(platforms)}; the first time on this computer takes minutes"
         say(f"note: {said}", err=True)
     with prints_apart():
-        made = build_fmu(
+        made = urmpipe.build_fmu(
             unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
         )
     if as_json:
@@ -165,8 +166,8 @@ def check(file: Path, as_json: bool, quiet: bool) -> int:
 
     Exit codes: 0 nothing found, 1 problems found, 2 no FMU.
     """
-    from urmpipe.fmu_printing import checked_dict, print_checked
-    from urmpipe.printing import print_json
+    from urmpipe.printing.fmu import checked_dict, print_checked
+    from urmpipe.printing.terminal import print_json
     from urmpipe_fmus.check import check_fmu
 
     checked = check_fmu(file)

@@ -8,6 +8,7 @@ from typing import Any
 import click
 from click.core import ParameterSource
 
+import urmpipe
 from urmpipe.options import (
     DURATION,
     JointValuesType,
@@ -25,7 +26,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
     if value is None:
         return None
     from urmpipe_models.errors import OptionError
-    from urmpipe_pipeline.tolerance import parse_tolerance
+    from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
     said = f"found {value!r}, allowed: a length on each axis, such as 0.0035 or 3.5mm"
     by_file = ctx.get_parameter_source("tolerance") == ParameterSource.DEFAULT_MAP
@@ -117,16 +118,15 @@ def ik(
     joints that are too fast), 2 bad input or usage.
     """
     tune_pyarrow()
-    from urmpipe.inverse_printing import print_inverse
-    from urmpipe.printing import print_json, print_recording, print_warnings, progress_bar, say
-    from urmpipe.solving import ik as solve
+    from urmpipe.printing.inverse import print_inverse
+    from urmpipe.printing.terminal import print_json, print_recording, print_warnings, progress_bar, say
 
     log_map = options["log_map"]
     robot, read = take_log_options(options)
     del options["robot_named"]
     names = ("start", "tolerance", "tsp", "within_pi", "method", "restarts", "seed", "strict")
     with progress_bar(f"Solving {targets}", quiet=quiet) as progress:
-        result = solve(
+        result = urmpipe.ik(
             targets,
             robot,
             read=read,

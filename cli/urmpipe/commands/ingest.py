@@ -7,6 +7,7 @@ from typing import Any
 
 import click
 
+import urmpipe
 from urmpipe.options import log_options, output_options, take_log_options
 from urmpipe.process import tune_pyarrow
 
@@ -61,8 +62,7 @@ def ingest(
       urmpipe ingest next.csv --map lab.toml
     """
     tune_pyarrow()
-    from urmpipe import api
-    from urmpipe.printing import (
+    from urmpipe.printing.terminal import (
         print_json,
         print_recording,
         print_run,
@@ -80,7 +80,7 @@ def ingest(
     robot, read = take_log_options(options)
     shared = {name: options[name] for name in ("tsp", "derivative", "strict")}
     with progress_bar(f"Writing {target}", quiet=quiet or explain) as progress:
-        run = api.ingest(
+        run = urmpipe.ingest(
             logs,
             robot=robot,
             read=read,

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 from click.core import ParameterSource
 
+import urmpipe
 from urmpipe.options import output_options
 from urmpipe.process import tune_pyarrow
 
@@ -66,12 +67,11 @@ def report(
     if figures is None and source == ParameterSource.COMMANDLINE:
         raise click.UsageError("--format: found without --figures, allowed: with --figures DIR")
     tune_pyarrow()
-    from urmpipe import api
-    from urmpipe.printing import print_json, progress_bar, say
+    from urmpipe.printing.terminal import print_json, progress_bar, say
 
     target = output or Path(f"{recordings[0].stem}.html")
     with progress_bar(f"Writing {target}", quiet=quiet) as progress:
-        result = api.report(
+        result = urmpipe.report(
             recordings, target, figures=figures, formats=FORMATS[figure_format], progress=progress
         )
     if as_json:

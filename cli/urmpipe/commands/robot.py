@@ -10,7 +10,7 @@ import click
 from urmpipe.options import JointValuesType, RobotType, output_options, placing_options
 
 if TYPE_CHECKING:
-    from urmpipe_models.chain import Chain
+    from urmpipe_models.chains.chain import Chain
     from urmpipe_models.transform import Transform
 
 
@@ -32,9 +32,9 @@ def list_(as_json: bool, quiet: bool) -> int:
       urmpipe robot list
       urmpipe robot list --json
     """
-    from urmpipe.printing import print_json
-    from urmpipe.robot_printing import print_robots
-    from urmpipe_models.catalogue import load_robot, robot_names
+    from urmpipe.printing.robot import print_robots
+    from urmpipe.printing.terminal import print_json
+    from urmpipe_models.robots.catalogue import load_robot, robot_names
 
     robots = [load_robot(name) for name in robot_names()]
     if as_json:
@@ -81,11 +81,11 @@ def show(
       urmpipe robot show urm6 --q 0,3.14,0,3.14,0,0 --picture urm6.svg
       urmpipe robot show panda.urdf --tip panda_hand_tcp --json
     """
-    from urmpipe.chain_drawing import chain_svg
-    from urmpipe.printing import print_json
-    from urmpipe.robot_printing import chain_at, print_chain
+    from urmpipe.printing.chain_drawing import chain_svg
+    from urmpipe.printing.robot import chain_at, print_chain
+    from urmpipe.printing.terminal import print_json
     from urmpipe_models.errors import OptionError
-    from urmpipe_models.export import write_export
+    from urmpipe_models.robots.written import write_export
 
     chain = _load(name, **options)
     q = chain.start if q is None else q
@@ -121,11 +121,11 @@ def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options
       urmpipe robot export ur5e --tool 0,0,0.15 -o ur5e-gripper.urdf
       urmpipe robot export urm8 -o urm8.toml
     """
-    from urmpipe.printing import print_json, say
+    from urmpipe.printing.terminal import print_json, say
     from urmpipe_models.errors import OptionError
-    from urmpipe_models.export import write_export
-    from urmpipe_models.robot_file import robot_toml
-    from urmpipe_models.urdf_writer import urdf_text
+    from urmpipe_models.robots.robot_file import robot_toml
+    from urmpipe_models.robots.urdf_writer import urdf_text
+    from urmpipe_models.robots.written import write_export
 
     target = output or Path(f"{Path(name).stem}.urdf")
     writers = {".urdf": urdf_text, ".toml": robot_toml}
@@ -143,6 +143,6 @@ def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options
 def _load(
     name: str, *, base: Transform | None, tool: Transform | None, base_link: str | None, tip: str | None
 ) -> Chain:
-    from urmpipe_models.catalogue import load_robot
+    from urmpipe_models.robots.catalogue import load_robot
 
     return load_robot(name, base_link=base_link, tip_link=tip).placed(base, tool)

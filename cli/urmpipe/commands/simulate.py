@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Literal
 
 import click
 
+import urmpipe
 from urmpipe.options import DURATION, output_options
 from urmpipe.process import tune_pyarrow
 from urmpipe.unit_options import NamedType, SystemType, argument_names, named_values
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.simulation import Simulation
+    from urmpipe_pipeline.simulations.simulation import Simulation
 
 
 @click.command(short_help="Run a system of blocks.")
@@ -80,8 +81,7 @@ def simulate(
     tune_pyarrow()
     from time import perf_counter
 
-    from urmpipe.printing import prints_apart, progress_bar, say
-    from urmpipe.simulating import simulate as run
+    from urmpipe.printing.terminal import prints_apart, progress_bar, say
 
     started = perf_counter()
     target = output or Path(default_name(system))
@@ -92,7 +92,7 @@ def simulate(
             say(f"note: {line}", err=True)
 
     with prints_apart(), progress_bar(f"Simulating {system}", quiet=quiet) as progress:
-        result = run(
+        result = urmpipe.simulate(
             system,
             arguments=arguments,
             step=step,
@@ -109,8 +109,8 @@ def simulate(
 
 def _print(result: Simulation, wall: float, draw: Path | None, as_json: bool, quiet: bool) -> None:
     """Print what a simulation, which took `wall` seconds, came to."""
-    from urmpipe.printing import print_json, print_recording, print_warnings, say
-    from urmpipe.simulation_printing import print_simulation
+    from urmpipe.printing.simulation import print_simulation
+    from urmpipe.printing.terminal import print_json, print_recording, print_warnings, say
 
     if not quiet:
         print_warnings(result.warnings)
@@ -127,8 +127,8 @@ def _print(result: Simulation, wall: float, draw: Path | None, as_json: bool, qu
 
 def _list(as_json: bool, quiet: bool) -> int:
     """List the shipped systems."""
-    from urmpipe.printing import print_json
-    from urmpipe.simulation_printing import print_systems
+    from urmpipe.printing.simulation import print_systems
+    from urmpipe.printing.terminal import print_json
     from urmpipe_fmus.cosim import load_system, system_names
 
     systems = [load_system(name, {}) for name in system_names()]

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import click
 
+import urmpipe
 from urmpipe import __version__
 
 
@@ -25,10 +26,8 @@ def view(recordings: tuple[Path, ...]) -> int:
       urmpipe view log-against-path.rrd
       urmpipe view monday.rrd tuesday.rrd
     """
-    from urmpipe import api
-
     try:
-        api.view(recordings)
+        urmpipe.view(recordings)
     except KeyboardInterrupt:
         click.echo("Closed.", err=True)
     return 0

@@ -13,11 +13,9 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_fmus.cosim.job import LoopJob
-
-FloatArray = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
 
 ITERATIONS = 50
 """Newton's method needs a handful; what is not solved by then does not converge."""

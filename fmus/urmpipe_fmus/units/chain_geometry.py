@@ -8,9 +8,9 @@ from typing import NamedTuple
 
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Parameter
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.urm import UrmGeometry, urm_chain, urm_geometry
 from urmpipe_models.transform import Transform, from_rpy, rpy_of
-from urmpipe_models.urm import UrmGeometry, urm_chain, urm_geometry
 
 
 class Geometry(NamedTuple):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Parameter, State
-from urmpipe_models.drive import Drive, current_rate, shaft_acceleration, shaft_torque
+from urmpipe_models.drives.drive import Drive, current_rate, shaft_acceleration, shaft_torque
 from urmpipe_models.elementwise import Element
 
 OPTIONS: Mapping[str, str] = {}

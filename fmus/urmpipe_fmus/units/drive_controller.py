@@ -9,9 +9,9 @@ import numpy as np
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter
-from urmpipe_models.drive_controller import Gains, next_voltage, sample_number
+from urmpipe_models.drives.controller import Gains, next_voltage, sample_number
+from urmpipe_models.drives.set_point import JointMotion
 from urmpipe_models.elementwise import Element
-from urmpipe_models.set_point import JointMotion
 
 OPTIONS: Mapping[str, str] = {}
 

@@ -12,12 +12,12 @@ from urmpipe_fmus.units.chain_geometry import geometry_of
 from urmpipe_fmus.units.options import some_of, yes_or_no
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Variable
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.elementwise import Element
 from urmpipe_models.errors import UnitError
-from urmpipe_models.kinematics import forward
-from urmpipe_models.motion import Motion, each_motion
-from urmpipe_models.robot_file import chain_from_dict, robot_toml
+from urmpipe_models.kinematics.forward import forward
+from urmpipe_models.kinematics.motion import Motion, each_motion
+from urmpipe_models.robots.robot_file import chain_from_dict, robot_toml
 from urmpipe_models.transform import Transform, euler_zyx
 
 OPTIONS: Mapping[str, str] = {

@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
-from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.targets import Targets
-
-FloatArray: TypeAlias = NDArray[np.float64]
 
 ROTATION_TOLERANCE = 1e-6
 """A matrix of a file with 7 digits is a rotation within this, and the nearest one is taken [-]."""

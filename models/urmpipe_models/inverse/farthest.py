@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import numpy as np
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.targets import Targets
 
 SURE = 1e-3

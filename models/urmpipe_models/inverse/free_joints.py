@@ -6,13 +6,13 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.chain import Chain
-from urmpipe_models.inverse.iterative import refine
+from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.closed.trigonometric import wrapped
+from urmpipe_models.inverse.iterative.refine import refine
 from urmpipe_models.inverse.limits import nearest_to_limits, within_limits
-from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Singular, Solutions
+from urmpipe_models.inverse.solutions import Singular, Solutions
 from urmpipe_models.inverse.targets import Targets
-from urmpipe_models.inverse.task import IntArray
-from urmpipe_models.inverse.trigonometric import wrapped
 
 ELSEWHERE = ", or what the limits of the joints allow"
 """What is added to the choice that `Singular.chosen` tells."""
@@ -50,13 +50,13 @@ def within_limits_by_choice(
     return within_limits(chain, replace(solutions, q=q, singular=singular), near)
 
 
-def _another(q: FloatArray, found: Solutions, row: IntArray) -> BoolArray:
+def _another(q: FloatArray, found: Solutions, row: IndexArray) -> BoolArray:
     """Return which joint values, shape (m, joints), are those of another branch of their targets."""
     away = np.abs(wrapped(q[:, None] - found.q[row])).max(axis=2)
     return np.asarray((away < SAME).any(axis=1))
 
 
-def _told(family: Singular, row: IntArray, column: IntArray) -> Singular:
+def _told(family: Singular, row: IndexArray, column: IndexArray) -> Singular:
     """Return a family whose text says, if some of its solutions were chosen by limits, that they were."""
     if not (family.free and family.where[row, column].any()):
         return family

@@ -7,9 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.arrays import BoolArray, FloatArray, TextArray
+from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.inverse.figures import figures
-from urmpipe_models.inverse.solutions import BoolArray, FloatArray, Solutions, TextArray
+from urmpipe_models.inverse.solutions import Solutions
 
 LIMIT_ROUNDING = 1e-11
 """A solution beyond a limit by this, in [rad] or [m], is on it: rounding. It is put on the limit."""

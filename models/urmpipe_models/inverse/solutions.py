@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-FloatArray: TypeAlias = NDArray[np.float64]
-BoolArray: TypeAlias = NDArray[np.bool_]
-TextArray: TypeAlias = NDArray[np.object_]
+from urmpipe_models.arrays import BoolArray, FloatArray, TextArray
+
 """Texts as Python objects: most are empty, and one object then."""
 
 SingularFamily = Literal[

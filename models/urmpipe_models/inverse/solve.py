@@ -8,21 +8,14 @@ from typing import Literal
 
 import numpy as np
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.checks import checked, search_faults
-from urmpipe_models.inverse.closed_form import ClosedForm, closed_form, exact_form
+from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.free_joints import within_limits_by_choice
 from urmpipe_models.inverse.limits import periods
-from urmpipe_models.inverse.solutions import (
-    NEAREST_POINT,
-    NO_BRANCH,
-    BoolArray,
-    FloatArray,
-    Singular,
-    Solutions,
-    no_solutions,
-)
+from urmpipe_models.inverse.solutions import NEAREST_POINT, NO_BRANCH, Singular, Solutions, no_solutions
 from urmpipe_models.inverse.targets import Targets
 
 Method = Literal["auto", "closed", "iterative"]
@@ -115,7 +108,7 @@ class _Search:
 
     def iteratively(self, targets: Targets, start: FloatArray) -> Solutions:
         """Return what the iterative solver finds."""
-        from urmpipe_models.inverse.restarts import solve_iteratively
+        from urmpipe_models.inverse.iterative.restarts import solve_iteratively
 
         if not len(targets):
             return no_solutions([], ("1",), len(self.chain.coordinates))

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.errors import Finding, OutputError
-from urmpipe_pipeline.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
 from urmpipe_pipeline.export.metadata import MARK, as_json
 from urmpipe_pipeline.export.tables import Table
 from urmpipe_pipeline.export.times import Times
 from urmpipe_pipeline.recording.entities import printable
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 DESCRIPTION = 116
 """Bytes at the start of a MAT file that are free text."""

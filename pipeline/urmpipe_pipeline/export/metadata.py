@@ -6,9 +6,9 @@ import json
 from dataclasses import asdict
 from typing import Any
 
-from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.results import json_ready
-from urmpipe_pipeline.simulation import Result, Simulation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.runs.results import json_ready
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 MARK = "urmpipe export"
 """Stands in every file that can hold it; only such a file is replaced."""

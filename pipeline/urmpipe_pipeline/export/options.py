@@ -7,9 +7,9 @@ from pathlib import Path
 from typing import Literal, get_args
 
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.compare import Tcp
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result, Simulation
+from urmpipe_pipeline.comparison.compare import Tcp
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 Format = Literal["csv", "parquet", "mat", "tum"]
 FORMATS: tuple[Format, ...] = get_args(Format)

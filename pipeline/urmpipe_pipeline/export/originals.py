@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_pipeline.joint_log import FloatArray, LogColumn
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.joint_log import LogColumn
 
 DIGITS = 15
 """A decimal number of so many digits is told apart from every other one by its double."""

@@ -7,16 +7,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, RecordingError
-from urmpipe_models.kinematics import poses_over_log
-from urmpipe_pipeline.compare import Tcp
-from urmpipe_pipeline.comparison import Deviation
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_pipeline.comparison.compare import Tcp
+from urmpipe_pipeline.comparison.comparison import Deviation
 from urmpipe_pipeline.export.options import ExportOptions, Rows
-from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result, Simulation
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -10,14 +10,15 @@ from typing import TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, RecordingError
-from urmpipe_pipeline.comparison import AXES, Comparison
+from urmpipe_pipeline.comparison.comparison import AXES, Comparison
 from urmpipe_pipeline.export.originals import originals
 from urmpipe_pipeline.export.times import DATE, DAY, TIME_OF_DAY, Times, shares
-from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog, LogColumn, LogWarning, Role
+from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.recording.entities import printable
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
 Values: TypeAlias = FloatArray | IntArray | NDArray[np.str_] | Times

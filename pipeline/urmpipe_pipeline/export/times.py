@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_pipeline.joint_log import IntArray
+from urmpipe_models.arrays import IntArray
 
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 """Powers of ten from a unit to [ns]."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_models.errors import Finding, OutputError
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.export.csv_file import write_csv
 from urmpipe_pipeline.export.mat_file import (
     comparison_fields,
@@ -28,8 +28,8 @@ from urmpipe_pipeline.export.tables import Table, delta_table, file_table, grid_
 from urmpipe_pipeline.export.tum_file import write_tum
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result, Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 POSE_COLUMNS = (
     ("t", "s"), ("x", "m"), ("y", "m"), ("z", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""),

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.chain import Chain
-from urmpipe_models.kinematics import frames_over_log
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.visual import Visual
+from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.orientation import quaternions
-from urmpipe_models.visual import Visual
-from urmpipe_pipeline.joint_log import FloatArray
-from urmpipe_pipeline.meshes import drawable
+from urmpipe_pipeline.runs.meshes import drawable
 
 
 @dataclass(frozen=True, slots=True, eq=False)

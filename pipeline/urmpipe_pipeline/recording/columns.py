@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.recording.entities import Block
 
 if TYPE_CHECKING:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import rgb
 from urmpipe_pipeline.recording.columns import block_columns
 from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, places_of, printable
@@ -18,8 +18,8 @@ from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.recording.tolerances import draw_meter_tolerances, draw_tolerances
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result, Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     from rerun import RecordingStream

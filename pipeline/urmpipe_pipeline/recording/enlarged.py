@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from urmpipe_pipeline.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
 from urmpipe_pipeline.palette import DEVIATION_COLOUR
 from urmpipe_pipeline.recording.entities import entity_path, printable
 from urmpipe_pipeline.recording.ways import Way, lines_of, track_of

@@ -35,13 +35,14 @@ from typing import Literal
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.orientation import NAMES
-from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
-from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
+from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation
+from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, joint_colour
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.text import unique
-from urmpipe_pipeline.trajectory import Trajectory
 
 LAYOUTS = {"run": 4, "comparison": 4, "simulation": 5}
 """The version that a recording says, by what it holds; raised when an older reader would misunderstand it.

@@ -7,14 +7,14 @@ from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
 
+from urmpipe_models.arrays import IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.audit_entry import AuditEntry
-from urmpipe_pipeline.comparison import Deviation
-from urmpipe_pipeline.joint_log import IntArray
+from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.wording import alignment_words, excess, sync_words
 from urmpipe_pipeline.recording.columns import time_columns
 from urmpipe_pipeline.recording.entities import Place, printable
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.wording import alignment_words, excess, sync_words
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.runs.results import Run
 
 if TYPE_CHECKING:
     from rerun import RecordingStream

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_models.arrays import FloatArray
 
 EYE = np.array([0.62, -0.66, 0.42]) / np.linalg.norm([0.62, -0.66, 0.42])
 """The way from the middle of the scene to the eye [-]: from the front right, a little above."""

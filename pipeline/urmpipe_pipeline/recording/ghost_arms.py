@@ -7,15 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.chain import Chain
-from urmpipe_models.kinematics import frames_over_log, points_over_log
-from urmpipe_pipeline.ghosts import Ghost
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_pipeline.palette import ghost_colour
 from urmpipe_pipeline.recording.entities import Place, branch_entity, branch_keys, printable
 from urmpipe_pipeline.recording.ghost_names import name_places, placed_names
 from urmpipe_pipeline.recording.ways import Gone, thinned
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.ghosts import Ghost
+from urmpipe_pipeline.runs.results import Run
 
 STUB = 0.1
 """Length of the piece of each joint's axis that is drawn, as a share of the arm's own reach."""

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.recording.columns import time_columns
 from urmpipe_pipeline.recording.ghost_arms import GhostArm

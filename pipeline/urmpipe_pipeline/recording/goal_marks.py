@@ -6,11 +6,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.orientation import matrices
-from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.recording.entities import Place
 from urmpipe_pipeline.recording.ways import MOST, dashed, lines_of
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.results import Run
 
 FRAMES = 100
 """Targets with an orientation that are drawn as frames, at most: more would hide each other."""

@@ -10,8 +10,8 @@ import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, TypeAlias
 
-from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
 from urmpipe_pipeline.recording.eye import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.ghost_arms import fullest_time
@@ -20,8 +20,8 @@ from urmpipe_pipeline.recording.scene import Scene
 from urmpipe_pipeline.recording.simulation_layout import simulation_plots, simulation_words
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.summary import summary
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result, Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     from rerun.blueprint import Blueprint, Container, Spatial3DView, TextLogView, View

@@ -7,16 +7,16 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from urmpipe_pipeline.audit_entry import AuditEntry
-from urmpipe_pipeline.comparison import Deviation
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.comparison.comparison import Deviation
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.recording.columns import scalar_column, time_columns
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.recording.overview import COMPARED
 from urmpipe_pipeline.recording.signal_entities import verdict_entities
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 if TYPE_CHECKING:
     from rerun import RecordingStream

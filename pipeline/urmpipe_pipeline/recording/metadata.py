@@ -13,9 +13,9 @@ from itertools import groupby
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.chain import Chain
-from urmpipe_pipeline.audit_entry import AuditEntry
-from urmpipe_pipeline.comparison import Comparison, Deviation, Statistics
+from urmpipe_models.chains.chain import Chain
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation, Statistics
+from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording.entities import (
@@ -26,8 +26,8 @@ from urmpipe_pipeline.recording.entities import (
     branch_keys,
     places_of,
 )
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.trajectory import Alignment, Sync, Trajectory
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.runs.results import Run
 
 if TYPE_CHECKING:
     from _typeshed import DataclassInstance
@@ -221,7 +221,7 @@ def robot_data(robot: Chain | None) -> dict[str, Any] | None:
     """Return an arm as JSON has it; None without one."""
     if robot is None:
         return None
-    from urmpipe_models.robot_file import chain_to_dict
+    from urmpipe_models.robots.robot_file import chain_to_dict
 
     return chain_to_dict(robot)
 
@@ -230,7 +230,7 @@ def robot_from(data: Mapping[str, Any] | None) -> Chain | None:
     """Return the arm that a JSON object tells of; None without one."""
     if data is None:
         return None
-    from urmpipe_models.robot_file import chain_from_dict
+    from urmpipe_models.robots.robot_file import chain_from_dict
 
     return chain_from_dict(data)
 

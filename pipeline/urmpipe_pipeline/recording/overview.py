@@ -12,8 +12,8 @@ import numpy as np
 
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.recording.entities import Block, Place, places_of
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result, Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 LONG = 50_000
 """Rows that the viewer still draws whole at once; of more an overview is shown first."""

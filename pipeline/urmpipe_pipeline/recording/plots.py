@@ -6,15 +6,15 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 from uuid import UUID
 
-from urmpipe_pipeline.comparison import Deviation
-from urmpipe_pipeline.joint_log import IntArray
+from urmpipe_models.arrays import IntArray
+from urmpipe_pipeline.comparison.comparison import Deviation
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.recording.marks import mark_entity, worst_entity
 from urmpipe_pipeline.recording.overview import LONG, overview_entity, speed_entity
 from urmpipe_pipeline.recording.tolerances import tolerance_entities
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.signal_groups import Group
-from urmpipe_pipeline.simulation import Result, Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.signal_groups import Group
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     from rerun.blueprint import TimeSeriesView

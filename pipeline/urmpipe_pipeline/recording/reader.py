@@ -10,11 +10,12 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import CosimulationError, RecordingError
-from urmpipe_models.kinematics import PointLog
-from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.ghosts import Ghost, Goals
-from urmpipe_pipeline.joint_log import FloatArray, IntArray, JointLog
+from urmpipe_models.kinematics.forward import PointLog
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.recording import metadata
 from urmpipe_pipeline.recording.entities import (
     GOAL_ARRAYS,
@@ -31,9 +32,9 @@ from urmpipe_pipeline.recording.entities import (
 from urmpipe_pipeline.recording.signal_entities import TIMES
 from urmpipe_pipeline.recording.simulation_data import simulation_fields
 from urmpipe_pipeline.recording.store import Chunk, Store
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Arm, Result, Signal, Simulation
-from urmpipe_pipeline.trajectory import Trajectory
+from urmpipe_pipeline.runs.ghosts import Ghost, Goals
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Arm, Result, Signal, Simulation
 
 Data: TypeAlias = Mapping[str, Any]
 
@@ -173,7 +174,7 @@ def _simulation(arrays: _Arrays, data: Data, path: Path) -> Simulation:
 
 
 def _arm(arrays: _Arrays, data: Data) -> Arm:
-    from urmpipe_models.robot_file import chain_from_dict
+    from urmpipe_models.robots.robot_file import chain_from_dict
 
     return Arm(data["block"], chain_from_dict(data["chain"]), arrays.chunk(data["entity"]).values)
 

@@ -8,13 +8,14 @@ from typing import cast
 
 import numpy as np
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.elementwise import Vector
-from urmpipe_models.kinematics import points_over_log, positions_over_log
+from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
 from urmpipe_models.transform import Transform, translation
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
 from urmpipe_pipeline.recording.bodies import Body, bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import enlarged
@@ -23,9 +24,8 @@ from urmpipe_pipeline.recording.ghost_arms import ArmName, GhostArm, ghost_arms,
 from urmpipe_pipeline.recording.goal_marks import GoalMarks, goal_marks
 from urmpipe_pipeline.recording.signal_entities import arm_keys
 from urmpipe_pipeline.recording.ways import NEVER, Gone, Way, dashed, lines_of, thinned, track_of
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result, Simulation
-from urmpipe_pipeline.trajectory import Trajectory
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 NEAR = 3.0
 """Targets that are missed are in view if they are not further from the middle than so many radii: at that

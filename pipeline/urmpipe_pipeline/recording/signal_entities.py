@@ -14,8 +14,8 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.recording.entities import Block, entity_key, entity_path, places, printable
-from urmpipe_pipeline.signal_groups import groups_of
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.simulations.signal_groups import groups_of
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 TIMES = "/signals"
 """The entity that carries the times."""

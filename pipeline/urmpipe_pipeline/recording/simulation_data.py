@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from urmpipe_pipeline.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.recording.entities import Block
 from urmpipe_pipeline.recording.metadata import (
     document,
@@ -16,7 +16,7 @@ from urmpipe_pipeline.recording.metadata import (
     warnings_from,
 )
 from urmpipe_pipeline.recording.signal_entities import arm_entities, signal_entities
-from urmpipe_pipeline.simulation import Setting, Signal, SimulatedBlock, Simulation
+from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation
 
 
 def simulation_json(simulation: Simulation, blocks: list[Block]) -> str:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 from urmpipe_pipeline.recording.entities import SUMMARY, printable
 from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE, signal_entities, verdict_entities
-from urmpipe_pipeline.signal_groups import Group, groups_of
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 if TYPE_CHECKING:
     from rerun.blueprint import Container, View

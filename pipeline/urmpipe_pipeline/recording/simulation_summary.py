@@ -5,10 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.wording import meter_words
 from urmpipe_pipeline.recording.summary import shown, table_row, warning_lines
-from urmpipe_pipeline.simulation import Simulation
-from urmpipe_pipeline.wording import meter_words
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 LISTED = 30
 """Blocks and connections that are listed; the others are counted."""

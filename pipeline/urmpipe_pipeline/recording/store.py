@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, RecordingError
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, is_recording, open_reader, our_entries
 
 if TYPE_CHECKING:

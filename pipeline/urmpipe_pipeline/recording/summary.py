@@ -10,12 +10,12 @@ from itertools import zip_longest
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import AXES, Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation
+from urmpipe_pipeline.comparison.wording import alignment_words, excess, sync_words, tolerance_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import ghost_colour_word, run_colour_word
 from urmpipe_pipeline.recording.entities import printable
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.wording import alignment_words, excess, sync_words, tolerance_words
+from urmpipe_pipeline.runs.results import Run
 
 BRANCHES = 8
 """Branches that are listed; the others are counted."""

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.joint_log import IntArray
+from urmpipe_models.arrays import IntArray
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.recording.columns import scalar_column, time_columns
 from urmpipe_pipeline.recording.entities import entity_path
 from urmpipe_pipeline.recording.signal_entities import verdict_entities
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 if TYPE_CHECKING:
     from rerun import RecordingStream

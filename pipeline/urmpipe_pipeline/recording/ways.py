@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_models.arrays import FloatArray, IntArray
 
 POSE_PERIOD = 0.02
 """Time between two poses drawn in [s], at least."""

@@ -24,8 +24,8 @@ from urmpipe_pipeline.recording.signal_entities import simulation_blocks
 from urmpipe_pipeline.recording.simulation_data import simulation_json
 from urmpipe_pipeline.recording.store import PROPERTY
 from urmpipe_pipeline.recording.verify import verify
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result, Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     from rerun import RecordingStream

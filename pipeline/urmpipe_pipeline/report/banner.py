@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.wording import of_allowed, tolerance_words
 from urmpipe_pipeline.report.facts import Fact
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.wording import of_allowed, tolerance_words
+from urmpipe_pipeline.runs.results import Run
 
 NAMED = 3
 """Logs named in the headline; more are only counted."""

@@ -6,7 +6,7 @@ import base64
 from dataclasses import dataclass
 from typing import Literal
 
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 
 @dataclass(frozen=True, slots=True)

@@ -8,10 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import Comparison, Deviation, Stretch
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.trajectory import Sync
-from urmpipe_pipeline.wording import correlation, tolerance_words, tool_option
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation, Stretch
+from urmpipe_pipeline.comparison.trajectory import Sync
+from urmpipe_pipeline.comparison.wording import correlation, tolerance_words, tool_option
+from urmpipe_pipeline.runs.results import Run
 
 
 @dataclass(frozen=True, slots=True)

@@ -6,9 +6,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import AXES, Deviation, Statistics
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
+from urmpipe_pipeline.comparison.comparison import AXES, Deviation, Statistics
+from urmpipe_pipeline.comparison.wording import correlation
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, joint_colour
 from urmpipe_pipeline.report.spec import MUTED, Figure, Panel, Spec, axis, base_layout, stacked, typed
 from urmpipe_pipeline.report.traces import (
@@ -24,7 +25,6 @@ from urmpipe_pipeline.report.traces import (
     stroke,
     told,
 )
-from urmpipe_pipeline.wording import correlation
 
 PANEL_PX = 112
 """Height of one plot among some on a common time axis."""

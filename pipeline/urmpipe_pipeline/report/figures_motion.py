@@ -6,15 +6,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.continuity import continuous_euler
-from urmpipe_models.kinematics import PointLog
+from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import POINTS
-from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.report.spec import MUTED, Figure, Panel, Spec, stacked
 from urmpipe_pipeline.report.traces import line, shaded
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.results import Run
 
 MOTION_PX = 170
 """Height of one plot of three coordinates."""

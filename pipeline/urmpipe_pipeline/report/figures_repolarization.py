@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.kinematics import PointLog
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_pipeline import text
-from urmpipe_pipeline.audit_entry import AuditEntry
 from urmpipe_pipeline.decimate import POINTS
-from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.palette import JOINT_COLOURS, joint_colour
-from urmpipe_pipeline.playback import MOST, PARTS, Playback
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.report.figures_motion import coordinates, point_name
 from urmpipe_pipeline.report.spec import FAULT, MUTED, Figure, Panel, Spec, stacked
 from urmpipe_pipeline.report.traces import DASHES, instant, label, line, marks, stroke
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.playback import MOST, PARTS, Playback
+from urmpipe_pipeline.runs.results import Run
 
 JOINTS_PX = 230
 """Height of a plot of all joints."""

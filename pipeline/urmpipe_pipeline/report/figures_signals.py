@@ -6,8 +6,8 @@ import numpy as np
 
 from urmpipe_pipeline.report.spec import Figure, Panel, Spec, stacked
 from urmpipe_pipeline.report.traces import DASHES, band, instant, label, level, line, stroke
-from urmpipe_pipeline.signal_groups import MOST, Group
-from urmpipe_pipeline.simulation import Signal, Simulation, extremes
+from urmpipe_pipeline.simulations.signal_groups import MOST, Group
+from urmpipe_pipeline.simulations.simulation import Signal, Simulation, extremes
 
 SIGNALS_PX = 260
 """Height of the plot of some signals."""

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.playback import play_back
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
 from urmpipe_pipeline.report.figures_deviation import deviation_figure, pose_figure, speed_figure
 from urmpipe_pipeline.report.figures_motion import motion_figure, pose_by_row_figure
 from urmpipe_pipeline.report.figures_overview import overview_figure
@@ -18,9 +17,10 @@ from urmpipe_pipeline.report.paths import (
     run_path_figure,
 )
 from urmpipe_pipeline.report.spec import Figure, unjoined
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.signal_groups import Group
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.runs.playback import play_back
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.signal_groups import Group
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 
 def comparison_figures(comparison: Comparison) -> list[Figure]:

@@ -10,12 +10,12 @@ from typing import Any
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.audit_entry import AuditKind
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.repolarization.audit_entry import AuditKind
 from urmpipe_pipeline.report.tables import Cell, Column, Table, listing, numbers, words
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result
 
 AUDIT_NOTES: dict[AuditKind, str] = {
     "in-between": "in-between: a sample that a linear resampling left on a wrap, Step deg off the line of its"

@@ -8,7 +8,8 @@ from itertools import groupby
 from typing import TypeAlias
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.wording import tolerance_words
 from urmpipe_pipeline.report import (
     gallery,
     log_tables,
@@ -22,10 +23,9 @@ from urmpipe_pipeline.report.drawings import Drawing, Listing, system_drawing, s
 from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_facts, run_facts
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.signal_groups import Group, groups_of
-from urmpipe_pipeline.simulation import Result, Simulation
-from urmpipe_pipeline.wording import tolerance_words
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 Block: TypeAlias = Table | Figure | Drawing | Listing
 

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_models.kinematics import positions_over_log
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import Deviation
+from urmpipe_pipeline.comparison.comparison import Deviation
 from urmpipe_pipeline.decimate import POINTS, decimate
-from urmpipe_pipeline.joint_log import FloatArray, IntArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour
-from urmpipe_pipeline.playback import Playback
 from urmpipe_pipeline.report.figures_motion import point_name
 from urmpipe_pipeline.report.figures_repolarization import BEFORE_POINTS, wrongness
 from urmpipe_pipeline.report.spec import FAULT, INK, Figure, Spec, base_layout, space_axis, typed
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.runs.playback import Playback
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 DEVIATION_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
 """Small to large deviation: darker all the way, blue to red, legible on white and to the colour-blind."""

@@ -12,7 +12,7 @@ from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions, figure_stem, write_figures
 from urmpipe_pipeline.report.markup import asset, environment, script_hash
 from urmpipe_pipeline.report.page import Page, lay_out
-from urmpipe_pipeline.simulation import Result
+from urmpipe_pipeline.simulations.simulation import Result
 
 
 @dataclass(frozen=True, slots=True)

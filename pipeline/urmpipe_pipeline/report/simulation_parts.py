@@ -6,12 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.wording import meter_words
 from urmpipe_pipeline.report.banner import Banner
 from urmpipe_pipeline.report.cards import Card
 from urmpipe_pipeline.report.facts import Fact
-from urmpipe_pipeline.simulation import Simulation
-from urmpipe_pipeline.wording import meter_words
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 STATES = {"pass": "pass", "fail": "fail", None: "simulated"}
 """How a card looks, by the verdict."""

@@ -5,9 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.report.tables import Cell, Column, Table, judged, listing, numbers, words
-from urmpipe_pipeline.simulation import Signal, Simulation, extremes
+from urmpipe_pipeline.simulations.simulation import Signal, Simulation, extremes
 
 
 def simulations_table(simulations: Sequence[Simulation], links: Sequence[str]) -> Table:

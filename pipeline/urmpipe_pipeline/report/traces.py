@@ -8,8 +8,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.decimate import POINTS, decimate
-from urmpipe_pipeline.joint_log import FloatArray
 from urmpipe_pipeline.report.spec import BAND, FAULT, INK, MUTED, Spec, typed
 
 DASHES = ("solid", "dash", "dot", "dashdot")

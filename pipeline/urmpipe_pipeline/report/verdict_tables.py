@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import AXES, Comparison, Deviation, Statistics
+from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation, Statistics
 from urmpipe_pipeline.report.facts import alignment_value, speed_correlation
 from urmpipe_pipeline.report.tables import (
     Cell,

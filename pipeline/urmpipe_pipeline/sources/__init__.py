@@ -8,6 +8,6 @@ columns?), `table` (its numbers, fast), `diagnose` (where it is wrong, with line
 from urmpipe_pipeline.sources.log_map import LogMap, map_of, read_map
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.read import read_log
-from urmpipe_pipeline.sources.tables import source_names
+from urmpipe_pipeline.sources.tables.opening import source_names
 
 __all__ = ["LogMap", "ReadOptions", "map_of", "read_log", "read_map", "source_names"]

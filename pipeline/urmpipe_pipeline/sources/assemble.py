@@ -7,31 +7,23 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.orientation import RotationForm
-from urmpipe_pipeline.joint_log import (
-    ROLES,
-    FloatArray,
-    Inference,
-    IntArray,
-    JointLog,
-    LogColumn,
-    LogWarning,
-    SourceFile,
-)
-from urmpipe_pipeline.sources.cells import is_number, plain, significant_digits
+from urmpipe_pipeline.joint_log import ROLES, Inference, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.sources.cells.cell import is_number, plain, significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
-from urmpipe_pipeline.sources.clock import even_clock
-from urmpipe_pipeline.sources.clock_units import EXPONENTS
-from urmpipe_pipeline.sources.columns import Column
+from urmpipe_pipeline.sources.clocks.clock import even_clock
+from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
+from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.content import Content
-from urmpipe_pipeline.sources.kinematic_units import by_kinematics
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan
-from urmpipe_pipeline.sources.rotation import settle_rotation
-from urmpipe_pipeline.sources.tables import PATH, TABLE
-from urmpipe_pipeline.sources.units import UnitFinder
+from urmpipe_pipeline.sources.tables.opening import PATH, TABLE
+from urmpipe_pipeline.sources.units.kinematic_units import by_kinematics
+from urmpipe_pipeline.sources.units.rotation import settle_rotation
+from urmpipe_pipeline.sources.units.units import UnitFinder
 from urmpipe_pipeline.sources.vocabulary import Unit
 
 

@@ -7,15 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
-from urmpipe_pipeline.quantised import behind_repeated
-from urmpipe_pipeline.sources.clock import Clock
-from urmpipe_pipeline.sources.clock_units import EXPONENTS
-from urmpipe_pipeline.sources.diagnose import SHOWN_FINDINGS, lines_of_rows
-from urmpipe_pipeline.sources.sniff import Layout
-from urmpipe_pipeline.sources.table import NO_TIME, UNREADABLE, Numbers
-from urmpipe_pipeline.sources.text_cells import LONGEST_CELL
+from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
+from urmpipe_pipeline.sources.clocks.clock import Clock
+from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
+from urmpipe_pipeline.sources.clocks.quantised import behind_repeated
+from urmpipe_pipeline.sources.tables.diagnose import SHOWN_FINDINGS, lines_of_rows
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.table import NO_TIME, UNREADABLE, Numbers
 
 GAP = 3.0
 """Times the median period: more than this between two rows is a gap."""

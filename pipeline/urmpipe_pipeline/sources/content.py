@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, for_each
-from urmpipe_pipeline.joint_log import FloatArray, Inference, IntArray, LogWarning
-from urmpipe_pipeline.sources.blockwise import read_blockwise
+from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.checks import (
     MOST_SKIPPED,
     find_errors,
@@ -18,13 +18,14 @@ from urmpipe_pipeline.sources.checks import (
     trimmed,
     without_unread,
 )
-from urmpipe_pipeline.sources.columns import Column
-from urmpipe_pipeline.sources.diagnose import lines_of_rows
+from urmpipe_pipeline.sources.clocks.text_times import timed
+from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.plan import Plan
-from urmpipe_pipeline.sources.roles import Roles
-from urmpipe_pipeline.sources.sniff import Layout
-from urmpipe_pipeline.sources.table import Numbers, read_fast
-from urmpipe_pipeline.sources.text_times import timed
+from urmpipe_pipeline.sources.tables.blockwise import read_blockwise
+from urmpipe_pipeline.sources.tables.diagnose import lines_of_rows
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.table import Numbers, read_fast
 
 
 @dataclass(frozen=True, slots=True, eq=False)

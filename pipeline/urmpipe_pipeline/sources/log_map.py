@@ -37,14 +37,14 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.files.tables import Table
+from urmpipe_models.files.toml_text import parse_toml, toml_lines, toml_text
 from urmpipe_models.orientation import FORMS
-from urmpipe_models.tables import Table
-from urmpipe_models.toml_text import parse_toml, toml_lines, toml_text
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
+from urmpipe_pipeline.sources.clocks.time_file import NOTHING_BUT
 from urmpipe_pipeline.sources.options import ReadOptions
-from urmpipe_pipeline.sources.rotation import PURE
-from urmpipe_pipeline.sources.time_file import NOTHING_BUT
+from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
 TURNING = ("rad", "deg")

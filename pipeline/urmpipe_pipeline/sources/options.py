@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
 
 from urmpipe_models.orientation import RotationForm
 
@@ -49,3 +50,23 @@ class ReadOptions:
     skip_bad: bool = False
     interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     repair: bool = False
+
+
+def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None) -> ReadOptions:
+    """Return the reading options among some named values; None means not given.
+
+    Args:
+        values: Options by name, others among them.
+        otherwise: What holds where nothing is given, such as that of a map. Units of single columns and
+            intervals of single joints add up; joints given anew leave behind what belonged to the others:
+            names, signs, offsets and intervals.
+    """
+    base = otherwise or ReadOptions()
+    known = {field.name for field in fields(ReadOptions)}
+    given = {name: value for name, value in values.items() if name in known and value is not None}
+    given["units"] = {**base.units, **given.get("units", {})}
+    if "joints" in given:
+        given = {"names": (), "signs": (), "offsets": (), "interval": {}, **given}
+    elif "" not in given.get("interval", {"": None}):
+        given["interval"] = {**base.interval, **given["interval"]}
+    return replace(base, **given)

@@ -5,21 +5,21 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.sources.clock import Clock, find_clock
-from urmpipe_pipeline.sources.columns import (
+from urmpipe_pipeline.sources.clocks.clock import Clock, find_clock
+from urmpipe_pipeline.sources.clocks.time_file import clock_of_file, time_file
+from urmpipe_pipeline.sources.columns.columns import (
     Column,
     columns_of,
     given_units,
     refuse_twins,
 )
+from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
+from urmpipe_pipeline.sources.columns.roles import Roles, assign
 from urmpipe_pipeline.sources.options import ReadOptions
-from urmpipe_pipeline.sources.places import one_plot_a_file, without_header
-from urmpipe_pipeline.sources.roles import Roles, assign
-from urmpipe_pipeline.sources.tables import PATH, Tables
-from urmpipe_pipeline.sources.time_file import clock_of_file, time_file
+from urmpipe_pipeline.sources.tables.opening import PATH, Tables
 from urmpipe_pipeline.sources.vocabulary import Unit
 
 

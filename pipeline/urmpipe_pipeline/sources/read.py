@@ -7,15 +7,15 @@ from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources.assemble import assemble
 from urmpipe_pipeline.sources.content import read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import make_plan
-from urmpipe_pipeline.sources.table import release_memory
-from urmpipe_pipeline.sources.tables import open_tables
-from urmpipe_pipeline.sources.text import fingerprint
+from urmpipe_pipeline.sources.tables.opening import open_tables
+from urmpipe_pipeline.sources.tables.table import release_memory
+from urmpipe_pipeline.sources.tables.text import fingerprint
 
 
 def read_log(

@@ -8,15 +8,16 @@ from pathlib import Path
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, for_each
-from urmpipe_pipeline.joint_log import FloatArray, IntArray, LogWarning
-from urmpipe_pipeline.sources.clock import even_clock, find_clock
-from urmpipe_pipeline.sources.columns import Column, columns_of, find_column, given_units
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.sources.clocks.clock import even_clock, find_clock
+from urmpipe_pipeline.sources.columns.columns import Column, columns_of, find_column, given_units
+from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.content import read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan
-from urmpipe_pipeline.sources.roles import Roles
-from urmpipe_pipeline.sources.tables import Tables, open_tables
+from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
 from urmpipe_pipeline.sources.vocabulary import Unit
 from urmpipe_pipeline.text import counted
 

@@ -6,7 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from shipped_units import sample_times
-from systems import FloatArray, System, Trace
+from systems import System, Trace
+from urmpipe_models.arrays import FloatArray
 
 
 def run_fmpy(system: System, step: float, steps: int) -> Trace:

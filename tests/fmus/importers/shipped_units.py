@@ -5,15 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_names
 from urmpipe_fmus.variable import Input
-from urmpipe_models.catalogue import load_robot
-
-FloatArray = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.robots.catalogue import load_robot
 
 STEP = 0.005
 """Communication step in [s]."""

@@ -12,12 +12,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Variable
-
-FloatArray = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
 
 
 @dataclass(frozen=True, slots=True)

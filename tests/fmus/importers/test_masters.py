@@ -12,10 +12,11 @@ from ecos_master import run_ecos
 from fmpy_master import run_fmpy
 from libcosim_master import run_libcosim
 from peers import need
-from shipped_units import STEP, FloatArray, columns, drawn_inputs, sample_times, shipped, shipped_unit
+from shipped_units import STEP, columns, drawn_inputs, sample_times, shipped, shipped_unit
 from systems import System, Trace, alone
 from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
+from urmpipe_models.arrays import FloatArray
 
 STEPS = 61
 MASTERS: dict[str, tuple[str, Callable[[System, float, int], Trace]]] = {

@@ -11,15 +11,16 @@ import pytest
 from ecos_master import run_ecos
 from libcosim_master import run_libcosim
 from peers import need, need_builds_for
-from shipped_units import STEP, FloatArray, sample_times, shipped_unit
+from shipped_units import STEP, sample_times, shipped_unit
 from systems import Block, Scalar, System, Trace, empty_trace
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.native import this_platform
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.units import make_unit
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.kinematics import positions_over_log
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_models.robots.catalogue import load_robot
 
 STEPS = 300
 Port = tuple[str, str]

@@ -18,9 +18,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from shipped_units import CROSS_BUILT, STEP, FloatArray, columns, drawn_inputs, sample_times, shipped_unit
+from shipped_units import CROSS_BUILT, STEP, columns, drawn_inputs, sample_times, shipped_unit
 from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
+from urmpipe_models.arrays import FloatArray
 
 STEPS = 41
 DECIMALS = 6

@@ -23,8 +23,8 @@ from urmpipe_fmus.table_file import TABLE_FILE, table_bytes
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.variable import Input, Output
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import FmuError
+from urmpipe_models.robots.catalogue import load_robot
 
 GUID = "{12345678-0000-0000-0000-000000000000}"
 HOST = Path(__file__).with_name("host.c")

@@ -12,9 +12,8 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-FloatArray = NDArray[np.float64]
+from urmpipe_models.arrays import FloatArray
 
 EXACT = np.longdouble if np.finfo(np.longdouble).nmant > 60 else np.float64
 MOST_ULPS = 3 if EXACT is np.longdouble else 4

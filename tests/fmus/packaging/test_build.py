@@ -22,8 +22,8 @@ from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_names
 from urmpipe_fmus.units.log_source import log_source
 from urmpipe_fmus.variable import Input, Output
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import FmuError
+from urmpipe_models.robots.catalogue import load_robot
 
 Make = Callable[..., Unit]
 WHY = native_missing([this_platform()])

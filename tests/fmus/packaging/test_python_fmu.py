@@ -20,8 +20,8 @@ from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.user_unit import load_unit_file, unit_of_source
 from urmpipe_fmus.variable import Input, Parameter
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import FmuError, UnitError
+from urmpipe_models.robots.catalogue import load_robot
 
 Make = Callable[..., Unit]
 HELPERS = str(Path(__file__).parents[1])

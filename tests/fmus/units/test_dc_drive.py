@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from urmpipe_fmus.dependencies import Dependencies
@@ -18,9 +17,8 @@ from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import State
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import UnitError
-
-FloatArray = NDArray[np.float64]
 
 K, DAMPING, RATIO, C, R, L, I1 = 2500.0, 5.0, 100.0, 0.05, 0.5, 1e-3, 0.5
 """The parameters at their start values, written out: what is tested computes nothing for its own oracle."""

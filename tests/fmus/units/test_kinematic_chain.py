@@ -7,7 +7,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
 from sliding_arm import sliding_arm
 from urmpipe_fmus.instance import Instance
@@ -15,14 +14,13 @@ from urmpipe_fmus.run import run
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit
 from urmpipe_fmus.units.kinematic_chain import kinematic_chain
-from urmpipe_models.catalogue import load_robot, robot_names
-from urmpipe_models.chain import Chain
-from urmpipe_models.kinematics import point_over_log, points_over_log, positions_over_log
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.urm import urm_chain, urm_geometry
+from urmpipe_models.chains.visual import Sphere, Visual
+from urmpipe_models.kinematics.forward import point_over_log, points_over_log, positions_over_log
+from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.transform import Transform, from_offset, from_rpy
-from urmpipe_models.urm import urm_chain, urm_geometry
-from urmpipe_models.visual import Sphere, Visual
-
-FloatArray = NDArray[np.float64]
 
 ROUNDING = 1e-13
 """Some hundred operations on values of up to 20, in another order: each errs by 1e-16 of them."""

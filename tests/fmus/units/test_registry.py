@@ -12,8 +12,8 @@ from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_help, unit_names, unit_options
 from urmpipe_fmus.variable import Output
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.errors import UnitError
+from urmpipe_models.robots.catalogue import load_robot
 
 TABLE = Table(np.array([0, 5_000_000]), np.array([[0.5, 1.0], [0.25, 2.0]]))
 

@@ -8,15 +8,13 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from random_units import PATIENT
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
 from urmpipe_fmus.units.repolarizer import repolarizer
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.repolarizer import repolarize
-
-FloatArray = NDArray[np.float64]
 
 
 def over(raw: FloatArray, **start: float) -> dict[str, FloatArray]:

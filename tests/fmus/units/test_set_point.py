@@ -9,8 +9,8 @@ from urmpipe_fmus.dependencies import TIME, Dependencies
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
 from urmpipe_fmus.units import make_unit
+from urmpipe_models.drives.set_point import ramp, step, trapezoid
 from urmpipe_models.errors import UnitError
-from urmpipe_models.set_point import ramp, step, trapezoid
 
 T = np.linspace(0.0, 2.0, 81)
 MOVE = {"begin": 0.25, "initial": 0.5, "target": -1.0, "speed": 1.5, "acceleration": 6.0}

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain, Joint, Mimic
+from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.inverse.farthest import farthest, too_far
 from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform, translation
 
 

@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain, Joint, Mimic
+from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.inverse.limits import periods, within_limits, within_pi
 from urmpipe_models.inverse.solutions import Singular, Solutions
+from urmpipe_models.robots.catalogue import load_robot
 
 TURN = 2.0 * math.pi
 

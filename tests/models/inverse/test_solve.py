@@ -5,16 +5,15 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.solve import Method, solve
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.robots.catalogue import load_robot
 
-FloatArray = NDArray[np.float64]
 MET = 1e-9
 """What the iterative solver stops at; the closed forms are at 1e-12."""
 

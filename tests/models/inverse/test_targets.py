@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
-from urmpipe_models.catalogue import load_robot
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.robots.catalogue import load_robot
 
 ARM = load_robot("arm6")
 Q = np.array([[0.3, 0.8, -0.6, 0.5, 0.7, 0.2]])

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.kinematics import poses_over_log
-from urmpipe_pipeline.compare import compare_runs
-from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.ingest import ingest_log
-from urmpipe_pipeline.results import Run
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.comparison.compare import compare_runs
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.runs.results import Run
 
 START_NS = 1_700_000_000_123_456_789
 """A clock of our years, to the nanosecond."""

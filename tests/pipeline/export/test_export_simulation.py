@@ -16,10 +16,10 @@ from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
 from urmpipe_models.errors import OptionError, RecordingError
-from urmpipe_models.kinematics import poses_over_log
-from urmpipe_pipeline.compare import Tcp
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.export import ExportOptions, Format, Rows, export_result
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 MakeSimulation = Callable[..., Simulation]
 

@@ -14,7 +14,7 @@ import pytest
 from scipy.io import savemat
 
 from urmpipe_models.errors import OptionError, OutputError, RecordingError, UrmpipeError
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.export import (
     FORMATS,
     ExportOptions,
@@ -29,7 +29,7 @@ from urmpipe_pipeline.export.identity import is_export
 from urmpipe_pipeline.export.lines import differences, texts, write_lines
 from urmpipe_pipeline.export.times import Times
 from urmpipe_pipeline.export.write import write_all
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.results import Run
 
 
 def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:

@@ -10,18 +10,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.inverse.targets import targets_of
-from urmpipe_models.kinematics import point_over_log
-from urmpipe_models.urm import urm_chain
-from urmpipe_pipeline.audit_entry import AuditEntry
-from urmpipe_pipeline.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_models.kinematics.forward import point_over_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run
+from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.solved import Ghost, goals_of, row_times, solved_run
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.runs.results import Run
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)
 TILT = math.radians(52.0)

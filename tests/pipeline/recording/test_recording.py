@@ -16,14 +16,14 @@ from hypothesis import strategies as st
 
 from same_results import assert_same
 from urmpipe_models.errors import OutputError
-from urmpipe_pipeline.compare import CompareOptions, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, record, write_recording
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Result
-from urmpipe_pipeline.trajectory import AlignMode
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

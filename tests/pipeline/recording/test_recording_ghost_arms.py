@@ -15,13 +15,14 @@ from hypothesis.extra.numpy import arrays
 from rerun.chunk import RrdReader
 
 from recorded import rows_of, static
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain, Joint
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.inverse.targets import Targets, targets_of
-from urmpipe_models.kinematics import points_over_log
+from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.orientation import matrices
-from urmpipe_models.urdf_reader import read_urdf
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.entities import places_of
 from urmpipe_pipeline.recording.ghost_arms import POSES, bones_of
@@ -29,8 +30,7 @@ from urmpipe_pipeline.recording.ghost_drawing import capsules
 from urmpipe_pipeline.recording.ghost_names import name_places
 from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.scene import scene_of
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.solved import Ghost, goals_of, row_times, solved_run
+from urmpipe_pipeline.runs.results import Run
 
 MakeSolved = Callable[..., Run]
 

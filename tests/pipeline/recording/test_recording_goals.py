@@ -10,16 +10,16 @@ import numpy as np
 from rerun.chunk import RrdReader
 
 from recorded import static
-from urmpipe_models.catalogue import load_robot
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.orientation import matrices
-from urmpipe_pipeline.compare import compare_runs
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.comparison.compare import compare_runs
+from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.palette import AXIS_COLOURS, rgb
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.scene import NEAR, scene_of
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.solved import goals_of, row_times, solved_run
+from urmpipe_pipeline.runs.results import Run
 
 MakeSolved = Callable[..., Run]
 

@@ -38,9 +38,9 @@ SPECIMENS = {
 IMPORTS = """
 import json, sys
 from pathlib import Path
-from urmpipe import api
+import urmpipe
 from urmpipe.process import tune_pyarrow
-from urmpipe_models.catalogue import load_robot
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.recording import identity
@@ -71,7 +71,7 @@ def imported(*arguments: str) -> set[str]:
 
 SENT = """
 import json, sys, threading
-from urmpipe import api
+import urmpipe
 from urmpipe.process import tune_pyarrow
 
 tune_pyarrow()
@@ -84,7 +84,7 @@ class Finder:
             threads.append(name)
 
 sys.meta_path.insert(0, Finder)
-api.ingest(sys.argv[1], robot="urm6", output=sys.argv[2])
+urmpipe.ingest(sys.argv[1], robot="urm6", output=sys.argv[2])
 print(json.dumps([name for name in threads if name in sys.modules]))
 """
 

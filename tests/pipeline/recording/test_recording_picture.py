@@ -14,10 +14,10 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from urmpipe_models.kinematics import frames_over_log, points_over_log
-from urmpipe_models.urdf_reader import read_urdf
-from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
+from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
@@ -32,8 +32,8 @@ from urmpipe_pipeline.recording.eye import FIELD_OF_VIEW
 from urmpipe_pipeline.recording.layout import eye_and_target
 from urmpipe_pipeline.recording.scene import Scene, scene_of
 from urmpipe_pipeline.recording.viewer import open_window, opening_times, run_viewer
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

@@ -12,24 +12,24 @@ import numpy as np
 import pytest
 from rerun.chunk import RrdReader
 
-from urmpipe_models.chain import Chain, Joint
-from urmpipe_models.kinematics import frames_over_log
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.visual import Box, Mesh, Sphere, Visual
+from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.orientation import matrices, quaternions
+from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.transform import rotation_x, translation
-from urmpipe_models.urdf_reader import read_urdf
-from urmpipe_models.visual import Box, Mesh, Sphere, Visual
-from urmpipe_pipeline.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.ingest import kinematics
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.meshes import drawable, missing_visuals
 from urmpipe_pipeline.recording import read_recording, write_recording
 from urmpipe_pipeline.recording.bodies import bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import LEAST_SEEN
 from urmpipe_pipeline.recording.scene import Mark, scene_of
 from urmpipe_pipeline.recording.store import Store
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.trajectory import AlignMode
+from urmpipe_pipeline.runs.ingest import kinematics
+from urmpipe_pipeline.runs.meshes import drawable, missing_visuals
+from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

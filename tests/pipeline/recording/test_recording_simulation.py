@@ -17,9 +17,10 @@ from hypothesis.extra.numpy import arrays
 from rerun import blueprint as rrb
 
 from same_results import assert_same
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import RecordingError
-from urmpipe_pipeline.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.joint_log import FloatArray, LogWarning, SourceFile
+from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, write_recording
@@ -30,8 +31,8 @@ from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.viewer import opening_times
 from urmpipe_pipeline.recording.writer import SLICE
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Setting, Signal, SimulatedBlock, Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation
 
 MakeSimulation = Callable[..., Simulation]
 MakeRun = Callable[..., Run]

@@ -14,9 +14,9 @@ import pytest
 import rerun as rr
 from rerun.chunk import RrdReader
 
-from urmpipe_models.kinematics import points_over_log
-from urmpipe_pipeline.audit_entry import AuditEntry, AuditKind
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_models.kinematics.forward import points_over_log
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.entities import places_of
@@ -28,8 +28,8 @@ from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.recording.ways import DASHES, LEAST_DASH, MOST
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.trajectory import Alignment, Sync
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
+from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]

@@ -7,17 +7,18 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_models.chain import Chain
-from urmpipe_models.kinematics import point_over_log
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.repolarizer import repolarize
-from urmpipe_models.urm import urm_chain
-from urmpipe_pipeline.audit_entry import AuditEntry
-from urmpipe_pipeline.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.derivatives import derivatives
-from urmpipe_pipeline.joint_log import FloatArray, Inference, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.runs.derivatives import derivatives
+from urmpipe_pipeline.runs.results import Run
 
 LENGTHS = (0.243215, *(0.212430,) * 5, 0.042215)  # Table 1 of the paper, in m
 TSP = 0.005

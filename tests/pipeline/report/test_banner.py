@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.report.banner import banner
 from urmpipe_pipeline.report.cards import card
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.results import Run
 
 LINKS = (("#a", "#b"),)
 

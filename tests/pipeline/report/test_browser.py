@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.report import render_report
 from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.report.spec import Figure
-from urmpipe_pipeline.results import Run
-from urmpipe_pipeline.simulation import Simulation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 if TYPE_CHECKING:
     from playwright.sync_api import Browser, Locator, Page

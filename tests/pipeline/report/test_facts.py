@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_models.catalogue import load_robot, parse_offset
 from urmpipe_models.inverse.targets import Targets
-from urmpipe_pipeline.comparison import Comparison, Stretch
+from urmpipe_models.robots.catalogue import load_robot, parse_offset
+from urmpipe_pipeline.comparison.comparison import Comparison, Stretch
+from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
+from urmpipe_pipeline.comparison.wording import tool_option
+from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run
 from urmpipe_pipeline.report import facts
-from urmpipe_pipeline.solved import Ghost, goals_of, row_times, solved_run
-from urmpipe_pipeline.trajectory import Alignment, Sync
-from urmpipe_pipeline.wording import tool_option
 
 TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 

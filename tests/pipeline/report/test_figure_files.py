@@ -16,7 +16,7 @@ from pathlib import Path
 import pytest
 
 from urmpipe_models.errors import OptionError, OutputError
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.report import FigureOptions, headless, write_report
 from urmpipe_pipeline.report.figure_files import figure_stem, write_figures
 from urmpipe_pipeline.report.page import lay_out
@@ -198,7 +198,7 @@ def test_it_works_where_a_loop_is_running_as_in_a_notebook(figure: Figure, tmp_p
 
 
 def test_figure_files_are_told_as_json(tmp_path: Path) -> None:
-    from urmpipe.api import Report
+    from urmpipe.api.report import Report
     from urmpipe_pipeline.report import FigureFile
 
     report = Report(tmp_path / "a.html", (), (FigureFile(tmp_path / "a.svg", "Path", "log"),))

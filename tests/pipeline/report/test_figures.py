@@ -10,12 +10,11 @@ import numpy as np
 import plotly.graph_objects as go
 import pytest
 
+from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.comparison import Comparison, Deviation
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, run_colour
-from urmpipe_pipeline.playback import play_back
 from urmpipe_pipeline.report import gallery
 from urmpipe_pipeline.report.figures_deviation import deviation_figure, pose_figure, speed_figure
 from urmpipe_pipeline.report.figures_motion import motion_figure
@@ -23,7 +22,8 @@ from urmpipe_pipeline.report.figures_overview import overview_figure
 from urmpipe_pipeline.report.figures_repolarization import joints_figure, point_figure
 from urmpipe_pipeline.report.paths import path_figure, repolarized_path_figure
 from urmpipe_pipeline.report.spec import Figure
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.playback import play_back
+from urmpipe_pipeline.runs.results import Run
 
 
 def numbers(spec: dict[str, Any]) -> FloatArray:

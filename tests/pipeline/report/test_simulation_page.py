@@ -13,13 +13,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from urmpipe_pipeline.comparison import Comparison
-from urmpipe_pipeline.joint_log import FloatArray, LogWarning
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.report import render_report
 from urmpipe_pipeline.report.page import Part, lay_out
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
-from urmpipe_pipeline.simulation import Setting, Signal, SimulatedBlock, Simulation
+from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation
 
 MakeSimulation = Callable[..., Simulation]
 HOSTILE = "</script><img src=x onerror=alert(1)>\"'&%{y}<b>"

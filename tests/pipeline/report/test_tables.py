@@ -7,12 +7,12 @@ from dataclasses import replace
 import pytest
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.audit_entry import AuditEntry
-from urmpipe_pipeline.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.report.log_tables import audit_table
 from urmpipe_pipeline.report.tables import Table
 from urmpipe_pipeline.report.verdict_tables import ranking_tables, statistics_tables
-from urmpipe_pipeline.results import Run
+from urmpipe_pipeline.runs.results import Run
 
 
 def row_of(table: Table, name: str) -> dict[str, str]:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_pipeline.joint_log import FloatArray
+from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.report.spec import Panel, stacked, typed
 from urmpipe_pipeline.report.traces import line, precision, shaded, told
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 import pytest
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.orientation import quaternions
 from urmpipe_pipeline.joint_log import JointLog
 

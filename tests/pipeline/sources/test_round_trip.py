@@ -13,11 +13,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from urmpipe_pipeline.sources import ReadOptions, read_log
-from urmpipe_pipeline.sources.diagnose import CarefulReader
-from urmpipe_pipeline.sources.sniff import sniff
-from urmpipe_pipeline.sources.stream import byte_encoding, row_blocks, squeeze
-from urmpipe_pipeline.sources.table import ClockColumn, read_fast
-from urmpipe_pipeline.sources.text import open_text
+from urmpipe_pipeline.sources.tables.diagnose import CarefulReader
+from urmpipe_pipeline.sources.tables.sniff import sniff
+from urmpipe_pipeline.sources.tables.stream import byte_encoding, row_blocks, squeeze
+from urmpipe_pipeline.sources.tables.table import ClockColumn, read_fast
+from urmpipe_pipeline.sources.tables.text import open_text
 
 Floats = NDArray[np.float64]
 

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.sources import ReadOptions, read_log
 

@@ -16,11 +16,11 @@ from scipy.spatial.transform import Rotation
 
 from make_specimens import FOLDER, files, paths
 from specimen import SPECIMENS, Truth, motion
-from urmpipe_models.catalogue import load_robot
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import UrmpipeError
-from urmpipe_pipeline.ingest import ingest_log
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.sources import ReadOptions, read_log
 
 UR = ("shoulder_pan", "shoulder_lift", "elbow", "wrist_1", "wrist_2", "wrist_3")

@@ -10,7 +10,7 @@ import numpy as np
 import pandas as pd
 import pytest
 
-from urmpipe_models.chain import Chain
+from urmpipe_models.chains.chain import Chain
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log, source_names
 

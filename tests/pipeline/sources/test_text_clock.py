@@ -14,12 +14,12 @@ from hypothesis import strategies as st
 
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log
-from urmpipe_pipeline.sources.diagnose import CarefulReader
-from urmpipe_pipeline.sources.sniff import sniff
-from urmpipe_pipeline.sources.stamps import known_forms
-from urmpipe_pipeline.sources.table import ClockColumn, read_fast
-from urmpipe_pipeline.sources.text import open_text
-from urmpipe_pipeline.sources.text_times import timed
+from urmpipe_pipeline.sources.clocks.stamps import known_forms
+from urmpipe_pipeline.sources.clocks.text_times import timed
+from urmpipe_pipeline.sources.tables.diagnose import CarefulReader
+from urmpipe_pipeline.sources.tables.sniff import sniff
+from urmpipe_pipeline.sources.tables.table import ClockColumn, read_fast
+from urmpipe_pipeline.sources.tables.text import open_text
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]

@@ -8,8 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_models.chain import Chain
-from urmpipe_pipeline.joint_log import FloatArray, JointLog
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_pipeline.joint_log import JointLog
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]

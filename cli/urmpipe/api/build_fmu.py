@@ -1,0 +1,68 @@
+"""`urmpipe.build_fmu`: a unit by name, from a file or as it is, packaged as an FMU."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from urmpipe.guards import PathLike, Robot
+from urmpipe.systems.log_tables import LogTable
+from urmpipe.systems.units import Backend, unit_of
+from urmpipe_fmus.unit import Unit
+from urmpipe_pipeline.operands import log_files
+from urmpipe_pipeline.outputs import guarded_output
+
+if TYPE_CHECKING:
+    from urmpipe_fmus.build import BuiltFmu
+    from urmpipe_pipeline.sources import ReadOptions
+
+
+def build_fmu(
+    unit: Unit | PathLike,
+    *,
+    robot: Robot | None = None,
+    log: PathLike | LogTable | None = None,
+    options: Mapping[str, Any] | None = None,
+    read: ReadOptions | None = None,
+    backend: Backend | None = None,
+    platforms: Sequence[str] = (),
+    output: PathLike = ".",
+) -> BuiltFmu:
+    """Package a unit as an FMU (FMI 2.0 co-simulation).
+
+    Args:
+        unit: A name of `urmpipe_fmus.units`, a Python file with a unit in it, or a unit.
+        robot: Name, file (TOML, URDF) or chain of the arm, for a unit that has one.
+        log: A log for a unit that plays one: CSV, a folder of plots, or what `read_table` made of them.
+        options: Further options of the unit by name; see `urmpipe fmu list`.
+        read: How to read the log where it cannot tell by itself.
+        backend: native (C) or python (needs Python with NumPy on the target); default: native if this
+            machine can build it, else python, with a `note` why.
+        platforms: linux64, win64; default: this one. Others than this one need the extra `cross`.
+        output: The folder for UNIT.fmu, or a name that ends in .fmu; only an FMU of urmpipe's is replaced.
+
+    Returns:
+        The FMU: its `path`, `backend`, `platforms`, `guid` and `note`.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the unit, its options or the output.
+    """
+    from urmpipe_fmus.build import build_fmu as build
+
+    made = unit_of(unit, robot=robot, log=log, options=options, read=read)
+    path = Path(output)
+    target = path if path.suffix == ".fmu" else path / f"{made.name}.fmu"
+    inputs = [file for one in (unit, robot, log) for file in _files(one)]
+    with guarded_output(target, inputs, "fmu") as part:
+        return replace(build(made, part, backend=backend, platforms=tuple(platforms)), path=target)
+
+
+def _files(operand: Any) -> Sequence[Path]:
+    """Return the files that an operand stands for, if it stands for any."""
+    if isinstance(operand, LogTable):
+        return operand.files
+    if not isinstance(operand, (str, Path)):
+        return ()
+    return log_files(Path(operand)) if Path(operand).is_dir() else [Path(operand)]

@@ -1,0 +1,48 @@
+"""`urmpipe.export`: a result as tables or trajectories for other programs."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from urmpipe.guards import PathLike, refuse_foreign
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
+
+if TYPE_CHECKING:
+    from urmpipe_pipeline.comparison.compare import Tcp
+    from urmpipe_pipeline.export import Exported, Format, Rows
+
+
+def export(
+    result: PathLike | Result,
+    output: PathLike | None = None,
+    *,
+    to: Format | None = None,
+    rows: Rows | None = None,
+    tcp: Tcp | None = None,
+) -> Exported:
+    """Write a run, a comparison or a simulation as tables (CSV, Parquet, MAT) or as trajectories (TUM).
+
+    Args:
+        result: A recording (.rrd), or what `ingest`, `compare` or `simulate` returned.
+        output: The file to write; default: NAME-grid.csv and the like in the working folder.
+        to: csv, parquet, mat or tum; default: by the output's suffix.
+        rows: grid: t, q, rates and the tool centre point on the run's grid, in SI; file: the columns of
+            the log that were used as its file has them: their names, units, rows, numbers and clock.
+            Default: grid; file with tcp recorded.
+        tcp: Of a trajectory: fk (default) by forward kinematics, recorded as the log has it.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the recording, the options or the output.
+    """
+    from urmpipe_pipeline.export import ExportOptions, export_result, format_of
+
+    target = None if output is None else Path(output)
+    options = ExportOptions(format_of(to, target), rows, tcp)
+    if isinstance(result, (Run, Comparison, Simulation)):
+        return export_result(result, target, options, [result.recording] if result.recording else [])
+    refuse_foreign([Path(result)])
+    return export_result(read_recording(Path(result)), target, options, [Path(result)])

@@ -1,0 +1,101 @@
+"""`urmpipe.report`: one self-contained page about recordings or results."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from urmpipe.guards import PathLike, refuse_foreign
+from urmpipe_models.errors import for_each
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Result
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from urmpipe_pipeline.report import FigureFile
+    from urmpipe_pipeline.report.headless import FigureFormat
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Report:
+    """A report that was written.
+
+    Attributes:
+        path: The HTML file.
+        results: What it shows.
+        figures: The files of its figures; none unless they were asked for.
+    """
+
+    path: Path
+    results: tuple[Result, ...]
+    figures: tuple[FigureFile, ...] = ()
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a compared log and quantity, as `Comparison.to_frame`, for all comparisons in it."""
+        import pandas as pd
+
+        frames = [result.to_frame() for result in self.results if isinstance(result, Comparison)]
+        return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object that `urmpipe report --json` prints."""
+        kinds = [
+            {"name": result.name, "verdict": None if isinstance(result, Run) else result.verdict}
+            for result in self.results
+        ]
+        return {
+            "schema": 1,
+            "report": str(self.path),
+            "recordings": kinds,
+            "figures": [figure.to_dict() for figure in self.figures],
+        }
+
+
+def report(
+    results: Sequence[PathLike | Result],
+    output: PathLike,
+    *,
+    figures: PathLike | None = None,
+    formats: Sequence[FigureFormat] = ("svg", "png"),
+    progress: Callable[[float], None] | None = None,
+) -> Report:
+    """Write one self-contained HTML file about recordings or results, and its figures as files: all or none.
+
+    Args:
+        results: Recordings (.rrd), or what `ingest`, `compare` and `simulate` returned.
+        output: The HTML file to write.
+        figures: A folder to write every figure to as a file; needs the extra `figures` and Chromium.
+        formats: svg, png or both.
+        progress: Told the share that is done, 0..1.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the recordings or the output.
+    """
+    from urmpipe_pipeline.report import FigureOptions, write_report
+
+    wanted = None if figures is None else FigureOptions(Path(figures), tuple(formats))
+    files = [Path(one) for one in results if isinstance(one, (str, Path))]
+    refuse_foreign(files)
+    reading, writing = _halves(progress)
+
+    def read(numbered: tuple[int, PathLike | Result]) -> Result:
+        """Return a result, read if it is a recording, and tell how far it is."""
+        number, one = numbered
+        found = read_recording(Path(one)) if isinstance(one, (str, Path)) else one
+        reading(number / len(results))
+        return found
+
+    shown = for_each(read, enumerate(results, start=1))
+    written = write_report(shown, Path(output), files, wanted, writing)
+    return Report(written.path, tuple(shown), written.figures)
+
+
+def _halves(progress: Callable[[float], None] | None) -> tuple[Callable[[float], None], ...]:
+    """Return what to tell the progress of the first and of the second half of some work."""
+    tell = progress or (lambda share: None)
+    return lambda share: tell(share / 2), lambda share: tell((1 + share) / 2)

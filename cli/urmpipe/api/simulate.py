@@ -1,0 +1,120 @@
+"""`urmpipe.simulate`: a system of blocks, run and recorded."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping
+from contextlib import ExitStack
+from dataclasses import replace
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import fmpy  # noqa: F401 - Rerun is imported beside: what both import must be there before
+
+from urmpipe import __version__
+from urmpipe.guards import PathLike, refuse_shared
+from urmpipe.systems.blocks import Blocks
+from urmpipe.systems.result import check_meters, simulation_of
+from urmpipe.systems.units import Backend
+from urmpipe_fmus.cosim import load_system, prepare, system_names, system_svg
+from urmpipe_fmus.cosim import simulate as run_plan
+from urmpipe_fmus.cosim.process import Worker
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.outputs import DRAWING_HEADER, OutputKind, guarded_output
+from urmpipe_pipeline.recording import record
+from urmpipe_pipeline.simulations.simulation import Simulation
+
+if TYPE_CHECKING:
+    from urmpipe_fmus.cosim.system import System
+    from urmpipe_pipeline.sources import ReadOptions
+
+
+def simulate(
+    system: PathLike,
+    *,
+    arguments: Mapping[str, str] | None = None,
+    step: float | None = None,
+    duration: float | None = None,
+    backend: Backend | None = None,
+    read: ReadOptions | None = None,
+    output: PathLike | None = None,
+    draw: PathLike | None = None,
+    told: Callable[[str], None] | None = None,
+    progress: Callable[[float], None] | None = None,
+) -> Simulation:
+    """Run a system of blocks, and write its recording and its drawing if they are named.
+
+    Args:
+        system: Name of a shipped system, or a system file (TOML).
+        arguments: Values for the `$name`s of the system, such as {"log": "log.csv"}.
+        step: Communication step in [s]; default: that of the system.
+        duration: In [s]; default: that of the system, else of the longest log that it reads.
+        backend: native or python, for the FMUs of units; default: native if it can be built here.
+        read: How to read the logs where they cannot tell by themselves.
+        output: The recording (.rrd) to write.
+        draw: An SVG file to draw the system to.
+        told: Told what takes its time before the first step, a line each.
+        progress: Told the share that is done, 0..1.
+
+    Returns:
+        The simulation: `signals`, `verdicts`, `to_frame()`, `to_dict()`. Where an FMU failed, `failed` tells
+        why, and what was recorded until then is there.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the system, before the first step, or with an output.
+    """
+    loaded = _changed(load_system(system, arguments), step, duration)
+    shipped = str(system) in system_names()
+    kept = [loaded.path, *_files(loaded)]
+    named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
+    refuse_shared({kind: Path(path) for kind, path in named.items() if path is not None})
+    running, writing = _halves(progress)
+    with ExitStack() as stack:
+        drawing = None if draw is None else stack.enter_context(guarded_output(Path(draw), kept, "drawing"))
+        worker = stack.enter_context(Worker())  # it loads what it needs meanwhile
+
+        def make() -> Simulation:
+            """Return the simulation; draw it before it is run."""
+            blocks = Blocks(loaded, shipped=shipped, backend=backend, read=read, told=told)
+            plan = prepare(loaded, blocks.make, column=blocks.column, duration=blocks.end)
+            check_meters(plan)
+            svg = system_svg(plan)
+            if drawing is not None:
+                _write_drawing(drawing, svg)
+            return simulation_of(plan, run_plan(plan, progress=running, worker=worker), blocks, svg)
+
+        return make() if output is None else record(lambda early: make(), Path(output), kept, writing)
+
+
+def _changed(system: System, step: float | None, duration: float | None) -> System:
+    """Return a system with another step or duration, if they are given.
+
+    Raises:
+        OptionError: If one is no positive time.
+    """
+    given = {"step": step, "duration": duration}
+    wrong = {name: value for name, value in given.items() if value is not None and not 0.0 < value < math.inf}
+    if wrong:
+        raise OptionError(*(f"{name}: found {value:g} s, allowed: above 0" for name, value in wrong.items()))
+    return replace(system, step=step or system.step, duration=duration or system.duration)
+
+
+def _files(system: System) -> list[Path]:
+    """Return the files that a system names: none of them is replaced."""
+    texts = [value for block in system.blocks for value in block.options.values() if isinstance(value, str)]
+    named = [*texts, *(one.log for one in system.inputs), *map(str, system.arguments.values())]
+    return [path for block in system.blocks for path in (block.file, block.fmu) if path] + [
+        Path(one) for one in named if "\0" not in one
+    ]
+
+
+def _halves(progress: Callable[[float], None] | None) -> tuple[Callable[[float], None], ...]:
+    """Return what to tell the progress of the run, and of its recording."""
+    tell = progress or (lambda share: None)
+    return lambda share: tell(0.8 * share), lambda share: tell(0.8 + 0.2 * share)
+
+
+def _write_drawing(path: Path, svg: str) -> None:
+    """Write a drawing with the mark by which one of ours is known."""
+    header = f"{DRAWING_HEADER}{__version__} -->\n"
+    path.write_text(svg if svg.startswith(DRAWING_HEADER) else header + svg, encoding="utf-8", newline="\n")

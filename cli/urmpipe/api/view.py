@@ -1,0 +1,23 @@
+"""`urmpipe.view`: recordings in the viewer, at their worst sample."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from urmpipe.guards import PathLike
+
+
+def view(recordings: PathLike | Sequence[PathLike]) -> None:
+    """Open recordings in the viewer, each in a window paused at its worst sample; return when all are closed.
+
+    Args:
+        recordings: Recordings (.rrd) that urmpipe wrote.
+
+    Raises:
+        UrmpipeError: With every file that is no recording, or if the viewer cannot be shown here.
+    """
+    from urmpipe_pipeline.recording.viewer import view_recordings
+
+    given = [recordings] if isinstance(recordings, (str, Path)) else recordings
+    view_recordings([Path(one) for one in given])

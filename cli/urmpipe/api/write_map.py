@@ -1,0 +1,45 @@
+"""`urmpipe.write_map`: what was inferred of a log, saved for the next ones."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from pathlib import Path
+
+from urmpipe.guards import PathLike, offset_of
+from urmpipe_models.robots.catalogue import robot_names
+from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.sources import map_of, read_map
+
+
+def write_map(run: Run, output: PathLike, inputs: Sequence[PathLike] = (), robot: str | None = None) -> Path:
+    """Write the map (TOML) by which further logs read as this one was read.
+
+    Args:
+        run: An ingested log.
+        output: The file to write; only another map of ours is replaced.
+        inputs: Files that may not be overwritten.
+        robot: Name or file of the arm; default: its name, if it is one of the catalogue.
+
+    Raises:
+        UrmpipeError: If it may not be written there.
+    """
+    path = Path(output)
+    with guarded_output(path, [Path(one) for one in inputs], "map") as part:
+        write_map_part(run, part, path, robot)
+    return path
+
+
+def write_map_part(run: Run, part: Path, path: Path, robot: str | None) -> None:
+    """Write the map of a run to a part that is to have a name, and read it back."""
+    arm = run.robot
+    if robot is None:
+        robot = arm.name if arm and arm.name in robot_names() else None
+    elif Path(robot).suffix:
+        robot = os.path.relpath(robot, path.parent)
+    frames = (arm.base, arm.tool) if arm else ()
+    given = run.provenance.options.get("read") or {}
+    text = map_of(run.log, robot, *(offset_of(frame) for frame in frames), given=given)
+    part.write_text(text, encoding="utf-8", newline="\n")
+    read_map(part)

@@ -1,0 +1,152 @@
+"""What is asked of inverse kinematics: the arm, the targets, the options, and which of them are refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from urmpipe.guards import Robot, place_robot
+from urmpipe.inverse.output import Written
+from urmpipe.inverse.targets import GivenTargets
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import OptionError
+from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
+from urmpipe_models.inverse.solve import METHODS, Method
+from urmpipe_models.robots.catalogue import robot_names
+from urmpipe_models.transform import Transform
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Asked:
+    """What is to be solved, and how.
+
+    Attributes:
+        arm: The arm on its base and with its tool.
+        given: Where its tool shall be.
+        start: Joint values in [rad] or [m], shape (joints,), that solutions are to be near to; None for the
+            robot's own.
+        every: Whether all solutions are asked for.
+        tolerance: What a target out of reach may be missed by on each axis, in [m]; None for not at all.
+        within_pi: Whether joints that turn without end are written within -pi to pi.
+        method: Which methods are allowed.
+        restarts: Random starts of the iterative solver.
+        seed: Of the random starts.
+        progress: Told the share of solving that is done, 0..1.
+    """
+
+    arm: Chain
+    given: GivenTargets
+    start: FloatArray | None
+    every: bool
+    tolerance: float | None
+    within_pi: bool
+    method: Method
+    restarts: int
+    seed: int
+    progress: Callable[[float], None] | None
+
+    @property
+    def form(self) -> ClosedForm | None:
+        """The closed form by which the targets are solved, if they are."""
+        if self.given.targets.rotation is None or self.method == "iterative":
+            return None
+        return closed_form(self.arm) if self.given.t_ns is None else exact_form(self.arm)
+
+    @property
+    def begin(self) -> FloatArray:
+        """Joint values that solutions are to be near to, shape (joints,)."""
+        return np.array(self.arm.start, dtype=float) if self.start is None else self.start
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options as a recording keeps them."""
+        names = ("every", "tolerance", "within_pi", "method", "restarts", "seed")
+        options = {name: getattr(self, name) for name in names}
+        return options | ({} if self.start is None else {"start": self.start.tolist()})
+
+
+def refuse_unsolvable(asked: Asked, kind: Written | None) -> None:
+    """Raise an `OptionError` with every option that makes no sense, alone or with a path.
+
+    Args:
+        asked: What is asked.
+        kind: What is to be written.
+    """
+    faults = [*_bad_values(asked)]
+    if not faults and asked.given.t_ns is not None:
+        faults += [*_what_no_path_has(asked, kind)]
+    if faults:
+        raise OptionError(*faults)
+
+
+def _bad_values(asked: Asked) -> Iterator[str]:
+    """Yield which values make no sense."""
+    if asked.method not in METHODS:
+        yield f"--method: found {asked.method!r}, allowed: {', '.join(METHODS)}"
+    for name, value in (("restarts", asked.restarts), ("seed", asked.seed)):
+        if not isinstance(value, (int, np.integer)) or value < 0:
+            yield f"--{name}: found {value!r}, allowed: a whole number, 0 or more"
+    tolerance = asked.tolerance
+    if tolerance is not None and not 0.0 < tolerance < math.inf:
+        yield f"--tolerance: found {tolerance:g} m, allowed: more than 0, finite"
+
+
+def _what_no_path_has(asked: Asked, kind: Written | None) -> Iterator[str]:
+    """Yield what is asked of a path and is not there."""
+    lacks = "positions only" if asked.given.targets.rotation is None else "no closed form"
+    if asked.method == "iterative":
+        yield (
+            "--method: found iterative with a path, allowed: auto; a path takes the closed form of the arm"
+            " if it has one"
+        )
+    if asked.method == "closed" and asked.form is None:
+        yield f"--method: found closed with a path of {asked.arm.name} that has {lacks}, allowed: auto"
+    if asked.every and asked.form is None:
+        yield (
+            f"--all: found with a path of {asked.arm.name} that has {lacks}, allowed: with poses and an arm"
+            " that has a closed form, whose branches run along the path; or with targets without times"
+        )
+    elif asked.every and kind != "recording":
+        yield (
+            "--all: found with a path and no recording, allowed: with -o RUN.rrd, where every branch is a"
+            " ghost arm; or with targets without times"
+        )
+
+
+def start_of(arm: Chain, start: Sequence[float] | None) -> FloatArray | None:
+    """Return the start as an array, shape (joints,).
+
+    Raises:
+        OptionError: If it has not one finite value for each joint.
+    """
+    if start is None:
+        return None
+    allowed = f"allowed: {len(arm.coordinates)}, one for each of {', '.join(arm.coordinates)}"
+    try:
+        values = np.asarray(start, dtype=float)
+    except (TypeError, ValueError):
+        raise OptionError(f"--start: found {start!r}, {allowed}, in rad and m") from None
+    if values.shape != (len(arm.coordinates),):
+        raise OptionError(f"--start: found {values.size} values, {allowed}")
+    if not np.isfinite(values).all():
+        raise OptionError(f"--start: found a value that is not finite, {allowed}, in rad and m")
+    return values
+
+
+def arm_of(robot: Robot | None, base: Transform | None, tool: Transform | None) -> Chain:
+    """Return the arm on its base and with its tool.
+
+    Raises:
+        OptionError: If there is none.
+        RobotError: If it is unknown, or with everything that is wrong with its file.
+    """
+    arm = place_robot(robot, base, tool)
+    if arm is None:
+        names = ", ".join(robot_names())
+        raise OptionError(f"found no robot; allowed: --robot NAME|FILE, a TOML, a URDF or one of {names}")
+    return arm

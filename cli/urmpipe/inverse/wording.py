@@ -1,0 +1,204 @@
+"""What inverse kinematics says in words: rows, what was reached, why not, and what was chosen."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from urmpipe.inverse.result import InverseResult
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.solutions import Solutions
+from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.kinematics.singularity import singularity_over_log
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.text import DIGITS, SHOWN, counted, enumerated
+
+NAMED = 6
+"""Rows or stretches of rows that are named; the others are counted."""
+
+NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
+"""What may differ in reasons that are one."""
+
+MILLI = 1e-3
+"""A target in mm that is read as m is a thousand times too far."""
+
+FAR = 10.0
+"""A target so many times farther than the arm reaches is no slip of the path, but may be one of the unit."""
+
+
+NEARLY = 1e-4
+"""Smallest singular value [-] below which a pose counts as nearly singular: a spherical wrist is aligned
+within some 0.05 deg, and joints turn ten thousand times as far as the tool."""
+
+MANY_TURNS = 4.0 * np.pi
+"""Joint values beyond two turns in [rad] are hardly meant: they may be in deg."""
+
+
+def rows_text(rows: Sequence[int] | IntArray) -> str:
+    """Return rows for a sentence, stretches of them as such: "row 3", "rows 3, 7-9 and 40 more"."""
+    rows = np.asarray(rows)
+    first = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) != 1)
+    last = np.append(first[1:], len(rows)) - 1
+    parts = [
+        str(rows[a]) if a == b else f"{rows[a]}-{rows[b]}"
+        for a, b in zip(first[:NAMED], last[:NAMED], strict=True)
+    ]
+    more = len(rows) - 1 - last[:NAMED][-1]
+    said = ", ".join(parts) + (f" and {more} more" if more else "")
+    return f"row{'' if len(rows) == 1 else 's'} {said}"
+
+
+def joint_number(value: float, unit: str) -> str:
+    """Return a joint value in [rad] as [deg] or in [m] as [mm]; what is only rounding is 0."""
+    return f"{round(float(value) * SHOWN[unit][1], DIGITS) + 0.0:.{DIGITS}f}"
+
+
+def method_words(method: str) -> str:
+    """Return what solved the targets: "closed form: spherical wrist", or "iterative"."""
+    return method if method == "iterative" else f"closed form: {method}"
+
+
+def reach_words(result: InverseResult) -> str:
+    """Say how many targets the arm reaches, and how they were solved."""
+    count, reached = len(result), int(result.reached.sum())
+    number = counted(count, "target") if reached == count else f"{reached} of {counted(count, 'target')}"
+    said = f"{result.name}: {result.robot.name} reaches {number} ({method_words(result.method)})"
+    if result.path is None:
+        return said
+    jumps, fast = len(result.path.jumps), len({one.joint for one in result.path.too_fast})
+    others = [counted(jumps, "jump")] * bool(jumps) + [f"{counted(fast, 'joint')} too fast"] * bool(fast)
+    return f"{said}, with {enumerated(others)}" if others else said
+
+
+def unreached(result: InverseResult, *, every: bool) -> Iterator[str]:
+    """Yield why targets have no solution, and, if all branches are asked for, why single branches have none.
+
+    Rows that follow each other for one reason, but for its numbers, are one line.
+    """
+    reasons = [reason or "" for reason in result.reasons]
+    kinds = [NUMBER.sub("#", reason) for reason in reasons]
+    start = 0
+    for end in range(1, len(kinds) + 1):
+        if end == len(kinds) or kinds[end] != kinds[start]:
+            if reasons[start]:
+                yield _not_reached(result.row[start:end], reasons[start:end])
+            elif every and result.method != "iterative":
+                yield from _branches_unreached(result, start, end)
+            start = end
+
+
+def _not_reached(row: IntArray, reasons: Sequence[str]) -> str:
+    """Return why rows are not reached: by the one in the middle where the numbers of the reasons differ."""
+    if len(set(reasons)) == 1:
+        return f"{rows_text(row)} not reached: {reasons[0]}"
+    middle = len(reasons) // 2
+    return f"{rows_text(row)} not reached; row {row[middle]}: {reasons[middle]}"
+
+
+def _branches_unreached(result: InverseResult, start: int, end: int) -> Iterator[str]:
+    """Yield why branches of targets that others reach have no solution."""
+    for index in range(start, end):
+        found: dict[str, list[str]] = {}
+        for branch, reason in zip(result.solutions.branches, result.solutions.reasons[index], strict=True):
+            if reason:
+                found.setdefault(reason, []).append(branch)
+        for reason, branches in found.items():
+            yield f"{rows_text(result.row[index : index + 1])}: not {'; '.join(branches)}: {reason}"
+
+
+def singular_warnings(solutions: Solutions, row: IntArray, listed: BoolArray) -> Iterator[LogWarning]:
+    """Yield one warning for each family of singular poses: what is infinite there, and what was chosen.
+
+    Args:
+        solutions: What was found.
+        row: Data row of each target.
+        listed: True of the solutions that a person is shown, shape (n, k).
+    """
+    for one in solutions.singular:
+        rows = row[(one.where & listed & solutions.reached).any(axis=1)]
+        if len(rows):
+            said = f"{one.free}; chosen: {one.chosen}" if one.free else "a direction of motion is lost there"
+            yield LogWarning("singular", f"{rows_text(rows)}: {one.family}: {said}")
+
+
+def near_singular_warnings(
+    chain: Chain, solutions: Solutions, row: IntArray, listed: BoolArray, *, orientation: bool
+) -> Iterator[LogWarning]:
+    """Yield a warning of solutions that are singular or nearly so, and lie in no family that has a name.
+
+    A wrist that is aligned but for the digits of a file lies in none: nothing is infinite there, and yet
+    the last of those digits turns joints far.
+
+    Args:
+        chain: The arm.
+        solutions: What was found.
+        row: Data row of each target.
+        listed: True of the solutions that a person is shown, shape (n, k).
+        orientation: Whether poses were asked for; False of positions.
+    """
+    named = np.zeros_like(solutions.reached)
+    for one in solutions.singular:
+        named |= one.where
+    asked = listed & solutions.reached & ~named & (solutions.shortfall == 0.0)
+    smallest = np.full(asked.shape, np.inf)
+    if asked.any():
+        smallest[asked] = singularity_over_log(chain, solutions.q[asked], orientation=orientation).smallest
+    least = smallest.min(axis=1)
+    near = least < NEARLY
+    if near.any():
+        worst = int(np.argmin(least))
+        where = f" in row {row[worst]}" if near.sum() > 1 else ""
+        said = (
+            f"{rows_text(row[near])}: singular or nearly so: smallest singular value {least[worst]:.2g}"
+            f"{where}; the least change of the target may turn joints far"
+        )
+        yield LogWarning("near-singular", said)
+
+
+def start_warnings(chain: Chain, start: FloatArray | None) -> Iterator[LogWarning]:
+    """Yield a warning of a start that is hardly in rad, shape (joints,)."""
+    if start is None:
+        return
+    found = [
+        f"{joint.name} = {value:g} rad ({np.degrees(value):.6g} deg)"
+        for joint, value in zip(chain.moving, start.tolist(), strict=True)
+        if joint.kind == "revolute" and abs(value) > MANY_TURNS
+    ]
+    if found:
+        yield LogWarning("start-unit", f"--start: found {', '.join(found)}: in deg? Allowed: rad")
+
+
+def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarning]:
+    """Yield a warning of the targets that the tool only comes near to."""
+    short = np.asarray(np.where(solutions.reached, solutions.shortfall, 0.0)).max(axis=1)
+    if short.any():
+        worst = int(np.argmax(short))
+        said = (
+            f"{rows_text(row[short > 0.0])}: out of reach, the nearest point is taken (--tolerance): up to"
+            f" {1e3 * short[worst]:.4g} mm away, in row {row[worst]}"
+        )
+        yield LogWarning("nearest-point", said)
+
+
+def far_warnings(chain: Chain, targets: Targets, row: IntArray, reached: BoolArray) -> Iterator[LogWarning]:
+    """Yield a warning of targets that are far out of reach, and would not be if they were in mm."""
+    reach = longest(chain)
+    away = np.linalg.norm(targets.position - np.asarray(chain.base.translation, dtype=float), axis=1)
+    with np.errstate(invalid="ignore"):
+        far = ~reached & (away > FAR * reach) & (MILLI * away <= reach)
+    if far.any():
+        said = (
+            f"{rows_text(row[far])}: up to {away[far].max():.6g} m from the base, while {chain.name} reaches"
+            f" no farther than {reach:.4g} m: in mm? Allowed: m, or of a file --unit x=mm"
+        )
+        yield LogWarning("too-far", said)
+
+
+def longest(chain: Chain) -> float:
+    """Return what the tool centre point is away from the base at most, in [m]: all lengths in one line."""
+    frames = [*(joint.origin for joint in chain.joints), chain.tip, chain.tool]
+    slides = [max(abs(joint.lower), abs(joint.upper)) for joint in chain.moving if joint.kind == "prismatic"]
+    return float(sum(np.linalg.norm(frame.translation) for frame in frames)) + sum(slides)

@@ -1,0 +1,97 @@
+"""What changed since an earlier comparison, in the terminal."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from urmpipe.printing.columns import Column, print_columns
+from urmpipe.printing.terminal import LISTED, judged_line
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.baseline import Absent, BaselineComparison, Change, Worse
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+ARROW = " → "
+
+WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out"}
+"""What people call what may be worse."""
+
+
+def print_baseline(console: Console, found: BaselineComparison) -> None:
+    """Print whether anything is worse, what changed beyond the noise, and what was made otherwise."""
+    number = len(found.worse)
+    worse = f"{number} {'quantity' if number == 1 else 'quantities'} worse"
+    gone = f", {len(found.gone)} gone" if found.gone else ""
+    said = "nothing worse" if found.verdict == "pass" else worse + gone
+    console.print()
+    console.print(judged_line(found.verdict, f"against the baseline {found.name}: {said}"), soft_wrap=True)
+    changed = [change for change in found.changes if change.changed]
+    if changed:
+        title = f"Changed since {found.name} by more than the noise"
+        print_columns(console, title, list(_columns(changed[:LISTED])))
+    if len(changed) > LISTED:
+        console.print(f"... and {len(changed) - LISTED} more; --json lists all")
+    for line_of in _lines(found):
+        console.print(f"  {line_of}", soft_wrap=True)
+
+
+def _columns(changes: Sequence[Change]) -> Iterator[Column]:
+    """Yield the columns of the table of changes."""
+    yield Column("Log", [one.run for one in changes], key=True)
+    yield Column(
+        "Quantity", [f"{text.symbol(one.now)} [{text.SHOWN[one.now.unit][0]}]" for one in changes], key=True
+    )
+    yield Column("worse", [", ".join(WORDS[name] for name in one.worse) or None for one in changes])
+    for name in ("max", "rms"):
+        yield Column(name, [_both(one, name) for one in changes])
+    if any(one.before.share_out or one.now.share_out for one in changes):
+        yield Column("out", [_shares(one) for one in changes])
+    yield Column("most at\none sample", [text.number(one.largest, one.now.unit) for one in changes])
+    times = [one.t_largest for one in changes]
+    yield Column("at t\n[s]", [None if t is None else text.seconds(t) for t in times])
+    if any(one.before.verdict != one.now.verdict for one in changes):
+        yield Column("verdict", [_verdicts(one) for one in changes])
+
+
+def _both(change: Change, name: str) -> str:
+    """Return a statistic before and now, with more digits only where they tell a change beyond the noise."""
+    before, now = (getattr(one, name) for one in (change.before, change.now))
+    apart = abs(now - before) > change.noise
+    unit = change.now.unit
+    return ARROW.join(
+        text.number(one, unit, other if apart else None) for one, other in ((before, now), (now, before))
+    )
+
+
+def _shares(change: Change) -> str:
+    shares = (change.before.share_out, change.now.share_out)
+    return ARROW.join(text.NOTHING if share is None else text.percent(share) for share in shares)
+
+
+def _verdicts(change: Change) -> str:
+    return ARROW.join((one.verdict or text.NOTHING).upper() for one in (change.before, change.now))
+
+
+def _lines(found: BaselineComparison) -> Iterator[str]:
+    """Yield what else is to be known of the two, a line each."""
+    levels = [(kind, value, _unit(kind)) for kind, value in found.noise.items()]
+    noise = ", ".join(
+        f"{kind} {text.limit(value, unit)} {text.SHOWN[unit][0]}" for kind, value, unit in levels
+    )
+    yield f"noise: {noise}"
+    for word, absent in (("new", found.new), ("gone", found.gone)):
+        if absent:
+            yield f"{word}: {_listed(absent)}"
+    for one in found.differences:
+        yield f"made otherwise: {one.what}: {text.plain(one.before)}{ARROW}{text.plain(one.now)}"
+
+
+def _unit(kind: str) -> str:
+    return "rad" if kind in ("angle", "joint") else "m"
+
+
+def _listed(absent: Sequence[Absent]) -> str:
+    more = f" and {len(absent) - LISTED} more" if len(absent) > LISTED else ""
+    return ", ".join(map(str, absent[:LISTED])) + more

@@ -1,0 +1,131 @@
+"""A comparison in the terminal: the verdict, the logs from best to worst, the statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from typing import TYPE_CHECKING
+
+from urmpipe.printing.columns import Column, print_columns
+from urmpipe.printing.comparison_facts import facts
+from urmpipe.printing.terminal import judged, judged_line, new_console
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation, Statistics
+from urmpipe_pipeline.comparison.wording import correlation, of_allowed
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+MANY = 3
+"""With more logs than these, the statistics are those of the logs that fail."""
+
+SHOWN = 5
+"""Logs whose statistics are printed at most."""
+
+
+def print_comparison(result: Comparison) -> None:
+    """Print the verdict of all, one table of the logs from best to worst, and the statistics of each."""
+    from urmpipe.printing.baseline import print_baseline
+
+    console = new_console()
+    _print_verdict(console, result)
+    ranked = result.ranking
+    if len(ranked) > 1:
+        print_columns(console, "From best to worst", list(_ranking(ranked)))
+    detailed = ranked if len(ranked) <= MANY else tuple(one for one in ranked if one.verdict == "fail")
+    for run in detailed[-SHOWN:]:
+        title = f"{run.name} against {result.reference.name}"
+        print_columns(console, title, list(_statistics(run)))
+        for line in facts(run):
+            console.print(f"  {line}", soft_wrap=True)
+    if left := len(ranked) - len(detailed[-SHOWN:]):
+        console.print(f"Statistics of {text.counted(left, 'more log')}: --csv FILE, --json or the report.")
+    if result.baseline:
+        print_baseline(console, result.baseline)
+
+
+def _print_verdict(console: Console, result: Comparison) -> None:
+    """Print pass or fail, and which quantity uses up most of its tolerance: how much, when and where."""
+    failed = [run.name for run in result.ranking if run.verdict == "fail"]
+    total = len(result.runs)
+    number = f"{len(failed)} of {total} logs" if failed else f"all {total} logs"
+    who = result.runs[0].name if total == 1 else number
+    said = f"{who} {'out of' if failed else 'within'} tolerance against {result.reference.name}"
+    console.print(judged_line(result.verdict, said), soft_wrap=True)
+    worst = result.ranking[-1]
+    console.print(f"      {_decisive(worst, named=total > 1)}", soft_wrap=True)
+
+
+def _decisive(run: Deviation, *, named: bool) -> str:
+    """Say which quantity uses up most of its tolerance: how much of how much, when and where."""
+    one = run.decisive
+    place = text.point(run.place(one))
+    of = f" of {run.name}" if named else ""
+    used = f" ({text.used(one)})" if one.tolerance is not None else ""
+    return (
+        f"max {text.size_of(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
+        f"{used}, at t = {text.seconds(one.t_max)} s, at ({place}) m"
+    )
+
+
+def _ranking(runs: Sequence[Deviation]) -> Iterator[Column]:
+    """Yield the columns of the table of logs; those that no log has are left out."""
+    yield Column("Log", [run.name for run in runs], key=True)
+    yield Column("Verdict", [judged(run.verdict) for run in runs])
+    quantities: dict[str, Callable[[Deviation], Statistics | None]] = {
+        f"max |{text.SYMBOLS[axis]}|": lambda run, axis=axis: run.statistics[axis]  # type: ignore[misc]
+        for axis in "xyz"
+    }
+    quantities |= {
+        f"max {text.SYMBOLS['norm']}": lambda run: run.statistics["norm"],
+        "max path": lambda run: run.statistics["path"],
+        "max angle": lambda run: run.statistics.get("angle"),
+        "max joint": lambda run: run.furthest_joint("rad"),
+        "max slide": lambda run: run.furthest_joint("m"),
+    }
+    for head, find in quantities.items():
+        found = [find(run) for run in runs]
+        unit = next((text.SHOWN[one.unit][0] for one in found if one), None)
+        if unit:
+            yield Column(f"{head}\n[{unit}]", [_cell(one) for one in found])
+    yield from _when(runs)
+
+
+def _when(runs: Sequence[Deviation]) -> Iterator[Column]:
+    """Yield the columns that tell how much was out, when, and what it goes with."""
+    stretches = [run.longest_out for run in runs]
+    if any(stretches):
+        yield Column("out", [text.percent(run.share_out) for run in runs])
+        yield Column("longest\nout [s]", [_seconds(one.duration if one else None) for one in stretches])
+        yield Column("from t\n[s]", [_seconds(one.t if one else None) for one in stretches])
+    yield Column("worst at\nt [s]", [text.seconds(float(run.t[run.worst])) for run in runs])
+    if any(run.speed_correlation is not None for run in runs):
+        yield Column("r(‖Δ‖,\nspeed)", [correlation(run.speed_correlation) for run in runs])
+    if any(run.sync.offset for run in runs):
+        yield Column("offset\n[s]", [f"{run.sync.offset:+.4f}" for run in runs])
+    if any(run.left_out for run in runs):
+        yield Column("left\nout", [str(run.left_out) for run in runs])
+
+
+def _seconds(value: float | None) -> str | None:
+    return None if value is None else text.seconds(value)
+
+
+def _cell(one: Statistics | None) -> str | None:
+    return None if one is None else text.number(one.max, one.unit, one.tolerance)
+
+
+def _statistics(run: Deviation) -> Iterator[Column]:
+    """Yield the columns of the statistics of one log, a row a quantity."""
+    every = run.all_statistics
+    start = dict(zip(AXES, run.start, strict=True))
+    yield Column("Quantity", [f"{text.symbol(one)} [{text.SHOWN[one.unit][0]}]" for one in every], key=True)
+    yield Column("Verdict", [judged(one.verdict) for one in every])
+    yield Column("tolerance", [text.limit(one.tolerance, one.unit) for one in every])
+    yield Column("max", [_cell(one) for one in every])
+    yield Column("at t [s]", [text.seconds(one.t_max) for one in every])
+    for name in ("rms", "p95", "mean", "std"):
+        yield Column(name, [text.number(getattr(one, name), one.unit) for one in every])
+    known = [start.get(one.quantity) if one.kind in ("axis", "norm") else None for one in every]
+    yield Column("at start", [value if value is None else text.number(value, "m") for value in known])
+    if any(one.share_out for one in every):
+        yield Column("out", [None if one.share_out is None else text.percent(one.share_out) for one in every])

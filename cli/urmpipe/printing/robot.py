@@ -1,0 +1,165 @@
+"""What `urmpipe robot` prints: the catalogue, and one arm in one pose."""
+
+from __future__ import annotations
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe.inverse.wording import method_words
+from urmpipe.printing.chain_drawing import chain_text
+from urmpipe.printing.terminal import new_console, new_table
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.inverse.closed.closed_form import closed_form
+from urmpipe_models.kinematics.forward import forward, points_over_log
+from urmpipe_models.robots.robot_file import chain_to_dict
+from urmpipe_models.transform import Transform, euler_zyx, rpy_of
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+WIDEST = 120
+"""Columns that a drawing takes at most."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class PosedChain:
+    """An arm in one pose.
+
+    Attributes:
+        chain: The arm.
+        q: Its coordinates in [rad] or [m].
+        poses: The points p1..pn.
+        skeleton: The base and the points in [m], shape (n + 1, 3).
+    """
+
+    chain: Chain
+    q: tuple[float, ...]
+    poses: tuple[Transform, ...]
+    skeleton: NDArray[np.float64]
+
+    @property
+    def inverse(self) -> str:
+        """What makes its inverse a closed form, such as "spherical wrist"; "iterative" without one."""
+        form = closed_form(self.chain)
+        return "iterative" if form is None else form.name
+
+    @property
+    def title(self) -> str:
+        """The robot's name, and what it is if that is known."""
+        return ": ".join(filter(None, (self.chain.name, self.chain.description)))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object that `urmpipe robot show --json` prints."""
+        names = self.chain.point_names
+        points = {
+            name: {"position": list(pose.translation), "euler_zyx": list(euler_zyx(pose.rotation)[:3])}
+            for name, pose in zip(names, self.poses, strict=True)
+        }
+        described = chain_to_dict(self.chain)
+        return {
+            "schema": 1, **described, "coordinates": list(self.chain.coordinates), "q": list(self.q),
+            "points": points, "inverse": self.inverse,
+        }  # fmt: skip
+
+
+def chain_at(chain: Chain, q: Sequence[float]) -> PosedChain:
+    """Return an arm in one pose, q in [rad] or [m], one value a coordinate."""
+    values = tuple(float(value) for value in q)
+    return PosedChain(chain, values, forward(chain, values), points_over_log(chain, np.array([values]))[0])
+
+
+def print_robots(robots: Sequence[Chain]) -> None:
+    """Print the catalogue."""
+    table = new_table("Name", "Joints", "Length [m]", "Description", title=f"{len(robots)} robots")
+    for chain in robots:
+        ways = np.diff(chain_at(chain, chain.start).skeleton, axis=0)
+        length = float(np.linalg.norm(ways, axis=1).sum())
+        table.add_row(chain.name, str(len(chain.coordinates)), f"{length:.3f}", chain.description)
+    new_console().print(table)
+
+
+def print_chain(posed: PosedChain) -> None:
+    """Print an arm's parameters, where its points are, and two views of it."""
+    console, chain = new_console(), posed.chain
+    console.print(posed.title, soft_wrap=True)
+    if chain.source:
+        console.print(f"Source: {chain.source}", soft_wrap=True)
+    console.print(f"Inverse: {method_words(posed.inverse)}", soft_wrap=True)
+    console.print(_parameters(posed))
+    console.print(_points(posed))
+    console.print(
+        chain_text(posed.skeleton, min(console.width, WIDEST), unicode=_takes_unicode()), soft_wrap=True
+    )
+
+
+def _parameters(posed: PosedChain) -> Table:
+    table = new_table(
+        "Joint", "Kind", "x, y, z [m]", "rx, ry, rz [deg]", "Axis", "Limits", "Speed", "q",
+        title="Joints: each frame in the one before it",
+    )  # fmt: skip
+    chain = posed.chain
+    values = dict(zip(chain.coordinates, posed.q, strict=True))
+    table.add_row("base", "frame", *_frame(chain.base))
+    for joint in chain.joints:
+        table.add_row(joint.name, _kind(joint), *_frame(joint.origin), *_motion(joint, values))
+    table.add_row("tip", "frame", *_frame(chain.tip))
+    table.add_row("tool", "frame", *_frame(chain.tool))
+    return table
+
+
+def _points(posed: PosedChain) -> Table:
+    table = new_table("Point", "x, y, z [m]", "rz, ry, rx [deg]", title="Points in this pose")
+    for name, pose in zip(posed.chain.point_names, posed.poses, strict=True):
+        angles = (math.degrees(angle) for angle in euler_zyx(pose.rotation)[:3])
+        table.add_row(name, _figures(pose.translation), _figures(angles))
+    return table
+
+
+def _kind(joint: Joint) -> str:
+    if joint.mimic is None:
+        return joint.kind
+    return f"{joint.kind}, {_figure(joint.mimic.multiplier)} x {joint.mimic.joint}"
+
+
+def _motion(joint: Joint, values: dict[str, float]) -> tuple[str, ...]:
+    """Return axis, limits, speed and coordinate of a moving joint."""
+    if joint.kind == "fixed":
+        return ()
+    unit, factor = ("m", 1.0) if joint.kind == "prismatic" else ("deg", 180.0 / math.pi)
+    speed = f"{_figure(joint.velocity * factor)} {unit}/s" if math.isfinite(joint.velocity) else "no limit"
+    value = f"{_figure(values[joint.name] * factor)} {unit}" if joint.name in values else ""
+    return _figures(joint.axis), _limits(joint, unit, factor), speed, value
+
+
+def _limits(joint: Joint, unit: str, factor: float) -> str:
+    lower, upper = joint.lower * factor, joint.upper * factor
+    if not math.isfinite(lower) and not math.isfinite(upper):
+        return "no limit"
+    return f"+-{_figure(upper)} {unit}" if lower == -upper else f"{_figure(lower)} .. {_figure(upper)} {unit}"
+
+
+def _frame(frame: Transform) -> tuple[str, str]:
+    return _figures(frame.translation), _figures(math.degrees(angle) for angle in rpy_of(frame.rotation))
+
+
+def _figures(values: Any) -> str:
+    return ", ".join(_figure(value) for value in values)
+
+
+def _figure(value: float) -> str:
+    """Return a number for people: a nanometre is nothing, and nothing has no sign."""
+    return f"{round(float(value), 9) + 0.0:.6g}"
+
+
+def _takes_unicode() -> bool:
+    try:
+        "⣿●■".encode(sys.stdout.encoding or "ascii")
+    except UnicodeEncodeError:
+        return False
+    return True

@@ -1,0 +1,105 @@
+"""A co-simulation in the terminal: how it ended, the verdicts, the extremes of its signals."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from urmpipe.printing.columns import Column, print_columns
+from urmpipe.printing.terminal import judged_line, new_console, new_table, say
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.wording import meter_words
+from urmpipe_pipeline.simulations.simulation import Signal, Simulation, extremes
+
+if TYPE_CHECKING:
+    from rich.console import Console
+
+    from urmpipe_fmus.cosim.system import System
+
+
+SHOWN = 12
+"""Signals whose extremes are printed; the others are counted."""
+
+
+def print_simulation(result: Simulation, wall: float) -> None:
+    """Print what was simulated and how fast, each verdict, and the extremes of each output.
+
+    Args:
+        result: The simulation.
+        wall: What it took in [s].
+    """
+    console = new_console()
+    console.print(_head(result, wall), soft_wrap=True)
+    for one in result.verdicts:
+        console.print(judged_line(one.verdict, f"{one.block}: {meter_words(one)}"), soft_wrap=True)
+    _print_extremes(console, result)
+
+
+def _head(result: Simulation, wall: float) -> str:
+    """Return how long it is, in which steps, and how fast it was."""
+    step = f"communication step {1e3 * result.step:.6g} ms"
+    faster = f", {result.duration / wall:.3g} times faster than real time" if result.duration > wall else ""
+    samples = text.counted(len(result.t_ns), "sample")
+    if len(result.t_ns) > 1 and (period := result.duration / (len(result.t_ns) - 1)) > 1.5 * result.step:
+        step += f", a sample every {1e3 * period:.6g} ms"
+    return f"{result.name}: {samples} over {text.seconds(result.duration)} s, {step}; in {wall:.2g} s{faster}"
+
+
+def _print_extremes(console: Console, result: Simulation) -> None:
+    """Print the least and the largest value of the first scalar signals; those that stand still come last."""
+    rows = [row for signal in _last_first(result) for row in _scalars(signal)]
+    if not rows or not len(result.t_ns):
+        return
+    shown = sorted(rows, key=lambda row: bool(np.ptp(row[2]) == 0.0))[:SHOWN]
+    print_columns(console, "Signals", list(_columns(shown, result.t)))
+    if len(rows) > SHOWN:
+        console.print(f"... and {len(rows) - SHOWN} more; --json has all, and the recording")
+
+
+def _last_first(result: Simulation) -> list[Signal]:
+    """Return the signals, what comes out at the end of the system first.
+
+    That is what blocks compute whose outputs no other block takes, then what no block takes, then the rest.
+    """
+    taken = set(result.connections.values())
+    inner = {source.partition(".")[0] for source in taken}
+    return sorted(
+        result.signals, key=lambda one: (one.block in inner, not taken.isdisjoint((one.name, *one.names)))
+    )
+
+
+def _scalars(signal: Signal) -> Iterator[tuple[str, str, FloatArray]]:
+    """Yield name, unit and values of each scalar of a signal."""
+    for name, values in zip(signal.names, signal.columns.T, strict=True):
+        yield name, signal.unit, values
+
+
+def _columns(rows: Sequence[tuple[str, str, FloatArray]], t: FloatArray) -> Iterator[Column]:
+    """Yield the columns of the table: a row a scalar."""
+    found = [extremes(values, t) for _, _, values in rows]
+    yield Column("Signal", [f"{name} [{unit}]" if unit else name for name, unit, _ in rows], key=True)
+    for head, key, form in (
+        ("first", "first", _number), ("min", "min", _number), ("at t [s]", "t_min", _time),
+        ("max", "max", _number), ("at t [s]", "t_max", _time), ("last", "last", _number),
+    ):  # fmt: skip
+        yield Column(head, [form(one[key]) for one in found])
+
+
+def _number(value: float | None) -> str | None:
+    return None if value is None else f"{value + 0.0:.6g}"  # + 0.0: no -0
+
+
+def _time(value: float | None) -> str | None:
+    return None if value is None else text.seconds(value)
+
+
+def print_systems(systems: Sequence[System]) -> None:
+    """Print the shipped systems: a line each, and their arguments."""
+    table = new_table("System", "What it is", "--set", title="Systems")
+    for one in systems:
+        table.add_row(one.name, one.description, "\n".join(f"{k}={v}" for k, v in one.arguments.items()))
+    new_console().print(table)
+    say("Run one: urmpipe simulate SYSTEM [--set NAME=VALUE]")

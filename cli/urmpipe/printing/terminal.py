@@ -1,0 +1,187 @@
+"""What people read in a terminal: tables on standard output, warnings and progress on standard error."""
+
+from __future__ import annotations
+
+import json
+import shutil
+import sys
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager, redirect_stdout
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from urmpipe_models.errors import one_line
+
+if TYPE_CHECKING:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    from urmpipe_pipeline.joint_log import LogWarning
+    from urmpipe_pipeline.runs.results import Run
+
+LISTED = 30
+"""Rows of a list that are printed; the others are counted (the recording and --json have them all)."""
+
+PIPE_WIDTH = 120
+"""Columns of a table that goes into a pipe, where no terminal tells."""
+
+
+def print_json(value: Any) -> None:
+    """Print one JSON object, NaN as null."""
+    from urmpipe_pipeline.runs.results import json_ready
+
+    echo_json(json_ready(value), indent=2)
+
+
+def echo_json(value: Any, indent: int | None = None) -> None:
+    """Print a JSON value in the letters that it holds, or in ASCII where the output cannot take them all."""
+    written = json.dumps(value, ensure_ascii=False, indent=indent)
+    try:
+        written.encode(sys.stdout.encoding or "utf-8")
+    except UnicodeEncodeError:  # such as the bytes of a file name that are no text
+        written = json.dumps(value, indent=indent)
+    click.echo(written)
+
+
+def say(line: str, *, err: bool = False) -> None:
+    """Print one line, on standard output or standard error; what is not printable in names as escapes."""
+    click.echo(one_line(line), err=err)
+
+
+def print_recording(recording: Path | None) -> None:
+    """Print where a recording is and how to open it, with the urmpipe that is running."""
+    command = "urmpipe"
+    if shutil.which(command) is None:  # not on the path, as in an environment that was not activated
+        installed, here = Path(sys.executable).parent / command, Path.cwd()
+        command = str(installed.relative_to(here) if installed.is_relative_to(here) else installed)
+    say(f"Recording: {recording}  (open it: {command} view {recording})")
+
+
+def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
+    """Print warnings on standard error, one unwrapped line each, behind the name of their log if given."""
+    named = f"{log}: " if log else ""
+    for warning in warnings[:LISTED]:
+        place = f"row {warning.row}: " if warning.row is not None else ""
+        say(f"warning: {named}{place}{warning.message}", err=True)
+    if len(warnings) > LISTED:
+        say(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
+
+
+def print_run(run: Run, *, alternatives: bool = False) -> None:
+    """Print what ingest inferred and what it changed; if asked for, how to have it otherwise."""
+    from urmpipe_pipeline.runs.explain import otherwise
+
+    console = new_console()
+    log = run.log
+    columns = ("What", "Found", "Because", "Otherwise")[: 4 if alternatives else 3]
+    table = new_table(*columns, title=f"{log.name}: {log.rows} rows, {run.duration:.6g} s")
+    for inference in log.inferences:
+        cells = (inference.what, inference.value, inference.evidence, otherwise(inference))
+        table.add_row(*cells[: len(columns)])
+    grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
+    resampled = any(warning.kind == "resampled" for warning in run.warnings)
+    table.add_row("grid", grid, "resampled" if resampled else "the log's own rows")
+    if not any(inference.what == "robot" for inference in log.inferences):
+        table.add_row("robot", run.robot.name if run.robot else "none", _why_robot(run))
+    console.print(table)
+    _print_audit(console, run)
+
+
+def _why_robot(run: Run) -> str:
+    """Say why a run has the robot that it has, where it was not inferred."""
+    if run.robot:
+        return run.robot.description
+    tried = run.log.joints and run.log.tcp_position is not None
+    why = "not given, and none of the catalogue alone fits the recorded TCP" if tried else "not given"
+    return f"{why}: no kinematics (--robot NAME|FILE)"
+
+
+def _print_audit(console: Console, run: Run) -> None:
+    """Print what the repolarizer did, and what it could not decide."""
+    from urmpipe_pipeline.text import counted
+
+    if not run.audit:
+        console.print("No repolarization.")
+        return
+    wraps = len(run.repolarizations)
+    others = f", {counted(len(run.audit) - wraps, 'other finding')}" if len(run.audit) > wraps else ""
+    title = f"{counted(wraps, 'repolarization')}{others}"
+    audit = new_table("What", "Joint", "Row", "t_r [s]", "Step [rad]", "Turns", title=title)
+    for one in run.audit[:LISTED]:
+        instant = f"{one.t:.6g} ± {one.half_period:.4g}"
+        turns = f"{one.before:+d} → {one.after:+d}"
+        audit.add_row(one.kind, one.joint, str(one.row), instant, f"{one.step:+.5f}", turns)
+    console.print(audit)
+    if len(run.audit) > LISTED:
+        console.print(f"... and {len(run.audit) - LISTED} more; --audit FILE.csv lists all")
+
+
+@contextmanager
+def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float], None] | None]:
+    """Show a bar on standard error while work goes on; on a terminal only, never in a pipe."""
+    if quiet or not sys.stderr.isatty():
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+
+    name = TextColumn("{task.description}", markup=False)  # a title holds names of files
+    columns = (name, BarColumn(), TaskProgressColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task(one_line(title), total=1.0)
+        yield lambda share: bar.update(task, completed=share)
+
+
+@contextmanager
+def prints_apart() -> Iterator[None]:
+    """Have what a user's unit prints on standard error: standard output is for results, such as JSON."""
+    with redirect_stdout(sys.stderr):
+        yield
+
+
+def judged(verdict: str | None) -> Text:
+    """Return a verdict as a word, with a colour on a terminal."""
+    from rich.text import Text
+
+    from urmpipe_pipeline.text import NOTHING
+
+    style = {"pass": "bold green", "fail": "bold red"}
+    return Text(NOTHING) if verdict is None else Text(verdict.upper(), style=style[verdict])
+
+
+def judged_line(verdict: str | None, said: str) -> Text:
+    """Return a verdict and what is said to it, in one line."""
+    return judged(verdict).append(f"  {one_line(said)}", style="not bold default")
+
+
+def new_console() -> Console:
+    """Return a console that takes text as it is: names from files may hold brackets."""
+    from rich.console import Console
+
+    class PlainConsole(Console):
+        """Shows text as it is, and lets nothing in it act on the terminal."""
+
+        def on_broken_pipe(self) -> None:
+            """Leave a closed pipe to the error boundary: rich itself exits with 1, which is a verdict."""
+            raise BrokenPipeError
+
+        def render_str(self, text: str, **options: Any) -> Text:
+            """Return a string or the text of a cell, line by line without what is not printable."""
+            return super().render_str("\n".join(one_line(line) for line in text.split("\n")), **options)
+
+    width = None if sys.stdout.isatty() else PIPE_WIDTH
+    return PlainConsole(width=width, markup=False, emoji=False, highlight=False)
+
+
+def new_table(*columns: str, title: str) -> Table:
+    """Return an empty table with these column heads."""
+    from rich import box
+    from rich.table import Table
+
+    table = Table(title=title, title_justify="left", box=box.SIMPLE_HEAD)
+    for column in columns:
+        table.add_column(column, overflow="fold")
+    return table

@@ -1,0 +1,164 @@
+"""The parts of a system: its robots, logs and units, and the FMU of each block from the cache."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from urmpipe.guards import place_robot
+from urmpipe.systems.log_tables import LogTable, read_table
+from urmpipe.systems.units import Backend, column_names, unit_of
+from urmpipe_datasets import LOGS
+from urmpipe_fmus.cache import cached_fmu
+from urmpipe_fmus.cosim.plan import LogColumn
+from urmpipe_fmus.native import native_missing
+from urmpipe_models.errors import OptionError, UrmpipeError
+from urmpipe_pipeline.sources import ReadOptions, read_map
+
+if TYPE_CHECKING:
+    from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
+    from urmpipe_fmus.unit import Unit
+    from urmpipe_models.chains.chain import Chain
+    from urmpipe_pipeline.joint_log import LogWarning
+
+CHAIN, METER = "kinematic_chain", "delta_meter"
+"""The units that are shown as an arm, and judged."""
+
+
+class Blocks:
+    """What the blocks and inputs of a system are made of, read at once.
+
+    What is wrong with one is raised when it is asked for, so that all of it is told together.
+
+    Args:
+        system: The system.
+        shipped: Whether it came with urmpipe: its logs are the bundled ones then, by name.
+        backend: What the FMUs of units are built with.
+        read: How to read a log where it cannot tell by itself.
+        told: Told what takes its time: an FMU that is built.
+
+    Attributes:
+        units: The unit of each block that is one.
+        chains: The arm of each block that has one.
+        files: The files that were read.
+        warnings: What a person should know of the logs.
+        end: Where the longest log ends in [s]; None without one.
+    """
+
+    def __init__(
+        self,
+        system: System,
+        *,
+        shipped: bool,
+        backend: Backend | None = None,
+        read: ReadOptions | None = None,
+        told: Callable[[str], None] | None = None,
+    ) -> None:
+        self._shipped, self._backend, self._read = shipped, backend, read
+        self._told = told or (lambda line: None)
+        self._why = ""
+        self.units: dict[str, Unit] = {}
+        self.chains: dict[str, Chain] = {}
+        self.files: list[Path] = []
+        self.warnings: list[LogWarning] = []
+        self.end: float | None = None
+        self._faults: dict[str, UrmpipeError] = {}
+        self._columns: dict[Port, LogTable] = {}
+        for block in system.blocks:
+            self._try(block.name, partial(self._take, block))
+        for one in system.inputs:
+            self._try(str(one.destination), partial(self._follow, one))
+
+    def make(self, block: Block) -> Path:
+        """Return the FMU of a block, built if it is not in the cache.
+
+        Raises:
+            UrmpipeError: With what is wrong with its unit, its robot, its log or its file.
+        """
+        if block.name in self._faults:
+            raise self._faults[block.name]
+        return block.fmu or self._fmu(block.name)
+
+    def column(self, asked: LogInput) -> LogColumn:
+        """Return the column of a log that an input follows.
+
+        Raises:
+            UrmpipeError: If it cannot be read.
+        """
+        if str(asked.destination) in self._faults:
+            raise self._faults[str(asked.destination)]
+        found = self._columns[asked.destination]
+        return LogColumn(found.table.t_ns, found.table.values[:, 0], found.columns[0].unit)
+
+    def _try(self, name: str, take: Callable[[], None]) -> None:
+        """Take a part, or remember what is wrong with it."""
+        try:
+            take()
+        except UrmpipeError as error:
+            self._faults[name] = error
+
+    def _take(self, block: Block) -> None:
+        """Take a block: its file, or its unit."""
+        path = block.fmu or block.file
+        if path is not None:
+            self.files.append(path)
+        if block.fmu is None:
+            self.units[block.name] = self._unit(block)
+
+    def _follow(self, asked: LogInput) -> None:
+        """Take the log of an input."""
+        self._columns[asked.destination] = self._table(asked.log, [asked.column])
+
+    def _unit(self, block: Block) -> Unit:
+        """Return the unit of a block."""
+        options = dict(block.options)
+        if block.file is not None:
+            return unit_of(block.file, options=options)
+        robot, log, log_map = (_text(name, options.pop(name, None)) for name in ("robot", "log", "map"))
+        arm = place_robot(robot)
+        if arm is not None:
+            self.chains[block.name] = arm
+        if robot is not None and Path(robot).is_file():
+            self.files.append(Path(robot))
+        if log is None and log_map is not None:
+            raise OptionError(f"map: found {log_map} without a log, allowed: with log = ...")
+        if log is None:
+            return unit_of(block.unit, robot=arm, options=options)
+        table = self._table(log, column_names(options.pop("columns", None)), arm, log_map)
+        return unit_of(block.unit, robot=arm, log=table, options=options)
+
+    def _fmu(self, block: str) -> Path:
+        """Return the FMU of a block from the cache; tell if it is built, and if Python runs it and why."""
+
+        def built(name: str) -> None:
+            """Tell that the FMU of a unit is built."""
+            self._told(f"building {name} for block {block} ...")
+
+        missing = native_missing(()) if self._backend is None else None
+        if missing and not self._why:
+            self._why = missing
+            self._told(f"the units run on Python: {missing}")
+        return cached_fmu(self.units[block], self._backend, told=built)
+
+    def _table(
+        self, name: str, columns: list[str] | None, robot: Chain | None = None, log_map: str | None = None
+    ) -> LogTable:
+        """Return a log by the name that the system gives it, and remember what there is to know of it."""
+        path = Path(name)
+        if self._shipped and not path.exists() and (LOGS / path.name).exists():
+            path = LOGS / path.name
+        read = self._read if log_map is None else read_map(Path(log_map)).read
+        found = read_table(path, columns, robot=robot, read=read)
+        self.files += found.files
+        self.warnings += [one for one in found.warnings if one not in self.warnings]
+        self.end = max(self.end or 0.0, float(found.table.t_ns[-1]) / 1e9)
+        return found
+
+
+def _text(name: str, value: Any) -> str | None:
+    """Return an option that names a robot or a file."""
+    if value is not None and not isinstance(value, str):
+        raise OptionError(f"{name}: found {value!r}, allowed: a name or a file")
+    return value

@@ -1,0 +1,143 @@
+"""Logs as tables for units: the file's own rows in SI over the time from its first."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import NamedTuple
+
+import numpy as np
+
+from urmpipe.guards import PathLike
+from urmpipe_fmus.table import Table
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.operands import log_files
+from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.text import counted
+
+OPTION = re.compile(
+    r"--(unit|time|period|joints|decimal|delimiter|rotation|interval|repair|skip-bad|source)\b"
+)
+"""Options of `urmpipe ingest`: what is said of a log offers them."""
+
+BY_MAP = (
+    'an option of urmpipe ingest, kept by its --write-map FILE for --map FILE, in a system for map = "FILE"'
+)
+"""How such an option reaches a unit."""
+
+
+class Quantity(NamedTuple):
+    """Columns of a table that are one variable.
+
+    Attributes:
+        name: The variable.
+        unit: Its unit; SI, spelled as FMI does.
+        size: How many columns it has; None for a variable that is no array.
+    """
+
+    name: str
+    unit: str
+    size: int | None = None
+
+
+class LogTable(NamedTuple):
+    """A log as a unit takes it.
+
+    Attributes:
+        table: Its rows.
+        columns: What the columns of the table are, from the left.
+        files: Its files.
+        warnings: What a person should know of it.
+    """
+
+    table: Table
+    columns: tuple[Quantity, ...]
+    files: tuple[Path, ...]
+    warnings: tuple[LogWarning, ...]
+
+
+def read_table(
+    log: PathLike,
+    names: Sequence[str] | None = None,
+    *,
+    robot: Chain | None = None,
+    read: ReadOptions | None = None,
+) -> LogTable:
+    """Return a log as a table: its motion, or some columns by name.
+
+    The variables of its motion are q, the angles of the joints that turn, and s, the ways of those that
+    slide; qd, qdd, sd and sdd, what was recorded of their rates; and p, a path or the recorded tool centre
+    point. A column by name, such as a voltage, is a variable of its own.
+
+    Args:
+        log: A log or path (CSV), or a folder whose CSV files make one log.
+        names: Columns by name or number, of any table; default: the motion.
+        robot: The arm: it tells how many joints there are, their names, and which of them slide.
+        read: How to read the file where it cannot tell by itself.
+
+    Raises:
+        LogError: With everything that is wrong with the files, or if a row lacks a value.
+    """
+    try:
+        found = _motion(Path(log), robot, read) if names is None else _columns(Path(log), names, read)
+    except LogError as error:
+        findings = [replace(one, message=_by_map(one.message)) for one in error.findings]
+        raise LogError(*findings) from error
+    warnings = (replace(one, message=_by_map(one.message)) for one in found.warnings)
+    return found._replace(warnings=tuple(warnings))
+
+
+def _by_map(message: str) -> str:
+    """Return what is said of a log with how the options that it offers reach a unit."""
+    return f"{message} ({BY_MAP})" if OPTION.search(message) else message
+
+
+def _motion(path: Path, robot: Chain | None, read: ReadOptions | None) -> LogTable:
+    """Return the motion that a log holds."""
+    files = log_files(path)
+    log = read_log(files, read, robot)
+    parts = list(_parts(log))
+    _refuse_missing(str(files[0]), parts)
+    columns = tuple(Quantity(name, unit, values.shape[1]) for name, unit, values in parts)
+    table = Table(log.t_ns, np.column_stack([values for _, _, values in parts]))
+    return LogTable(table, columns, tuple(files), tuple(one.of(log.name) for one in log.warnings))
+
+
+def _columns(path: Path, names: Sequence[str], read: ReadOptions | None) -> LogTable:
+    """Return columns of a table by name."""
+    from urmpipe_pipeline.sources.series import read_series
+
+    found = read_series(path, names, read)
+    columns = tuple(Quantity(name, unit or "") for name, unit in zip(found.names, found.units, strict=True))
+    warnings = tuple(one.of(path.stem) for one in found.warnings)
+    return LogTable(Table(found.t_ns, found.values), columns, (path,), warnings)
+
+
+def _parts(log: JointLog) -> Iterator[tuple[str, str, FloatArray]]:
+    """Yield name, unit and values of each variable of a log."""
+    turns = np.array([log.units.get(name, "rad") in ("rad", "deg") for name in log.joints], dtype=np.bool_)
+    recorded = {"": log.q if log.joints else None, "d": log.qd, "dd": log.qdd}
+    per = {"": "", "d": "/s", "dd": "/s2"}
+    for suffix, values in recorded.items():
+        for name, unit, mine in (("q", "rad", turns), ("s", "m", ~turns)):
+            if values is not None and mine.any():
+                yield f"{name}{suffix}", f"{unit}{per[suffix]}", values[:, mine]
+    if log.tcp_position is not None:
+        yield "p", "m", log.tcp_position
+
+
+def _refuse_missing(file: str, parts: Sequence[tuple[str, str, FloatArray]]) -> None:
+    """Raise a `LogError` with each variable that has a row without a value."""
+    findings = []
+    for name, _, values in parts:
+        rows, places = np.nonzero(~np.isfinite(values))
+        if len(rows):
+            said = f"found {counted(len(np.unique(rows)), 'row')} without a value, allowed: one in every row"
+            findings.append(Finding(said, file, row=int(rows[0]) + 1, column=f"{name}[{places[0] + 1}]"))
+    if findings:
+        raise LogError(*findings)

@@ -1,0 +1,192 @@
+"""A co-simulation's arrays with their names: signals, settings, arms and verdicts."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from urmpipe.systems.blocks import CHAIN, METER, Blocks
+from urmpipe_fmus.cosim.interface import ELEMENT, Interface
+from urmpipe_fmus.cosim.plan import Plan
+from urmpipe_fmus.cosim.simulation import Recorded
+from urmpipe_fmus.cosim.system import Block, Port, System
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict, delta_verdict
+from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.simulations.simulation import Arm, Setting, Signal, SimulatedBlock, Simulation
+from urmpipe_pipeline.sources.tables.text import fingerprint
+
+TOLERANCE = "tolerance"
+"""The parameter of a delta meter that its verdict rests on."""
+
+
+def check_meters(plan: Plan) -> None:
+    """Raise an `OptionError` if a delta meter has no tolerance to judge by: before the first step."""
+    wrong = [name for name in _meters(plan.system) if not _value(plan, Port(name, TOLERANCE)) > 0.0]
+    if wrong:
+        raise OptionError(*(f"block {name}: tolerance: found 0, allowed: above 0, in m" for name in wrong))
+
+
+def simulation_of(plan: Plan, recorded: Recorded, blocks: Blocks, svg: str) -> Simulation:
+    """Return what was recorded as a simulation.
+
+    Args:
+        plan: The system as it was run.
+        recorded: Its arrays.
+        blocks: What the blocks were made of.
+        svg: The system as a drawing.
+    """
+    system = plan.system
+    notes = (LogWarning("co-simulation", note) for note in (*recorded.notes, *_unjudged(system)))
+    given = {
+        "system": system.name,
+        "arguments": dict(system.arguments),
+        "step": system.step,
+        "duration": plan.count * system.step,
+    }
+    return Simulation(
+        name=system.name,
+        description=system.description,
+        t_ns=recorded.t_ns,
+        step=system.step,
+        signals=tuple(_signals(plan, recorded, blocks)),
+        system_svg=svg,
+        system_text=system.path.read_text(encoding="utf-8-sig"),
+        blocks=tuple(_block(plan, one, blocks) for one in system.blocks),
+        failed=recorded.failed,
+        warnings=(*blocks.warnings, *notes),
+        provenance=provenance("simulate", given, _inputs([system.path, *blocks.files])),
+        connections={str(one.connection.destination): str(one.connection.source) for one in plan.links},
+        arms=tuple(_arms(plan, recorded, blocks)),
+        verdicts=tuple(_verdicts(plan, recorded)),
+    )
+
+
+def _unjudged(system: System) -> Iterator[str]:
+    """Yield what a verdict does not see: a delta meter is judged by what is recorded of it."""
+    if system.record_every > 1:
+        every = f"one communication point of {system.record_every}, as system.record_every says"
+        yield from (f"block {name}: the verdict is that of {every}" for name in _meters(system))
+
+
+def _inputs(paths: list[Path]) -> list[SourceFile]:
+    """Return the files that a simulation came from, each once."""
+    return [fingerprint(path) for path in dict.fromkeys(paths)]
+
+
+def _signals(plan: Plan, recorded: Recorded, blocks: Blocks) -> Iterator[Signal]:
+    """Yield the signals: scalars, and arrays whose elements were all recorded."""
+    places = {port: i for i, port in enumerate(recorded.names)}
+    done: set[Port] = set()
+    for port in recorded.names:
+        if port in done:
+            continue
+        ports, name = _array(plan.interfaces[port.block], port, places)
+        done.update(ports)
+        columns = recorded.values[:, [places[one] for one in ports]]
+        yield Signal(
+            block=port.block,
+            variable=name,
+            values=columns if name != port.variable else columns[:, 0],
+            unit=recorded.units[places[port]],
+            type=recorded.types[places[port]],  # type: ignore[arg-type]
+            **_described(blocks, port.block, name),
+        )
+
+
+def _array(shown: Interface, port: Port, places: Mapping[Port, int]) -> tuple[list[Port], str]:
+    """Return the elements of the array that a recorded scalar is of, and its name; else the scalar."""
+    match = ELEMENT.fullmatch(port.variable)
+    elements = shown.arrays.get(match[1], ()) if match else ()
+    ports = [Port(port.block, one.name) for one in elements]
+    whole = match is not None and [f"{match[1]}[{i + 1}]" for i in range(len(ports))] == [
+        one.variable for one in ports
+    ]
+    if match is None or not whole or any(one not in places for one in ports):
+        return [port], port.variable
+    kinds = {(one.type, one.unit) for one in elements}
+    return (ports, match[1]) if len(kinds) == 1 else ([port], port.variable)
+
+
+def _described(blocks: Blocks, block: str, variable: str) -> dict[str, Any]:
+    """Return description and display unit of a variable of a unit; of another FMU nothing."""
+    unit = blocks.units.get(block)
+    found = next((one for one in unit.variables if one.name == variable), None) if unit else None
+    return {"description": found.description, "display_unit": found.display_unit} if found else {}
+
+
+def _block(plan: Plan, block: Block, blocks: Blocks) -> SimulatedBlock:
+    """Return what is to be known of a block."""
+    shown, unit = plan.interfaces[block.name], blocks.units.get(block.name)
+    return SimulatedBlock(
+        name=block.name,
+        kind="fmu" if block.fmu else "file" if block.file else "unit",
+        source=block.kind,
+        content=shown.guid,
+        settings=tuple(_settings(plan, block.name, shown)),
+        description=unit.description if unit else "",
+    )
+
+
+def _settings(plan: Plan, block: str, shown: Interface) -> Iterator[Setting]:
+    """Yield what the parameters, states and unconnected inputs of a block had before the first step."""
+    given = {one.variable.name: one.value for one in plan.starts[block]}
+    fed = {*plan.sources, *(one.destination for one in plan.logged)}
+    for one in shown.variables.values():
+        value = given.get(one.name, one.start)
+        if one.settable and value is not None and one.type != "String" and Port(block, one.name) not in fed:
+            yield Setting(one.name, _number(value), one.unit, one.causality, one.name in given)
+
+
+def _number(value: float | str) -> float:
+    """Return a start value, as an FMU spells it or as it was given, as a number."""
+    return float({"true": 1.0, "false": 0.0}.get(value, value) if isinstance(value, str) else value)
+
+
+def _value(plan: Plan, port: Port) -> float:
+    """Return what a scalar has before the first step."""
+    given = {one.variable.name: one.value for one in plan.starts[port.block]}
+    start = plan.variable(port).start
+    return _number(given.get(port.variable, 0.0 if start is None else start))
+
+
+def _arms(plan: Plan, recorded: Recorded, blocks: Blocks) -> Iterator[Arm]:
+    """Yield the arm of each block of kinematics, as its joints were."""
+    for block in plan.system.blocks:
+        if block.unit == CHAIN and block.name in blocks.chains:
+            chain = blocks.chains[block.name]
+            counts = {"revolute": 0, "prismatic": 0}
+            columns = []
+            for joint in chain.moving:
+                counts[joint.kind] += 1
+                variable = f"{'phi' if joint.kind == 'revolute' else 's'}[{counts[joint.kind]}]"
+                columns.append(_over_time(plan, recorded, Port(block.name, variable)))
+            yield Arm(block.name, chain, np.column_stack(columns))
+
+
+def _over_time(plan: Plan, recorded: Recorded, destination: Port) -> FloatArray:
+    """Return what an input had at each sample, shape (n,): its source, its log, or its start value."""
+    port = plan.sources.get(destination, destination)
+    if port in recorded.names:
+        return recorded.values[:, recorded.names.index(port)]
+    return np.full(len(recorded.t_ns), _value(plan, destination))
+
+
+def _meters(system: System) -> list[str]:
+    """Return the names of the delta meters."""
+    return [block.name for block in system.blocks if block.unit == METER]
+
+
+def _verdicts(plan: Plan, recorded: Recorded) -> Iterator[DeltaVerdict]:
+    """Yield the verdict of each delta meter."""
+    for name in _meters(plan.system):
+        columns = [recorded.column(name, f"delta[{i}]") for i in (1, 2, 3)]
+        tolerance = {"axis": _value(plan, Port(name, TOLERANCE))}
+        found = delta_verdict(name, recorded.t_ns, np.column_stack(columns), tolerance)
+        if found is not None:
+            yield found

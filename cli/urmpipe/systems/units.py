@@ -1,0 +1,104 @@
+"""Units as they are named: by name, from a file or complete, with robot, log and options."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal
+
+from urmpipe.guards import PathLike, Robot, place_robot
+from urmpipe.systems.log_tables import LogTable, read_table
+from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.units import make_unit, unit_options
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import OptionError
+
+if TYPE_CHECKING:
+    from urmpipe_pipeline.sources import ReadOptions
+
+Backend = Literal["native", "python"]
+
+FROM_LOG = ("table", "columns")
+"""Options of a unit that come from a log."""
+
+
+def unit_of(
+    unit: Unit | PathLike,
+    *,
+    robot: Robot | None = None,
+    log: PathLike | LogTable | None = None,
+    options: Mapping[str, Any] | None = None,
+    read: ReadOptions | None = None,
+) -> Unit:
+    """Return a unit by name or from a file, made with its options.
+
+    Args:
+        unit: A name, a Python file, or a unit.
+        robot: The arm, for a unit that has one; for one that plays a log it tells how to read it.
+        log: A log for a unit that plays one, or what `read_table` made of it.
+        options: Further options of the unit. Of a log, `columns` names columns of any table; without it
+            they are the joints, or the x, y, z of a path.
+        read: How to read the log where it cannot tell by itself.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the unit or its options.
+    """
+    given = dict(options or {})
+    if isinstance(unit, Unit) or Path(unit).suffix == ".py":
+        _refuse_options(unit, {"robot": robot, "log": log, **given})
+        return unit if isinstance(unit, Unit) else _from_file(Path(unit))
+    name = str(unit)
+    known = unit_options(name)
+    _refuse_missing(name, known, robot, log)
+    arm = place_robot(robot)
+    if log is not None:
+        names = column_names(given.pop("columns", None))
+        found = log if isinstance(log, LogTable) else read_table(log, names, robot=arm, read=read)
+        given |= {"table": found.table, "columns": found.columns}
+    elif arm is not None:
+        given["robot"] = arm
+    return make_unit(name, **given)
+
+
+def _from_file(path: Path) -> Unit:
+    """Return the unit of a user's file."""
+    from urmpipe_fmus.user_unit import load_unit_file
+
+    return load_unit_file(path)
+
+
+def column_names(columns: Any) -> list[str] | None:
+    """Return names of columns as they stand in an option: one, or a list of them."""
+    if columns is None:
+        return None
+    return [str(one) for one in (columns if isinstance(columns, (list, tuple)) else [columns])]
+
+
+def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, log: Any) -> None:
+    """Raise an `OptionError` if a unit lacks its robot or its log, or is given what it does not have."""
+    takes = {"robot": "robot" in known, "log": FROM_LOG[0] in known}
+    faults = []
+    for option, value, metavar in (("robot", robot, "NAME|FILE"), ("log", log, "LOG")):
+        if takes[option] and value is None:
+            allowed = f"--{option} {metavar}, in a system file {option} = ..."
+            faults.append(f"unit {name}: found no {option}, allowed: {allowed}")
+        elif not takes[option] and value is not None and not (option == "robot" and takes["log"]):
+            said = f"found a {option} ({_shown(value)}), allowed: none, it has no such option"
+            faults.append(f"unit {name}: {said}")
+    if faults:
+        raise OptionError(*faults)
+
+
+def _shown(value: Any) -> Any:
+    """Return what a robot or a log is called."""
+    if isinstance(value, LogTable):
+        return value.files[0]
+    return value.name if isinstance(value, Chain) else value
+
+
+def _refuse_options(unit: Unit | PathLike, given: Mapping[str, Any]) -> None:
+    """Raise an `OptionError` if a unit that is complete is given options."""
+    found = [name for name, value in given.items() if value is not None]
+    if found:
+        who = unit.name if isinstance(unit, Unit) else unit
+        raise OptionError(f"unit {who}: found {', '.join(found)}, allowed: no options, it is complete")

@@ -1,0 +1,137 @@
+"""The chain: a serial arm as frames and joints, whatever it was described by."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Literal
+
+from urmpipe_models.chains.visual import Visual
+from urmpipe_models.errors import RobotError
+from urmpipe_models.transform import Transform
+
+JointKind = Literal["revolute", "prismatic", "fixed"]
+
+AXIS_TOLERANCE = 1e-9
+"""An axis may differ from unit length by this: rounding, not a forgotten normalisation."""
+
+
+@dataclass(frozen=True, slots=True)
+class Mimic:
+    """A joint that follows another: value = multiplier * q[joint] + offset (rad or m)."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+
+@dataclass(frozen=True, slots=True)
+class Joint:
+    """One joint of a chain, with the frame it sits in.
+
+    Attributes:
+        name: Its name, unique in the chain.
+        kind: revolute (any range), prismatic, or fixed: a frame that carries a sensor.
+        origin: The joint's frame at q = 0, in the moving frame of the joint before it (or the base).
+        axis: Unit vector of rotation or translation in the joint's frame [-].
+        lower: Least value allowed, in [rad] or [m].
+        upper: Largest value allowed, in [rad] or [m].
+        velocity: Largest speed, in [rad/s] or [m/s].
+        mimic: The joint it follows, if it has no coordinate of its own.
+    """
+
+    name: str
+    kind: JointKind = "revolute"
+    origin: Transform = field(default_factory=Transform)
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    lower: float = -math.inf
+    upper: float = math.inf
+    velocity: float = math.inf
+    mimic: Mimic | None = None
+
+
+@dataclass(frozen=True)
+class Chain:
+    """A serial chain from its base to its tip.
+
+    The points p1..pn are the ends of its segments: p_k is the origin of the frame that follows
+    joint k, turned as joint k leaves it; the last one is the tool centre point (tip and tool
+    included). For a URM arm they are the p_i of the paper.
+
+    Attributes:
+        name: The robot's name.
+        joints: Joints from the base outwards; fixed ones are frames that may carry a sensor.
+        tip: The end of the arm in the frame of the last joint.
+        base: Where the arm stands in the world.
+        tool: The tool centre point in the tip's frame.
+        start: Calibration pose q(0), in [rad] or [m], one value a coordinate.
+        description: One line for people.
+        source: Where the numbers come from.
+        visuals: What the arm looks like; none where the description does not tell.
+    """
+
+    name: str
+    joints: tuple[Joint, ...]
+    tip: Transform = field(default_factory=Transform)
+    base: Transform = field(default_factory=Transform)
+    tool: Transform = field(default_factory=Transform)
+    start: tuple[float, ...] = ()
+    description: str = ""
+    source: str = ""
+    visuals: tuple[Visual, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.start:
+            object.__setattr__(self, "start", (0.0,) * len(self.coordinates))
+        faults = [f"robot {self.name}: {fault}" for fault in self._faults()]
+        if faults:
+            raise RobotError(*faults)
+
+    def _faults(self) -> Iterator[str]:
+        names = [joint.name for joint in self.joints]
+        repeated = sorted({name for name in names if names.count(name) > 1})
+        if repeated:
+            yield f"joint names repeat: {', '.join(repeated)}; allowed: each once"
+        if not self.coordinates:
+            yield "has no moving joint; at least one is needed"
+        for joint in self.joints:
+            length = math.hypot(*joint.axis)
+            if abs(length - 1.0) > AXIS_TOLERANCE:
+                yield f"joint {joint.name}: axis {list(joint.axis)} has length {length:g}; allowed: 1"
+            if not joint.lower <= joint.upper:
+                yield f"joint {joint.name}: lower limit {joint.lower:g} above upper {joint.upper:g}"
+            if not joint.velocity > 0.0:
+                yield f"joint {joint.name}: velocity {joint.velocity:g}; allowed: more than 0"
+            if joint.mimic is not None and joint.mimic.joint not in self.coordinates:
+                yield (
+                    f"joint {joint.name} mimics {joint.mimic.joint}, no moving joint of the chain;"
+                    f" allowed: {', '.join(self.coordinates)}"
+                )
+        for visual in self.visuals:
+            yield from visual.faults()
+        carriers = {visual.joint for visual in self.visuals if visual.joint is not None}
+        for carrier in sorted(carriers - set(names)):
+            yield f"a visual hangs on {carrier}, no joint of the chain; allowed: {', '.join(names)}"
+        if len(self.start) != len(self.coordinates):
+            yield f"start has {len(self.start)} values; allowed: {len(self.coordinates)}, one a coordinate"
+
+    @cached_property
+    def moving(self) -> tuple[Joint, ...]:
+        """The joints that have a coordinate of their own, in the order of q."""
+        return tuple(joint for joint in self.joints if joint.kind != "fixed" and joint.mimic is None)
+
+    @cached_property
+    def coordinates(self) -> tuple[str, ...]:
+        """The names of the coordinates q, in order."""
+        return tuple(joint.name for joint in self.moving)
+
+    @property
+    def point_names(self) -> tuple[str, ...]:
+        """p1..pn."""
+        return tuple(f"p{k}" for k in range(1, len(self.joints) + 1))
+
+    def placed(self, base: Transform | None = None, tool: Transform | None = None) -> Chain:
+        """Return the same arm on another base or with another tool."""
+        return replace(self, base=base or self.base, tool=tool or self.tool)

@@ -1,0 +1,1 @@
+"""What turns a joint: motor, gear and shaft, controller, set point."""

@@ -1,0 +1,1 @@
+"""Files in: TOML and XML read with every fault and its line."""

@@ -1,0 +1,1 @@
+"""Solutions along a path: one continuous motion, and where there is none."""

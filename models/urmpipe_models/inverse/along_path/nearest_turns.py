@@ -1,0 +1,26 @@
+"""Samples that were solved beside each other, brought into the turns of the one before each."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.limits import within_limits
+from urmpipe_models.inverse.solutions import Solutions
+
+
+def in_nearest_turns(chain: Chain, q: FloatArray, last: FloatArray) -> FloatArray:
+    """Return joint values with each joint in the allowed turn that is nearest to the sample before.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], within limits, shape (m, joints); NaN where there are none.
+        last: Those of the sample before them, shape (joints,).
+    """
+    turned = q.copy()
+    none = np.array([[""]], dtype=np.object_)
+    for sample in np.flatnonzero(np.isfinite(q).all(axis=1)).tolist():
+        one = Solutions(q[sample][None, None], ("",), none)
+        turned[sample] = last = within_limits(chain, one, last).q[0, 0]
+    return turned

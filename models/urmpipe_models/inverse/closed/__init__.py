@@ -1,0 +1,1 @@
+"""Closed forms: all solutions of a pose, written down."""

@@ -1,0 +1,30 @@
+"""Angles between directions, elementwise, to the last digits wherever they point."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.elementwise import cross, dot
+from urmpipe_models.inverse.closed.trigonometric import wrapped
+
+
+def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Return the angle in (-pi, pi] by which one vector must turn about an axis to point as another does.
+
+    Args:
+        axis: Unit vector, shape (3,).
+        start: Shape (3, ...), or (3,) for all.
+        end: See start; what both have along the axis does not count. It is taken off first, so that vectors
+            that are almost along the axis lose no digit.
+    """
+    x, y, z = (float(one) for one in axis)
+    u, v = cross((x, y, z), tuple(start)), cross((x, y, z), tuple(end))
+    return wrapped(np.arctan2(dot((x, y, z), cross(u, v)), dot(u, v)))
+
+
+def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return the angle in [0, pi] between a vector, shape (3,), and others, shape (3, ...), in [rad]."""
+    x, y, z = cross(tuple(first.tolist()), tuple(second))
+    cosine = sum(a * b for a, b in zip(first.tolist(), second, strict=True))
+    return np.asarray(np.arctan2(np.sqrt(x * x + y * y + z * z), cosine))

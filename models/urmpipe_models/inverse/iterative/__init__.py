@@ -1,0 +1,1 @@
+"""Iterative solutions of any arm, many targets at once."""

@@ -1,0 +1,242 @@
+"""From joint values towards the target, step by step: three methods on one block of rows."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Literal
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
+from urmpipe_models.inverse.iterative.small_systems import (
+    column_squares,
+    dot_product,
+    factor,
+    gram,
+    product,
+    rows_of,
+    transposed_product,
+)
+from urmpipe_models.inverse.iterative.task import Miss, Task
+
+Method = Literal["lm", "dls", "pinv"]
+
+METHODS: tuple[Method, ...] = ("lm", "dls", "pinv")
+
+FIRST_GAIN = 0.1
+"""Levenberg-Marquardt starts with mu = 0.1 |e|^2."""
+
+GAINS = (1e-8, 1e8)
+"""Between these mu / |e|^2 stays; a row that reaches the upper one finds no better point near it."""
+
+STATIONARY = 1e-7
+"""Where the cosine between e and what each free joint can change of it is less, e cannot be made less."""
+
+LEAST_RATIO = 1e-4
+"""A step that gains less of what was foreseen is not taken."""
+
+LONGEST_STEP = 0.5
+"""Of damped least squares and the pseudoinverse, in [rad] or [m] of any joint."""
+
+RANK_CUTOFF = 1e-6
+"""Singular values below this part of the largest count as 0 in the pseudoinverse."""
+
+
+@dataclass(frozen=True, eq=False)
+class Settings:
+    """How a descent steps and when it has arrived; see `iterative.refine`."""
+
+    lower: FloatArray
+    upper: FloatArray
+    method: Method = "lm"
+    metres: float = 1e-10
+    radians: float = 1e-10
+    damping: float = 0.05
+    stationary: float = STATIONARY
+
+    @cached_property
+    def limited(self) -> bool:
+        """Whether any joint has a limit."""
+        return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
+
+    def within(self, q: FloatArray) -> FloatArray:
+        """Return joint values, shape (joints, n), clipped to their limits."""
+        return np.clip(q, self.lower[:, None], self.upper[:, None]) if self.limited else q
+
+
+@dataclass(frozen=True, slots=True)
+class Progress:
+    """How far every row of a batch has come.
+
+    Attributes:
+        q: Joint values in [rad] or [m], shape (joints, n).
+        gain: mu / |e|^2 of Levenberg-Marquardt, shape (n,).
+        steps: Taken so far, shape (n,).
+        distance: |target - tool| in [m], shape (n,).
+        angle: Between tool and target in [rad], shape (n,).
+        arrived: True where both are within what was asked for, shape (n,).
+        ended: True where no step more is to be taken, shape (n,).
+    """
+
+    q: FloatArray
+    gain: FloatArray
+    steps: IndexArray
+    distance: FloatArray
+    angle: FloatArray
+    arrived: BoolArray
+    ended: BoolArray
+
+    @classmethod
+    def at(cls, q: FloatArray) -> Progress:
+        """Return the progress of rows that have not moved from q, shape (n, joints)."""
+        n = len(q)
+        return cls(
+            np.array(q.T, order="C"),
+            np.full(n, FIRST_GAIN),
+            np.zeros(n, np.intp),
+            np.full(n, np.nan),
+            np.full(n, np.nan),
+            np.zeros(n, np.bool_),
+            np.zeros(n, np.bool_),
+        )
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """The rows of a block that are still on their way: q of shape (joints, n), gain of shape (n,)."""
+
+    index: IndexArray
+    task: Task
+    q: FloatArray
+    gain: FloatArray
+    miss: Miss
+
+    def kept(self, rows: IndexArray) -> Rows:
+        """Return some of the rows."""
+        task, q, miss = self.task.kept(rows), rows_of(self.q, rows), self.miss.kept(rows)
+        return Rows(self.index[rows], task, q, self.gain[rows], miss)
+
+
+def descend(progress: Progress, task: Task, index: IndexArray, settings: Settings, steps: int) -> None:
+    """Take some rows of a batch up to `steps` steps further; those that have arrived leave early.
+
+    Args:
+        progress: Of the batch; the rows at `index` are brought up to date.
+        task: The targets of the rows at `index`.
+        index: Where the rows stand in the batch.
+        settings: How to step.
+        steps: The most to take.
+    """
+    q = rows_of(progress.q, index)
+    rows = Rows(index, task, q, progress.gain[index], task.miss(q))
+    rows = _parted(progress, rows, _ended(rows, settings), settings)
+    for _ in range(steps):
+        if not len(rows.index):
+            return
+        progress.steps[rows.index] += 1
+        rows = _stepped(rows, settings)
+        rows = _parted(progress, rows, ~_under_way(rows.miss, settings), settings)
+    _store(progress, rows, np.arange(len(rows.index)), settings)
+
+
+def _under_way(miss: Miss, settings: Settings) -> BoolArray:
+    """Return where the target is neither met nor not a number."""
+    return np.asarray((miss.square < np.inf) & ~miss.within(settings.metres, settings.radians))
+
+
+def _ended(rows: Rows, settings: Settings) -> BoolArray:
+    """Return where the target is met, is no number, or cannot be come nearer to.
+
+    The gradient of |e|^2 / 2 is -J^T e; joints that are held do not count.
+    """
+    J = _free(rows, settings)
+    slope = transposed_product(J, rows.miss.error)
+    moves = slope * slope > settings.stationary**2 * rows.miss.square * column_squares(J)
+    going = _under_way(rows.miss, settings) & np.asarray(moves.any(axis=0))
+    return np.asarray(~going | (rows.gain >= GAINS[1]))
+
+
+def _parted(progress: Progress, rows: Rows, leaving: BoolArray, settings: Settings) -> Rows:
+    """Store the rows that leave, and return the others."""
+    if not leaving.any():
+        return rows
+    gone = np.flatnonzero(leaving)
+    _store(progress, rows, gone, settings)
+    progress.ended[rows.index[gone]] = True
+    return rows.kept(np.flatnonzero(~leaving))
+
+
+def _store(progress: Progress, rows: Rows, which: IndexArray, settings: Settings) -> None:
+    """Write how far some of the rows have come."""
+    at, miss = rows.index[which], rows.miss
+    progress.q[:, at] = rows.q[:, which]
+    progress.gain[at] = rows.gain[which]
+    progress.distance[at] = np.sqrt(miss.distance2[which])
+    progress.angle[at] = np.sqrt(miss.turn2[which]) / miss.length
+    progress.arrived[at] = miss.within(settings.metres, settings.radians)[which]
+
+
+def _free(rows: Rows, settings: Settings) -> FloatArray:
+    """Return J without the joints that stand at a limit and would leave it downhill: J^T e points out."""
+    J = rows.miss.jacobian
+    if not settings.limited:
+        return J
+    slope = transposed_product(J, rows.miss.error)
+    held = (rows.q <= settings.lower[:, None]) & (slope < 0.0)
+    held |= (rows.q >= settings.upper[:, None]) & (slope > 0.0)
+    return np.where(held, 0.0, J)
+
+
+def _stepped(rows: Rows, settings: Settings) -> Rows:
+    """Return the rows after one step of the method, within limits."""
+    J = _free(rows, settings)
+    if settings.method == "lm":
+        return _marquardt(rows, J, settings)
+    if settings.method == "dls":
+        step = damped_step(J, rows.miss.error, (settings.damping * rows.miss.length) ** 2)
+    else:
+        step = pseudoinverse_step(J, rows.miss.error)
+    step *= np.minimum(1.0, LONGEST_STEP / np.maximum(np.abs(step).max(axis=0), LONGEST_STEP))
+    q = settings.within(rows.q + step)
+    return replace(rows, q=q, miss=rows.task.miss(q))
+
+
+def _marquardt(rows: Rows, J: FloatArray, settings: Settings) -> Rows:
+    """Return the rows after a Levenberg-Marquardt step, taken where it comes nearer as was foreseen.
+
+    Foreseen is |e|^2 - |e - J dq|^2; the gain ratio is what was gained of it.
+    """
+    now, square = rows.miss, rows.miss.square
+    q = settings.within(rows.q + damped_step(J, now.error, rows.gain * square))
+    left = now.error - product(J, q - rows.q)
+    foreseen = square - dot_product(left, left)
+    new = rows.task.miss(q)
+    gained = square - new.square
+    taken = (gained > LEAST_RATIO * foreseen) & (foreseen > 0.0)  # limits can make it less than 0
+    good, poor = taken & (gained > 0.75 * foreseen), ~taken | (gained < 0.25 * foreseen)
+    factors = np.where(good, 0.125, np.where(poor, 4.0, 1.0))
+    refused = np.flatnonzero(~taken)
+    if len(refused):
+        q[:, refused] = rows.q[:, refused]
+        new.restore(refused, now)
+    return replace(rows, q=q, gain=np.clip(rows.gain * factors, *GAINS), miss=new)
+
+
+def damped_step(J: FloatArray, error: FloatArray, damping: FloatArray | float) -> FloatArray:
+    """Return dq = (J^T J + mu I)^-1 J^T e = J^T (J J^T + mu I)^-1 e, by the smaller of the two systems.
+
+    Args:
+        J: Shape (m, joints, n).
+        error: e, shape (m, n).
+        damping: mu, in the unit of J squared, shape (n,) or one for all.
+    """
+    if J.shape[0] <= J.shape[1]:
+        return transposed_product(J, factor(gram(J), damping).solve(error))
+    return factor(gram(J.transpose(1, 0, 2)), damping).solve(transposed_product(J, error))
+
+
+def pseudoinverse_step(J: FloatArray, error: FloatArray) -> FloatArray:
+    """Return dq = J^+ e, J^+ the Moore-Penrose pseudoinverse by singular values; shapes as `damped_step`."""
+    inverse = np.linalg.pinv(J.transpose(2, 0, 1), rcond=RANK_CUTOFF).transpose(1, 2, 0)
+    return product(np.asarray(inverse, dtype=np.float64), error)

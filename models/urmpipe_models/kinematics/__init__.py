@@ -1,0 +1,1 @@
+"""How an arm moves: frames, poses, velocities, Jacobian, screws, singular poses."""

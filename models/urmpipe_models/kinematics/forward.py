@@ -1,0 +1,245 @@
+"""Forward kinematics and Jacobian of a chain, elementwise, and its motion over a log.
+
+Each function takes one element per coordinate (see `elementwise`): arrays over the samples of a log,
+floats, or CasADi symbols. `over_log` runs one of them over the rows of an (n, joints) array.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.elementwise import ZERO, Element, Vector, cross, plus, subtract, times
+from urmpipe_models.kinematics.frames import frames, joint_values, moved
+from urmpipe_models.kinematics.motion import each_motion
+from urmpipe_models.row_blocks import THREADS, row_blocks, side_by_side
+from urmpipe_models.transform import Transform, euler_zyx
+
+
+def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
+    """Return the poses of the points p1..pn.
+
+    p_{i+1} = Rz1 [r_1 + sum_k prod_j (Ry_{j+1} Rz_{j+1}) r_{k+1}], for any chain as the product of its
+    frames and joint motions.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+
+    Returns:
+        A transform per point, in the world; positions in [m].
+
+    Source: [UrmArm2021]_ eq. 7 and 8.
+    """
+    _, *links = frames(chain, q)
+    poses = [
+        Transform(frame.rotation, frame.point(joint.origin.translation))
+        for frame, joint in zip(links, chain.joints[1:], strict=False)
+    ]
+    return (*poses, links[-1] @ chain.tip @ chain.tool)
+
+
+def tip_pose(chain: Chain, q: Sequence[Element]) -> Transform:
+    """Return the pose of the tool centre point alone: the last of `forward`, at less cost."""
+    for frame in frames(chain, q):
+        last = frame
+    return last @ chain.tip @ chain.tool
+
+
+def jacobian(chain: Chain, q: Sequence[Element], point: int = -1) -> tuple[tuple[Element, ...], ...]:
+    """Return the geometric Jacobian of a point p1..pn, in the world.
+
+    Column i is (z_i x (p - o_i), z_i) for a revolute and (z_i, 0) for a prismatic joint with axis z_i
+    through o_i; a mimic's column counts with its multiplier towards the joint it follows.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+        point: Index of the point, -1 for the tool centre point.
+
+    Returns:
+        One column a coordinate, each vx, vy, vz in [m/s] and wx, wy, wz in [rad/s] per unit rate.
+    """
+    count = len(chain.joints)
+    last = range(count)[point]
+    axes: list[tuple[Vector, Vector]] = []
+    frame = chain.base
+    target = ZERO
+    for k, (joint, value) in enumerate(zip(chain.joints, joint_values(chain, q), strict=True)):
+        at_joint = frame @ joint.origin
+        if k == last + 1:
+            target = at_joint.translation
+            break
+        axes.append((at_joint.rotate(joint.axis), at_joint.translation))
+        frame = moved(at_joint, joint, value)
+    else:
+        target = (frame @ chain.tip @ chain.tool).translation
+
+    columns: dict[str, tuple[Element, ...]] = dict.fromkeys(chain.coordinates, (0.0,) * 6)
+    for joint, (axis, origin) in zip(chain.joints, axes, strict=False):
+        if joint.kind == "fixed":
+            continue
+        column = (
+            (*cross(axis, subtract(target, origin)), *axis) if joint.kind == "revolute" else (*axis, *ZERO)
+        )
+        name, factor = (
+            (joint.name, 1.0) if joint.mimic is None else (joint.mimic.joint, joint.mimic.multiplier)
+        )
+        columns[name] = tuple(plus(a, times(factor, b)) for a, b in zip(columns[name], column, strict=True))
+    return tuple(columns.values())
+
+
+@dataclass(frozen=True, slots=True)
+class PointLog:
+    """One point of the arm over the samples of a log, in the world.
+
+    Attributes:
+        position: In [m], shape (n, 3).
+        velocity: In [m/s], shape (n, 3).
+        acceleration: In [m/s2], shape (n, 3).
+        euler_zyx: rz, ry, rx in [rad], shape (n, 3).
+        singular: Where ry = +-pi/2 and rx = 0 by convention, shape (n,).
+    """
+
+    position: FloatArray
+    velocity: FloatArray
+    acceleration: FloatArray
+    euler_zyx: FloatArray
+    singular: NDArray[np.bool_]
+
+
+def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return the tool centre point in [m], shape (n, 3), of joint values q, shape (n, joints)."""
+    position = np.empty((3, len(q)))
+
+    def work(block: slice) -> None:
+        """Fill the rows of a block."""
+        _fill(position[:, block], tip_pose(chain, _columns(q[block])).translation)
+
+    side_by_side(work, row_blocks(len(q)))
+    return position.T
+
+
+def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return position [m], shape (n, 3), and rotation, shape (n, 3, 3), of the tool centre point.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints).
+    """
+    position, rotation = np.empty((3, len(q))), np.empty((3, 3, len(q)))
+
+    def work(block: slice) -> None:
+        """Fill the rows of a block."""
+        pose = tip_pose(chain, _columns(q[block]))
+        _fill(position[:, block], pose.translation)
+        for row in range(3):
+            _fill(rotation[row, :, block], pose.rotation[row])
+
+    side_by_side(work, row_blocks(len(q)))
+    return position.T, rotation.transpose(2, 0, 1)
+
+
+def point_over_log(
+    chain: Chain,
+    q: FloatArray,
+    qd: FloatArray,
+    qdd: FloatArray,
+    point: int = -1,
+    *,
+    threads: int = THREADS,
+) -> PointLog:
+    """Return the motion of one point p1..pn over a log.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints).
+        qd: Their rates in [rad/s] or [m/s], shape (n, joints).
+        qdd: Their second derivatives in [rad/s2] or [m/s2], shape (n, joints).
+        point: Index of the point, -1 for the tool centre point.
+        threads: Blocks worked on side by side; 1 leaves the other cores to whoever needs them meanwhile.
+    """
+    count, place = len(q), range(len(chain.joints))[point]
+    position, velocity, acceleration, euler = (np.empty((3, count)) for _ in range(4))
+    singular = np.empty(count, dtype=np.bool_)
+
+    def work(block: slice) -> None:
+        """Fill the rows of a block."""
+        every = each_motion(chain, _columns(q[block]), _columns(qd[block]), _columns(qdd[block]))
+        motion = next(islice(every, place, None))
+        rz, ry, rx, singular[block] = euler_zyx(motion.pose.rotation)
+        _fill(position[:, block], motion.pose.translation)
+        _fill(velocity[:, block], motion.velocity)
+        _fill(acceleration[:, block], motion.acceleration)
+        _fill(euler[:, block], (rz, ry, rx))
+
+    side_by_side(work, row_blocks(count), threads)
+    return PointLog(position.T, velocity.T, acceleration.T, euler.T, singular)
+
+
+def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
+    """Return the positions of the base and of p1..pn in [m], shape (n, points + 1, 3): the arm's skeleton."""
+    skeleton = np.empty((len(chain.joints) + 1, 3, len(q)))
+    _fill(skeleton[0], chain.base.translation)
+
+    def work(block: slice) -> None:
+        """Fill the rows of a block."""
+        for k, pose in enumerate(forward(chain, _columns(q[block])), start=1):
+            _fill(skeleton[k, :, block], pose.translation)
+
+    side_by_side(work, row_blocks(len(q)))
+    return skeleton.transpose(2, 0, 1)
+
+
+def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return positions [m], shape (n, joints + 1, 3), and rotations, shape (n, joints + 1, 3, 3), of frames.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, coordinates).
+
+    Returns:
+        The base's, then those of the moving frame of every joint, fixed ones and mimics included.
+    """
+    count = len(chain.joints) + 1
+    position, rotation = np.empty((count, 3, len(q))), np.empty((count, 3, 3, len(q)))
+
+    def work(block: slice) -> None:
+        """Fill the rows of a block."""
+        for k, frame in enumerate(frames(chain, _columns(q[block]))):
+            _fill(position[k, :, block], frame.translation)
+            for row in range(3):
+                _fill(rotation[k, row, :, block], frame.rotation[row])
+
+    side_by_side(work, row_blocks(len(q)))
+    return position.transpose(2, 0, 1), rotation.transpose(3, 0, 1, 2)
+
+
+def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArray:
+    """Return the geometric Jacobian of a point for every row of q: shape (n, 6, joints)."""
+    result = np.empty((len(chain.coordinates), 6, len(q)))
+
+    def work(block: slice) -> None:
+        """Fill the rows of a block."""
+        for i, column in enumerate(jacobian(chain, _columns(q[block]), point)):
+            _fill(result[i, :, block], column)
+
+    side_by_side(work, row_blocks(len(q)))
+    return result.transpose(2, 1, 0)
+
+
+def _columns(rows: FloatArray) -> list[FloatArray]:
+    """Return the columns of (m, joints) as contiguous arrays."""
+    return list(np.ascontiguousarray(rows.T))
+
+
+def _fill(target: FloatArray, elements: Sequence[Element]) -> None:
+    """Write one element a row into target, shape (k, m); constants spread over the columns."""
+    for i, element in enumerate(elements):
+        target[i] = element

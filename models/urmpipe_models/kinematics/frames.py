@@ -1,0 +1,46 @@
+"""The frames of a chain, elementwise: the value of every joint, and what it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.elementwise import Element, plus, scale, times
+from urmpipe_models.transform import Transform
+
+
+def joint_values(chain: Chain, q: Sequence[Element]) -> list[Element]:
+    """Return the value of every joint of the chain, mimics included, fixed ones as 0 (rad or m)."""
+    of = dict(zip(chain.coordinates, q, strict=True))
+    return [_value(joint, of) for joint in chain.joints]
+
+
+def frames(chain: Chain, q: Sequence[Element]) -> Iterator[Transform]:
+    """Yield the base and the moving frame of every joint, in the world: what the links hang on.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+    """
+    frame = chain.base
+    yield frame
+    for joint, value in zip(chain.joints, joint_values(chain, q), strict=True):
+        frame = moved(frame @ joint.origin, joint, value)
+        yield frame
+
+
+def moved(at_joint: Transform, joint: Joint, value: Element) -> Transform:
+    """Return the joint's moving frame from its fixed one and its value in [rad] or [m]."""
+    if joint.kind == "revolute":
+        return at_joint.turned(joint.axis, value)
+    if joint.kind == "prismatic":
+        return Transform(at_joint.rotation, at_joint.point(scale(value, joint.axis)))
+    return at_joint
+
+
+def _value(joint: Joint, of: dict[str, Element]) -> Element:
+    if joint.kind == "fixed":
+        return 0.0
+    if joint.mimic is None:
+        return of[joint.name]
+    return plus(times(joint.mimic.multiplier, of[joint.mimic.joint]), joint.mimic.offset)

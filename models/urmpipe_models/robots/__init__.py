@@ -1,0 +1,1 @@
+"""Arms in files: the catalogue, TOML and URDF, in and out."""

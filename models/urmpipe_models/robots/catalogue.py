@@ -1,0 +1,76 @@
+"""The robots that urmpipe brings along, and the one way to get a robot from a name or a file."""
+
+from __future__ import annotations
+
+import math
+import re
+from difflib import get_close_matches
+from pathlib import Path
+
+from urmpipe_datasets import ROBOTS
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import OptionError, RobotError
+from urmpipe_models.files.tables import shown
+from urmpipe_models.robots.robot_file import read_robot_file
+from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.transform import Transform, from_offset
+
+
+def robot_names() -> tuple[str, ...]:
+    """Return the names of the catalogue, families together and small arms first."""
+    return tuple(sorted((path.stem for path in ROBOTS.glob("*.toml")), key=_by_size))
+
+
+def load_robot(
+    name_or_path: str | Path, *, base_link: str | None = None, tip_link: str | None = None
+) -> Chain:
+    """Return a robot of the catalogue, or of a .toml or .urdf file.
+
+    Args:
+        name_or_path: The robot's name, or its file.
+        base_link: Link of a URDF where the chain begins; its root by default.
+        tip_link: Link of a URDF where the chain ends; see `read_urdf`.
+
+    Raises:
+        RobotError: If there is no such robot, or with everything that is wrong with its file.
+        OptionError: If links are chosen of a robot that is no URDF.
+    """
+    path = Path(name_or_path)
+    suffix = path.suffix.lower()
+    if suffix in {".urdf", ".xacro"}:
+        return read_urdf(path, base_link=base_link, tip_link=tip_link)
+    if base_link or tip_link:
+        raise OptionError(f"robot {name_or_path}: found a base or tip link, allowed only for a .urdf file")
+    if suffix == ".toml":
+        return read_robot_file(path)
+    names = robot_names()
+    if str(name_or_path) in names:
+        return read_robot_file(ROBOTS / f"{name_or_path}.toml")
+    near = get_close_matches(str(name_or_path), names, 1)
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    raise RobotError(
+        f"unknown robot {str(name_or_path)!r}{hint}; allowed: {', '.join(names)}, or a .toml or .urdf file"
+    )
+
+
+def parse_offset(text: str) -> Transform:
+    """Return the frame written as X,Y,Z or X,Y,Z,RX,RY,RZ, in [m] and [rad]: Rz(RZ) Ry(RY) Rx(RX).
+
+    Raises:
+        OptionError: If the text is anything else.
+    """
+    try:
+        values = [float(part) for part in text.split(",")]
+    except ValueError:
+        values = []
+    if len(values) not in {3, 6} or not all(map(math.isfinite, values)):
+        raise OptionError(
+            f"found {shown(text)}, allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15"
+        )
+    return from_offset(values)
+
+
+def _by_size(name: str) -> tuple[str, str, int]:
+    """Order urm4 before urm6, ur5 before ur10, and ur10 before ur3e."""
+    family, size, generation = re.fullmatch(r"(\D*)(\d*)(.*)", name).groups()  # type: ignore[union-attr]
+    return family, generation, int(size or 0)

@@ -1,0 +1,289 @@
+"""Robots as data: TOML files for people, and the dictionary that a recording stores."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias, cast
+
+from urmpipe_models.chains.articulated_6r import articulated_6r
+from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
+from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.errors import Finding, RobotError
+from urmpipe_models.files.tables import Table
+from urmpipe_models.files.toml_text import parse_toml, toml_lines
+from urmpipe_models.robots.robot_frames import Units, frame_to_dict, read_frame
+from urmpipe_models.robots.robot_visuals import read_visual, visual_to_dict
+from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.written import EXPORT_MARK
+
+Build: TypeAlias = Callable[[str], Chain]
+"""Makes the chain of a given name, once all keys are read and found right."""
+
+
+class _Limits(NamedTuple):
+    lower: float
+    upper: float
+    velocity: float
+
+
+def read_robot_file(path: str | Path) -> Chain:
+    """Return the arm that a TOML file describes.
+
+    Common keys: `kind` (urm, dh, modified_dh, articulated6r, joints or urdf), `name` (the file's stem by
+    default), `description`, `source`, `length_unit` (m, mm), `angle_unit` (rad, deg), `start`, and the
+    tables `[base]` and `[tool]` with `translation` and `rpy` (or `rotation`, three rows). By kind:
+
+    - urm: `lengths`, `tilts`, `directions`; `[limits]` with `lower`, `upper`, `velocity`, each one number
+      or one a moving joint.
+    - dh, modified_dh: `[[joints]]` with `name`, `kind` (fixed: a frame without a coordinate), `theta`, `d`,
+      `a`, `alpha`; `[limits]`.
+    - articulated6r: `lengths` l0..l4 (see `articulated_6r`); `[limits]`.
+    - joints: `[[joints]]` with `name`, `kind`, `origin`, `axis`, `lower`, `upper`, `velocity`, `mimic`;
+      `[tip]`. A mimic has `joint`, `offset` and `multiplier`, the last in rad and m always.
+    - urdf: `file` (relative to this one), `base_link`, `tip_link`.
+
+    What the arm looks like (instead of what a URDF says): `[[visuals]]` with `joint` (none: the base),
+    `origin`, `colour` (r, g, b, opacity) and one of `box` (x, y, z), `cylinder` and `capsule` (radius,
+    length), `sphere` (radius), `mesh` (a file, relative to this one) with `scale`.
+
+    Args:
+        path: The file.
+
+    Raises:
+        RobotError: With everything that is wrong: the key, what was found and what is allowed.
+    """
+    path = Path(path)
+    chain = _read(
+        parse_toml(path, RobotError), tuple(_READERS), file=str(path), stem=path.stem, folder=path.parent
+    )
+    return replace(chain, visuals=tuple(visual.located(path.parent) for visual in chain.visuals))
+
+
+def chain_to_dict(chain: Chain) -> dict[str, Any]:
+    """Return a chain as a JSON object of kind `joints`: SI, floats bit by bit, infinities as None."""
+    return {
+        "kind": "joints",
+        "name": chain.name,
+        "description": chain.description,
+        "source": chain.source,
+        "start": [float(value) for value in chain.start],
+        "base": frame_to_dict(chain.base),
+        "tip": frame_to_dict(chain.tip),
+        "tool": frame_to_dict(chain.tool),
+        "joints": [_joint_to_dict(joint) for joint in chain.joints],
+        **({"visuals": [visual_to_dict(visual) for visual in chain.visuals]} if chain.visuals else {}),
+    }
+
+
+def chain_from_dict(data: Mapping[str, Any], file: str | None = None) -> Chain:
+    """Return the chain of a dictionary: `chain_to_dict`'s exact inverse.
+
+    Args:
+        data: What `chain_to_dict` returned; no other kind, so that a stranger's data open no file.
+        file: Where it came from, for the errors.
+
+    Raises:
+        RobotError: With everything that is wrong.
+    """
+    return _read(data, ("joints",), file=file)
+
+
+def robot_toml(chain: Chain) -> str:
+    """Return a chain as a TOML robot file of kind `joints`; read back it is the same chain, bit by bit."""
+    data = chain_to_dict(chain)
+    frames = {key: data.pop(key) for key in ("base", "tip", "tool")}
+    lists = {key: data.pop(key, []) for key in ("joints", "visuals")}
+    lines = [f"# {EXPORT_MARK}: lengths in m, angles in rad", *toml_lines(data)]
+    for key, frame in frames.items():
+        lines += ["", f"[{key}]", *toml_lines(frame)]
+    for key, items in lists.items():
+        for item in items:
+            lines += ["", f"[[{key}]]", *toml_lines(item)]
+    return "\n".join(lines) + "\n"
+
+
+def _read(
+    data: Mapping[str, Any],
+    kinds: Sequence[str],
+    *,
+    file: str | None,
+    stem: str = "",
+    folder: Path = Path(),
+) -> Chain:
+    """Read every key, raise what is wrong, and only then build."""
+    faults: list[Finding] = []
+    table = Table(data, faults, file)
+    kind = table.choice("kind", kinds)
+    if faults:  # without a kind every other key would be called unknown
+        raise RobotError(*faults)
+    units = Units(
+        table.choice("length_unit", ("m", "mm"), "m") == "mm",
+        table.choice("angle_unit", ("rad", "deg"), "rad") == "deg",
+    )
+    name, description, source = (
+        table.text(key, default) for key, default in (("name", stem), ("description", ""), ("source", ""))
+    )
+    start = table.numbers("start", None, ())
+    base, tool = (read_frame(table.table(key), units) if table.has(key) else None for key in ("base", "tool"))
+    build = _READERS[kind](table, units, folder)
+    given = table.tables("visuals") if table.has("visuals") else []
+    visuals = tuple(read_visual(row, units) for row in given)
+    table.close()
+    if faults:
+        raise RobotError(*faults)
+    try:
+        chain = build(name)
+        return replace(
+            chain.placed(base, tool),
+            name=name or chain.name,
+            start=_start(chain, start, units) or chain.start,
+            description=description or chain.description,
+            source=source or chain.source,
+            visuals=visuals or chain.visuals,
+        )
+    except RobotError as error:
+        raise RobotError(*(replace(fault, file=fault.file or file) for fault in error.findings)) from error
+
+
+def _read_urm(table: Table, units: Units, folder: Path) -> Build:
+    lengths = tuple(units.length(value) for value in table.numbers("lengths", None))
+    tilts = tuple(units.angle(value) for value in table.numbers("tilts", None))
+    directions = table.numbers("directions", None, ())
+    limits = _limits(table.table("limits"), ["revolute"] * len(tilts), units)
+
+    def build(name: str) -> Chain:
+        """Return the arm; its last joint, the effector, is fixed and has no limits."""
+        chain = urm_chain(name, lengths, tilts, directions=directions)
+        *modules, effector = chain.joints
+        limited = [replace(joint, **limit._asdict()) for joint, limit in zip(modules, limits, strict=True)]
+        return replace(chain, joints=(*limited, effector))
+
+    return build
+
+
+def _read_dh(table: Table, units: Units, folder: Path, *, modified: bool = False) -> Build:
+    rows = [_dh_row(row, units) for row in table.tables("joints")]
+    moving = [row.kind for row in rows if row.kind != "fixed"]
+    limits = iter(_limits(table.table("limits"), moving, units))
+    limited = [row if row.kind == "fixed" else replace(row, **next(limits)._asdict()) for row in rows]
+    return partial(modified_dh_chain if modified else dh_chain, rows=limited)
+
+
+def _read_articulated6r(table: Table, units: Units, folder: Path) -> Build:
+    lengths = tuple(units.length(value) for value in table.numbers("lengths", 5))
+    limits = _limits(table.table("limits"), ["revolute"] * 6, units)
+
+    def build(name: str) -> Chain:
+        """Return the arm with its limits."""
+        chain = articulated_6r(*lengths, name=name)
+        limited = [
+            replace(joint, **limit._asdict()) for joint, limit in zip(chain.joints, limits, strict=True)
+        ]
+        return replace(chain, joints=tuple(limited))
+
+    return build
+
+
+def _read_joints(table: Table, units: Units, folder: Path) -> Build:
+    joints = tuple(_joint(row, units) for row in table.tables("joints"))
+    return partial(Chain, joints=joints, tip=read_frame(table.table("tip"), units))
+
+
+def _read_urdf(table: Table, units: Units, folder: Path) -> Build:
+    file = table.text("file")
+    base_link, tip_link = (table.text(key, "") or None for key in ("base_link", "tip_link"))
+    return lambda name: read_urdf(folder / file, base_link=base_link, tip_link=tip_link)
+
+
+_READERS: dict[str, Callable[[Table, Units, Path], Build]] = {
+    "urm": _read_urm,
+    "dh": _read_dh,
+    "modified_dh": partial(_read_dh, modified=True),
+    "articulated6r": _read_articulated6r,
+    "joints": _read_joints,
+    "urdf": _read_urdf,
+}
+
+
+def _dh_row(table: Table, units: Units) -> DHRow:
+    row = DHRow(
+        theta=units.angle(table.number("theta", 0.0)),
+        d=units.length(table.number("d", 0.0)),
+        a=units.length(table.number("a", 0.0)),
+        alpha=units.angle(table.number("alpha", 0.0)),
+        name=table.text("name", ""),
+        kind=cast("JointKind", table.choice("kind", ("revolute", "prismatic", "fixed"), "revolute")),
+    )
+    table.close()
+    return row
+
+
+def _joint(table: Table, units: Units) -> Joint:
+    kind = table.choice("kind", ("revolute", "prismatic", "fixed"), "revolute")
+    joint = Joint(
+        table.text("name"),
+        cast("JointKind", kind),
+        read_frame(table.table("origin"), units),
+        cast("tuple[float, float, float]", table.numbers("axis", 3, (0.0, 0.0, 1.0))),
+        lower=units.of_joint(kind, table.number("lower", -math.inf, infinite=True)),
+        upper=units.of_joint(kind, table.number("upper", math.inf, infinite=True)),
+        velocity=units.of_joint(kind, table.number("velocity", math.inf, infinite=True)),
+        mimic=_mimic(table.table("mimic"), kind, units) if table.has("mimic") else None,
+    )
+    table.close()
+    return joint
+
+
+def _mimic(table: Table, kind: str, units: Units) -> Mimic:
+    mimic = Mimic(
+        table.text("joint"),
+        table.number("multiplier", 1.0),
+        units.of_joint(kind, table.number("offset", 0.0)),
+    )
+    table.close()
+    return mimic
+
+
+def _limits(table: Table, kinds: Sequence[JointKind], units: Units) -> list[_Limits]:
+    """Return the limits of every joint, in SI."""
+    given = [
+        table.spread(key, len(kinds), default)
+        for key, default in (("lower", -math.inf), ("upper", math.inf), ("velocity", math.inf))
+    ]
+    table.close()
+    return [
+        _Limits(*(units.of_joint(kind, value) for value in values))
+        for kind, *values in zip(kinds, *given, strict=True)
+    ]
+
+
+def _start(chain: Chain, values: tuple[float, ...], units: Units) -> tuple[float, ...]:
+    if len(values) != len(chain.moving):  # Chain says what is wrong
+        return values
+    return tuple(units.of_joint(joint.kind, value) for joint, value in zip(chain.moving, values, strict=True))
+
+
+def _joint_to_dict(joint: Joint) -> dict[str, Any]:
+    return {
+        "name": joint.name,
+        "kind": joint.kind,
+        "origin": frame_to_dict(joint.origin),
+        "axis": [float(value) for value in joint.axis],
+        "lower": _finite_or_none(joint.lower),
+        "upper": _finite_or_none(joint.upper),
+        "velocity": _finite_or_none(joint.velocity),
+        "mimic": joint.mimic and _mimic_to_dict(joint.mimic),
+    }
+
+
+def _mimic_to_dict(mimic: Mimic) -> dict[str, Any]:
+    return {"joint": mimic.joint, "multiplier": float(mimic.multiplier), "offset": float(mimic.offset)}
+
+
+def _finite_or_none(value: float) -> float | None:
+    return float(value) if math.isfinite(value) else None

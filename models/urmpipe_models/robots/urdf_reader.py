@@ -1,0 +1,198 @@
+"""URDF in: the serial chain between two links of a robot description."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+from difflib import get_close_matches
+from pathlib import Path
+
+from urmpipe_models.chains.chain import Chain, Joint, Mimic
+from urmpipe_models.chains.visual import Visual
+from urmpipe_models.errors import RobotError
+from urmpipe_models.robots.urdf_tree import (
+    BASE_JOINT,
+    KINDS,
+    OTHER_TYPES,
+    TIP_JOINT,
+    TOOL_JOINT,
+    Edge,
+    UrdfTree,
+    read_tree,
+)
+from urmpipe_models.robots.urdf_visuals import link_visuals
+from urmpipe_models.transform import Transform
+
+
+def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str | None = None) -> Chain:
+    """Return the chain from a base link to a tip link of a URDF file.
+
+    Every joint between the two is kept, the fixed ones as frames that may carry a sensor. Only the
+    three fixed joints that `write_urdf` adds for base, tip and tool become these again. What the links
+    between the two look like is kept, too; mesh files are looked up but not opened.
+
+    Args:
+        path: The file.
+        base_link: Where the chain begins; the root by default.
+        tip_link: Where it ends. By default the only leaf; of several, the one with the most moving
+            joints on its way, if there is a single one.
+
+    Raises:
+        RobotError: With everything that is wrong with the file or the choice of links.
+    """
+    tree = read_tree(Path(path))
+    edges = _choose(tree, base_link, tip_link) if tree.sound else []
+    joints = [_joint(tree, edge, edges) for edge in edges]
+    base, tool, tip = (
+        _take(joints, BASE_JOINT, 0),
+        _take(joints, TOOL_JOINT, -1),
+        _take(joints, TIP_JOINT, -1),
+    )
+    visuals = tuple(_visuals(tree, edges, joints, base))
+    if tree.faults:
+        raise RobotError(*tree.faults)
+    located = tuple(visual.located(Path(path).parent) for visual in visuals)
+    try:
+        return Chain(
+            tree.name, tuple(joints), tip=tip, base=base, tool=tool, source=Path(path).name, visuals=located
+        )
+    except RobotError as error:
+        raise RobotError(*(replace(fault, file=tree.file) for fault in error.findings)) from error
+
+
+def _choose(tree: UrdfTree, base: str | None, tip: str | None) -> list[Edge]:
+    """Return the joints from base to tip; nothing, and a fault noted, where there is no such way."""
+    known = [_is_link(tree, role, link) for role, link in (("base", base), ("tip", tip)) if link]
+    root = base or _root(tree)
+    if not all(known) or root is None:
+        return []
+    ways = _ways(tree, root)
+    if tip is None:
+        tip = _default_tip(tree, ways)
+    elif tip not in ways:
+        tree.fault(f"tip link {tip} does not follow base link {root}; allowed: {_listed(ways)}")
+    return ways.get(tip, []) if tip else []
+
+
+def _is_link(tree: UrdfTree, role: str, link: str) -> bool:
+    if link in tree.links:
+        return True
+    near = get_close_matches(link, tree.links, 1)
+    hint = f" (did you mean {near[0]}?)" if near else ""
+    tree.fault(f"{role} link {link!r} is not in the file{hint}; allowed: {_listed(tree.links)}")
+    return False
+
+
+def _root(tree: UrdfTree) -> str | None:
+    carried = {edge.child for edge in tree.edges.values()}
+    roots = [link for link in tree.links if link not in carried]
+    if len(roots) == 1:
+        return roots[0]
+    found = f"{len(roots)} root links: {_listed(roots)}" if roots else "no link"
+    tree.fault(f"found {found}; allowed: one root, or a base link chosen by name")
+    return None
+
+
+def _ways(tree: UrdfTree, root: str) -> dict[str, list[Edge]]:
+    """Return the joints from the root to every link that follows it."""
+    below: dict[str, list[Edge]] = {}
+    for edge in tree.edges.values():
+        below.setdefault(edge.parent, []).append(edge)
+    ways: dict[str, list[Edge]] = {root: []}
+    waiting = [root]
+    while waiting:
+        link = waiting.pop()
+        for edge in below.get(link, []):
+            ways[edge.child] = [*ways[link], edge]
+            waiting.append(edge.child)
+    return ways
+
+
+def _default_tip(tree: UrdfTree, ways: dict[str, list[Edge]]) -> str | None:
+    parents = {edge.parent for edge in tree.edges.values()}
+    moving = {link: sum(map(_moves, way)) for link, way in ways.items() if link not in parents}
+    most = [link for link, count in moving.items() if count == max(moving.values())]
+    if len(most) == 1:
+        return most[0]
+    tree.fault(
+        f"found {len(most)} ends with {moving[most[0]]} moving joints; choose a tip link: {_listed(moving)}"
+    )
+    return None
+
+
+def _moves(edge: Edge) -> bool:
+    return edge.joint.kind != "fixed" and edge.joint.mimic is None
+
+
+def _joint(tree: UrdfTree, edge: Edge, chain: Sequence[Edge]) -> Joint:
+    """Return a joint of the chain; one that mimics follows the joint that has the coordinate."""
+    if edge.type in OTHER_TYPES:
+        tree.fault(
+            f"joint {edge.joint.name}: is {edge.type}; allowed on a chain: {', '.join(KINDS)}", edge.line
+        )
+    if edge.joint.mimic is None:
+        return edge.joint
+    mimic = _followed(tree, edge)
+    leader = tree.edges[mimic.joint] if mimic else None
+    if leader is not None and leader not in chain:
+        ends = f"{chain[0].parent} to {chain[-1].child}"
+        tree.fault(
+            f"joint {edge.joint.name}: mimics {leader.joint.name}, which is not on the chain {ends};"
+            f" allowed: {_listed(other.joint.name for other in chain if _moves(other))}",
+            edge.line,
+        )
+    elif leader is not None and leader.joint.kind == "fixed":
+        found = f"mimics {leader.joint.name}, which is {leader.type}"
+        tree.fault(f"joint {edge.joint.name}: {found}; allowed: a moving joint", edge.line)
+    return replace(edge.joint, mimic=mimic)
+
+
+def _followed(tree: UrdfTree, edge: Edge) -> Mimic | None:
+    """Return the mimic with the mimics that it follows put in: m (m' q + o') + o; None if it follows none."""
+    mimic = edge.joint.mimic
+    passed = {edge.joint.name}
+    while mimic is not None and mimic.joint in tree.edges:
+        if mimic.joint in passed:
+            tree.fault(f"joint {edge.joint.name}: mimics itself by way of {mimic.joint}", edge.line)
+            return None
+        further = tree.edges[mimic.joint].joint.mimic
+        if further is None:
+            return mimic
+        passed.add(mimic.joint)
+        offset = mimic.multiplier * further.offset + mimic.offset
+        mimic = Mimic(further.joint, mimic.multiplier * further.multiplier, offset)
+    return None
+
+
+def _take(joints: list[Joint], name: str, index: int) -> Transform:
+    """Remove the fixed joint of that name from that end and return its frame; the identity without one."""
+    if joints and joints[index].name == name and joints[index].kind == "fixed":
+        return joints.pop(index).origin
+    return Transform()
+
+
+def _visuals(
+    tree: UrdfTree, edges: Sequence[Edge], joints: Sequence[Joint], base: Transform
+) -> Iterator[Visual]:
+    """Yield what the links of the chain show, each on the joint of the chain that carries it.
+
+    Links that hang on a joint which became base, tip or tool are carried by the joint before it.
+    """
+    if not edges:
+        return
+    kept = {joint.name for joint in joints}
+    carrier, frame = None, base.inverse()
+    yield from _on(frame, link_visuals(tree, edges[0].parent, carrier))
+    for edge in edges:
+        name = edge.joint.name
+        carrier, frame = (name, Transform()) if name in kept else (carrier, frame @ edge.joint.origin)
+        yield from _on(frame, link_visuals(tree, edge.child, carrier))
+
+
+def _on(frame: Transform, visuals: Iterable[Visual]) -> Iterator[Visual]:
+    """Yield shapes that are given in a frame in the frame that carries it."""
+    return (replace(visual, origin=frame @ visual.origin) for visual in visuals)
+
+
+def _listed(names: Iterable[str]) -> str:
+    return ", ".join(names) or "none"

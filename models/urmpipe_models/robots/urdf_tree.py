@@ -1,0 +1,281 @@
+"""What a URDF file says: its links, its joints, and everything that is wrong with them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from difflib import get_close_matches
+from pathlib import Path
+from typing import Literal
+
+from urmpipe_models.chains.chain import Joint, JointKind, Mimic
+from urmpipe_models.errors import Finding, RobotError
+from urmpipe_models.files.xml_tree import Node, read_xml
+from urmpipe_models.transform import Transform, from_rpy
+
+KINDS: dict[str, JointKind] = {
+    "revolute": "revolute", "continuous": "revolute", "prismatic": "prismatic", "fixed": "fixed",
+}  # fmt: skip
+"""URDF's joint types that a chain can hold."""
+
+OTHER_TYPES = ("floating", "planar")
+"""URDF's joint types that it cannot; they may stand beside the chain."""
+
+UNLIMITED = 1.7976931348623157e308
+"""The largest double: stands for infinity where URDF wants a number."""
+
+BASE_JOINT, TIP_JOINT, TOOL_JOINT = "urmpipe_base", "urmpipe_tip", "urmpipe_tool"
+"""Names of the fixed joints that stand for a chain's base, tip and tool."""
+
+STAND_IN = "urmpipe"
+"""Name of the material of the shapes that `write_urdf` gives an arm that has none."""
+
+COUNTS = {1: "a number", 3: "three numbers", 4: "four numbers"}
+
+
+@dataclass(frozen=True, slots=True)
+class Edge:
+    """A joint of the file, between two links.
+
+    Attributes:
+        joint: The joint; of a type that no chain can hold, a fixed one.
+        type: URDF's type.
+        parent: The link it sits on.
+        child: The link it carries.
+        line: Where it stands in the file.
+    """
+
+    joint: Joint
+    type: str
+    parent: str
+    child: str
+    line: int
+
+
+@dataclass(slots=True)
+class UrdfTree:
+    """The links and joints of a file.
+
+    Attributes:
+        file: The file, as the user named it.
+        name: The robot's name.
+        links: The element of each link by its name.
+        edges: The joints by name.
+        colours: The <color> of each material that has one, by the material's name.
+        faults: All that is wrong.
+        sound: Whether links and joints form a forest, so that paths can be followed.
+    """
+
+    file: str
+    name: str
+    links: dict[str, Node] = field(default_factory=dict)
+    edges: dict[str, Edge] = field(default_factory=dict)
+    colours: dict[str, Node] = field(default_factory=dict)
+    faults: list[Finding] = field(default_factory=list)
+    sound: bool = True
+
+    def fault(self, message: str, line: int | None = None) -> None:
+        """Note that something is wrong."""
+        self.faults.append(Finding(message, self.file, line=line))
+
+
+def read_tree(path: Path) -> UrdfTree:
+    """Return the links and joints of a URDF file, with everything that is wrong noted in `faults`.
+
+    Raises:
+        RobotError: If the file is no URDF at all.
+    """
+    root = read_xml(path)
+    if path.suffix == ".xacro" or any(node.tag.startswith("xacro:") for node in root.walk()):
+        target = path.with_suffix("").stem + (".urdf" if path.suffix == ".xacro" else ".expanded.urdf")
+        raise RobotError(Finding(f"is a xacro file; expand it first: xacro {path} -o {target}", str(path)))
+    if root.tag != "robot":
+        raise RobotError(
+            Finding(f"found <{root.tag}>; allowed: a URDF file, <robot>", str(path), line=root.line)
+        )
+    tree = UrdfTree(str(path), root.attributes.get("name", path.stem))
+    for node in root.all("link"):
+        _add_link(tree, node)
+    for node in root.all("joint"):
+        _add_joint(tree, node)
+    for node in root.walk():
+        if node.tag == "material" and (colour := node.first("color")):
+            tree.colours.setdefault(node.attributes.get("name", ""), colour)
+    _check_links(tree)
+    _check_mimics(tree)
+    return tree
+
+
+def _add_link(tree: UrdfTree, node: Node) -> None:
+    name = node.attributes.get("name")
+    if not name:
+        tree.fault("link without a name", node.line)
+    elif name in tree.links:
+        tree.fault(f"link {name}: name stands already in line {tree.links[name].line}", node.line)
+    else:
+        tree.links[name] = node
+
+
+def _add_joint(tree: UrdfTree, node: Node) -> None:
+    name, type_ = node.attributes.get("name"), node.attributes.get("type", "")
+    if not name:
+        tree.fault("joint without a name", node.line)
+        return
+    if name in tree.edges:
+        tree.fault(f"joint {name}: name stands already in line {tree.edges[name].line}", node.line)
+        return
+    if type_ not in KINDS and type_ not in OTHER_TYPES:
+        tree.fault(f"joint {name}: found type {type_!r}; allowed: {', '.join(KINDS)}", node.line)
+    parent, child = (_link_of(tree, node, name, end) for end in ("parent", "child"))
+    kind = KINDS.get(type_, "fixed")
+    lower, upper, velocity = _limits(tree, node, name, type_)
+    joint = Joint(
+        name,
+        kind,
+        origin_of(tree, node, f"joint {name}"),
+        (0.0, 0.0, 1.0) if kind == "fixed" else _axis(tree, node, name),
+        lower=lower,
+        upper=upper,
+        velocity=velocity,
+        mimic=None if kind == "fixed" else _mimic(tree, node, name),
+    )
+    tree.edges[name] = Edge(joint, type_, parent, child, node.line)
+
+
+def _link_of(tree: UrdfTree, node: Node, joint: str, end: Literal["parent", "child"]) -> str:
+    element = node.first(end)
+    link = element.attributes.get("link") if element else None
+    if not link:
+        tree.fault(f'joint {joint}: no <{end} link="...">; allowed: one', node.line)
+        tree.sound = False
+        return ""
+    if link not in tree.links:
+        near = get_close_matches(link, tree.links, 1)
+        hint = f" (did you mean {near[0]}?)" if near else ""
+        tree.fault(f"joint {joint}: {end} {link!r}; allowed: a link of the file{hint}", node.line)
+        tree.sound = False
+    return link
+
+
+def origin_of(tree: UrdfTree, node: Node, place: str) -> Transform:
+    """Return the frame that an element's <origin> tells, the identity without one.
+
+    Args:
+        tree: The file; what is wrong is noted there.
+        node: The element.
+        place: What it is, for the faults.
+    """
+    origin = node.first("origin")
+    if origin is None:
+        return Transform()
+    x, y, z = numbers_of(tree, origin, f"{place}: origin", "xyz", (0.0, 0.0, 0.0))
+    rx, ry, rz = numbers_of(tree, origin, f"{place}: origin", "rpy", (0.0, 0.0, 0.0))
+    return Transform(from_rpy(rx, ry, rz).rotation, (x, y, z))
+
+
+def _axis(tree: UrdfTree, node: Node, joint: str) -> tuple[float, float, float]:
+    """Return the unit axis; one that has unit length already keeps its bits."""
+    element = node.first("axis")
+    if element is None:
+        return (1.0, 0.0, 0.0)
+    x, y, z = numbers_of(tree, element, f"joint {joint}: axis", "xyz", (1.0, 0.0, 0.0))
+    length = math.hypot(x, y, z)
+    if length == 0.0:
+        tree.fault(f"joint {joint}: axis is zero; allowed: a direction", element.line)
+        return (1.0, 0.0, 0.0)
+    if abs(length - 1.0) < 4e-16:
+        return x, y, z
+    return x / length, y / length, z / length
+
+
+def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, float, float]:
+    """Return lower, upper and velocity; what the file leaves out or gives as 0 speed is not limited."""
+    limit = node.first("limit")
+    if limit is None or type_ == "fixed":
+        return -math.inf, math.inf, math.inf
+    place = f"joint {joint}: limit"
+    (velocity,) = numbers_of(tree, limit, place, "velocity", (math.inf,))
+    if velocity < 0.0:
+        tree.fault(f"{place} velocity: found {velocity:g}; allowed: 0 (not known) or more", limit.line)
+        velocity = 0.0
+    if type_ == "continuous" or not limit.attributes.keys() & {"lower", "upper"}:
+        return -math.inf, math.inf, velocity or math.inf
+    (lower,), (upper,) = (numbers_of(tree, limit, place, end, (0.0,)) for end in ("lower", "upper"))
+    if lower > upper:
+        tree.fault(f"{place}: lower {lower:g} above upper {upper:g}", limit.line)
+        upper = lower
+    return lower, upper, velocity or math.inf
+
+
+def _mimic(tree: UrdfTree, node: Node, joint: str) -> Mimic | None:
+    element = node.first("mimic")
+    if element is None:
+        return None
+    place = f"joint {joint}: mimic"
+    (multiplier,) = numbers_of(tree, element, place, "multiplier", (1.0,))
+    (offset,) = numbers_of(tree, element, place, "offset", (0.0,))
+    return Mimic(element.attributes.get("joint", ""), multiplier, offset)
+
+
+def numbers_of(
+    tree: UrdfTree, node: Node, place: str, attribute: str, default: Sequence[float]
+) -> tuple[float, ...]:
+    """Return the numbers of an attribute, as many as the default has; only limits may be infinite.
+
+    Args:
+        tree: The file; what is wrong is noted there.
+        node: The element.
+        place: What it is, for the faults.
+        attribute: The attribute's name.
+        default: What stands for an attribute that is not there, or is wrong.
+    """
+    text = node.attributes.get(attribute)
+    if text is None:
+        return tuple(default)
+    try:
+        values = tuple(_infinite(float(word)) for word in text.split())
+    except ValueError:
+        values = ()
+    finite = node.tag == "limit" or all(math.isfinite(value) for value in values)
+    if len(values) != len(default) or any(math.isnan(value) for value in values) or not finite:
+        tree.fault(f"{place} {attribute}: found {text!r}, expected {COUNTS[len(default)]}", node.line)
+        return tuple(default)
+    return values
+
+
+def _infinite(value: float) -> float:
+    return math.copysign(math.inf, value) if abs(value) >= UNLIMITED else value
+
+
+def _check_links(tree: UrdfTree) -> None:
+    """Note links with two parents and loops."""
+    above: dict[str, Edge] = {}
+    for edge in tree.edges.values():
+        if edge.child and edge.child in above:
+            both = f"{above[edge.child].joint.name} and {edge.joint.name}"
+            tree.fault(f"link {edge.child}: child of joints {both}; allowed: one parent", edge.line)
+            tree.sound = False
+        above.setdefault(edge.child, edge)
+    seen: set[str] = set()
+    for start in tree.links:
+        link = start
+        way: list[str] = []
+        while link in above and link not in seen:
+            seen.add(link)
+            way.append(link)
+            link = above[link].parent
+        if link in way:
+            loop = [link, *reversed(way[way.index(link) :])]
+            tree.fault(f"links {' -> '.join(loop)} form a loop; allowed: a tree", above[link].line)
+            tree.sound = False
+
+
+def _check_mimics(tree: UrdfTree) -> None:
+    """Note mimics of joints that are not there."""
+    for edge in tree.edges.values():
+        mimic = edge.joint.mimic
+        if mimic is not None and mimic.joint not in tree.edges:
+            tree.fault(
+                f"joint {edge.joint.name}: mimics {mimic.joint!r}; allowed: a joint of the file", edge.line
+            )

@@ -1,0 +1,155 @@
+"""URDF out: a chain as links and joints, with what it looks like, or cylinders to look at."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from pathlib import Path
+from xml.sax.saxutils import quoteattr
+
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.visual import Box, Mesh, Shape, Sphere, Visual
+from urmpipe_models.elementwise import ZERO, Vector
+from urmpipe_models.errors import RobotError
+from urmpipe_models.robots.urdf_tree import BASE_JOINT, STAND_IN, TIP_JOINT, TOOL_JOINT, UNLIMITED
+from urmpipe_models.robots.written import EXPORT_MARK, replace_text
+from urmpipe_models.transform import rpy_of
+
+SLENDERNESS = 40.0
+"""The arm's stretched length by the cylinders' radius: a choice for the eye."""
+
+
+def write_urdf(chain: Chain, path: str | Path) -> None:
+    """Write a chain as a URDF file; see `urdf_text`.
+
+    Raises:
+        OutputError: If the file cannot be written.
+        RobotError: If a joint has one of the three names that stand for base, tip and tool.
+    """
+    replace_text(Path(path), urdf_text(chain))
+
+
+def urdf_text(chain: Chain) -> str:
+    """Return a chain as URDF. Read back with `read_urdf` it is the same chain, to rounding.
+
+    Links: `world`, `base_link`, then `link1`, `link2`, ... carried by the chain's joints, the fixed ones
+    too, then `tip` and `tool0`. The fixed joints `urmpipe_base`, `urmpipe_tip` and `urmpipe_tool` hold
+    the chain's base, tip and tool. Point p_k is where joint k + 1 sits on link k, so the origin of link
+    k + 1 if that joint does not slide; the last one is the origin of tool0. A revolute joint without
+    limits is `continuous`; elsewhere the largest double stands for infinity. An arm without visuals gets a
+    cylinder a link, which `read_urdf` leaves out again.
+
+    Raises:
+        RobotError: If a joint has one of these three names.
+    """
+    taken = {BASE_JOINT, TIP_JOINT, TOOL_JOINT} & {joint.name for joint in chain.joints}
+    if taken:
+        raise RobotError(
+            f"robot {chain.name}: joint name {', '.join(sorted(taken))} stands for base, tip or tool"
+        )
+    frames = [
+        Joint(BASE_JOINT, "fixed", chain.base),
+        *chain.joints,
+        Joint(TIP_JOINT, "fixed", chain.tip),
+        Joint(TOOL_JOINT, "fixed", chain.tool),
+    ]
+    links = ["world", "base_link", *(f"link{k}" for k in range(1, len(chain.joints) + 1)), "tip", "tool0"]
+    carried: dict[str, list[str]] = {link: [] for link in links}
+    of_joint = dict(zip([None, *(joint.name for joint in chain.joints)], links[1:-2], strict=True))
+    for visual in chain.visuals:
+        carried[of_joint[visual.joint]] += _visual_lines(visual)
+    radius = sum(math.hypot(*joint.origin.translation) for joint in frames[1:]) / SLENDERNESS
+    lines = [
+        '<?xml version="1.0" encoding="utf-8"?>',
+        f"<!-- {EXPORT_MARK}: lengths in m, angles in rad -->",
+        f"<robot name={quoteattr(chain.name)}>",
+        f'  <material name="{STAND_IN}"><color rgba="0.35 0.55 0.75 1.0"/></material>',
+        '  <link name="world"/>',
+    ]
+    for joint, following, parent, child in zip(
+        frames, [*frames[1:], None], links[:-1], links[1:], strict=True
+    ):
+        end = following.origin.translation if following else ZERO
+        lines += _link_lines(child, carried[child] if chain.visuals else _stand_in_lines(end, radius))
+        lines += _joint_lines(joint, parent, child)
+    return "\n".join([*lines, "</robot>"]) + "\n"
+
+
+def _link_lines(name: str, visuals: Sequence[str]) -> list[str]:
+    """Return a link with the lines of its visuals."""
+    return [f'  <link name="{name}">', *visuals, "  </link>"] if visuals else [f'  <link name="{name}"/>']
+
+
+def _stand_in_lines(end: Vector, radius: float) -> list[str]:
+    """Return a cylinder from a link's frame to the next one at `end`; nothing where that is no way off."""
+    length = math.hypot(*end)
+    if length == 0.0:
+        return []
+    x, y, z = end
+    middle = (x / 2.0, y / 2.0, z / 2.0)
+    along = (0.0, math.atan2(math.hypot(x, y), z), math.atan2(y, x))  # turns the cylinder's z towards the end
+    return [
+        "    <visual>",
+        f'      <origin xyz="{_numbers(middle)}" rpy="{_numbers(along)}"/>',
+        f'      <geometry><cylinder radius="{float(radius)!r}" length="{length!r}"/></geometry>',
+        f'      <material name="{STAND_IN}"/>',
+        "    </visual>",
+    ]
+
+
+def _visual_lines(visual: Visual) -> list[str]:
+    """Return a shape that the arm shows."""
+    xyz, rpy = _numbers(visual.origin.translation), _numbers(rpy_of(visual.origin.rotation))
+    lines = [
+        "    <visual>",
+        f'      <origin xyz="{xyz}" rpy="{rpy}"/>',
+        f"      <geometry>{_shape(visual.shape)}</geometry>",
+    ]
+    if visual.colour is not None:
+        rgba = _numbers(visual.colour)
+        lines.append(f'      <material name="{rgba}"><color rgba="{rgba}"/></material>')
+    return [*lines, "    </visual>"]
+
+
+def _shape(shape: Shape) -> str:
+    """Return a shape as an element."""
+    if isinstance(shape, Mesh):
+        return f'<mesh filename={quoteattr(shape.file)} scale="{_numbers(shape.scale)}"/>'
+    if isinstance(shape, Box):
+        return f'<box size="{_numbers(shape.size)}"/>'
+    if isinstance(shape, Sphere):
+        return f'<sphere radius="{float(shape.radius)!r}"/>'
+    tag = type(shape).__name__.lower()
+    return f'<{tag} radius="{float(shape.radius)!r}" length="{float(shape.length)!r}"/>'
+
+
+def _joint_lines(joint: Joint, parent: str, child: str) -> list[str]:
+    xyz, rpy = _numbers(joint.origin.translation), _numbers(rpy_of(joint.origin.rotation))
+    lines = [
+        f'  <joint name={quoteattr(joint.name)} type="{_type(joint)}">',
+        f'    <parent link="{parent}"/>',
+        f'    <child link="{child}"/>',
+        f'    <origin xyz="{xyz}" rpy="{rpy}"/>',
+    ]
+    if joint.kind != "fixed":
+        limits = {"lower": joint.lower, "upper": joint.upper, "effort": math.inf, "velocity": joint.velocity}
+        given = " ".join(f'{key}="{_finite(value)!r}"' for key, value in limits.items())
+        lines += [f'    <axis xyz="{_numbers(joint.axis)}"/>', f"    <limit {given}/>"]
+    if joint.mimic is not None:
+        leader, multiplier, offset = joint.mimic.joint, joint.mimic.multiplier, joint.mimic.offset
+        values = f'multiplier="{float(multiplier)!r}" offset="{float(offset)!r}"'
+        lines.append(f"    <mimic joint={quoteattr(leader)} {values}/>")
+    return [*lines, "  </joint>"]
+
+
+def _type(joint: Joint) -> str:
+    unlimited = joint.lower == -math.inf and joint.upper == math.inf
+    return "continuous" if joint.kind == "revolute" and unlimited else joint.kind
+
+
+def _finite(value: float) -> float:
+    return max(-UNLIMITED, min(UNLIMITED, float(value)))
+
+
+def _numbers(values: Sequence[float]) -> str:
+    return " ".join(repr(float(value)) for value in values)

@@ -1,0 +1,42 @@
+"""Long arrays, worked on in blocks of rows, several blocks side by side."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from typing import TypeVar
+
+BLOCK = 16384
+"""Rows worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
+
+THREADS = min(4, os.cpu_count() or 1)
+"""Blocks worked on side by side: beyond some, Python's own work, which runs alone, sets the pace."""
+
+Block = TypeVar("Block")
+Result = TypeVar("Result")
+
+
+def row_blocks(count: int, size: int = BLOCK) -> list[slice]:
+    """Return the slices that part `count` rows into blocks of `size`, the last one shorter."""
+    return [slice(start, min(start + size, count)) for start in range(0, count, size)]
+
+
+def side_by_side(
+    work: Callable[[Block], Result], blocks: Sequence[Block], threads: int = THREADS
+) -> list[Result]:
+    """Return what work makes of each block, several at a time: NumPy computes without Python's lock.
+
+    Args:
+        work: Called once a block.
+        blocks: Slices, indices of rows, or rows themselves.
+        threads: Blocks worked on at a time; 1 leaves the other cores to whoever needs them meanwhile.
+
+    Raises:
+        Exception: What work raised first, in the order of the blocks.
+    """
+    if len(blocks) < 2 or threads < 2:
+        return [work(block) for block in blocks]
+    from concurrent.futures import ThreadPoolExecutor
+
+    with ThreadPoolExecutor(threads) as pool:
+        return list(pool.map(work, blocks))

@@ -1,0 +1,142 @@
+"""Space: moving a log so that what remains is what the question is about."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import get_args
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.orientation import best_rotation, conjugate, matrices, product, quaternions
+from urmpipe_models.transform import rpy_of, translation
+from urmpipe_pipeline.comparison.matching import Matched, lacking
+from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
+from urmpipe_pipeline.runs.results import Run
+
+ALIGN_MODES: tuple[AlignMode, ...] = get_args(AlignMode)
+
+RESOLVED = 1e-4
+"""Positions that leave a line by less than this, root mean square in [m], leave the rotation about it open: a
+joint angle of four digits puts a point as far off."""
+
+IN_COMMON = 1e-9
+"""Two motions across a line have nothing in common if their covariance is below this share of their sizes:
+rounding leaves as much."""
+
+
+def check_align(mode: str) -> None:
+    """Raise an `OptionError` if there is no such alignment."""
+    if mode not in ALIGN_MODES:
+        raise OptionError(f"--align: found {mode}, allowed: {', '.join(ALIGN_MODES)}")
+
+
+def align(matched: Matched, mode: AlignMode, run: Run) -> tuple[Alignment, Matched]:
+    """Return how the log is moved in space, and both sides with the log so moved.
+
+    Args:
+        matched: Both sides at the same times, at least one.
+        mode: none, start (the first pose that both sides have agrees; without orientations the first
+            position), rigid (the best rigid motion of the positions) or tool (the best constant offset of the
+            tool centre point; samples without an orientation are left out).
+        run: The log, for messages.
+
+    Raises:
+        LogError: If the positions leave the rotation open, or the log has no orientation for a tool.
+    """
+    if mode == "start":
+        return _moved(matched, _start(matched))
+    if mode == "rigid":
+        return _moved(matched, _rigid(matched, run))
+    return _with_tool(matched, run) if mode == "tool" else (Alignment(), matched)
+
+
+def tool_with(robot: Chain, alignment: Alignment) -> tuple[float, ...]:
+    """Return the tool of a robot moved by the offset of an alignment, as `--tool` takes it.
+
+    Args:
+        robot: The arm of the log, with the tool that it has.
+        alignment: That of the mode tool.
+
+    Returns:
+        X, Y, Z in [m]; with RX, RY, RZ in [rad] behind them if the robot's tool is turned.
+    """
+    tool = robot.tool @ translation(*alignment.tool)
+    x, y, z = (float(value) for value in tool.translation)
+    turned = rpy_of(tool.rotation)
+    return (x, y, z, *turned) if any(turned) else (x, y, z)
+
+
+def _start(matched: Matched) -> Alignment:
+    """Return the motion that joins the first poses: R = R_reference R_log^T, t = p_reference - R p_log."""
+    first, turn = 0, np.array([[0.0, 0.0, 0.0, 1.0]])
+    if matched.wanted_quat is not None and matched.done_quat is not None:
+        there = np.isfinite(matched.wanted_quat).all(axis=1) & np.isfinite(matched.done_quat).all(axis=1)
+        if there.any():
+            first = int(np.argmax(there))
+            turn = product(matched.wanted_quat[[first]], conjugate(matched.done_quat[[first]]))
+    rotation = matrices(turn)[0]
+    return _alignment("start", rotation, matched.wanted[first] - rotation @ matched.done[first])
+
+
+def _rigid(matched: Matched, run: Run) -> Alignment:
+    """Return the rigid motion with the least squared distances, if the positions tell it.
+
+    Source: Umeyama 1991, eq. 38-42, without scale.
+    """
+    wanted, done = matched.wanted - matched.wanted.mean(axis=0), matched.done - matched.done.mean(axis=0)
+    rotation, common = best_rotation(wanted.T @ done / len(done))
+    size, breadth = zip(*map(_extent, (wanted, done)), strict=True)
+    if min(breadth) < RESOLVED or common[1] + common[2] <= IN_COMMON * breadth[0] * breadth[1]:
+        raise LogError(lacking(run, _open_rotation(min(size), min(breadth))))
+    shift = matched.wanted.mean(axis=0) - rotation @ matched.done.mean(axis=0)
+    return _alignment("rigid", rotation, shift)
+
+
+def _extent(centred: FloatArray) -> tuple[float, float]:
+    """Return the root mean square of positions about their middle, along their main line and across it."""
+    sizes = np.linalg.svd(centred, compute_uv=False) / np.sqrt(len(centred))
+    along, across = [*sizes.tolist(), 0.0][:2]  # a position alone has one
+    return along, across
+
+
+def _open_rotation(size: float, breadth: float) -> str:
+    """Say why positions leave the rotation open, and what is allowed."""
+    if size < RESOLVED:
+        found = f"compared positions in one point (within {size * 1e3:.4f} mm rms)"
+    elif breadth < RESOLVED:
+        found = f"compared positions on one line (within {breadth * 1e3:.4f} mm rms)"
+    else:
+        found = "two motions without anything in common"
+    return f"--align rigid: found {found}, which leaves the rotation open, allowed: start, tool, none"
+
+
+def _alignment(mode: AlignMode, rotation: FloatArray, shift: FloatArray) -> Alignment:
+    """Return an alignment of plain numbers."""
+    x, y, z = (float(value) for value in shift)
+    return Alignment(mode, tuple(tuple(row) for row in rotation.tolist()), (x, y, z))
+
+
+def _moved(matched: Matched, alignment: Alignment) -> tuple[Alignment, Matched]:
+    """Return the alignment, and both sides with the log moved by its rotation and translation."""
+    rotation = np.array(alignment.rotation)
+    done = matched.done @ rotation.T + np.array(alignment.translation)
+    quat = matched.done_quat
+    if quat is not None:
+        quat = product(quaternions(rotation.reshape(1, 9), "matrix"), quat)
+    return alignment, replace(matched, done=done, done_quat=quat)
+
+
+def _with_tool(matched: Matched, run: Run) -> tuple[Alignment, Matched]:
+    """Return the offset d of the least squared |p_reference - p - R d|, the mean of R^T (p_reference - p)."""
+    quat = matched.done_quat
+    known = np.zeros(0, np.intp) if quat is None else np.flatnonzero(np.isfinite(quat).all(axis=1))
+    if quat is None or not len(known):
+        found = "--align tool: found no orientation of the log"
+        raise LogError(lacking(run, f"{found}, allowed: joints with a --robot, or a recorded orientation"))
+    posed = matched if len(known) == len(quat) else matched.at(known)
+    rotation = matrices(quat[known])
+    x, y, z = np.einsum("nji,nj->ni", rotation, posed.wanted - posed.done).mean(axis=0).tolist()
+    return Alignment("tool", tool=(x, y, z)), replace(posed, done=posed.done + rotation @ np.array((x, y, z)))

@@ -1,0 +1,248 @@
+"""Compare: the deviation of some logs from a reference, and the verdict on it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Literal, get_args
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.continuity import continuous_quaternions
+from urmpipe_models.errors import LogError, OptionError, for_each
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.orientation import quaternions
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.alignment import align, check_align
+from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.left_out import left_out_warnings
+from urmpipe_pipeline.comparison.matching import Matched, as_recorded, by_kinematics, lacking, match
+from urmpipe_pipeline.comparison.measure import measure, unheld
+from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
+from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE, check_tolerance
+from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.repolarization.audit import audit_log
+from urmpipe_pipeline.runs.meshes import missing_visuals
+from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
+from urmpipe_pipeline.runs.results import Run
+
+Tcp = Literal["fk", "recorded"]
+
+ONE_CLOCK = "its joints and its recorded tool centre point stand in the same rows"
+
+
+@dataclass(frozen=True, slots=True)
+class CompareOptions:
+    """How logs are held against a reference.
+
+    Attributes:
+        tolerance: Largest deviation allowed in [m] or [rad], by kind: axis, norm, path, angle, joint, or one
+            coordinate. What is not named has no tolerance.
+        tcp: Where a log was: by forward kinematics of its joints, or as it recorded itself.
+        sync: How the clocks are put together: start (both start together), auto (by the motion), or
+            the offset in [s]: t_reference = t_log + offset, both from their first samples.
+        align: How a log is moved in space before it is compared: none, start, rigid or tool.
+    """
+
+    tolerance: Mapping[str, float] = field(default_factory=lambda: {"axis": DEFAULT_TOLERANCE})
+    tcp: Tcp = "fk"
+    sync: SyncOption = "start"
+    align: AlignMode = "none"
+
+    def __post_init__(self) -> None:
+        check_tolerance(self.tolerance)
+        if self.tcp not in get_args(Tcp):
+            raise OptionError(f"--tcp: found {self.tcp}, allowed: {', '.join(get_args(Tcp))}")
+        check_sync(self.sync)
+        check_align(self.align)
+
+
+def trajectory(run: Run, tcp: Tcp = "fk") -> Trajectory:
+    """Return where a run's tool centre point was, on its grid.
+
+    A log without joints (a path) is where it recorded itself; one with joints goes by `tcp`.
+
+    Raises:
+        LogError: If the run has neither kinematics nor a recorded position to go by.
+    """
+    return by_kinematics(run) if run.log.joints and tcp == "fk" else as_recorded(run)
+
+
+def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | None = None) -> Comparison:
+    """Hold runs against a reference run: delta on the samples of each run, statistics, verdict.
+
+    The reference is interpolated linearly at the samples of the run; samples outside its time, inside a
+    gap of it, or without a value of their own are left out and counted.
+
+    Args:
+        reference: A path, or a run of its own.
+        runs: The logs to judge, at least one.
+        options: Tolerance, which tool centre point, how time and space are put together.
+
+    Raises:
+        LogError: If a run has no position to go by, shares no time with the reference, or lacks what a
+            tolerance is for; if solved targets without times are held against a motion.
+        OptionError: If the clocks of targets without times are to be put together.
+
+    Source: [UrmArm2021]_ eq. 19-23.
+    """
+    chosen = options or CompareOptions()
+    if not runs:
+        raise OptionError("compare: no log to hold against the reference; at least one is needed")
+    _refuse_poses_as_motion(reference, runs, chosen.sync)
+    wanted = trajectory(reference, chosen.tcp if reference.log.joints else "recorded")
+    names = text.unique([run.name for run in runs])
+    deviations = for_each(
+        lambda named: _deviation(*named, wanted, trajectory(named[1], chosen.tcp), chosen),
+        zip(names, runs, strict=True),
+    )
+    told = [*_told_of(reference), *_differing_robots([reference, *runs], chosen.tcp)]
+    return _comparison(wanted, deviations, chosen, told)
+
+
+def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOption) -> None:
+    """Raise if single poses are held against a motion: the second between two of them is no time.
+
+    Single poses are held against single poses row by row; any other offset would interpolate between them.
+    """
+    single = [run for run in (reference, *runs) if run.single_poses]
+    if single and len(single) <= len(runs):
+        said = "found targets without times, which are no motion; allowed: a log or a path of its own times"
+        hint = "urmpipe ik --tsp S gives the targets some"
+        raise LogError(*(lacking(run, f"{said}; {hint}") for run in single))
+    if single and sync != "start":
+        raise OptionError(f"--sync: found {sync} of targets without times, allowed: start, row by row")
+
+
+def _told_of(reference: Run) -> list[LogWarning]:
+    """Return the warnings of a reference, which a comparison holds as a trajectory alone."""
+    return [one.of(reference.name) for one in reference.warnings]
+
+
+def _differing_robots(runs: Sequence[Run], tcp: Tcp) -> list[LogWarning]:
+    """Return a warning if the runs were held against each other by the kinematics of different arms."""
+    arms = [(run.name, run.robot.name) for run in runs if tcp == "fk" and run.log.joints and run.robot]
+    if len({arm for _, arm in arms}) < 2:
+        return []
+    said = ", ".join(f"{name} as {arm}" for name, arm in arms)
+    return [LogWarning("robots-differ", f"the kinematics are those of different robots: {said}")]
+
+
+def compare_recorded(run: Run, options: CompareOptions | None = None) -> Comparison:
+    """Hold the forward kinematics of a log against the tool centre point that the same log recorded.
+
+    Both stand in the same rows of one file: nothing is resampled; samples are rows, from 0. Their joints are
+    the same and are not compared.
+    Where samples left on a wrap were repaired, the repaired ones count.
+
+    Raises:
+        OptionError: If another time than its own is asked for.
+        LogError: If the log has no joints, no robot, or recorded no position.
+    """
+    chosen = options or CompareOptions()
+    if chosen.sync != "start":
+        raise OptionError(f"--sync: found {chosen.sync} for one log, allowed: start, since {ONE_CLOCK}")
+    log = run.log
+    if not log.joints:
+        raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to hold against it"))
+    if run.robot is None:
+        raise LogError(lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
+    if log.tcp_position is None:
+        raise LogError(
+            lacking(run, "one log, which recorded no tool centre point; allowed: a reference before the log")
+        )
+    recorded = Trajectory(
+        f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files, quat_xyzw=log.tcp_quat_xyzw
+    )
+    position, rotation = poses_over_log(run.robot, _on_rows(run))
+    quat = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
+    computed = Trajectory(run.name, log.t_ns, position, log.files, quat_xyzw=quat)
+    deviation = _deviation(run.name, run, recorded, computed, chosen)
+    found = _comparison(recorded, [deviation], chosen)
+    doubts = lacking_tool(run.robot, log) if deviation.verdict == "fail" else []
+    return replace(found, warnings=(*found.warnings, *doubts))
+
+
+def _on_rows(run: Run) -> FloatArray:
+    """Return the joints on the file's own rows: as they stand there, or repaired as the run was."""
+    if not any(entry.kind == "repaired" for entry in run.audit):
+        return run.log.q
+    read = run.provenance.options.get("read") or {}
+    intervals = {name: (low, high) for name, (low, high) in read.get("interval", {}).items()}
+    return audit_log(run.log, run.robot, interval=intervals, repaired=True).q
+
+
+def _comparison(
+    reference: Trajectory,
+    deviations: Sequence[Deviation],
+    options: CompareOptions,
+    told: Sequence[LogWarning] = (),
+) -> Comparison:
+    warnings = list(told)
+    for one in deviations:
+        warnings += sync_doubts(one.name, one.sync, one.run.tsp)
+        warnings += left_out_warnings(one, reference)
+        if _lacks_joints(reference, one):
+            warnings.append(_joints_not_compared(reference, one))
+    warnings += _shapes_gone(deviations)
+    inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
+    given = {
+        "tolerance": dict(options.tolerance),
+        "tcp": options.tcp,
+        "sync": options.sync,
+        "align": options.align,
+    }
+    name = (
+        f"{deviations[0].name}-against-{reference.name}"
+        if len(deviations) == 1
+        else f"against-{reference.name}"
+    )
+    return Comparison(
+        name=name,
+        reference=reference,
+        runs=tuple(deviations),
+        tolerance=dict(options.tolerance),
+        warnings=tuple(warnings),
+        provenance=provenance("compare", given, inputs),
+    )
+
+
+def _shapes_gone(deviations: Sequence[Deviation]) -> list[LogWarning]:
+    """Return what cannot be drawn of the arms any more: a recording keeps the names of mesh files only."""
+    arms = [one.run for one in deviations if one.run.robot]
+    told = {warning.message for run in arms for warning in run.warnings}
+    gone = dict.fromkeys(warning for run in arms if run.robot for warning in missing_visuals(run.robot))
+    return [warning for warning in gone if warning.message not in told]
+
+
+def _lacks_joints(reference: Trajectory, one: Deviation) -> bool:
+    """Tell whether both sides have joints that were not compared."""
+    return bool(reference.joints and one.run.log.joints) and one.joint_delta is None
+
+
+def _joints_not_compared(reference: Trajectory, one: Deviation) -> LogWarning:
+    """Return the warning that says why."""
+    return LogWarning(
+        "joints-not-compared", f"{one.name}: no joint is compared: {unheld(reference, one.run)}"
+    )
+
+
+def _deviation(
+    name: str, run: Run, reference: Trajectory, actual: Trajectory, options: CompareOptions
+) -> Deviation:
+    """Return the deviation of one trajectory, at its own samples."""
+    sync = synchronise(reference, actual, options.sync, options.align)
+    matched = _matched(run, reference, actual, sync)
+    alignment, aligned = align(matched, options.align, run)
+    return measure(name, run, reference, aligned, sync, alignment, options.tolerance)
+
+
+def _matched(run: Run, reference: Trajectory, actual: Trajectory, sync: Sync) -> Matched:
+    """Return both sides at the same times, at least one of them."""
+    matched = match(reference, actual, sync.offset)
+    if not len(matched.sample):
+        raise LogError(
+            lacking(run, f"no sample in common with {reference.name} (time offset {sync.offset} s)")
+        )
+    return matched

@@ -1,0 +1,43 @@
+"""What was not compared, in words: samples without a value, and samples beyond the other side."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.runs.grid import ROUNDING_NS
+
+BEYOND = "sync-left-out"
+"""Kind of the warning that says what an offset between the clocks leaves out: no doubt about the log."""
+
+
+def left_out_warnings(one: Deviation, reference: Trajectory) -> list[LogWarning]:
+    """Return what was not compared of a log, and, where the clocks are shifted, of the reference.
+
+    Samples that an offset moves beyond the reference's time are what --sync asks for; they are told apart
+    from those that lack a value, lie in a gap, or come after a reference that started together with the log.
+
+    Args:
+        one: The deviation of the log.
+        reference: What was asked for, whole.
+    """
+    samples = one.left_out + len(one.sample)
+    beyond = _beyond(one, reference) if one.sync.offset else 0
+    warnings = []
+    if one.left_out > beyond:
+        said = f"{one.name}: {one.left_out - beyond} of {samples} samples have no reference or no value"
+        warnings.append(LogWarning("left-out", said))
+    if one.sync.offset and (beyond or one.reference_left_out):
+        theirs = f"{one.reference_left_out} of {len(reference.t_ns)} samples of {reference.name}"
+        said = f"the offset of {one.sync.offset:.6g} s leaves {beyond} of {samples} samples and {theirs}"
+        warnings.append(LogWarning(BEYOND, f"{one.name}: {said} without the other side"))
+    return warnings
+
+
+def _beyond(one: Deviation, reference: Trajectory) -> int:
+    """Return how many samples of a log lie outside the time of the reference."""
+    at_ns = one.run.t_ns + round(one.sync.offset * 1e9)
+    before, after = at_ns < reference.t_ns[0] - ROUNDING_NS, at_ns > reference.t_ns[-1] + ROUNDING_NS
+    return int(np.count_nonzero(before | after))

@@ -1,0 +1,206 @@
+"""Two trajectories at the same times: what a comparison compares."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.continuity import continuous_quaternions
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.orientation import quaternions, slerp
+from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.runs.grid import ROUNDING_NS, interpolate
+from urmpipe_pipeline.runs.results import Run
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Matched:
+    """Both sides at the samples that were compared.
+
+    Attributes:
+        sample: Samples of the log, shape (m,).
+        t_ns: Their times on the log's clock in integer [ns], shape (m,).
+        wanted: Where the reference was, in [m], shape (m, 3).
+        done: Where the log was, in [m], shape (m, 3).
+        wanted_quat: Orientation of the reference x, y, z, w [-], shape (m, 4); None without one.
+        done_quat: The same of the log.
+        wanted_q: Joints of the reference, in the log's order, in [rad] or [m], shape (m, joints); None where
+            `joints_apart` tells why not.
+        done_q: The same of the log.
+        left_out: Samples of the log that were not compared.
+        reference_left_out: Samples of the reference outside the log's time.
+    """
+
+    sample: IntArray
+    t_ns: IntArray
+    wanted: FloatArray
+    done: FloatArray
+    wanted_quat: FloatArray | None
+    done_quat: FloatArray | None
+    wanted_q: FloatArray | None
+    done_q: FloatArray | None
+    left_out: int
+    reference_left_out: int
+
+    def at(self, kept: NDArray[np.intp]) -> Matched:
+        """Return both sides at some of these samples alone, by index; the others are left out."""
+        return Matched(
+            sample=self.sample[kept],
+            t_ns=self.t_ns[kept],
+            wanted=self.wanted[kept],
+            done=self.done[kept],
+            wanted_quat=None if self.wanted_quat is None else self.wanted_quat[kept],
+            done_quat=None if self.done_quat is None else self.done_quat[kept],
+            wanted_q=None if self.wanted_q is None else self.wanted_q[kept],
+            done_q=None if self.done_q is None else self.done_q[kept],
+            left_out=self.left_out + len(self.sample) - len(kept),
+            reference_left_out=self.reference_left_out,
+        )
+
+
+def by_kinematics(run: Run) -> Trajectory:
+    """Return where a run's tool centre point was by its joints, on its grid.
+
+    Raises:
+        LogError: If it has no kinematics.
+    """
+    if run.tcp is None:
+        raise LogError(lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
+    quat = continuous_quaternions(quaternions(run.tcp.euler_zyx, "zyx"))
+    return Trajectory(
+        run.name,
+        run.t_ns,
+        run.tcp.position,
+        run.log.files,
+        quat,
+        run.log.joints,
+        tuple(run.joint_units),
+        run.q,
+    )
+
+
+def as_recorded(run: Run) -> Trajectory:
+    """Return where a run recorded its tool centre point itself, on its grid.
+
+    Raises:
+        LogError: If it recorded none.
+    """
+    if run.tcp_recorded is None:
+        raise LogError(lacking(run, "no recorded tool centre point; allowed: --tcp fk with a --robot"))
+    joints = run.log.joints
+    units = tuple(run.joint_units) if joints else ()
+    return Trajectory(
+        run.name,
+        run.t_ns,
+        run.tcp_recorded,
+        run.log.files,
+        _recorded_quat(run),
+        joints,
+        units,
+        run.q if joints else None,
+    )
+
+
+def match(reference: Trajectory, log: Trajectory, offset: float) -> Matched:
+    """Return both sides at the log's samples; the reference is interpolated there.
+
+    Positions and joints are interpolated linearly, orientations on the great arc. Samples outside the time of
+    the reference, inside a gap of it, or without a position of their own are left out and counted.
+
+    Args:
+        reference: What was asked for.
+        log: What was done.
+        offset: t_reference = t_log + offset in [s].
+    """
+    shift = round(offset * 1e9)
+    at_ns = log.t_ns + shift
+    wanted = interpolate(at_ns, reference.t_ns, reference.position)
+    sample = np.flatnonzero(np.isfinite(wanted).all(axis=1) & np.isfinite(log.position).all(axis=1))
+    at_ns = at_ns[sample]
+    wanted_q, done_q = _joints(reference, log, sample, at_ns)
+    before = reference.t_ns < log.t_ns[0] + shift - ROUNDING_NS
+    after = reference.t_ns > log.t_ns[-1] + shift + ROUNDING_NS
+    return Matched(
+        sample=sample,
+        t_ns=log.t_ns[sample],
+        wanted=wanted[sample],
+        done=log.position[sample],
+        wanted_quat=_between(at_ns, reference),
+        done_quat=None if log.quat_xyzw is None else log.quat_xyzw[sample],
+        wanted_q=wanted_q,
+        done_q=done_q,
+        left_out=len(log.t_ns) - len(sample),
+        reference_left_out=int(np.count_nonzero(before | after)),
+    )
+
+
+def joints_apart(reference: Trajectory, joints: tuple[str, ...], units: tuple[str, ...]) -> str:
+    """Return why the joints of a log cannot be held against those of the reference; empty if they can.
+
+    Args:
+        reference: What was asked for.
+        joints: Names of the log's joints.
+        units: Theirs: rad or m.
+    """
+    if not reference.joints or not joints:
+        return "a side has no joints"
+    order = joint_order(reference.joints, joints)
+    if order is None:
+        return f"the log has {len(joints)} joints, the reference has {len(reference.joints)}"
+    turning = [reference.joint_units[place] for place in order]
+    apart = [name for name, *pair in zip(joints, units, turning, strict=True) if pair[0] != pair[1]]
+    return f"{', '.join(apart)} turn on one side and slide on the other" if apart else ""
+
+
+def lacking(run: Run, message: str) -> Finding:
+    """Return what a run lacks, with the name of its file."""
+    return Finding(message, file=run.log.files[0].name if run.log.files else run.name)
+
+
+def joint_order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int] | None:
+    """Return where the reference has the log's joints: by name, else by place; None if it has others.
+
+    Args:
+        reference: Names of the reference's joints.
+        log: Names of the log's.
+    """
+    if not log or len(reference) != len(log):
+        return None
+    if set(reference) == set(log):
+        return [reference.index(name) for name in log]
+    return list(range(len(log)))
+
+
+def _joints(
+    reference: Trajectory, log: Trajectory, sample: IntArray, at_ns: IntArray
+) -> tuple[FloatArray | None, FloatArray | None]:
+    """Return the joints of both sides at the compared samples; None where they cannot be compared."""
+    order = joint_order(reference.joints, log.joints)
+    if order is None or joints_apart(reference, log.joints, log.joint_units):
+        return None, None
+    if reference.q is None or log.q is None:
+        return None, None
+    return interpolate(at_ns, reference.t_ns, reference.q[:, order]), log.q[sample]
+
+
+def _recorded_quat(run: Run) -> FloatArray | None:
+    """Return the orientation that a run recorded, on its grid."""
+    form, values = run.log.rotation_form, run.rotation_recorded
+    if form is None or values is None:
+        return None
+    return continuous_quaternions(quaternions(values, "quat_xyzw" if form == "matrix" else form))
+
+
+def _between(at_ns: IntArray, reference: Trajectory) -> FloatArray | None:
+    """Return the reference's orientations at times within its own, on the great arc between two of them."""
+    known_ns, quat = reference.t_ns, reference.quat_xyzw
+    if quat is None:
+        return None
+    if len(known_ns) == 1:
+        return np.repeat(quat, len(at_ns), axis=0)
+    after = np.clip(np.searchsorted(known_ns, at_ns), 1, len(known_ns) - 1)
+    share = (at_ns - known_ns[after - 1]) / (known_ns[after] - known_ns[after - 1])
+    return slerp(quat[after - 1], quat[after], np.clip(share, 0.0, 1.0))

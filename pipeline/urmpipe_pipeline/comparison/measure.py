@@ -1,0 +1,193 @@
+"""Measure: every deviation of a log from the reference at the same times, with its statistics."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.delta import delta
+from urmpipe_models.errors import LogError
+from urmpipe_models.orientation import angle_between
+from urmpipe_models.repolarizer import FULL_TURN
+from urmpipe_pipeline.comparison.comparison import AXES, Deviation, Kind
+from urmpipe_pipeline.comparison.matching import Matched, joints_apart, lacking
+from urmpipe_pipeline.comparison.nearest_path import distance_from_path
+from urmpipe_pipeline.comparison.statistics import Measured, correlation, describe, overall
+from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
+from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.runs.grid import apart, interpolate
+from urmpipe_pipeline.runs.results import Run
+
+KINDS: tuple[Kind, ...] = ("axis", "axis", "axis", "norm")
+"""What the columns of delta are measured of."""
+
+START_SAMPLES = 11
+"""Samples by which the turns of the start are counted: as few as outvote a wild one."""
+
+
+def measure(
+    name: str,
+    run: Run,
+    reference: Trajectory,
+    matched: Matched,
+    sync: Sync,
+    alignment: Alignment,
+    tolerance: Mapping[str, float],
+) -> Deviation:
+    """Return the deviation of a log: delta, distance from the path, angle, joints, and the verdict.
+
+    Args:
+        name: The log's name, unique in the comparison.
+        run: The log.
+        reference: What was asked for, whole.
+        matched: Both sides at the same times, the log aligned.
+        sync: How the clocks were put together.
+        alignment: How the log was moved in space.
+        tolerance: In [m] or [rad], by kind or by coordinate.
+
+    Raises:
+        LogError: If there is a tolerance for what a side does not have.
+
+    Source: [UrmArm2021]_ eq. 19-23.
+    """
+    t, sample = seconds(matched.t_ns), matched.sample
+    values = np.column_stack(delta(_columns(matched.wanted), _columns(matched.done)))
+    path = distance_from_path(matched.done, reference.position, ~apart(reference.t_ns))
+    path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
+    angle = _angle(matched)
+    joint_delta, turns = _joint_delta(run, matched)
+    _refuse_unheld(run, reference, tolerance, angle, joint_delta)
+    in_space = [
+        *(Measured(axis, KINDS[i], "m", values[:, i]) for i, axis in enumerate(AXES)),
+        Measured("path", "path", "m", path),
+        *([] if angle is None else [Measured("angle", "angle", "rad", angle)]),
+    ]
+    of_joints = _of_joints(run, joint_delta)
+    statistics, joint_statistics = (
+        {one.quantity: describe(one, t, sample, tolerance) for one in measured}
+        for measured in (in_space, of_joints)
+    )
+    speed = _speed(run, matched)
+    x, y, z, norm = (float(value) for value in values[0])
+    return Deviation(
+        name=name,
+        run=run,
+        sample=sample,
+        t_ns=matched.t_ns,
+        reference=matched.wanted,
+        actual=matched.done,
+        delta=values,
+        path=path,
+        speed=speed,
+        angle=angle,
+        joint_delta=joint_delta,
+        joint_turns=turns,
+        outside=np.any([one.outside(tolerance) for one in (*in_space, *of_joints)], axis=0),
+        sync=sync,
+        alignment=alignment,
+        left_out=matched.left_out,
+        reference_left_out=matched.reference_left_out,
+        statistics=statistics,
+        joint_statistics=joint_statistics,
+        start=(x, y, z, norm),
+        speed_correlation=correlation(values[:, 3], speed),
+        verdict=overall([*statistics.values(), *joint_statistics.values()]),
+    )
+
+
+def _angle(matched: Matched) -> FloatArray | None:
+    """Return the angle between the orientations in [rad], shape (m,); None if a side has none anywhere."""
+    if matched.wanted_quat is None or matched.done_quat is None:
+        return None
+    angle = angle_between(matched.wanted_quat, matched.done_quat)
+    return angle if np.isfinite(angle).any() else None
+
+
+def _joint_delta(run: Run, matched: Matched) -> tuple[FloatArray | None, tuple[int, ...]]:
+    """Return reference - log of each joint, and the whole turns that are taken out of it.
+
+    None if a joint has no value on a side: it could not be judged.
+    """
+    if matched.wanted_q is None or matched.done_q is None:
+        return None, ()
+    difference = matched.wanted_q - matched.done_q
+    if not np.isfinite(difference).any(axis=0).all():
+        return None, ()
+    turning = zip(difference.T, run.joint_units, strict=True)
+    turns = [_turns_at_start(values) if unit == "rad" else 0 for values, unit in turning]
+    return difference - FULL_TURN * np.array(turns), tuple(turns)
+
+
+def _turns_at_start(difference: FloatArray) -> int:
+    """Return the whole turns that two joints in [rad] count apart for the pose they start in.
+
+    Logs of one motion may name it by other turns, such as pi and -pi: that is no deviation, a turn more on
+    the way is. The median of the first few samples: a wild first one would put all the others a turn out,
+    and what happens later stands where it happens.
+    """
+    first = difference[np.isfinite(difference)][:START_SAMPLES]
+    return int(np.rint(np.sort(first)[(len(first) - 1) // 2] / FULL_TURN))
+
+
+def _of_joints(run: Run, joint_delta: FloatArray | None) -> list[Measured]:
+    """Return each joint as a quantity."""
+    if joint_delta is None:
+        return []
+    columns = zip(run.log.joints, run.joint_units, joint_delta.T, strict=True)
+    return [Measured(name, "joint", unit, values) for name, unit, values in columns]
+
+
+def unheld(reference: Trajectory, run: Run) -> str:
+    """Return why no joint of a log is compared."""
+    apart = joints_apart(reference, run.log.joints, tuple(run.joint_units))
+    return apart or "a joint has no value at any compared sample"
+
+
+def _refuse_unheld(
+    run: Run,
+    reference: Trajectory,
+    tolerance: Mapping[str, float],
+    angle: FloatArray | None,
+    joint_delta: FloatArray | None,
+) -> None:
+    """Raise a `LogError` if there is a tolerance for what a side does not have: nothing would be judged."""
+    faults = []
+    if "angle" in tolerance and angle is None:
+        found = "--tolerance angle: found a side without an orientation"
+        faults.append(lacking(run, f"{found}, allowed: joints with a --robot, or a recorded orientation"))
+    if "joint" in tolerance and joint_delta is None:
+        found = f"--tolerance joint: found that {unheld(reference, run)}"
+        faults.append(lacking(run, f"{found}, allowed: the same joints on both sides"))
+    if faults:
+        raise LogError(*faults)
+
+
+def _speed(run: Run, matched: Matched) -> FloatArray:
+    """Return the speed of the log's tool centre point in [m/s]: by kinematics, else by its positions."""
+    if run.tcp is not None:
+        speed = np.linalg.norm(run.tcp.velocity, axis=1, keepdims=True)
+        return interpolate(matched.t_ns, run.t_ns, speed)[:, 0]
+    return _speed_by_positions(matched)
+
+
+def _speed_by_positions(matched: Matched) -> FloatArray:
+    """Return the speed by the differences to both neighbours: to one beside a gap or a sample left out.
+
+    NaN without a neighbour. Between two the slopes are weighted so that a parabola's is exact.
+    """
+    step = np.diff(seconds(matched.t_ns))[:, np.newaxis]
+    joined = (np.diff(matched.sample) == 1) & ~apart(matched.t_ns)
+    slope = np.where(joined[:, np.newaxis], np.diff(matched.done, axis=0) / step, 0.0)
+    weight = np.where(joined[:, np.newaxis], 1.0 / step, 0.0)  # of the nearer neighbour the more
+    none = np.zeros((1, 1))
+    before, after = np.vstack((none, weight)), np.vstack((weight, none))
+    along = before * np.vstack((np.zeros((1, 3)), slope)) + after * np.vstack((slope, np.zeros((1, 3))))
+    with np.errstate(invalid="ignore"):
+        return np.asarray(np.linalg.norm(along / (before + after), axis=1))
+
+
+def _columns(position: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    x, y, z = position.T
+    return x, y, z

@@ -1,0 +1,110 @@
+"""A side of a comparison, and how two sides are put together in time and in space."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any, Literal
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.orientation import angle_between, quaternions
+from urmpipe_pipeline.joint_log import SourceFile, seconds
+
+SyncMode = Literal["start", "given", "auto"]
+AlignMode = Literal["none", "start", "rigid", "tool"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Trajectory:
+    """Where an arm or a point was, when: a side of a comparison.
+
+    Attributes:
+        name: Its name.
+        t_ns: Times from its first sample in integer [ns], shape (m,).
+        position: In [m], shape (m, 3).
+        files: The files it came from.
+        quat_xyzw: Orientation as unit quaternions x, y, z, w [-], shape (m, 4), each the nearer of q and -q
+            to the one before; None without one.
+        joints: Names of the joints; none of a path.
+        joint_units: rad or m, one a joint.
+        q: Repolarized joint values in [rad] or [m], shape (m, joints); None without joints.
+    """
+
+    name: str
+    t_ns: IntArray
+    position: FloatArray
+    files: tuple[SourceFile, ...] = ()
+    quat_xyzw: FloatArray | None = None
+    joints: tuple[str, ...] = ()
+    joint_units: tuple[str, ...] = ()
+    q: FloatArray | None = None
+
+    @property
+    def t(self) -> FloatArray:
+        """Times in [s], shape (m,)."""
+        return seconds(self.t_ns)
+
+
+@dataclass(frozen=True, slots=True)
+class Sync:
+    """How two clocks were put together: t_reference = t_log + offset, both from their first samples.
+
+    Attributes:
+        mode: start (both start together), given, or auto (estimated from the motion).
+        offset: In [s].
+        by: What an estimate rests on: joints or position; empty without one.
+        precision: Standard error of an estimate in [s]; None without one.
+        similarity: How alike the two motions are at that offset, -1 to 1; None without an estimate.
+    """
+
+    mode: SyncMode = "start"
+    offset: float = 0.0
+    by: str = ""
+    precision: float | None = None
+    similarity: float | None = None
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return asdict(self) | {"by": self.by or None}
+
+
+@dataclass(frozen=True, slots=True)
+class Alignment:
+    """How the log was moved in space before it was compared: p' = rotation p + translation + R' tool.
+
+    R' is the log's orientation after the rotation.
+
+    Attributes:
+        mode: none, start (the first compared poses agree), rigid (the best rigid motion) or tool (the best
+            constant offset of the tool centre point).
+        rotation: Rotation matrix [-], row by row, 3 by 3.
+        translation: In [m].
+        tool: In the frame of the log's tool, in [m].
+    """
+
+    mode: AlignMode = "none"
+    rotation: tuple[tuple[float, ...], ...] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    translation: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    tool: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+    @property
+    def angle(self) -> float:
+        """Angle of the rotation in [rad], 0 to pi."""
+        quat = quaternions(np.reshape(self.rotation, (1, 9)), "matrix")
+        return float(angle_between(quat, np.array([[0.0, 0.0, 0.0, 1.0]]))[0])
+
+    def moved(self, aligned: FloatArray) -> FloatArray:
+        """Return how far the log's positions were moved, in [m], shape (m,).
+
+        Args:
+            aligned: Where they are now, in [m], shape (m, 3).
+        """
+        if self.mode == "tool":
+            return np.full(len(aligned), np.linalg.norm(self.tool))
+        before = (aligned - np.array(self.translation)) @ np.array(self.rotation)  # R^T (p' - t)
+        return np.asarray(np.linalg.norm(aligned - before, axis=1))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return asdict(self)

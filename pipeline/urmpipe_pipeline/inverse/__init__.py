@@ -1,0 +1,1 @@
+"""Around inverse kinematics: targets from files, joint logs, and runs of solutions."""

@@ -1,0 +1,340 @@
+"""The repolarizer over a log, and its audit: what was undone, repaired, left, or could not be decided."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.in_between import beside_wraps, off_line, repair
+from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
+from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, seconds
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
+from urmpipe_pipeline.repolarization.interval import Interval, double_turns, given_periods, said_intervals
+
+LISTED = 8
+"""Warnings of a kind that are told one by one; the others are counted, and listed by the audit."""
+
+ALL = "; ingest --audit FILE.csv lists all"
+"""Where the others are."""
+
+MOST = 10_000
+"""Entries of a kind that are no wraps: a log with more of them is none of joints; a warning counts all."""
+
+GAP = 1.5
+"""Two values of a joint further apart than this many median periods have a gap between them."""
+
+NEAR = 3.0
+"""A step misses 4 pi by no more than this times what the joint moves at its largest speed."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Audited:
+    """A log's joints, repolarized, and what there is to say about it.
+
+    Attributes:
+        q: Repolarized values on the file's own rows, repaired if that was asked for, shape (n, joints).
+        entries: The audit, by row.
+        warnings: What a person should know.
+        inferences: The intervals that the joints are limited to.
+        unresolved: Row before, row after and joint index of each step that is unexplained or ambiguous,
+            shape (u, 3): nothing is to be interpolated across it.
+        broken: The same of each step that is no motion, shape (b, 3): the unresolved ones, and those to and
+            from an in-between sample.
+    """
+
+    q: FloatArray
+    entries: tuple[AuditEntry, ...]
+    warnings: tuple[LogWarning, ...]
+    inferences: tuple[Inference, ...]
+    unresolved: IntArray
+    broken: IntArray
+
+
+class _Places(NamedTuple):
+    """Where something is: rows and joints, the rows of the values before, and how large it is."""
+
+    rows: IntArray
+    joints: IntArray
+    before: IntArray
+    figures: FloatArray
+
+    @property
+    def steps(self) -> IntArray:
+        """Row before, row after and joint index, shape (m, 3)."""
+        return np.column_stack((self.before, self.rows, self.joints))
+
+
+def audit_log(
+    log: JointLog,
+    robot: Chain | None = None,
+    *,
+    interval: Mapping[str, Interval] | None = None,
+    repaired: bool = False,
+) -> Audited:
+    """Repolarize the joints that turn, on the file's own rows, and tell all about it.
+
+    Args:
+        log: The log, its times strictly increasing.
+        robot: The arm: it tells which joints turn and how fast they can.
+        interval: The interval of a joint by its name, by "" of all that turn, in the file's own unit.
+        repaired: Whether in-between samples are put on the line through their neighbours.
+
+    Raises:
+        OptionError: If an interval makes no sense.
+        LogError: If values lie outside of an interval that was given, or it cannot be told without.
+    """
+    given = interval or {}
+    fixed, periods, limits = _repolarized(log, robot, given)
+    inferences, noticed = said_intervals(log, fixed, periods, given)
+    odd = _unexplained(log, fixed)
+    between = _in_between(log, fixed, periods)
+    unsure, speeds = _ambiguous(log, fixed, periods, limits, between)
+    kinds: dict[AuditKind, _Places] = {
+        "wrap": _steps_to(log, fixed.rows, fixed.joints),
+        "repaired" if repaired else "in-between": between,
+        "unexplained": odd,
+        "ambiguous": unsure,
+    }
+    warnings = [
+        *noticed,
+        *_warn_unexplained(log, odd, periods),
+        *_warn_ambiguous(log, unsure, speeds, periods),
+        *([] if repaired else _warn_in_between(log, between)),
+    ]
+    unresolved = np.concatenate((odd.steps, unsure.steps))
+    mended = np.column_stack((between.rows, between.joints))
+    return Audited(
+        q=repair(fixed.q, log.t, mended) if repaired and len(mended) else fixed.q,
+        entries=tuple(_entries(log, fixed, periods, kinds)),
+        warnings=tuple(warnings),
+        inferences=tuple(inferences),
+        unresolved=unresolved,
+        broken=unresolved if repaired else np.concatenate((unresolved, *_beside(log, between))),
+    )
+
+
+def _repolarized(
+    log: JointLog, robot: Chain | None, given: Mapping[str, Interval]
+) -> tuple[Repolarized, FloatArray, FloatArray]:
+    """Repolarize the joints; return P of each and the largest speed of each too."""
+    turns = turning(log, robot)
+    periods = given_periods(log, turns.tolist(), given)
+    limits = np.array([np.inf if robot is None else robot.moving[j].velocity for j in range(len(turns))])
+    dt = seconds(np.diff(log.t_ns, prepend=log.t_ns[:1]))
+    fixed = repolarize(log.q, dt, period=periods, max_speed=limits)
+    asked = [] if "" in given or not len(fixed.unexplained) else _doubled(log, fixed)
+    doubled = [j for j in asked if log.joints[j] not in given]
+    if doubled:
+        periods[doubled] = 2.0 * FULL_TURN
+        fixed = repolarize(log.q, dt, period=periods, max_speed=limits)
+    return fixed, periods, limits
+
+
+def turning(log: JointLog, robot: Chain | None) -> NDArray[np.bool_]:
+    """Tell which joints turn, by the robot or else by the unit of their columns; the others slide.
+
+    Args:
+        log: The log.
+        robot: The arm, or None.
+
+    Returns:
+        Shape (joints,).
+    """
+    if robot is not None and log.joints:
+        return np.array([joint.kind == "revolute" for joint in robot.moving])
+    return np.array([log.units.get(name) in ("rad", "deg") for name in log.joints], dtype=np.bool_)
+
+
+def _steps_to(log: JointLog, rows: IntArray, joints: IntArray) -> _Places:
+    """Return the steps to some values, with their size as it stands in the file."""
+    before = rows - 1
+    for j in np.unique(joints[np.isnan(log.q[before, joints])]):
+        mine = joints == j
+        present = np.flatnonzero(~np.isnan(log.q[:, j]))
+        before[mine] = present[np.searchsorted(present, rows[mine]) - 1]
+    return _Places(rows, joints, before, log.q[rows, joints] - log.q[before, joints])
+
+
+def _unexplained(log: JointLog, fixed: Repolarized) -> _Places:
+    rows, joints = fixed.unexplained.T
+    return _steps_to(log, rows, joints)
+
+
+def _doubled(log: JointLog, fixed: Repolarized) -> list[int]:
+    """Return the joints that are seen to be limited to +-2 pi."""
+    odd = _unexplained(log, fixed)
+    speeds = np.zeros(len(log.joints))
+    for j in np.unique(odd.joints):
+        speeds[j] = _held_speed(log, fixed.q, int(j), odd.rows[odd.joints == j])
+    elapsed = seconds(log.t_ns[odd.rows] - log.t_ns[odd.before])
+    rest = NEAR * speeds[odd.joints] * elapsed + FULL_TURN / 100.0
+    return double_turns(log, fixed, odd.joints, odd.figures, np.minimum(rest, FULL_TURN / 2.0))
+
+
+def _in_between(log: JointLog, fixed: Repolarized, periods: FloatArray) -> _Places:
+    """Return the in-between samples, with how far they lie from the line through their neighbours."""
+    found = [np.empty((0, 2), dtype=np.int64)]
+    off = [np.empty(0)]
+    every, times, sparse = np.arange(log.rows), log.t, _sparse(log)
+    for j in np.unique(fixed.joints).tolist():
+        present, q, x, t = every, log.q[:, j], fixed.q[:, j], times
+        if sparse[j]:
+            present = np.flatnonzero(~np.isnan(q))
+            q, x, t = q[present], x[present], t[present]
+        wraps = np.searchsorted(present, fixed.rows[fixed.joints == j])
+        hidden = np.searchsorted(present, fixed.in_between[fixed.in_between[:, 1] == j, 0])
+        at = np.union1d(hidden, beside_wraps(q, x, t, wraps, float(periods[j])))
+        found.append(np.column_stack((present[at], np.full(len(at), j))))
+        off.append(off_line(x, t, at))
+    rows, joints = np.concatenate(found).T
+    order = np.lexsort((joints, rows))
+    places = _steps_to(log, rows[order], joints[order])
+    return places._replace(figures=np.concatenate(off)[order])
+
+
+def _beside(log: JointLog, between: _Places) -> list[IntArray]:
+    """Return the steps to and from the in-between samples."""
+    following = between.rows + 1
+    for k in np.flatnonzero(np.isnan(log.q[following, between.joints])):
+        rest = log.q[following[k] :, between.joints[k]]
+        following[k] += int(np.argmax(~np.isnan(rest)))
+    return [between.steps, np.column_stack((between.rows, following, between.joints))]
+
+
+def _ambiguous(
+    log: JointLog, fixed: Repolarized, periods: FloatArray, limits: FloatArray, between: _Places
+) -> tuple[_Places, FloatArray]:
+    """Return the gaps in which a joint can have turned more than half a period, and how fast it can be.
+
+    That is the robot's limit; without one the largest speed that was seen.
+    """
+    steps = np.diff(log.t_ns)
+    rows, joints = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
+    speeds = np.zeros(len(periods))
+    usual = (
+        float(np.median(steps)) if len(steps) and steps.max() > GAP * steps.min() else steps.max(initial=0)
+    )
+    wide = np.flatnonzero(steps > GAP * usual)
+    sparse = _sparse(log)
+    for j in np.flatnonzero(np.isfinite(periods)).tolist():
+        after, before = _wide_steps(log, j, GAP * usual) if sparse[j] else (wide + 1, wide)
+        if not len(after):
+            continue
+        odd = fixed.unexplained[fixed.unexplained[:, 1] == j, 0]
+        skipped = np.concatenate((odd, between.rows[between.joints == j], after))
+        speeds[j] = limits[j] if np.isfinite(limits[j]) else _held_speed(log, fixed.q, j, skipped)
+        reached = speeds[j] * seconds(log.t_ns[after] - log.t_ns[before])
+        rows.append(after[reached > periods[j] / 2.0])
+        joints.append(np.full(len(rows[-1]), j))
+    at, on = np.concatenate(rows), np.concatenate(joints)
+    order = np.lexsort((on, at))
+    return _steps_to(log, at[order], on[order]), speeds[on[order]]
+
+
+def _sparse(log: JointLog) -> NDArray[np.bool_]:
+    """Tell which joints miss samples; one pass over all says whether to look column by column."""
+    if not np.isnan(log.q.sum()):
+        return np.zeros(len(log.joints), dtype=np.bool_)
+    return np.asarray(np.isnan(log.q.sum(axis=0)))
+
+
+def _wide_steps(log: JointLog, joint: int, longest: float) -> tuple[IntArray, IntArray]:
+    """Return the rows after and before the steps of a joint that take longer than so many [ns]."""
+    present = np.flatnonzero(~np.isnan(log.q[:, joint]))
+    at = np.flatnonzero(np.diff(log.t_ns[present]) > longest)
+    return present[at + 1], present[at]
+
+
+def _held_speed(log: JointLog, x: FloatArray, joint: int, skipped: IntArray) -> float:
+    """Return the largest speed of a joint that was held over two steps in [rad/s]: outliers do not count.
+
+    Args:
+        log: The log.
+        x: Its joints, repolarized.
+        joint: Index of the joint.
+        skipped: Rows at which it does not move as a joint does: the steps to and from them do not count.
+    """
+    present = np.flatnonzero(~np.isnan(x[:, joint]))
+    speed = np.abs(np.diff(x[present, joint])) / seconds(np.diff(log.t_ns[present]))
+    at = np.searchsorted(present, skipped)
+    for steps in (at - 1, at):
+        speed[steps[(steps >= 0) & (steps < len(speed))]] = 0.0
+    return float(np.minimum(speed[1:], speed[:-1]).max(initial=0.0))
+
+
+def _entries(
+    log: JointLog, fixed: Repolarized, periods: FloatArray, kinds: Mapping[AuditKind, _Places]
+) -> list[AuditEntry]:
+    """Return the audit by row: of each kind its entries, of those that are no wraps the first `MOST`."""
+    entries: list[AuditEntry] = []
+    for kind, places in kinds.items():
+        most = None if kind == "wrap" else MOST
+        rows, joints, before = places.rows[:most], places.joints[:most], places.before[:most]
+        ends = (log.t_ns[rows] if kind in ("in-between", "repaired") else log.t_ns[before], log.t_ns[rows])
+        turns = (_turns_at(log, fixed, periods, at, joints) for at in (before, rows))
+        columns = (
+            rows,
+            joints,
+            (ends[0] + ends[1]) / 2e9,
+            (ends[1] - ends[0]) / 2e9,
+            places.figures[:most],
+            *turns,
+        )
+        for row, j, t, half, figure, k_before, k_after in zip(*(c.tolist() for c in columns), strict=True):
+            entries.append(AuditEntry(log.joints[j], row + 1, t, half, figure, k_before, k_after, kind))
+    return sorted(entries, key=lambda entry: entry.row)
+
+
+def _turns_at(
+    log: JointLog, fixed: Repolarized, periods: FloatArray, rows: IntArray, joints: IntArray
+) -> IntArray:
+    """Return k at some values."""
+    added = fixed.q[rows, joints] - log.q[rows, joints]
+    return np.rint(added / periods[joints]).astype(np.int64)
+
+
+def _warn_unexplained(log: JointLog, odd: _Places, periods: FloatArray) -> Iterator[LogWarning]:
+    """Warn of steps above a quarter period that are no repolarization."""
+    for row, j in zip(odd.rows[:LISTED].tolist(), odd.joints[:LISTED].tolist(), strict=True):
+        said = (
+            f"{log.joints[j]} steps by more than {np.degrees(periods[j] / 4.0):.0f} deg from the value"
+            f" before, to {log.q[row, j]:.6g} rad, which is no wrap: it stays"
+        )
+        yield LogWarning("large-step", said, row + 1)
+    if len(odd.rows) > LISTED:
+        yield LogWarning("large-step", f"{len(odd.rows) - LISTED} more steps that are no wraps{ALL}")
+
+
+def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
+    """Warn of samples that a linear resampling left on a wrap."""
+    for row, j, _, off in zip(*(part[:LISTED].tolist() for part in between), strict=True):
+        said = (
+            f"{log.joints[j]} lies between the ends of a wrap, {abs(off):.4g} rad off the line of its"
+            " neighbours, where a linear resampling left it: --repair puts it there"
+        )
+        yield LogWarning("in-between", said, row + 1)
+    if len(between.rows) > LISTED:
+        yield LogWarning("in-between", f"{len(between.rows) - LISTED} more samples on wraps{ALL}")
+
+
+def _warn_ambiguous(
+    log: JointLog, unsure: _Places, speeds: FloatArray, periods: FloatArray
+) -> Iterator[LogWarning]:
+    """Warn of gaps in which a joint can have turned."""
+    places = (unsure.rows, unsure.joints, unsure.before, speeds)
+    for row, j, before, speed in zip(*(part[:LISTED].tolist() for part in places), strict=True):
+        gap = float(log.t_ns[row] - log.t_ns[before]) / 1e9
+        said = (
+            f"{log.joints[j]} has no value for {gap:.6g} s before; at {speed:.3g} rad/s it can have turned by"
+            f" more than {np.degrees(periods[j] / 2.0):.0f} deg: the nearest turn is taken"
+        )
+        yield LogWarning("ambiguous-turn", said, row + 1)
+    if len(unsure.rows) > LISTED:
+        left = len(unsure.rows) - LISTED
+        yield LogWarning("ambiguous-turn", f"{left} more gaps in which a joint can have turned{ALL}")

@@ -1,0 +1,223 @@
+"""The uniform time grid of a run: the log's own samples where they are regular, else a resampling.
+
+Times are integer nanoseconds from the log's first row. Nothing is upsampled in silence, and nothing is
+interpolated across a gap, or across a step of a joint that no motion explains.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.sources.clocks.quantised import Regular, behind_rounded
+
+REGULAR = 0.01
+"""A log is regular if no sample is further from its place on the grid than this share of the period."""
+
+GAP = 3.0
+"""Two rows further apart than this many median periods have a gap between them."""
+
+ROUNDING_NS = 1000
+"""Clocks are printed to the microsecond or finer: so much beyond the last known time is still at it."""
+
+
+MOST = 20_000_000
+"""Samples of a grid, where a log does not have as many rows: more come of a broken clock or a mistyped period
+and would fill the memory."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Grid:
+    """Where a run is sampled.
+
+    Attributes:
+        t_ns: Times from the log's first row in integer [ns], shape (g,).
+        tsp: Sampling period in [s]; 0 for a single sample.
+        own: True if each sample is a row of the log, at its own time or that of the clock rounded to it.
+        source_ns: The rows' times in integer [ns], shape (n,).
+        warnings: What was changed.
+    """
+
+    t_ns: IntArray
+    tsp: float
+    own: bool
+    source_ns: IntArray
+    warnings: tuple[LogWarning, ...]
+
+    def resample(self, values: FloatArray) -> FloatArray:
+        """Return values of the rows, shape (n, k), on the grid, shape (g, k): linear, NaN inside gaps."""
+        if self.own:
+            return values
+        return interpolate(self.t_ns, self.source_ns, values)
+
+    def resample_joints(
+        self, values: FloatArray, unresolved: IntArray
+    ) -> tuple[FloatArray, tuple[LogWarning, ...]]:
+        """Return joint values on the grid; NaN inside gaps and between the rows of an unresolved step.
+
+        Args:
+            values: Repolarized values of the rows, shape (n, joints).
+            unresolved: Row before, row after and joint index of steps that no motion explains, shape (u, 3).
+
+        Returns:
+            The values, shape (g, joints), and a warning that counts what was left open.
+        """
+        if self.own or not len(unresolved):
+            return self.resample(values), ()
+        result = self.resample(values)
+        inside = inside_spans(*self._between(unresolved), unresolved[:, 2], result.shape)
+        left = int(np.count_nonzero((inside & ~np.isnan(result)).any(axis=1)))
+        result[inside] = np.nan
+        said = f"{left} grid samples lie inside steps of a joint that no motion explains and have no value"
+        return result, (LogWarning("step-left-open", said),) if left else ()
+
+    def steps(self, rows: IntArray) -> IntArray:
+        """Return the steps of the grid that steps between rows reach into.
+
+        Args:
+            rows: Row before, row after and joint index, shape (b, 3).
+
+        Returns:
+            First and last step of the grid that each reaches into, by the sample before the step, and joint
+            index, shape (m, 3).
+        """
+        if self.own:
+            return np.column_stack((rows[:, 0], rows[:, 1] - 1, rows[:, 2]))
+        first, end = self._between(rows)
+        last = np.minimum(end - 1, len(self.t_ns) - 2)
+        return np.column_stack((first - 1, last, rows[:, 2]))[first - 1 <= last]
+
+    def _between(self, rows: IntArray) -> tuple[IntArray, IntArray]:
+        """Return the first grid sample after each row before, and the first at or after the row after."""
+        first = np.searchsorted(self.t_ns, self.source_ns[rows[:, 0]], side="right")
+        return first, np.searchsorted(self.t_ns, self.source_ns[rows[:, 1]], side="left")
+
+
+def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> FloatArray:
+    """Return values at given times: linear between the known ones, NaN outside them and inside gaps.
+
+    Args:
+        at_ns: Times wanted in integer [ns], shape (m,).
+        known_ns: Times known in integer [ns], strictly increasing, shape (n,).
+        values: Values at the known times, shape (n, k).
+
+    Returns:
+        Values at the times wanted, shape (m, k).
+    """
+    x, known = at_ns.astype(np.float64), known_ns.astype(np.float64)
+    within = np.clip(x, known[0], known[-1])
+    x = np.where(np.abs(within - x) <= ROUNDING_NS, within, x)
+    result = np.empty((len(x), values.shape[1]))
+    for i, column in enumerate(values.T):
+        result[:, i] = np.interp(x, known, column, np.nan, np.nan)
+    result[inside_gaps(at_ns, known_ns)] = np.nan
+    return result
+
+
+def inside_spans(
+    first: IntArray, end: IntArray, columns: IntArray, shape: tuple[int, ...]
+) -> NDArray[np.bool_]:
+    """Return a mask of a table that is true in some spans of rows.
+
+    Args:
+        first: First row of each span, shape (m,).
+        end: The row after its last one, not before `first`, shape (m,).
+        columns: The column it stands in, shape (m,).
+        shape: Rows and columns of the table.
+    """
+    depth = np.zeros((shape[0] + 1, shape[1]), dtype=np.int32)
+    np.add.at(depth, (first, columns), 1)
+    np.add.at(depth, (end, columns), -1)
+    return np.asarray(np.cumsum(depth, axis=0)[:-1] > 0)
+
+
+def apart(known_ns: IntArray) -> NDArray[np.bool_]:
+    """Tell which times are more than 3 median periods from the next, shape (n - 1,)."""
+    step = np.diff(known_ns)
+    return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
+
+
+def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> NDArray[np.bool_]:
+    """Tell which times lie strictly between two known ones that are more than 3 median periods apart."""
+    if len(known_ns) < 2:
+        return np.zeros(len(at_ns), dtype=np.bool_)
+    after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)
+    wide = apart(known_ns)[after - 1]
+    return np.asarray(wide & (at_ns > known_ns[after - 1]) & (at_ns < known_ns[after]))
+
+
+def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
+    """Return the grid of a log.
+
+    Args:
+        log: The log, its times strictly increasing.
+        tsp: The period wanted in [s]; None for the log's own, which is its rows where they are
+            regular (as far as the resolution of their clock tells) and else its median period.
+
+    Raises:
+        LogError: If it would have more samples than fit in memory.
+    """
+    t = log.t_ns
+    if len(t) < 2:
+        return Grid(t, tsp or 0.0, True, t, ())
+    mean = float(t[-1] - t[0]) / (len(t) - 1)
+    ideal = t[0] + np.arange(len(t)) * mean
+    regular = bool(np.max(np.abs(t - ideal)) <= REGULAR * mean)
+    clock = None if regular else behind_rounded(t)
+    if clock is not None and (
+        tsp is None or abs(tsp * 1e9 - clock.period) <= REGULAR * clock.period / len(t)
+    ):
+        even = clock.t_ns - clock.t_ns[0] + t[0]
+        return Grid(even, clock.period / 1e9, True, t, (_rounded(clock),))
+    wanted = tsp * 1e9 if tsp is not None else mean if regular else float(np.median(np.diff(t)))
+    if regular and abs(wanted - mean) <= REGULAR * mean / len(t):
+        return Grid(t, mean / 1e9, True, t, ())
+    count = int((t[-1] - t[0]) / wanted + 1e-6) + 1
+    _refuse_endless(log, wanted, count)
+    grid = np.rint(np.arange(count) * wanted).astype(np.int64) + t[0]
+    in_gap = inside_gaps(grid, t)
+    return Grid(grid, wanted / 1e9, False, t, tuple(_changes(log, wanted, count, in_gap)))
+
+
+def _refuse_endless(log: JointLog, wanted: float, count: int) -> None:
+    """Raise a `LogError` if a grid has more samples than fit in memory."""
+    if count > max(MOST, log.rows):
+        steps = np.diff(log.t_ns)
+        row = int(np.argmax(steps)) + 2
+        found = f"found {count} samples every {wanted / 1e6:.6g} ms for {log.rows} rows"
+        gap = f"{float(steps.max()) / 1e9:.6g} s pass before row {row}"
+        message = f"{found}, {gap}, allowed: {MOST} samples; a clock without such a gap, or --tsp SECONDS"
+        raise LogError(Finding(message, log.files[0].name if log.files else log.name, row=row))
+
+
+def _rounded(clock: Regular) -> LogWarning:
+    """Say that a regular clock is seen behind rounded times."""
+    said = f"the times are those of a regular clock of {clock.period / 1e6:.6g} ms in steps of"
+    return LogWarning(
+        "clock-rounded", f"{said} {clock.resolution / 1e6:.6g} ms: the rows are taken as regular"
+    )
+
+
+def _changes(log: JointLog, wanted: float, count: int, in_gap: NDArray[np.bool_]) -> list[LogWarning]:
+    """Say what the resampling did."""
+    median = float(np.median(np.diff(log.t_ns)))
+    said = f"{log.rows} rows with a median period of {median / 1e6:.6g} ms became {count} samples"
+    warnings = [LogWarning("resampled", f"{said} every {wanted / 1e6:.6g} ms (linear)")]
+    if wanted < (1.0 - REGULAR) * median:
+        warnings.append(
+            LogWarning(
+                "upsampled",
+                f"the grid of {wanted / 1e6:.6g} ms is finer than the log's {median / 1e6:.6g} ms: the"
+                " samples between its rows are interpolated, not measured",
+            )
+        )
+    if in_gap.any():
+        warnings.append(
+            LogWarning("gap-left-open", f"{int(in_gap.sum())} grid samples lie inside gaps and have no value")
+        )
+    return warnings

@@ -1,0 +1,221 @@
+"""Ingest: a log becomes a run - repolarized, on a uniform grid, with the arm's kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Any, get_args
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.kinematics.forward import PointLog, point_over_log
+from urmpipe_models.row_blocks import THREADS
+from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.repolarization.audit import audit_log, turning
+from urmpipe_pipeline.runs.derivatives import Method, derivatives, recorded_agree
+from urmpipe_pipeline.runs.grid import Grid, make_grid
+from urmpipe_pipeline.runs.meshes import VISUAL_MISSING, missing_visuals
+from urmpipe_pipeline.runs.plausibility import implausible
+from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.robot_inference import infer_robot
+from urmpipe_pipeline.sources import ReadOptions, read_log
+
+QUANTISED_DIGITS = 5
+"""Joint values with this many significant digits or fewer are differentiated with smoothing."""
+
+LONGEST_TSP = 1e9
+"""Periods in [s] from this one on are no times that integers of 64 bits hold in [ns]."""
+
+UNUSED_PERIOD = LogWarning(
+    "period-not-used", "--period is not used, since the log has a clock; --time none leaves that out"
+)
+
+EULER_SINGULAR = "euler-singular"
+
+OF_ROBOT = (EULER_SINGULAR, VISUAL_MISSING)
+"""The kinds of the warnings that rest on the robot."""
+
+
+def ingest_log(
+    files: Sequence[Path],
+    *,
+    robot: Chain | None = None,
+    read: ReadOptions | None = None,
+    tsp: float | None = None,
+    derivative: Method | None = None,
+    name: str | None = None,
+    early: Callable[[JointLog | Run], None] | None = None,
+) -> Run:
+    """Return the run of one log.
+
+    The joints are repolarized on the file's own rows, then put on the grid, differentiated, and
+    taken through the robot's kinematics.
+
+    Args:
+        files: The log's file, or its files if its source writes one a plot.
+        robot: The arm, with base and tool; None for the one that the log singles out, if it does.
+        read: How to read the file where it cannot tell by itself.
+        tsp: Period of the grid in [s]; default: the log's own.
+        derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
+        name: What to call it; default: the file's stem.
+        early: Told the log when it is read and the run before its kinematics are computed, so that they
+            can be written meanwhile.
+
+    Raises:
+        LogError: With everything that is wrong with the files.
+        OptionError: If an option's value makes no sense.
+    """
+    options = read or ReadOptions()
+    _refuse_senseless(tsp, derivative)
+    log = read_log(files, options, robot)
+    inferred = infer_robot(log) if robot is None else None
+    if inferred:
+        robot, because = inferred
+        log = replace(log, inferences=(*log.inferences, because))
+    if early:
+        early(log)
+    given = {
+        "robot": robot.name if robot else None,
+        "tsp": tsp,
+        "derivative": derivative,
+        "read": _given(options),
+    }
+    return run_of(
+        log, robot, options, tsp=tsp, derivative=derivative, name=name, early=early, made=("ingest", given)
+    )
+
+
+def run_of(
+    log: JointLog,
+    robot: Chain | None,
+    options: ReadOptions,
+    *,
+    made: tuple[str, Mapping[str, Any]],
+    tsp: float | None = None,
+    derivative: Method | None = None,
+    name: str | None = None,
+    early: Callable[[JointLog | Run], None] | None = None,
+) -> Run:
+    """Return the run of a log that is there: what `ingest_log` does once it has read it.
+
+    Args:
+        log: The log, its times strictly increasing.
+        robot: The arm, with base and tool; None for no kinematics.
+        options: How it was read: `interval`, `repair` and `period` matter here.
+        made: Which command makes the run, and the options it was given.
+        tsp: Period of the grid in [s]; default: the log's own.
+        derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
+        name: What to call it; default: the log's name.
+        early: Told the run before its kinematics are computed, so that it can be written meanwhile.
+
+    Raises:
+        LogError: If the log's joints are not the robot's, or its times need a grid without end.
+        OptionError: If an interval makes no sense.
+    """
+    found = audit_log(log, robot, interval=options.interval, repaired=options.repair)
+    log = replace(log, inferences=(*log.inferences, *found.inferences))
+    clocked = any(column.role == "time" for column in log.columns)
+    timed = options.period is not None or clocked
+    doubts = implausible(log, found.q, robot, turning(log, robot), found.broken[:, 1:], timed=timed)
+    grid = make_grid(log, tsp)
+    q, left_open = grid.resample_joints(found.q, found.unresolved)
+    warnings = [*log.warnings, *far_from_recorded(robot, log), *found.warnings, *doubts]
+    warnings += [*grid.warnings, *left_open, *([UNUSED_PERIOD] if clocked and options.period else [])]
+    method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
+    qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
+    run = Run(
+        name=name or log.name,
+        log=log,
+        robot=robot,
+        tsp=grid.tsp,
+        t_ns=grid.t_ns,
+        q=q,
+        qd=qd,
+        qdd=qdd,
+        tcp=None,
+        tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
+        audit=found.entries,
+        warnings=tuple(warnings),
+        provenance=provenance(*made, log.files),
+    )
+    if early:
+        early(run)
+    # The joints are being written meanwhile: that takes a core of its own.
+    tcp, noticed = kinematics(robot, q, qd, qdd, threads=1 if early else THREADS)
+    return replace(run, tcp=tcp, warnings=(*warnings, *noticed))
+
+
+def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
+    """Raise an `OptionError` for a period or a method that makes no sense."""
+    if tsp is not None and not 0 < tsp < LONGEST_TSP:
+        raise OptionError(f"--tsp: found {tsp:g} s, allowed: a positive time below {LONGEST_TSP:g} s")
+    if derivative is not None and derivative not in get_args(Method):
+        raise OptionError(f"--derivative: found {derivative}, allowed: {', '.join(get_args(Method))}")
+
+
+def _given(options: ReadOptions) -> dict[str, Any] | None:
+    """Return the reading options that differ from the defaults."""
+    default = asdict(ReadOptions())
+    return {name: value for name, value in asdict(options).items() if value != default[name]} or None
+
+
+def _rates(
+    log: JointLog, grid: Grid, q: FloatArray, method: Method, broken: IntArray, warnings: list[LogWarning]
+) -> tuple[FloatArray, FloatArray]:
+    """Return q' and q'' on the grid: the recorded ones where they agree with the differences.
+
+    Fewer than three samples have no differences that could contradict what was recorded.
+    """
+    computed = derivatives(q, grid.tsp, method, broken)
+    recorded = (log.qd, log.qdd)
+    result = []
+    for values, own, word in zip(computed, recorded, ("rates", "accelerations"), strict=True):
+        on_grid = None if own is None else grid.resample(own)
+        if on_grid is None or len(q) < 3 or recorded_agree(on_grid, values):
+            result.append(values if on_grid is None else on_grid)
+            continue
+        result.append(values)
+        warnings.append(
+            LogWarning(
+                f"recorded-{word}",
+                f"the recorded {word} do not agree with the differences of the joint values;"
+                " the differences are used",
+            )
+        )
+    return result[0], result[1]
+
+
+def kinematics(
+    robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray, *, threads: int = THREADS
+) -> tuple[PointLog | None, list[LogWarning]]:
+    """Return the motion of the tool centre point, if there is a robot, and what there is to say about it.
+
+    Args:
+        robot: The arm, or None.
+        q: Joint values in [rad] or [m], shape (g, joints).
+        qd: Their rates in [rad/s] or [m/s], shape (g, joints).
+        qdd: Their second derivatives in [rad/s2] or [m/s2], shape (g, joints).
+        threads: Blocks of samples worked on side by side.
+
+    Raises:
+        LogError: If the log has another number of joints than the robot.
+    """
+    if robot is None or q.shape[1] == 0:
+        return None, []
+    if q.shape[1] != len(robot.coordinates):
+        raise LogError(
+            f"found {q.shape[1]} joints, allowed: {len(robot.coordinates)}, as robot {robot.name} has"
+        )
+    tcp = point_over_log(robot, q, qd, qdd, threads=threads)
+    notices = missing_visuals(robot)
+    if not tcp.singular.any():
+        return tcp, notices
+    count, first = int(tcp.singular.sum()), int(np.argmax(tcp.singular))
+    said = "ry is +-90 deg: rz and rx are not separately defined, rx = 0 by convention"
+    return tcp, [*notices, LogWarning(EULER_SINGULAR, f"at {count} samples from {first} on {said}")]

@@ -1,0 +1,231 @@
+"""Whether a log can be the motion of an arm: its first and last row, its pace, its joints' limits and speeds.
+
+What is found is a warning: the values stay as they are. Each check is silent where noise, the number format
+of the file or a clock that hurries would explain what it sees.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.repolarization.joint_motion import JointMotion, over_rows
+from urmpipe_pipeline.sources.units.unit_evidence import FASTEST
+
+FAR = 5.0
+"""An outlying end is further off than so many times the largest step between the other rows."""
+
+LEAST_STEP = 0.01
+"""A step below this in [rad] or [m], beside that of the number format, makes no outlier."""
+
+HARDEST_STOP = 100.0
+"""Acceleration in [rad/s2] or [m/s2] that no joint of an arm reaches: a smaller one may be a hard start."""
+
+LEAST_ROWS = 10
+"""A log of fewer rows tells too little of the motion to call one of them an outlier."""
+
+LEAST_RUNS = 10
+"""So many runs of repeated rows make a pattern."""
+
+EVEN_SHARE = 0.95
+"""Share of the runs of repeated rows that are about equally long where a controller is slow."""
+
+REST = 3
+"""A run of repeated rows so many times longer than the usual one is an arm that stands still."""
+
+OVERSHOOT = 1.1
+"""A controller may pass a nominal limit of speed by a tenth."""
+
+NOISE = 5.0
+"""Times the median second difference: no noise step in a million is larger (Gaussian noise: 5.8 sigma)."""
+
+ROUNDED_LIMIT = 0.005
+"""Robot files round their limits, in [rad] or [m]: 6.28 is 0.0032 short of a turn."""
+
+
+def implausible(
+    log: JointLog,
+    q: FloatArray,
+    robot: Chain | None,
+    turning: NDArray[np.bool_],
+    told: NDArray[np.int64],
+    *,
+    timed: bool,
+) -> list[LogWarning]:
+    """Return what an arm would hardly have done.
+
+    Args:
+        log: The log.
+        q: Its joint values, repolarized, in [rad] or [m], shape (n, joints).
+        robot: The arm, with its limits; None if it is not known.
+        turning: Which joints turn (the others slide), shape (joints,).
+        told: Row and joint index of steps that a warning speaks of already, shape (u, 2).
+        timed: Whether the times are those of the motion; else nothing is said of speeds.
+    """
+    if len(q) < 2 or not q.shape[1]:
+        return []
+    motion = JointMotion.of(log, q, turning)
+    outliers = outlying_ends(motion)
+    held = pace(motion)
+    warnings = [*outlier_warnings(motion, outliers), *repeated_samples(motion, held)]
+    if robot is not None:
+        warnings += beyond_limits(motion, robot)
+    if timed:
+        steps = np.maximum(outliers, (1, 0))  # a step belongs to the row that it ends in
+        limits = speed_limits(robot, turning)
+        warnings += too_fast(motion, limits, np.vstack((told, steps)), held * motion.period)
+    return warnings
+
+
+def outlying_ends(motion: JointMotion) -> NDArray[np.int64]:
+    """Return row and joint index where the first or the last row is off the motion of the others.
+
+    It is if the joint steps there by more than `FAR` times what it does anywhere else, and starts or stops
+    harder than an arm can.
+    """
+    q, t_ns = motion.q, motion.t_ns
+    found = [np.empty((0, 2), dtype=np.int64)]
+    for row, beside in motion.ends if len(q) >= LEAST_ROWS else ():
+        dt = max(abs(int(t_ns[row]) - int(t_ns[beside])) / 1e9, motion.period)
+        least = np.maximum(LEAST_STEP + motion.fineness, np.maximum(FAR * motion.inner, HARDEST_STOP * dt**2))
+        joints = np.flatnonzero(np.abs(q[row] - q[beside]) > least)  # never where values are missing: NaN
+        found.append(np.column_stack((np.full(len(joints), row), joints)))
+    return np.concatenate(found)
+
+
+def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[LogWarning]:
+    """Return a warning for each end that is an outlier: which joints are off, and by how much."""
+    q, warnings = motion.q, []
+    for row, beside in motion.ends:
+        joints = outliers[outliers[:, 0] == row, 1].tolist()
+        if joints:
+            steps = ", ".join(
+                f"{motion.names[j]} by {abs(q[row, j] - q[beside, j]):.4g} {motion.units[j]}"
+                f" (other steps: at most {motion.inner[j]:.4g})"
+                for j in joints
+            )
+            said = f"an outlier, off the motion of the other rows: {steps}"
+            hint = "it stays; take it out of the file if the arm was not there"
+            warnings.append(
+                LogWarning("outlier-last" if row else "outlier-first", f"{said}; {hint}", row + 1)
+            )
+    return warnings
+
+
+def pace(motion: JointMotion) -> float:
+    """Return how many rows a moving arm's values stay bit for bit the same, on average; 1 where they do not.
+
+    More than 1 is a slow controller polled fast: its differences are stairs. An arm at rest makes few runs
+    of repeated rows, all long; where the numbers are coarse for a slow motion, they change by a digit, one
+    joint here, one there.
+    """
+    changes = np.flatnonzero(~_repeats(motion.q))
+    runs = np.diff(changes)
+    usual = float(np.median(runs)) if len(runs) >= LEAST_RUNS else 1.0
+    if usual < 2.0:
+        return 1.0
+    moving = runs <= REST * usual
+    even = (runs >= 2) & (np.abs(runs - usual) <= max(1.0, usual / 4))
+    if moving.sum() < LEAST_RUNS or even[moving].mean() < EVEN_SHARE or not _in_one_go(motion.q, changes):
+        return 1.0
+    return float(runs[moving].mean())
+
+
+def repeated_samples(motion: JointMotion, rows: float) -> list[LogWarning]:
+    """Return a warning if the values stay the same for several rows, as `pace` tells."""
+    if rows == 1.0:
+        return []
+    repeats, time = _repeats(motion.q), rows * motion.period
+    said = f"the joint values change only every {rows:.3g} rows ({time * 1e3:.4g} ms)"
+    count = f"{int(repeats.sum())} of {len(motion.q)} rows repeat the row before"
+    hint = f"a slow controller polled fast? --tsp {time:.4g} takes each value once"
+    return [LogWarning("repeated-samples", f"{said}, {count}: {hint}", int(np.argmax(repeats)) + 2)]
+
+
+def _repeats(q: FloatArray) -> NDArray[np.bool_]:
+    """Tell which rows, from the second on, are the row before in every joint."""
+    same: NDArray[np.bool_] = q[1:, 0] == q[:-1, 0]
+    for j in range(1, q.shape[1]):
+        if not same.any():
+            break
+        same &= q[1:, j] == q[:-1, j]
+    return same
+
+
+def _in_one_go(q: FloatArray, changes: NDArray[np.int64]) -> bool:
+    """Tell whether the joints change together, or by steps of several sizes, and not digit by digit."""
+    steps = np.abs(q[changes + 1] - q[changes])
+    together = ((steps > 0.0).sum(axis=1) > 1).mean() >= EVEN_SHARE
+    small, large = np.quantile(np.fmax.reduce(steps, axis=1), (0.1, 0.9))
+    return bool(together or large > 1.5 * small)
+
+
+def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
+    """Return a warning for each joint that leaves its limits: how often, where first, where worst."""
+    q, slack = motion.q, ROUNDED_LIMIT + motion.fineness
+    lower, upper = np.array([(joint.lower, joint.upper) for joint in robot.moving]).T
+    if not np.isfinite((lower, upper)).any():
+        return []
+    kept = (over_rows(np.minimum, q) >= lower - slack) & (over_rows(np.maximum, q) <= upper + slack)
+    warnings = []
+    for j in np.flatnonzero(~kept).tolist():  # also the columns where values are missing: NaN
+        beyond = np.maximum(lower[j] - q[:, j], q[:, j] - upper[j])
+        rows = np.flatnonzero(beyond > slack[j])
+        if len(rows):
+            worst = int(rows[np.argmax(beyond[rows])])
+            limits = f"its limits of {lower[j]:.6g} to {upper[j]:.6g} {motion.units[j]}"
+            where = f"in {len(rows)} of {len(q)} rows, at worst {q[worst, j]:.6g} in row {worst + 1}"
+            said = f"{motion.names[j]} is beyond {limits} {where}: check robot, unit, sign and zero"
+            warnings.append(LogWarning("joint-limit", said, int(rows[0]) + 1))
+    return warnings
+
+
+def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
+    """Return the largest speed of each joint: the robot's, else `FASTEST` for one that turns, else inf."""
+    fallback = np.where(turning, FASTEST, np.inf)
+    if robot is None:
+        return fallback
+    own = np.array([joint.velocity for joint in robot.moving])
+    return np.where(np.isfinite(own), own, fallback)
+
+
+def too_fast(
+    motion: JointMotion, limits: FloatArray, told: NDArray[np.int64], period: float
+) -> list[LogWarning]:
+    """Return a warning for each joint that steps faster than it can: how often, where first, where worst.
+
+    Rows closer in time than the usual period are taken to be that far apart: it is their clock that hurries.
+
+    Args:
+        motion: The motion.
+        limits: Largest speeds in [rad/s] or [m/s], shape (joints,).
+        told: Row and joint index of steps that a warning speaks of already, shape (u, 2).
+        period: Usual time from one value to the next in [s].
+    """
+    q = motion.q
+    largest = np.max([motion.inner, *(np.abs(q[row] - q[beside]) for row, beside in motion.ends)], axis=0)
+    suspects = np.flatnonzero(~(largest <= OVERSHOOT * limits * period + motion.fineness)).tolist()
+    dt = np.maximum(np.diff(motion.t_ns) / 1e9, period) if suspects else np.empty(0)
+    warnings = []
+    for j in suspects:
+        steps = np.abs(np.diff(q[:, j]))
+        fast = steps > OVERSHOOT * limits[j] * dt + motion.fineness[j] + _noise(q[:, j])
+        fast[told[told[:, 1] == j, 0] - 1] = False
+        rows = np.flatnonzero(fast)
+        if len(rows):
+            speeds = steps[rows] / dt[rows]
+            worst = f"at worst at {speeds.max():.4g} {motion.units[j]}/s to row {rows[np.argmax(speeds)] + 2}"
+            said = f"{motion.names[j]} moves faster than {limits[j]:.4g} {motion.units[j]}/s"
+            said = f"{said} in {len(rows)} of {len(steps)} steps, {worst}: check robot, unit and clock"
+            warnings.append(LogWarning("speed-limit", said, int(rows[0]) + 2))
+    return warnings
+
+
+def _noise(column: FloatArray) -> float:
+    """Return how large a step is that noise alone may make, from what is not smooth in a column."""
+    second = np.abs(np.diff(column, 2))
+    second = second[~np.isnan(second)]
+    return NOISE * float(np.median(second)) if len(second) else 0.0

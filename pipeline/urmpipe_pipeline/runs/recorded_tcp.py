@@ -1,0 +1,107 @@
+"""Forward kinematics against the tool centre point that the log recorded: where they do not meet."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import combinations
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, fit, spread
+
+LACKING_TOOL = "recorded-tcp-tool"
+"""The kind of a hint beside a verdict of fail: it says nothing against the log."""
+
+FAR = 0.03
+"""Root mean square distance in [m] that no calibration and no rounding explain."""
+
+
+def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
+    """Return a warning if the kinematics of a robot do not come near the recorded tool centre point.
+
+    A constant tool is allowed for. What would bring them together is said: another base, or two joints
+    exchanged. A log that hardly moves tells nothing, since some tool always fits.
+
+    Args:
+        robot: The arm, or None.
+        log: The log, in SI.
+    """
+    if robot is None or log.tcp_position is None or log.q.shape[1] != len(robot.moving):
+        return []
+    rows = spread(log.rows)
+    q, recorded = log.q[rows], log.tcp_position[rows]
+    found = fit(robot, q, recorded)
+    if found is None or not np.isfinite(found.with_tool) or min(found.distance, found.with_tool) <= FAR:
+        return []
+    said = (
+        f"the kinematics of {robot.name} stay {found.distance * 1e3:.1f} mm (rms) from the recorded TCP"
+        f" ({found.with_tool * 1e3:.1f} mm with the tool that fits best)"
+    )
+    unknown = "robot, base, units, signs or order of the joints may differ"
+    remedy = next(_remedies(robot, log, q, recorded), unknown)
+    return [LogWarning("recorded-tcp-far", f"{said}: {remedy}")]
+
+
+def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
+    """Return a warning if kinematics and recorded tool centre point lie apart by what a tool explains.
+
+    Args:
+        robot: The arm.
+        log: The log, in SI, with a recorded position.
+    """
+    if log.tcp_position is None:
+        return []
+    rows = spread(log.rows)
+    q, recorded = log.q[rows], log.tcp_position[rows]
+    found, bare = fit(robot, q, recorded), fit(replace(robot, tool=Transform()), q, recorded)
+    if found is None or bare is None or found.distance <= CLOSE_WITH_TOOL:
+        return []
+    apart = f"the kinematics of {robot.name} stay {found.distance * 1e3:.1f} mm (rms) from the recorded TCP"
+    if not np.isfinite(found.with_tool):
+        said = f"{apart}, and the log moves too little to tell why: is a --tool or a --base missing?"
+    elif CLEARLY * found.with_tool <= found.distance and found.with_tool <= CLOSE_WITH_TOOL:
+        tool = ",".join(f"{round(value, 4) + 0.0:.4f}" for value in bare.tool)  # + 0.0: no -0.0
+        said = f"{apart}, but {found.with_tool * 1e3:.2f} mm with --tool {tool}"
+    else:
+        return []
+    return [LogWarning(LACKING_TOOL, said)]
+
+
+def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[str]:
+    """Yield what brings kinematics and recorded points together."""
+    columns = [column for column in log.columns if column.role == "joint"]
+    called = [column.header or str(column.number) for column in columns] or log.joints
+    for first, second in combinations(range(q.shape[1]), 2):
+        order = list(range(q.shape[1]))
+        order[first], order[second] = second, first
+        found = fit(robot, q[:, order], recorded)
+        if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
+            names = ",".join(called[j] for j in order)
+            yield f"with {log.joints[first]} and {log.joints[second]} exchanged they agree (--joints {names})"
+    base, distance = _base(robot, q, recorded)
+    if distance <= CLOSE_WITH_TOOL:
+        yield f"on another base they agree within {distance * 1e3:.2f} mm (--base {base})"
+
+
+def _base(robot: Chain, q: FloatArray, recorded: FloatArray) -> tuple[str, float]:
+    """Return the base with which the points agree best, as an option, and the rms distance left in [m].
+
+    Source: Kabsch 1976: with the singular values of sum (a - mean a)(b - mean b)^T = U S V^T the rotation is
+    V diag(1, 1, det V U^T) U^T.
+    """
+    known = np.isfinite(q).all(axis=1) & np.isfinite(recorded).all(axis=1)
+    computed, wanted = positions_over_log(replace(robot, base=Transform()), q[known]), recorded[known]
+    middle, target = computed.mean(axis=0), wanted.mean(axis=0)
+    u, _, vt = np.linalg.svd((computed - middle).T @ (wanted - target))
+    turn = vt.T @ np.diag([1.0, 1.0, np.linalg.det(vt.T @ u.T)]) @ u.T
+    shift = target - turn @ middle
+    miss = computed @ turn.T + shift - wanted
+    x, y, z = (tuple(row) for row in turn.tolist())
+    numbers = (*shift.tolist(), *rpy_of((x, y, z)))
+    return ",".join(f"{value:.4f}" for value in numbers), float(np.sqrt((miss**2).sum(axis=1).mean()))

@@ -1,0 +1,176 @@
+"""What `ingest` returns: plain arrays, a table (`to_frame`) and JSON (`to_dict`)."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import PointLog
+from urmpipe_models.orientation import NAMES, angles
+from urmpipe_pipeline.joint_log import JointLog, LogWarning, seconds
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.runs.ghosts import Ghost, Goals
+from urmpipe_pipeline.runs.grid import interpolate
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCHEMA = 1
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Run:
+    """One ingested log: repolarized, on a uniform grid, with the arm's kinematics.
+
+    Attributes:
+        name: The log's name.
+        log: The file's own rows.
+        robot: The arm, or None for a log without kinematics.
+        tsp: Sampling period of the grid in [s].
+        t_ns: Grid times in integer [ns], shape (g,).
+        q: Repolarized joint values in [rad] or [m], shape (g, joints).
+        qd: Rates in [rad/s] or [m/s], shape (g, joints).
+        qdd: Second derivatives in [rad/s2] or [m/s2], shape (g, joints).
+        tcp: Motion of the tool centre point, or None without a robot.
+        tcp_recorded: The position that the log itself recorded, on the grid, in [m], shape (g, 3).
+        audit: What the repolarizer did and what it could not decide, by row.
+        warnings: What a person should know.
+        provenance: How to repeat it.
+        recording: Where it was written.
+        ghosts: The other branches of what inverse kinematics solved, times from the log's first row.
+        goals: What it was solved for, times from the log's first row; None for a run of anything else.
+    """
+
+    name: str
+    log: JointLog
+    robot: Chain | None
+    tsp: float
+    t_ns: IntArray
+    q: FloatArray
+    qd: FloatArray
+    qdd: FloatArray
+    tcp: PointLog | None
+    tcp_recorded: FloatArray | None
+    audit: tuple[AuditEntry, ...]
+    warnings: tuple[LogWarning, ...]
+    provenance: Provenance
+    recording: Path | None = None
+    ghosts: tuple[Ghost, ...] = ()
+    goals: Goals | None = None
+
+    @property
+    def t(self) -> FloatArray:
+        """Grid times in [s], shape (g,)."""
+        return seconds(self.t_ns)
+
+    @property
+    def repolarizations(self) -> tuple[AuditEntry, ...]:
+        """Every wrap that was undone."""
+        return tuple(entry for entry in self.audit if entry.kind == "wrap")
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last row, in [s]."""
+        return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9
+
+    @property
+    def single_poses(self) -> bool:
+        """True of solved targets without times: no motion joins one pose and the next."""
+        return self.goals is not None and not any(column.role == "time" for column in self.log.columns)
+
+    @property
+    def rotation_recorded(self) -> FloatArray | None:
+        """The orientation that the log itself recorded, on the grid, shape (g, k); None without one.
+
+        In its own form (of a matrix as a quaternion x, y, z, w) in [rad] or [-], without jumps between the
+        names of one rotation, and so linear between the rows.
+        """
+        form = self.log.rotation_form
+        values = self.log.tcp_quat_xyzw if form == "matrix" else self.log.tcp_rotation_continuous
+        if form is None or values is None:
+            return None
+        if not np.array_equal(self.t_ns, self.log.t_ns):
+            values = interpolate(self.t_ns, self.log.t_ns, values)
+        return values if angles(form) else values / np.linalg.norm(values, axis=1, keepdims=True)
+
+    @property
+    def rotation_names(self) -> tuple[str, ...]:
+        """What the columns of `rotation_recorded` are called; none without one."""
+        form = self.log.rotation_form
+        return () if form is None else NAMES["quat_xyzw" if form == "matrix" else form]
+
+    @property
+    def joint_units(self) -> list[str]:
+        """The SI unit of each joint, rad or m: by the robot, else by the unit of its column."""
+        if self.robot is not None and self.log.joints:
+            return ["rad" if joint.kind == "revolute" else "m" for joint in self.robot.moving]
+        told = (self.log.units.get(name, "rad") for name in self.log.joints)
+        return ["rad" if unit in ("rad", "deg") else "m" for unit in told]
+
+    def joint_unit(self, per: str = "") -> str:
+        """Return the SI unit of all joints: rad, m or both.
+
+        Args:
+            per: What divides it: "", "/s" or "/s2".
+        """
+        return " or ".join(f"{unit}{per}" for unit in sorted(set(self.joint_units) or {"rad"}, reverse=True))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a grid sample: t [s], the joints, their rates, and the TCP where there is one."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {"t": self.t}
+        for prefix, values in (("", self.q), ("d_", self.qd), ("dd_", self.qdd)):
+            columns |= {f"{prefix}{name}": values[:, i] for i, name in enumerate(self.log.joints)}
+        if self.tcp is not None:
+            for name, values in (
+                ("p", self.tcp.position), ("v", self.tcp.velocity), ("a", self.tcp.acceleration),
+            ):  # fmt: skip
+                columns |= {f"{name}{axis}": values[:, i] for i, axis in enumerate("xyz")}
+            columns |= {name: self.tcp.euler_zyx[:, i] for i, name in enumerate(("rz", "ry", "rx"))}
+        return pd.DataFrame(columns)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object that `urmpipe ingest --json` prints."""
+        return {
+            "schema": SCHEMA,
+            "name": self.name,
+            "samples": self.log.rows,
+            "duration": self.duration,
+            "period": self.log.period,
+            "tsp": self.tsp,
+            "grid_samples": len(self.t_ns),
+            "clock_start": self.log.clock_start,
+            "joints": list(self.log.joints),
+            "source": self.log.source,
+            "robot": self.robot.name if self.robot else None,
+            "units": dict(self.log.units),
+            "inferences": [asdict(inference) for inference in self.log.inferences],
+            "repolarizations": [entry.to_dict() for entry in self.repolarizations],
+            "audit": [entry.to_dict() for entry in self.audit],
+            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+            "recording": str(self.recording) if self.recording else None,
+        }
+
+
+def json_ready(value: Any) -> Any:
+    """Return a value as JSON can hold it: arrays as lists, NaN and infinities as null."""
+    if isinstance(value, Mapping):
+        return {str(key): json_ready(item) for key, item in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [json_ready(item) for item in value]
+    if isinstance(value, np.ndarray):
+        return json_ready(value.tolist())
+    if isinstance(value, np.generic):
+        return json_ready(value.item())
+    if isinstance(value, float) and not math.isfinite(value):
+        return None
+    return str(value) if isinstance(value, Path) else value

@@ -1,0 +1,1 @@
+"""What a co-simulation recorded, and how its signals are grouped."""

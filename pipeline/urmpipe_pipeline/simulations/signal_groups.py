@@ -1,0 +1,140 @@
+"""Which signals of a simulation share a plot, and their colours: the same in the viewer and in the report."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import groupby
+
+from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.display_unit import display_unit
+from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS
+from urmpipe_pipeline.simulations.simulation import Signal, Simulation
+
+MOST = len(JOINT_COLOURS)
+"""Lines in a plot, so that each has a colour of its own; only an array that has more gets more."""
+
+NAMED = 3
+"""Variables that the title of a plot names; of more, the first and the last."""
+
+
+FAMILY = 3
+"""So many blocks of one kind with the same variables are plotted together, variable by variable."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Group:
+    """Signals in one unit which share a plot: those of a block, or one variable of several like blocks.
+
+    Attributes:
+        block: Name of the block, or "drive1 ... drive6" of several.
+        unit: Their unit; empty for numbers without one.
+        signals: At least one.
+        verdict: The verdict on them, if they are what a delta meter is judged by.
+        family: Whether they are of several blocks.
+    """
+
+    block: str
+    unit: str
+    signals: tuple[Signal, ...]
+    verdict: DeltaVerdict | None = None
+    family: bool = False
+
+    @property
+    def variables(self) -> str:
+        """What is plotted: "theta1, theta2", or "Mk ... i" of many."""
+        names = list(dict.fromkeys(one.variable for one in self.signals))
+        return ", ".join(names) if len(names) <= NAMED else f"{names[0]} ... {names[-1]}"
+
+    @property
+    def names(self) -> tuple[tuple[str, ...], ...]:
+        """What the legend calls each scalar, by signal: with its block where there are several."""
+        return tuple(one.names if self.family else one.variables for one in self.signals)
+
+    @property
+    def bracket(self) -> str:
+        """The unit as it stands behind a name: rad, or - for numbers without one."""
+        return self.unit or "-"
+
+    @property
+    def shown(self) -> tuple[str, float]:
+        """The unit that people like to see them in, if all have the same, and how many of it one unit is."""
+        wanted = {one.display_unit for one in self.signals}
+        return display_unit(self.unit, wanted.pop() if len(wanted) == 1 else "")
+
+    @property
+    def colours(self) -> tuple[tuple[str, ...], ...]:
+        """The colour of each scalar as #rrggbb, by signal: of three coordinates those of the axes."""
+        widths = [one.columns.shape[1] for one in self.signals]
+        spatial = self.verdict is not None or widths == [3]
+        palette = tuple(AXIS_COLOURS.values()) if spatial else JOINT_COLOURS
+        starts = [sum(widths[:i]) for i in range(len(widths))]
+        return tuple(
+            tuple(palette[(start + k) % len(palette)] for k in range(width))
+            for start, width in zip(starts, widths, strict=True)
+        )
+
+
+def groups_of(simulation: Simulation) -> list[Group]:
+    """Return the groups of all signals, by block in the order in which the blocks first stand."""
+    families = _families(simulation)
+    found: list[Group] = []
+    for block in dict.fromkeys(one.block for one in simulation.signals):
+        family = next((one for one in families if block in one), None)
+        if family is None:
+            found += _groups_of_block(simulation, block)
+        elif block == family[0]:
+            found += _groups_of_family(simulation, family)
+    return found
+
+
+def _families(simulation: Simulation) -> list[list[str]]:
+    """Return the names of blocks of one kind that recorded the same variables; none that is judged."""
+    judged = {one.block for one in simulation.verdicts}
+    kinds: dict[object, list[str]] = {}
+    for block in simulation.blocks:
+        own = tuple(
+            (one.variable, one.unit, one.columns.shape[1])
+            for one in simulation.signals
+            if one.block == block.name
+        )
+        if own and block.name not in judged:
+            kinds.setdefault((block.kind, block.source, own), []).append(block.name)
+    return [names for names in kinds.values() if len(set(names)) >= FAMILY]
+
+
+def _groups_of_family(simulation: Simulation, family: list[str]) -> Iterator[Group]:
+    """Yield the signals of several blocks, variable by variable."""
+    label = f"{family[0]} ... {family[-1]}"
+    members = [one for one in simulation.signals if one.block in family]
+    for variable in dict.fromkeys(one.variable for one in members):
+        some = [one for one in members if one.variable == variable]
+        yield from (Group(label, some[0].unit, packed, None, True) for packed in _packed(some))
+
+
+def _groups_of_block(simulation: Simulation, block: str) -> Iterator[Group]:
+    """Yield what is judged first, then the other signals by unit."""
+    verdict = next((one for one in simulation.verdicts if one.block == block), None)
+    own = [one for one in simulation.signals if one.block == block]
+    judged = [one for one in own if verdict is not None and one.variable in verdict.variables]
+    if judged:
+        yield Group(block, judged[0].unit, tuple(judged), verdict)
+    others = [one for one in own if one not in judged]
+    order = list(dict.fromkeys(one.unit for one in others))
+    others.sort(key=lambda one: order.index(one.unit))
+    for unit, signals in groupby(others, key=lambda one: one.unit):
+        yield from (Group(block, unit, some) for some in _packed(list(signals)))
+
+
+def _packed(signals: list[Signal]) -> Iterator[tuple[Signal, ...]]:
+    """Yield as many signals at a time as a plot has colours for."""
+    some: list[Signal] = []
+    lines = 0
+    for one in signals:
+        width = one.columns.shape[1]
+        if some and lines + width > MOST:
+            yield tuple(some)
+            some, lines = [], 0
+        some.append(one)
+        lines += width
+    yield tuple(some)

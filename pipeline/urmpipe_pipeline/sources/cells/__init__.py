@@ -1,0 +1,1 @@
+"""The cells of a text: numbers, texts, and clocks written as text."""

@@ -1,0 +1,250 @@
+"""Clocks written as text: dates, times of day, lengths of time. Which forms there are, and what a cell means.
+
+A form is a regular expression whose groups name the parts of a cell. Cells of one shape (the same signs but
+for their digits) have the same parts at the same places: one match tells how to read all of them at once.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import IntArray
+from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
+from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+Flags = NDArray[np.bool_]
+
+DATE, TIME_OF_DAY, LENGTH = "date", "time of day", "s"
+"""Units of a clock's column that is text."""
+
+SECOND_NS = 10**9
+DAY_NS = 86_400 * SECOND_NS
+
+_TAILS = {"s": "decimals", "us": "microseconds", "ms": "milliseconds"}  # the digits behind a third colon
+_TAIL_NS = {"us": 1000, "ms": 10**6}
+_WORDS_NS = {"sec": SECOND_NS, "s": SECOND_NS, "ms": 10**6, "us": 1000, "ns": 1}
+_WORDS_NS |= {"min": 60 * SECOND_NS, "hr": 3600 * SECOND_NS, "h": 3600 * SECOND_NS}
+_WORDS_NS |= dict.fromkeys(("day", "days"), DAY_NS)
+
+
+class Parts:
+    """The parts of cells of one shape.
+
+    Args:
+        match: The match of a form with one of the cells.
+        cells: Their bytes, shape (n, length).
+    """
+
+    def __init__(self, match: re.Match[str], cells: NDArray[np.uint8]) -> None:
+        self.cells = cells
+        self._texts = match.groupdict()
+        self._places = {name: match.span(name) for name, text in self._texts.items() if text}
+
+    def text(self, name: str) -> str:
+        """Return a part that is no number, the same in all cells: lower case, empty if it is not there."""
+        return (self._texts.get(name) or "").lower()
+
+    def sign(self, name: str) -> int:
+        """Return -1 if a part is a minus, else 1."""
+        return -1 if self.text(name) == "-" else 1
+
+    def number(self, name: str) -> IntArray:
+        """Return the whole numbers of a part, 0 where it is not there, shape (n,)."""
+        start, end = self._places.get(name, (0, 0))
+        numbers = np.zeros(len(self.cells), dtype=np.int64)
+        for place in range(start, end):
+            numbers *= 10
+            numbers += self.cells[:, place]
+            numbers -= ord("0")
+        return numbers
+
+    def billionths(self, name: str) -> IntArray:
+        """Return a part of decimals, nine at the most, as a count of 1e-9, shape (n,)."""
+        numbers = self.number(name)
+        numbers *= 10 ** (9 - len(self._texts.get(name) or ""))
+        return numbers
+
+
+_UNPADDED = "microseconds not zero-padded"
+
+
+@dataclass(frozen=True, slots=True)
+class Form:
+    """One way to write a clock.
+
+    Attributes:
+        name: What it is called.
+        unit: The unit of its column: DATE, TIME_OF_DAY or LENGTH.
+        pattern: What a whole cell looks like.
+        timed: Whether a cell holds a time, not the date alone.
+        keys: The units that ask for it where its cells may be of another form as well.
+        tail: What the digits behind a third colon count: s (decimals), ms or us.
+        last: Whether it is tried only if the clock runs backwards in every other form.
+    """
+
+    name: str
+    unit: str
+    pattern: re.Pattern[str]
+    timed: bool = True
+    keys: tuple[str, ...] = ()
+    tail: str = "s"
+    last: bool = False
+
+    @property
+    def dated(self) -> bool:
+        """Whether a cell holds a date."""
+        return self.unit == DATE
+
+    @property
+    def half(self) -> str | None:
+        """What it is half a clock of, date or time of day; None if it says all."""
+        if self.dated:
+            return None if self.timed else DATE
+        return TIME_OF_DAY if self.unit == TIME_OF_DAY else None
+
+    def has_zone(self, cell: str) -> bool:
+        """Return whether a cell says how far its clock is ahead of UTC."""
+        match = self.pattern.match(cell)
+        return match is not None and bool(match.groupdict().get("zone"))
+
+    def nanoseconds(self, parts: Parts) -> tuple[IntArray, Flags]:
+        """Return what cells mean in [ns], and which of them mean something.
+
+        A date counts from 1970 in UTC (without a time zone it is taken as UTC), a time of day from midnight.
+
+        Args:
+            parts: The cells.
+        """
+        if parts.text("word"):
+            return _length(parts)
+        time, valid = _time(parts, self.tail)
+        if not self.dated:
+            days = parts.number("days")
+            total = parts.sign("days_sign") * days * DAY_NS + parts.sign("sign") * time
+            return total, valid & (days < LONGEST_NS // DAY_NS)
+        date, real = _date(parts)
+        return date * DAY_NS + time - _zone(parts), real & valid & (time < DAY_NS)
+
+
+def _date(parts: Parts) -> tuple[IntArray, Flags]:
+    """Return days since 1970, and which are days of the calendar within 146 years of it."""
+    name = parts.text("month_name")
+    month = parts.number("month") + (vocabulary().months.get(name, 0) if name else 0)
+    written = (parts.number("year") * 100 + month) * 100 + parts.number("day")
+    if len(written) and (written == written[0]).all():
+        written = written[:1]
+    few = np.sort(written)  # np.unique would import numpy.ma
+    few = few[np.append(True, few[1:] != few[:-1])]
+    places = np.searchsorted(few, written)
+    day, real = _days_since_1970(few // 10_000, few // 100 % 100, few % 100)
+    shape = (len(parts.cells),)
+    return np.broadcast_to(day[places], shape), np.broadcast_to(real[places], shape)
+
+
+def _days_since_1970(year: IntArray, month: IntArray, day: IntArray) -> tuple[IntArray, Flags]:
+    first = ((year - 1970) * 12 + month - 1).astype("datetime64[M]")
+    dates = first.astype("datetime64[D]") + (day - 1)
+    days = dates.astype(np.int64)
+    real = (month >= 1) & (month <= 12) & (dates.astype("datetime64[M]") == first)
+    return days, real & (np.abs(days) < LONGEST_NS // DAY_NS)
+
+
+def _time(parts: Parts, tail: str) -> tuple[IntArray, Flags]:
+    """Return hours, minutes and seconds in [ns], and which are a time."""
+    hour, minute, second = (parts.number(name) for name in ("hour", "minute", "second"))
+    valid = (minute < 60) & (second < 60)
+    half = parts.text("half")
+    if half:
+        valid &= (hour >= 1) & (hour <= 12)
+        hour = hour % 12 + (12 if half == "p" else 0)
+    total = ((hour * 60 + minute) * 60 + second) * SECOND_NS + parts.billionths("decimals")
+    if tail == "s":
+        return total + parts.billionths("count"), valid
+    count, digits = parts.number("count"), len(parts.text("count"))
+    padded = (digits > 1) & (count < 10 ** (digits - 1))  # 05 are decimals: a count is not written so
+    return total + count * _TAIL_NS[tail], valid & ~padded & (count * _TAIL_NS[tail] < SECOND_NS)
+
+
+def _zone(parts: Parts) -> IntArray:
+    """Return how far the clock is ahead of UTC in [ns]."""
+    minutes = parts.number("zone_hour") * 60 + parts.number("zone_minute")
+    return parts.sign("ahead") * minutes * (60 * SECOND_NS)
+
+
+def _length(parts: Parts) -> tuple[IntArray, Flags]:
+    """Return a number with a unit behind it in [ns], rounded once, half to even, and which 64 bits hold."""
+    unit, whole = _WORDS_NS[parts.text("word")], parts.number("whole")
+    decimals, divisor = parts.billionths("decimals"), max(SECOND_NS // unit, 1)
+    decimals *= max(unit // SECOND_NS, 1)
+    low, rest = decimals // divisor, decimals % divisor
+    low += (2 * rest > divisor) | ((2 * rest == divisor) & (low % 2 == 1))
+    valid = whole < LONGEST_NS // unit
+    return parts.sign("sign") * (np.where(valid, whole, 0) * unit + low), valid
+
+
+def _forms() -> tuple[Form, ...]:
+    """Return all forms that are known."""
+    decimals = r"(?:[.,](?P<decimals>\d{1,9}))?"
+    minutes = r"(?P<minute>\d\d)"
+    clock = rf"(?P<hour>\d{{1,5}}):{minutes}(?::(?P<second>\d\d){decimals})?"
+    counted = rf"(?P<hour>\d{{1,5}}):{minutes}:(?P<second>\d\d):(?P<count>\d{{1,9}})"
+    unpadded = rf"(?P<hour>\d{{1,5}}):{minutes}:(?P<second>\d\d)[.,](?P<count>\d{{1,6}})"
+    dense = rf"(?P<hour>\d\d){minutes}(?P<second>\d\d){decimals}"
+    half = r"(?: ?(?P<half>[ap])\.?m\.?)?"
+    zone = r"(?P<zone> ?(?:z|utc|gmt|(?P<ahead>[+-])(?P<zone_hour>\d\d):?(?P<zone_minute>\d\d)?))?"
+    dates = {
+        "year first": (r"(?P<year>\d{4})(?P<gap>[-/.])(?P<month>\d{1,2})(?P=gap)(?P<day>\d{1,2})", "ymd"),
+        "day first": (r"(?P<day>\d{1,2})(?P<gap>[-/.])(?P<month>\d{1,2})(?P=gap)(?P<year>\d{4})", "dmy"),
+        "month first": (r"(?P<month>\d{1,2})(?P<gap>[-/.])(?P<day>\d{1,2})(?P=gap)(?P<year>\d{4})", "mdy"),
+        "month by name": (r"(?P<day>\d{1,2})[-/. ]{1,2}(?P<month_name>[a-z]+)[-/. ]{1,2}(?P<year>\d{4})", ""),
+        "without signs": (r"(?P<year>\d{4})(?P<month>\d\d)(?P<day>\d\d)", "ymd"),
+    }
+    between = r"(?:t|_|,? +)"
+    found = []
+    for style, (date, key) in dates.items():
+        keys = (key,) if key else ()
+        found.append(Form(f"date, {style}", DATE, _compiled(date), timed=False, keys=keys))
+        whole = _compiled(f"{date}{between}(?:{clock}){half}{zone}")
+        found.append(Form(f"date and time, {style}", DATE, whole, keys=keys))
+        name, loose = f"date and time, {style}, {_UNPADDED}", _compiled(date + between + unpadded)
+        found.append(Form(name, DATE, loose, True, keys, "us", last=True))
+        for tail, what in _TAILS.items():
+            name = f"date and time, {style}, {what} behind the last colon"
+            found.append(Form(name, DATE, _compiled(date + between + counted), True, (*keys, tail), tail))
+    iso = _compiled(f"{dates['without signs'][0]}{between}{dense}{zone}")
+    found.append(Form("date and time, without signs", DATE, iso))
+    found.append(Form("time of day", TIME_OF_DAY, _compiled(rf"(?P<sign>[+-]?){clock}{half}")))
+    loose = _compiled(unpadded)
+    found.append(Form(f"time of day, {_UNPADDED}", TIME_OF_DAY, loose, tail="us", last=True))
+    for tail, what in _TAILS.items():
+        name = f"time of day, {what} behind the last colon"
+        found.append(Form(name, TIME_OF_DAY, _compiled(counted), True, (tail,), tail))
+    days = rf"(?P<days_sign>[+-]?)(?P<days>\d{{1,6}}) days?(?: \+?{clock})?"
+    found.append(Form("days, hours, minutes and seconds", LENGTH, _compiled(days)))
+    short = rf"{minutes}:(?P<second>\d\d)[.,](?P<decimals>\d{{1,9}})"
+    found.append(Form("minutes and seconds", LENGTH, _compiled(short)))
+    words = "|".join(_WORDS_NS)
+    number = rf"(?P<sign>[+-]?)(?P<whole>\d{{1,15}}){decimals} ?(?P<word>{words})"
+    found.append(Form("a number with its unit", LENGTH, _compiled(number)))
+    return tuple(found)
+
+
+def _compiled(pattern: str) -> re.Pattern[str]:
+    return re.compile(rf" *{pattern} *\Z", re.IGNORECASE | re.ASCII)
+
+
+FORMS: Sequence[Form] = _forms()
+"""All forms, the usual ones first."""
+
+
+def looks_like_a_clock(cell: str) -> bool:
+    """Return whether the text of a cell may be a time."""
+    if len(cell) >= LONGEST_CELL or cell[:1] not in "+-0123456789":
+        return False
+    return any(form.pattern.match(cell) for form in FORMS)

@@ -1,0 +1,198 @@
+"""The clock: which column is the time, its unit or the form of its text."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal
+
+import numpy as np
+
+from urmpipe_models.arrays import IntArray
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
+from urmpipe_pipeline.sources.cells.text_clock import DATE, SECOND_NS, TIME_OF_DAY
+from urmpipe_pipeline.sources.clocks.clock_columns import time_columns, times_of
+from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS, unit_of
+from urmpipe_pipeline.sources.clocks.stamps import known_forms
+from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.table import ClockColumn
+from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
+
+PAPER_PERIOD = 0.005
+"""Tsp of the paper in [s]: taken where nothing tells the time. Source: [UrmArm2021]_ eq. 22."""
+
+FORMS_TOLD = "numbers in s, ms, us or ns, or times such as 2021-04-11 22:27:21.573, 22:27:21.573, 0.005 sec"
+"""What a clock may look like, for errors."""
+
+
+_DATES = (19_700_101_000_000, 21_000_101_000_000)
+"""Dates written as numbers, YYYYMMDDhhmmss."""
+
+
+@dataclass(frozen=True, slots=True)
+class Clock:
+    """The clock of one table.
+
+    Attributes:
+        columns: One column, or seconds and nanoseconds apart; none if the table has no time.
+        parts: The same for the reader.
+        unit: Its unit: s, ms, us, ns, or where it is text "date" or "time of day".
+        told: Whether the user or the name of its column tells that unit.
+        inferences: What was found out.
+        warnings: What a person should know.
+    """
+
+    columns: tuple[Column, ...] = ()
+    parts: tuple[ClockColumn, ...] = ()
+    unit: str = "s"
+    told: bool = False
+    inferences: tuple[Inference, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
+
+    @property
+    def units(self) -> dict[str, str]:
+        """The unit of each of its columns by name."""
+        return {column.name: _unit_of(part) for column, part in zip(self.columns, self.parts, strict=True)}
+
+    def shown(self, nanoseconds: int) -> str:
+        """Return a time as the file would write it."""
+        if self.unit == DATE:
+            seconds, rest = divmod(nanoseconds, SECOND_NS)
+            date = np.datetime64(seconds, "s").item().isoformat(" ")
+            return f"{date}.{rest:09d}".rstrip("0").rstrip(".")
+        if self.unit == TIME_OF_DAY:
+            sign, (seconds, rest) = "-" * (nanoseconds < 0), divmod(abs(nanoseconds), SECOND_NS)
+            clock = f"{seconds // 3600:02d}:{seconds // 60 % 60:02d}:{seconds % 60:02d}"
+            return f"{sign}{clock}.{rest:09d}".rstrip("0").rstrip(".")
+        value = Decimal(nanoseconds).scaleb(-EXPONENTS[self.unit]).normalize()
+        return f"{value:f} {self.unit}"
+
+
+def _unit_of(part: ClockColumn) -> str:
+    """Return the unit of a column of the clock."""
+    if part.forms:
+        return part.forms[0].unit
+    return next(unit for unit, exponent in EXPONENTS.items() if exponent == part.exponent)
+
+
+def find_clock(
+    columns: Sequence[Column],
+    layout: Layout,
+    options: ReadOptions,
+    source: KnownSource | None,
+    units: Mapping[int, Unit],
+    joints: int | None = None,
+) -> Clock:
+    """Return the clock of a table.
+
+    Args:
+        columns: The table's columns.
+        layout: The table.
+        options: What the user says.
+        source: The source, if it is known.
+        units: Units given by the user, by the column's number.
+        joints: How many joints the robot has, if there is one.
+
+    Raises:
+        LogError: If the time is text in no form that is known, or its unit cannot be told.
+        OptionError: If its unit is given as one that is no time.
+    """
+    chosen, why = time_columns(columns, layout, options, joints)
+    return clock_of(chosen, why, layout, source, units)
+
+
+def clock_of(
+    chosen: tuple[Column, ...],
+    why: str,
+    layout: Layout,
+    source: KnownSource | None,
+    units: Mapping[int, Unit],
+) -> Clock:
+    """Return the clock that columns make.
+
+    Args:
+        chosen: The columns: one, a date and a time of day, seconds and nanoseconds; or none.
+        why: Why these.
+        layout: Their table.
+        source: The source, if it is known.
+        units: Units given by the user, by the column's number.
+
+    Raises:
+        LogError: If the time is text in no form that is known, or its unit cannot be told.
+        OptionError: If its unit is given as one that is no time.
+    """
+    if not chosen:
+        return Clock(inferences=(Inference("time column", "none", why),))
+    found = Inference("time column", " and ".join(column.name for column in chosen), why)
+    if chosen[0].text:
+        parts = tuple(_text_part(column, layout, units) for column in chosen)
+        return Clock(chosen, parts, _unit_of(parts[0]), inferences=(found,))
+    if len(chosen) == 2:
+        both = (ClockColumn(chosen[0].index, 9), ClockColumn(chosen[1].index, 0))
+        return Clock(chosen, both, "s", inferences=(found,))
+    time = chosen[0]
+    unit, evidence, warnings = unit_of(time, layout, source, units)
+    _refuse_ages(time, layout, unit)
+    parts = (ClockColumn(time.index, EXPONENTS[unit]),)
+    said = (found, Inference("unit of the time", unit, evidence))
+    told = time.number in units or time.unit is not None
+    return Clock(chosen, parts, unit, told, said, warnings)
+
+
+def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> ClockColumn:
+    """Return a column of text for the reader: the forms that it may have."""
+    cells, given = layout.cells(column.index), units.get(column.number)
+    forms = known_forms(cells)
+    if not forms:
+        message = f"found {cells[0]!r}, allowed: {FORMS_TOLD}"
+        raise LogError(Finding(message, str(layout.segment.path), layout.first_line, 1, column.header))
+    wanted = given or column.unit
+    asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
+    if given is not None and not asked:
+        keys = ", ".join(dict.fromkeys(key for form in forms for key in form.keys)) or "none"
+        raise OptionError(f"--unit: found {given.name} for the time {column.name!r}, allowed: {keys}")
+    return ClockColumn(column.index, forms=asked or forms)
+
+
+def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
+    """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
+    for value in times_of(layout.cells(time.index), layout)[:1]:
+        if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
+            message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
+            hint = f"say the unit with --unit {time.name}=ns"
+            if unit == "s" and _DATES[0] <= value < _DATES[1]:
+                hint = "a date is read if it is written as 2021-04-11 22:27:21.5"
+            raise LogError(
+                Finding(f"{message}; {hint}", str(layout.segment.path), layout.first_line, 1, time.header)
+            )
+
+
+def even_clock(
+    rows: int, period: float | None, option: str = "--period"
+) -> tuple[IntArray, tuple[Inference, ...], list[LogWarning]]:
+    """Return the times in [ns] of a log without a clock, what that rests on, and a warning if it is assumed.
+
+    Args:
+        rows: Number of rows.
+        period: Time between rows in [s], if the user gave it.
+        option: How it was given, for errors.
+
+    Raises:
+        OptionError: If the period is not a positive time of 1 ns or more.
+    """
+    if period is not None and not (math.isfinite(period) and period >= 1e-9):
+        raise OptionError(f"{option}: found {period:g} s, allowed: a positive time of 1e-9 s or more")
+    step = PAPER_PERIOD if period is None else period
+    if rows * step * 1e9 >= LONGEST_NS:
+        longest = LONGEST_NS / 1e9 / rows
+        raise OptionError(f"{option}: found {step:g} s, allowed: less than {longest:g} s for {rows} rows")
+    times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
+    if period is not None:
+        return times, (Inference("period", f"{step:g} s", "given as an option"),), []
+    said = "no time column: the rows are taken as 5 ms apart; --period S says otherwise"
+    return times, (Inference("period", "0.005 s", "assumed"),), [LogWarning("assumed-period", said)]

@@ -1,0 +1,111 @@
+"""The unit of a clock of numbers: given, in its name, known of the source, or told by its values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.sources.clocks.clock_columns import steps_of, times_of
+from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
+
+EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
+"""Powers of ten from a unit to [ns]."""
+
+SHORTEST, LONGEST = 0.0005, 1.0
+"""Usual periods of a log in [s]: they tell the unit of a clock that does not say it."""
+
+_UNUSUAL, _IMPOSSIBLE = 0.0002, 1e-5
+"""Periods in [s] below which a log is unusual, and below which no joint is sampled: days or hours look so."""
+
+_EPOCH = (946_684_800.0, 4_102_444_800.0)  # 2000 to 2100 as Unix time in [s]
+
+_UNITS = ", ".join(EXPONENTS)
+
+Found = tuple[str, str, tuple[LogWarning, ...]]
+"""A unit, why, and what a person should know."""
+
+
+def unit_of(time: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]) -> Found:
+    """Return the unit of a time column, why, and a warning if it is assumed.
+
+    Args:
+        time: The column.
+        layout: Its table.
+        source: The source, if it is known.
+        units: Units given by the user, by the column's number.
+
+    Raises:
+        LogError: If it is a unit that is not read, or cannot be told.
+        OptionError: If it is given as one that is no time.
+    """
+    given = units.get(time.number)
+    if given is not None:
+        if given.name not in EXPONENTS:
+            raise OptionError(f"--unit: found {given.name} for the time {time.name!r}, allowed: {_UNITS}")
+        return given.name, "given as an option", ()
+    if time.unit is not None and time.unit.name in EXPONENTS:
+        return time.unit.name, "its name", ()
+    if time.unit_text is not None and time.unit_text.lower() in vocabulary().long_times:
+        hint = "convert the times, or --time none with --period SECONDS"
+        raise _error(f"found the unit {time.unit_text!r}, allowed: {_UNITS}; {hint}", time, layout)
+    if source is not None and "time" in source.units:
+        return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()
+    return _by_values(time, layout)
+
+
+def _by_values(time: Column, layout: Layout) -> Found:
+    """Tell the unit by the year that the times give, or else by their steps."""
+    cells = layout.cells(time.index)
+    start = next(iter(times_of(cells, layout)), 0.0)
+    steps = sorted(step for step in steps_of(cells, layout) if step > 0)
+    step = steps[len(steps) // 2] if steps else 0.0
+    likely = [u for u, e in EXPONENTS.items() if SHORTEST < step * 10.0 ** (e - 9) <= LONGEST]
+    epoch = _since_1970(start, step)
+    if epoch is not None and not (likely and step * 10.0 ** (EXPONENTS[epoch] - 9) > LONGEST):
+        return epoch, "it counts from 1970, so as Unix time it is of our years", ()
+    if epoch is not None:
+        raise _question(time, layout, f"times of our years in steps of {step:g}", [epoch, *likely])
+    if step <= SHORTEST:
+        return _short(time, layout, step)
+    evidence = f"its steps of {step:g}"
+    if len(likely) == 1:
+        return likely[0], evidence, ()
+    if "s" in likely:
+        return "s", evidence, (_assumed(time, step),)
+    raise _question(time, layout, f"steps of {step:g}", likely or list(EXPONENTS))
+
+
+def _since_1970(start: float, step: float) -> str | None:
+    """Return the unit in which a time is a Unix time of our years, if there is one."""
+    for unit, exponent in EXPONENTS.items():
+        scale = 10.0 ** (exponent - 9)
+        if _EPOCH[0] <= start * scale <= _EPOCH[1] and step * scale <= 20 * LONGEST:
+            return unit
+    return None
+
+
+def _short(time: Column, layout: Layout, step: float) -> Found:
+    """Return s for short steps, or for none; raise where they are too short for a log."""
+    if 0 < step < _IMPOSSIBLE:
+        said = f"found steps of {step:.3g}, as of days or hours, allowed: times in {_UNITS}"
+        hint = f"convert them, or say that it is so with --unit {time.name}=s"
+        raise _error(f"{said}; {hint}", time, layout)
+    return "s", "the usual unit", (_assumed(time, step),) if 0 < step < _UNUSUAL else ()
+
+
+def _assumed(time: Column, step: float) -> LogWarning:
+    return LogWarning("assumed-unit", f"the time {time.name!r} steps by {step:.6g}: taken as s")
+
+
+def _question(time: Column, layout: Layout, found: str, units: list[str]) -> LogError:
+    """Ask which of some units is meant."""
+    options = " or ".join(f"--unit {time.name}={unit}" for unit in units)
+    return _error(f"found {found}, which may be {' or '.join(units)}: say which with {options}", time, layout)
+
+
+def _error(message: str, time: Column, layout: Layout) -> LogError:
+    """Return an error about a time column."""
+    return LogError(Finding(message, str(layout.segment.path), layout.first_line, 1, time.header))

@@ -1,0 +1,165 @@
+"""The times of a text clock: what its cells may mean, and what the whole column decides."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from urmpipe_models.arrays import IntArray
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.cells.text_cells import TextCells
+from urmpipe_pipeline.sources.cells.text_clock import DAY_NS, TIME_OF_DAY, Form
+from urmpipe_pipeline.sources.clocks.stamps import read_cells
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.table import REPORTED, UNREADABLE, ClockColumn, Numbers
+
+MIDNIGHT_NS = DAY_NS - 3600 * 10**9
+"""A time of day that falls back by this much or more has gone on over midnight."""
+
+Combination = tuple[Form, ...]
+
+
+def timed(layout: Layout, parts: Sequence[ClockColumn], numbers: Numbers) -> Numbers:
+    """Return the numbers of a table with the times that the texts of its clock mean; others as they are.
+
+    Args:
+        layout: How the table is written.
+        parts: The columns of its clock.
+        numbers: What was read.
+
+    Raises:
+        LogError: If the cells may be read in two ways and nothing in the file decides.
+    """
+    if not numbers.texts:
+        return numbers
+    readings, evidence = read_columns(numbers.texts, [part.forms for part in parts])
+    if len(readings) > 1:
+        raise LogError(_question(layout, parts, readings))
+    reading = readings[0]
+    if numbers.clock is not None:
+        reading.times[numbers.clock == REPORTED] = REPORTED
+    return replace(numbers, clock=reading.times, inferences=_said(reading, numbers.texts, evidence))
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Reading:
+    """A column of text clocks, or two side by side, read in one combination of forms.
+
+    Attributes:
+        forms: The form of each column.
+        times: Their sum in [ns], or NO_TIME, or UNREADABLE.
+        nights: How often a time of day fell back over midnight.
+    """
+
+    forms: Combination
+    times: IntArray
+    nights: int
+
+    @property
+    def unreadable(self) -> int:
+        """How many rows are no times."""
+        return int(np.count_nonzero(self.times == UNREADABLE))
+
+    @property
+    def steps(self) -> IntArray:
+        """Steps between the rows that have a time in [ns]."""
+        return np.diff(self.times[self.times > UNREADABLE])
+
+    @property
+    def backwards(self) -> int:
+        """How often the clock runs backwards."""
+        return int(np.count_nonzero(self.steps < 0))
+
+    @property
+    def name(self) -> str:
+        """What the forms are called."""
+        return " and ".join(form.name for form in self.forms)
+
+
+def read_columns(
+    columns: Sequence[TextCells], forms: Sequence[Combination]
+) -> tuple[list[Reading], list[str]]:
+    """Return the readings of a clock that fit it best, and why: several if they differ and nothing decides.
+
+    Those with the fewest cells that are no times; of these, those that run backwards in the fewest places;
+    of these, one for all whose steps are the same.
+
+    Args:
+        columns: The columns, whose times are added.
+        forms: The forms that each may have.
+    """
+    usual = [tuple(form for form in known if not form.last) for known in forms]
+    readings = [_read(columns, combination) for combination in product(*usual)]
+    if not any(reading.backwards == reading.unreadable == 0 for reading in readings):
+        readings += [_read(columns, one) for one in product(*forms) if any(form.last for form in one)]
+    fewest = min(reading.unreadable for reading in readings)
+    readable = [reading for reading in readings if reading.unreadable == fewest]
+    least = min(reading.backwards for reading in readable)
+    forwards = [reading for reading in readable if reading.backwards == least]
+    different: list[Reading] = []
+    for reading in forwards:
+        if not any(np.array_equal(reading.steps, other.steps) for other in different):
+            different.append(reading)
+    evidence = []
+    if len(readable) < len(readings):
+        evidence.append("in another form some are no times")
+    if len(forwards) < len(readable):
+        evidence.append("in another form they run backwards")
+    if len(different) < len(forwards):
+        evidence.append(f"as {forwards[-1].name} the steps are the same")
+    return different, evidence
+
+
+def _read(columns: Sequence[TextCells], forms: Combination) -> Reading:
+    total = np.zeros(len(columns[0]), dtype=np.int64)
+    parts = [read_cells(cells, form) for cells, form in zip(columns, forms, strict=True)]
+    for part in parts:
+        total += np.where(part > UNREADABLE, part, 0)
+    for part in parts:
+        total[part <= UNREADABLE] = part[part <= UNREADABLE]
+    nights = 0
+    if all(form.unit == TIME_OF_DAY for form in forms):
+        nights = _add_nights(total)
+    return Reading(forms, total, nights)
+
+
+def _add_nights(times: IntArray) -> int:
+    """Put times of day that fall back by nearly 24 h on the next day, in place; return how often."""
+    rows = np.flatnonzero(times > UNREADABLE)
+    valid = times[rows]
+    if not len(valid) or valid.min() < 0 or valid.max() >= DAY_NS:
+        return 0
+    nights = np.cumsum(np.diff(valid, prepend=valid[0]) <= -MIDNIGHT_NS)
+    times[rows] += nights * DAY_NS
+    return int(nights[-1])
+
+
+def _said(reading: Reading, columns: Sequence[TextCells], evidence: Sequence[str]) -> tuple[Inference, ...]:
+    """Return what was found out about a text clock."""
+    shown = " ".join(cells.text(0).strip() for cells in columns)
+    reasons = [f"its cells, such as {shown!r}", *evidence]
+    if any(form.dated for form in reading.forms) and not reading.forms[-1].has_zone(columns[-1].text(0)):
+        reasons.append("without a time zone: taken as UTC")
+    said = [Inference("form of the time", reading.name, "; ".join(reasons))]
+    if reading.nights:
+        why = "there the time of day falls back by nearly 24 h: the next day begins"
+        said.append(Inference("nights passed", str(reading.nights), why))
+    return tuple(said)
+
+
+def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[Reading]) -> Finding:
+    """Ask which of several readings is meant, for the first column in which they differ."""
+    choices = list(zip(*(reading.forms for reading in readings), strict=True))
+    place = next(k for k, forms in enumerate(choices) if len(set(forms)) > 1)
+    names = " or ".join(dict.fromkeys(form.name for form in choices[place]))
+    shared = set.intersection(*(set(form.keys) for form in choices[place]))
+    keys = dict.fromkeys(key for form in choices[place] for key in form.keys if key not in shared)
+    column = layout.names[parts[place].column]
+    shown = layout.cells(parts[place].column)[0]
+    options = " or ".join(f"--unit {column}={key}" for key in keys)
+    message = f"found {shown!r}, which may be {names}: say which with {options}"
+    return Finding(message, str(layout.segment.path), layout.first_line, 1, column)

@@ -1,0 +1,71 @@
+"""Times in a file of their own: a column, or a row of n values as MATLAB's writematrix leaves a vector."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.sources.clocks.clock import Clock, clock_of
+from urmpipe_pipeline.sources.clocks.clock_columns import runs_evenly
+from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.tables.opening import Tables
+from urmpipe_pipeline.sources.vocabulary import Unit, key, vocabulary
+
+NOTHING_BUT = "holds nothing but"
+"""Stands in the evidence for a clock that is a file of its own."""
+
+
+def time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
+    """Return which of two tables holds nothing but the times of the other; None if neither does.
+
+    It is a single column, or a single row, that is named like a time (the column or the file), or the only
+    one of the two, without a header, that runs in even steps.
+
+    Args:
+        tables: The tables.
+        columns: Their columns.
+    """
+    if len(tables.layouts) != 2 or len(set(tables.paths)) != 2:
+        return None
+    single = [i for i in (0, 1) if sum(column.table == i for column in columns) == 1]
+    named = [i for i in single if _is_named(tables, columns, i)]
+    if len(named) == 1:
+        return named[0]
+    even = [
+        i
+        for i in single
+        if tables.layouts[i].header is None and runs_evenly(tables.layouts[i].cells(0), tables.layouts[i])
+    ]
+    return even[0] if len(single) == len(even) == 1 else None
+
+
+def clock_of_file(tables: Tables, columns: Sequence[Column], index: int, units: dict[int, Unit]) -> Clock:
+    """Return the clock that a file of times makes.
+
+    Args:
+        tables: The tables.
+        columns: Their columns.
+        index: The table of the times.
+        units: Units given by the user, by the column's number.
+
+    Raises:
+        LogError: If the other table has a time as well, or the unit of the times cannot be told.
+    """
+    layout, title = tables.layouts[index], tables.layouts[index].segment.path.name
+    for column in columns:
+        if column.table != index and _is_time(column.key):
+            other = tables.layouts[column.table]
+            message = f"found a time here and in {title}, allowed: one clock; say which column with --time"
+            raise LogError(Finding(message, str(other.segment.path), other.header, column=column.header))
+    own = tuple(column for column in columns if column.table == index)
+    form = "one row" if layout.across else "one column"
+    return clock_of(own, f"{title} {NOTHING_BUT} {form} of times", layout, tables.known, units)
+
+
+def _is_named(tables: Tables, columns: Sequence[Column], index: int) -> bool:
+    own = next(column for column in columns if column.table == index)
+    return _is_time(own.key) or _is_time(key(tables.titles[index]))
+
+
+def _is_time(name: str) -> bool:
+    return any(pattern.search(name) for pattern in (*vocabulary().time, *vocabulary().dates))

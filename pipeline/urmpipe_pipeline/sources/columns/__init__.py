@@ -1,0 +1,1 @@
+"""What each column is: joints, rates, tool centre point."""

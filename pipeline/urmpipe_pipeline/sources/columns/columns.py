@@ -1,0 +1,202 @@
+"""The columns of a log: those of all its tables in a row, with names, units and places."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_pipeline.sources.cells.cell import is_missing, is_text
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.vocabulary import Quantity, Unit, key, split_unit, vocabulary
+
+_NAME_COLUMN = re.compile(r"(?P<before>.*?)name_?(?P<n>\d+)\Z")
+_NUMBERED = re.compile(r"(?P<before>.*?)(position|velocity|effort)_?(?P<n>\d+)\Z")
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a log.
+
+    Attributes:
+        number: Its number over all tables of the log, from 1.
+        table: Index of its table.
+        index: Its index in that table.
+        header: Its name as the file has it.
+        name: The same without the unit in brackets, told apart from those of other tables.
+        key: The name for comparison with the vocabulary.
+        unit_text: Its unit as the file has it, None if it has none.
+        text: Whether it holds text instead of numbers.
+    """
+
+    number: int
+    table: int
+    index: int
+    header: str
+    name: str
+    key: str
+    unit_text: str | None
+    text: bool
+
+    @property
+    def unit(self) -> Unit | None:
+        """Its unit, None if the file has none or one that is not known."""
+        return None if self.unit_text is None else vocabulary().unit(self.unit_text)
+
+    @property
+    def counts_rows(self) -> bool:
+        """Whether its name says that it only counts rows or frames."""
+        return any(pattern.search(self.key) for pattern in vocabulary().index)
+
+    @property
+    def words(self) -> frozenset[str]:
+        """The words of its name."""
+        return frozenset(self.key.split("_"))
+
+
+def columns_of(layouts: Sequence[Layout], titles: Sequence[str]) -> tuple[Column, ...]:
+    """Return the columns of some tables.
+
+    Args:
+        layouts: The tables.
+        titles: A title for each, told before the name where two tables have columns of one name,
+            other than a time.
+    """
+    found: list[Column] = []
+    for table, layout in enumerate(layouts):
+        earlier = {column.name for column in found}
+        for index, header in enumerate(layout.names):
+            label, unit = split_unit(header) if layout.header else (header, None)
+            if layout.units and index < len(layout.units):
+                unit = layout.units[index].strip("[]() ") or unit
+            time = any(pattern.search(key(label)) for pattern in vocabulary().time)
+            name = f"{titles[table]}/{label}" if label in earlier and not time else label
+            text = _holds_text(layout.cells(index), layout.decimal)
+            number = len(found) + 1
+            name = name or f"column {number}"
+            found.append(Column(number, table, index, header, name, key(label), unit, text))
+    return _named_in_cells(found, layouts)
+
+
+def _named_in_cells(columns: Sequence[Column], layouts: Sequence[Layout]) -> tuple[Column, ...]:
+    """Return the columns, those named in the cells beside them by these names.
+
+    rostopic echo -p writes name0, name1, ... with a joint's name in each row, and position0, position1, ...:
+    position0 becomes position.NAME, whatever the order in which the joints were published.
+    """
+    names: dict[tuple[int, str, str], str] = {}
+    for column in columns:
+        match = _NAME_COLUMN.match(column.key)
+        cells = set(layouts[column.table].cells(column.index)) if match and column.text else set()
+        if match and len(cells) == 1:
+            names[column.table, match["before"], match["n"]] = cells.pop()
+    result = []
+    for column in columns:
+        match = _NUMBERED.match(column.key)
+        name = names.get((column.table, match["before"], match["n"])) if match and not column.text else None
+        if match and name:
+            label = f"{column.name.rstrip('0123456789')}.{name}"
+            column = replace(column, name=label, key=key(label))  # noqa: PLW2901
+        result.append(column)
+    return tuple(result)
+
+
+def find_column(columns: Sequence[Column], text: str, option: str) -> Column:
+    """Return the column that the user means.
+
+    Args:
+        columns: The log's columns.
+        text: Its name, with or without unit, or its number from 1.
+        option: The option that it was given with.
+
+    Raises:
+        LogError: If no column or more than one is meant.
+    """
+    named = [column for column in columns if text in (column.header, column.name)]
+    named = named or [column for column in columns if key(text) == column.key != ""]
+    if len(named) == 1:
+        return named[0]
+    if named:
+        numbers = ", ".join(str(column.number) for column in named)
+        raise LogError(f"{option}: found {text!r} as columns {numbers}, allowed: one; give its number")
+    for column in columns:
+        if text == str(column.number):
+            return column
+    raise LogError(f"{option}: found no column {text!r}, allowed: {listed(columns)}")
+
+
+def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Unit]:
+    """Return the units that the user gave, by the column's number; by 0 that of all joints that turn.
+
+    Raises:
+        OptionError: If a text is no unit, or that of all joints none of angle.
+        LogError: If there is no such column.
+    """
+    given = {}
+    for text, unit_text in options.units.items():
+        unit = vocabulary().unit(unit_text)
+        quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
+        if unit is None or unit.quantity not in quantities:
+            allowed = [name for quantity in quantities for name in vocabulary().spelled(quantity)]
+            raise OptionError(f"--unit: found {unit_text!r}, allowed: {', '.join(allowed)}")
+        given[find_column(columns, text, "--unit").number if text else 0] = unit
+    return given
+
+
+def listed(columns: Sequence[Column], most: int = 24) -> str:
+    """Return the names of columns in a row, as the user may give them; the middle of many is left out."""
+    names = [column.header or f"column {column.number}" for column in columns]
+    if len(names) > most:
+        names = [*names[: most - 2], f"... {len(names) - most + 1} more ...", names[-1]]
+    return ", ".join(names)
+
+
+def refuse_twins(
+    used: Sequence[Column], columns: Sequence[Column], layouts: Sequence[Layout], remedy: str
+) -> None:
+    """Raise if a column that is to be used shares its name with another one.
+
+    A rate of the same name is no twin, nor is an angle "t (rad)" one of the time "t (s)": the unit says what
+    it is.
+
+    Args:
+        used: The columns that were found to matter.
+        columns: All columns of the log.
+        layouts: The tables.
+        remedy: What the user can do.
+
+    Raises:
+        LogError: With a finding for each such column.
+    """
+    findings = []
+    for column in used:
+        twins = [
+            other
+            for other in columns
+            if other.key == column.key != ""
+            and other is not column
+            and not other.text
+            and _alike(other, column)
+        ]
+        if twins:
+            numbers = ", ".join(str(n) for n in sorted(c.number for c in (column, *twins)))
+            message = f"found as columns {numbers}, allowed: once; {remedy}"
+            layout = layouts[column.table]
+            findings.append(Finding(message, str(layout.segment.path), layout.header, column=column.header))
+    if findings:
+        raise LogError(*findings)
+
+
+def _alike(one: Column, other: Column) -> bool:
+    """Tell whether two columns may hold the same quantity, by their units; one without may be anything."""
+    if one.unit and other.unit and one.unit.quantity != other.unit.quantity:
+        return False
+    return (one.unit.order if one.unit else 0) == (other.unit.order if other.unit else 0)
+
+
+def _holds_text(cells: Sequence[str], decimal: str) -> bool:
+    """Return whether most cells with content are neither numbers nor missing."""
+    cells = [cell for cell in cells if not is_missing(cell)]
+    return 2 * sum(is_text(cell, decimal) for cell in cells) > len(cells)

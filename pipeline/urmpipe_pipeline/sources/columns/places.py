@@ -1,0 +1,160 @@
+"""Joints by their place: tables without a header, and plots with one result a file."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.orientation import width
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
+from urmpipe_pipeline.sources.columns.pose import (
+    Pose,
+    chosen_pose,
+    trailing_matrix,
+    trailing_quaternion,
+    with_form,
+)
+from urmpipe_pipeline.sources.columns.roles import OPTION, Roles, about_pose, check_count
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.sniff import Layout
+
+
+def without_header(
+    columns: Sequence[Column], layout: Layout, options: ReadOptions, robot: Chain | None, *, path: bool
+) -> Roles:
+    """Return the roles of the columns of a table without a header: joints in order, as many as the robot has.
+
+    The last 16 or 12 columns may be a pose: that they are a homogeneous transform shows in their numbers;
+    and so may the last seven: x, y, z and a quaternion, whose length is 1 (a trajectory in TUM's form).
+
+    Args:
+        columns: The columns, without the clock.
+        layout: The table.
+        options: What the user says: joint columns, position, orientation.
+        robot: The arm; without one every column is a joint.
+        path: The user says that it is a path: the columns are x, y, z, and an orientation behind them.
+
+    Raises:
+        LogError: If there are too few columns, or one of them holds text.
+    """
+    file = str(layout.segment.path)
+    columns = [column for column in columns if column.header]
+    pose = chosen_pose(columns, options)
+    if options.joints:
+        joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
+        check_count(joints, file, robot)
+        return _by_place(joints, columns, robot, "given as an option", pose)
+    for column in () if path else columns:  # of a path they are wrong rows
+        if column.text:
+            shown = layout.cells(column.index)[0]
+            message = f"found {shown!r} in a table without a header, allowed: numbers; {OPTION}"
+            raise LogError(Finding(message, file, layout.first_line, 1, column.name))
+    if path:
+        return _path_by_place(columns, layout, options, pose)
+    if not columns:
+        raise LogError(Finding("found no column beside the time, allowed: the joints", file=file))
+    behind = None if pose else _trailing_pose(columns, layout, robot)
+    pose = with_form(pose or behind or Pose(), options.rotation)
+    used = (*pose.position, *pose.rotation)
+    start = min(map(columns.index, used)) if behind else len(columns)
+    free = [column for column in columns[:start] if column not in used]
+    joints = tuple(free[: len(robot.coordinates)] if robot else free)
+    check_count(joints, file, robot)
+    many = ", as many as the robot has" if robot else ""
+    return _by_place(joints, columns, robot, f"no header: joints in order{many}", pose)
+
+
+def _path_by_place(
+    columns: Sequence[Column], layout: Layout, options: ReadOptions, pose: Pose | None
+) -> Roles:
+    """Return x, y, z and the orientation behind them: of the form told, or by what its numbers are."""
+    if pose is None and len(columns) < 3:
+        raise LogError(
+            Finding(f"found {len(columns)} columns, allowed: x, y, z", file=str(layout.segment.path))
+        )
+    form = options.rotation
+    if pose is None and form is not None and len(columns) == 3 + width(form):
+        pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), "given as an option")
+    behind = _trailing_pose(columns, layout, None, some=True) if pose is None else None
+    pose = with_form(pose or behind or Pose(tuple(columns[:3]), evidence="there is no header"), form)
+    rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
+    said = [Inference("path", listed(pose.position), pose.evidence), *about_pose(pose)[1:]]
+    if rest:
+        said.append(Inference("columns not used", listed(rest, most=8), "no header tells what they are"))
+    return Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms, inferences=tuple(said))
+
+
+def _trailing_pose(
+    columns: Sequence[Column], layout: Layout, robot: Chain | None, *, some: bool = False
+) -> Pose | None:
+    """Return the pose that stands behind the joints, or alone in a table, by what (some of) its rows are."""
+    found = trailing_matrix(columns, (layout,), some=some)
+    joints = len(robot.coordinates) if robot else 0
+    fits = len(columns) == 7 if robot is None else len(columns) >= joints + 7
+    return found or (trailing_quaternion(columns, (layout,), some=some) if fits else None)
+
+
+def one_plot_a_file(
+    columns: Sequence[Column], paths: Sequence[Path], robot: Chain | None
+) -> tuple[Column, ...] | None:
+    """Return the joint columns, in order, of files that hold one result each; None if one holds more.
+
+    The order is that of the numbers in the files' names, if these differ only by a number; else that of
+    the numbers in the columns' names; else the order in which the files were given.
+
+    Args:
+        columns: The columns of all files, without the clocks.
+        paths: The files, one a table.
+        robot: The arm: a plot for each of its joints is needed.
+    """
+    numeric = [column for column in columns if not column.text and not column.counts_rows]
+    if [column.table for column in numeric] != list(range(len(paths))):
+        return None
+    if robot is not None and len(numeric) != len(robot.coordinates):
+        return None
+    for names in ([path.stem for path in paths], [column.name for column in numeric]):
+        numbers = _only_numbers_differ(names)
+        if numbers:
+            return tuple(
+                column for _, column in sorted(zip(numbers, numeric, strict=True), key=lambda p: p[0])
+            )
+    return tuple(numeric)
+
+
+def _only_numbers_differ(names: Sequence[str]) -> list[int] | None:
+    """Return the last number in each name, if the names are the same without it and the numbers differ."""
+    found = [re.fullmatch(r"(.*?)(\d+)(\D*)", name) for name in names]
+    parts = [match.groups() for match in found if match]
+    numbers = [int(number) for _, number, _ in parts]
+    same = len({(before, after) for before, _, after in parts}) == 1
+    return numbers if same and len(set(numbers)) == len(names) else None
+
+
+def _by_place(
+    joints: Sequence[Column],
+    columns: Sequence[Column],
+    robot: Chain | None,
+    evidence: str,
+    pose: Pose | None,
+) -> Roles:
+    """Return joints that are named by the robot, or q1, q2, ..., and the pose beside them."""
+    pose = pose or Pose()
+    said = [Inference("joint columns", ", ".join(column.name for column in joints), evidence)]
+    said += about_pose(pose)
+    rest = [column for column in columns if column not in (*joints, *pose.position, *pose.rotation)]
+    if rest:
+        said.append(Inference("columns not used", listed(rest, most=8), "no header tells what they are"))
+    names = robot.coordinates if robot else [f"q{k + 1}" for k in range(len(joints))]
+    named = tuple(replace(column, name=name) for column, name in zip(joints, names, strict=True))
+    return Roles(
+        joints=named,
+        position=pose.position,
+        rotation=pose.rotation,
+        forms=pose.forms,
+        inferences=tuple(said),
+    )

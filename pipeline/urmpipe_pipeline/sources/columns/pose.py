@@ -1,0 +1,238 @@
+"""The tool centre point that a log recorded: the columns of its position and orientation, and their form."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, FloatArray
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.orientation import FORMS, RotationForm, width
+from urmpipe_pipeline.sources.cells.cell import to_float
+from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
+from urmpipe_pipeline.sources.columns.families import Family, families
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+ORTHOGONAL = 1e-2
+"""Entries of R R^T may differ from those of I by this: matrices are printed with three digits or more."""
+
+
+_LIKE_JOINT = re.compile(r"q_?\d")
+"""Names that quaternions and joints have."""
+
+_UNIT_LENGTH = 1e-2
+
+
+@dataclass(frozen=True, slots=True)
+class Pose:
+    """Columns of a recorded tool centre point.
+
+    Attributes:
+        position: x, y, z, or none.
+        rotation: The columns of its orientation, in the order of the form, or none.
+        forms: What these may be; one if it is known.
+        evidence: Why.
+    """
+
+    position: tuple[Column, ...] = ()
+    rotation: tuple[Column, ...] = ()
+    forms: tuple[RotationForm, ...] = ()
+    evidence: str = "their names"
+
+
+def find_pose(
+    numeric: Sequence[Column],
+    layouts: Sequence[Layout],
+    file: str | None = None,
+    *,
+    form: RotationForm | None = None,
+    some: bool = False,
+) -> Pose:
+    """Return the recorded pose among some columns with names.
+
+    Args:
+        numeric: Candidates.
+        layouts: The tables.
+        file: The file, if it is an error that several positions are recorded; else they are left.
+        form: Form of the orientation, if it is told: its columns are not asked then whether they hold it.
+        some: Whether it is enough that some rows hold an orientation: the others are wrong.
+
+    Raises:
+        LogError: If there are several positions where one is needed.
+    """
+    vectors = [f for f in families(numeric, vocabulary().tcp_pose_vector, 0) if _numbers(f) == range(6)]
+    if len(vectors) == 1:
+        ordered = vectors[0].ordered()
+        return Pose(ordered[:3], ordered[3:], ("vector",))
+    for family in families(numeric, vocabulary().tcp_matrix, 0):
+        pose = matrix_pose(family.ordered(), layouts, some=some)
+        if pose is not None:
+            return pose
+    position = _position(numeric, file)
+    rest = [column for column in numeric if column not in position]
+    rotation, forms = _rotation(rest, layouts, form, some=some) if position else ((), ())
+    return Pose(position, rotation, forms)
+
+
+def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
+    """Return the pose whose columns the user named; None if none are named.
+
+    Raises:
+        LogError: If there is no such column.
+        OptionError: If there are too few or too many for a position or for the form of the orientation.
+    """
+    if not options.position:
+        if options.orientation:
+            raise OptionError("orientation: found without a position, allowed: beside x, y, z")
+        return None
+    position = tuple(find_column(columns, text, "position") for text in options.position)
+    rotation = tuple(find_column(columns, text, "orientation") for text in options.orientation)
+    if len(position) != 3:
+        raise OptionError(f"position: found {len(position)} columns, allowed: x, y, z")
+    forms = tuple(form for form in FORMS if width(form) == len(rotation) and options.rotation in (None, form))
+    if rotation and not forms:
+        allowed = f"{width(options.rotation)}, as {options.rotation} has" if options.rotation else "3, 4 or 9"
+        raise OptionError(f"orientation: found {len(rotation)} columns, allowed: {allowed}")
+    return Pose(position, rotation, forms if rotation else (), "given as an option")
+
+
+def with_form(pose: Pose, form: RotationForm | None) -> Pose:
+    """Return the pose with the form of orientation that the user tells.
+
+    Raises:
+        OptionError: If it has another number of columns.
+    """
+    if form is None or not pose.rotation:
+        return pose
+    if width(form) != len(pose.rotation):
+        found = f"{form}, which has {width(form)} columns, for {listed(pose.rotation)}"
+        raise OptionError(f"--rotation: found {found}, allowed: a form of {len(pose.rotation)} columns")
+    return replace(pose, forms=(form,))
+
+
+def trailing_matrix(
+    columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False
+) -> Pose | None:
+    """Return the pose in columns without names of which the last 16 or 12 are a homogeneous transform."""
+    for count in (16, 12):
+        pose = matrix_pose(columns[-count:], layouts, some=some) if len(columns) >= count else None
+        if pose is not None:
+            return pose
+    return None
+
+
+def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False) -> Pose | None:
+    """Return the pose that 16 or 12 columns hold as a homogeneous transform, by what their numbers are.
+
+    Row by row, or of 16 also column by column: the entries 0, 0, 0, 1 tell which, and R R^T = I that it
+    is one at all.
+
+    Args:
+        columns: The columns, in their order.
+        layouts: The tables.
+        some: Whether it is enough that some rows are one: the others are wrong.
+    """
+    if len(columns) not in (12, 16):
+        return None
+    values = _sampled(columns, layouts)
+    places = np.arange(16).reshape(4, 4)
+    for order, entries in (("row by row", places), ("column by column", places.T)):
+        if len(columns) == 12 and order != "row by row":
+            continue
+        turned = entries[:3, :3].ravel().tolist()
+        holds = _orthogonal(values[:, turned].reshape(-1, 3, 3))
+        if len(columns) == 16:
+            holds &= (values[:, entries[3]] == (0, 0, 0, 1)).all(axis=1)
+        if _enough(holds, some=some):
+            position = tuple(columns[k] for k in entries[:3, 3].tolist())
+            return Pose(position, tuple(columns[k] for k in turned), ("matrix",), f"a transform, {order}")
+    return None
+
+
+def trailing_quaternion(
+    columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False
+) -> Pose | None:
+    """Return the pose in the last seven columns without names, if four of length 1 follow three others."""
+    if len(columns) < 7 or not _is_unit(columns[-4:], layouts, some=some):
+        return None
+    evidence = "the last four of seven numbers have length 1"
+    return Pose(tuple(columns[-7:-4]), tuple(columns[-4:]), ("quat_xyzw", "quat_wxyz"), evidence)
+
+
+def _is_unit(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool) -> bool:
+    """Return whether the numbers of three rows or more, or of some, have length 1, as quaternions have."""
+    values = _sampled(columns, layouts)
+    holds = np.abs((values**2).sum(axis=1) - 1.0) < _UNIT_LENGTH
+    return (some or len(values) > 2) and _enough(holds, some=some)
+
+
+def _sampled(columns: Sequence[Column], layouts: Sequence[Layout]) -> FloatArray:
+    """Return the sampled rows in which all of these columns have a number."""
+    cells = [layouts[c.table].cells(c.index) for c in columns]
+    decimals = [layouts[c.table].decimal for c in columns]
+    rows = [
+        [to_float(cell, decimal) for cell, decimal in zip(row, decimals, strict=True)]
+        for row in zip(*cells, strict=False)
+    ]
+    values = np.array([row for row in rows if None not in row], dtype=np.float64)
+    return values[np.isfinite(values).all(axis=1)] if len(values) else np.empty((0, len(columns)))
+
+
+def _orthogonal(r: FloatArray) -> BoolArray:
+    """Return which of these are rotation matrices: R R^T = I and det R = 1; shape (n,)."""
+    gram = r @ r.transpose(0, 2, 1)
+    near = (np.abs(gram - np.eye(3)) < ORTHOGONAL).all(axis=(1, 2))
+    return np.asarray(near & (np.linalg.det(r) > 0))
+
+
+def _enough(holds: BoolArray, *, some: bool) -> bool:
+    """Return whether a law holds in all rows, of which there is one, or in some: the others are wrong."""
+    return bool(holds.any()) if some else len(holds) > 0 and bool(holds.all())
+
+
+def _position(numeric: Sequence[Column], file: str | None) -> tuple[Column, ...]:
+    """Return the columns x, y, z; none if there are several and these need not be known."""
+    forces = any(column.key in ("fx", "f_x") for column in numeric)  # tx, ty, tz beside them are torques
+    numeric = [c for c in numeric if not (forces and c.key.startswith("t") and len(c.key) <= len("t_x"))]
+    found = [f for f in families(numeric, vocabulary().tcp_position, 0) if _numbers(f) == range(3)]
+    best = [family for family in found if family.rank == found[0].rank]
+    if len(best) > 1 and file is not None:
+        groups = "; ".join(listed(family.ordered()) for family in best)
+        raise LogError(Finding(f"found several positions: {groups}; allowed: one x, y, z", file=file))
+    return best[0].ordered() if len(best) == 1 else ()
+
+
+def _rotation(
+    rest: Sequence[Column], layouts: Sequence[Layout], form: RotationForm | None, *, some: bool
+) -> tuple[tuple[Column, ...], tuple[RotationForm, ...]]:
+    """Return the columns of the only orientation, and the forms that their names allow."""
+    for words in vocabulary().tcp_rotations:
+        wanted = range(4) if words.forms[0].startswith("quat") else range(3)
+        found = [f for f in families(rest, words.patterns, 0) if _numbers(f) == wanted]
+        if len(found) != 1:
+            continue
+        columns = found[0].ordered()
+        told = not _LIKE_JOINT.fullmatch(columns[0].key) or form in words.forms
+        if told or _is_unit(columns, layouts, some=some):
+            return columns, words.forms
+    nine = [family for family in families(rest, vocabulary().tcp_matrix, 0) if len(family.columns) == 9]
+    if len(nine) == 1:
+        columns = nine[0].ordered()
+        holds = _orthogonal(_sampled(columns, layouts).reshape(-1, 3, 3))
+        entries = some and "i" in vocabulary().tcp_matrix[nine[0].rank].groupindex  # r11 is no joint
+        if entries or form == "matrix" or _enough(holds, some=some):
+            return columns, ("matrix",)
+    return (), ()
+
+
+def _numbers(family: Family) -> range | None:
+    """Return range(n) if the n numbers of a family count up from 0, or from 1, without a gap."""
+    count = range(len(family.columns))
+    lowest = min(family.columns)
+    counted = lowest in (0, 1) and sorted(family.columns) == [lowest + k for k in count]
+    return count if counted else None

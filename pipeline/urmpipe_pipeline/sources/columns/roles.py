@@ -1,0 +1,319 @@
+"""What each column is: joints and their order, recorded rates, recorded tool centre point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.orientation import RotationForm
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
+from urmpipe_pipeline.sources.columns.families import families, measured
+from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.vocabulary import key, vocabulary
+
+OPTION = "name them in the robot's order with --joints A,B,C"
+
+
+@dataclass(frozen=True, slots=True)
+class Roles:
+    """The columns of a log that are used, each group in order.
+
+    Attributes:
+        joints: Joint values, in the robot's order; none for a path.
+        rates: Recorded rates of the same joints, or none.
+        accelerations: Recorded second derivatives of the same joints, or none.
+        position: Recorded x, y, z of the tool centre point, or none.
+        rotation: Recorded orientation of the tool, or none.
+        forms: The forms that the orientation may have; one if it is known.
+        inferences: What was found out.
+    """
+
+    joints: tuple[Column, ...] = ()
+    rates: tuple[Column, ...] = ()
+    accelerations: tuple[Column, ...] = ()
+    position: tuple[Column, ...] = ()
+    rotation: tuple[Column, ...] = ()
+    forms: tuple[RotationForm, ...] = ()
+    inferences: tuple[Inference, ...] = ()
+
+    @property
+    def groups(self) -> tuple[tuple[Column, ...], ...]:
+        """The columns of each role: joints, rates, accelerations, position, rotation."""
+        return self.joints, self.rates, self.accelerations, self.position, self.rotation
+
+    @property
+    def columns(self) -> tuple[Column, ...]:
+        """All of them."""
+        return tuple(column for group in self.groups for column in group)
+
+
+def assign(
+    columns: Sequence[Column],
+    layouts: Sequence[Layout],
+    options: ReadOptions,
+    robot: Chain | None,
+    *,
+    path: bool = False,
+) -> Roles:
+    """Return the roles of the columns of a table with a header.
+
+    The joints are, in this order: the columns that the user names; those named like the robot's
+    joints; those with a word for a joint and its number; those with a unit of angle; as many
+    columns as the robot has joints, if no more are left. Without any, x, y, z make a path.
+
+    Args:
+        columns: The columns, without the clock.
+        layouts: The tables.
+        options: What the user says: joint columns, position, orientation.
+        robot: The arm, or None.
+        path: The user says that it is a path: joints are not looked for.
+
+    Raises:
+        LogError: If the joints cannot be told, or are too few or too many for the robot.
+    """
+    file = str(layouts[0].segment.path)
+    numeric = [column for column in columns if (path or not column.text) and not column.counts_rows]
+    if options.joints:
+        joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
+        found = _Joints(joints, "given as an option", *_family_of(joints))
+        pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
+    else:
+        own = () if path else _called_as_joints(numeric, robot)
+        pose = chosen_pose(columns, options) or find_pose(
+            [c for c in numeric if c not in own], layouts, form=options.rotation if path else None, some=path
+        )
+        free = [column for column in numeric if column not in (*pose.position, *pose.rotation)]
+        half = bool(pose.position and not pose.rotation)
+        found = _Joints(()) if path else _find_joints(free, file, robot, half_pose=half)
+    pose = with_form(pose, options.rotation)
+    if not found.columns:
+        return _path(columns, numeric, pose, layouts, robot, path=path)
+    check_count(found.columns, file, robot)
+    rates = _derivative("rate", numeric, found)
+    accelerations = _derivative("acceleration", numeric, found)
+    roles = Roles(found.columns, rates, accelerations, pose.position, pose.rotation, pose.forms)
+    said = [Inference("joint columns", ", ".join(c.name for c in found.columns), found.evidence)]
+    for what, group in (("rates", rates), ("accelerations", accelerations)):
+        if group:
+            said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
+    said += about_pose(pose)
+    return _with_rest(roles, said, numeric)
+
+
+@dataclass(frozen=True, slots=True)
+class _Joints:
+    """Joint columns, why they are, and the names and numbers that their rates share."""
+
+    columns: tuple[Column, ...]
+    evidence: str = ""
+    numbers: tuple[int, ...] = ()
+    names: tuple[str, ...] = ()
+
+
+def _family_of(joints: Sequence[Column]) -> tuple[tuple[int, ...], tuple[str, ...]]:
+    """Return the numbers, or else the names, that chosen joints share with their rates, in their order."""
+    for family in families(joints, vocabulary().joint["position"], order=0):
+        if len(family.columns) == len(joints):
+            number_of = {column: n for n, column in family.columns.items()}
+            return tuple(number_of[column] for column in joints), ()
+    for names in vocabulary().orders:
+        of_joint = [[name for name in names if _role_beside(c, name) == "position"] for c in joints]
+        if all(len(matching) == 1 for matching in of_joint):
+            return (), tuple(matching[0] for matching in of_joint)
+    return (), ()
+
+
+def _called_as_joints(numeric: Sequence[Column], robot: Chain | None) -> tuple[Column, ...]:
+    """Return the columns named exactly as the robot's joints: x, y, z of a gantry are no position."""
+    if robot is None:
+        return ()
+    found = named_after(numeric, robot.coordinates, "position")
+    names = [key(name) for name in robot.coordinates]
+    return found if [column.key for column in found] == names else ()
+
+
+def _find_joints(free: Sequence[Column], file: str, robot: Chain | None, *, half_pose: bool) -> _Joints:
+    """Return the joints among some columns; beside half a pose, three angles may be its other half."""
+    count = len(robot.coordinates) if robot else None
+    orders = [*((robot.coordinates,) if robot else ()), *vocabulary().orders]
+    for names in orders:
+        by_name = named_after(free, names, "position")
+        if by_name and count in (None, len(by_name)):
+            evidence = (
+                "the robot's joint names" if robot and names == robot.coordinates else "known joint names"
+            )
+            return _Joints(by_name, evidence, names=tuple(names))
+    by_number = _numbered(free, file, count)
+    if by_number:
+        return by_number
+    return _without_number(free, count, half_pose=half_pose)
+
+
+def _without_number(free: Sequence[Column], count: int | None, *, half_pose: bool) -> _Joints:
+    """Return joints without numbers: by the word position, by their units, or as all that is left."""
+    words = vocabulary()
+    about_else = words.other | words.joint_words["rate"] | words.joint_words["acceleration"]
+    still = tuple(c for c in free if not c.words & about_else and not (c.unit and c.unit.order))
+    marked = tuple(column for column in still if column.words & words.marks)
+    if marked and count in (None, len(marked)):
+        names = tuple("_".join(w for w in c.key.split("_") if w not in words.marks) for c in marked)
+        evidence = "the word position or angle in their names; the order is the file's"
+        return _Joints(marked, evidence, names=names)
+    sized = tuple(c for c in still if c.unit and c.unit.quantity in ("angle", "length"))
+    turning = any(c.unit and c.unit.quantity == "angle" for c in sized)
+    if turning and count in (None, len(sized)) and not (half_pose and count is None and len(sized) == 3):
+        return _Joints(sized, "their units; the order is the file's")
+    if count is not None and len(still) == count:
+        return _Joints(still, f"the only {count} columns left; the order is the file's")
+    return _Joints(())
+
+
+def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> tuple[Column, ...]:
+    """Return the columns that carry the names of joints, one each in their order, or nothing.
+
+    Args:
+        columns: Candidates.
+        names: Names of the joints.
+        role: position, rate or acceleration: decided by the words beside the joint's name.
+    """
+    result = []
+    for name in names:
+        matches = [column for column in columns if _role_beside(column, name) == role]
+        matches = measured(matches, lambda column: column.words)
+        exact = [c for c in matches if c.words - _words(name) <= vocabulary().joint_words["position"]]
+        matches = exact if len(exact) == 1 else matches
+        if len(matches) != 1:
+            return ()
+        result.append(matches[0])
+    return tuple(result) if len(set(result)) == len(result) else ()
+
+
+def _words(name: str) -> frozenset[str]:
+    return frozenset(key(name).split("_"))
+
+
+def _role_beside(column: Column, name: str) -> str | None:
+    """Return what a column says about a joint: by the words beside the joint's name in its own."""
+    padded, inner = f"_{column.key}_", f"_{key(name)}_"
+    if inner not in padded:
+        return None
+    beside = frozenset(padded.replace(inner, "_", 1).strip("_").split("_")) - {""}
+    words = vocabulary().joint_words
+    if beside & vocabulary().other:
+        return None
+    for role in ("acceleration", "rate"):
+        if beside & words[role] or (
+            column.unit and column.unit.order == ("rate", "acceleration").index(role) + 1
+        ):
+            return role
+    return "position"
+
+
+def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints | None:
+    """Return the joints by a word and a number: q1, J1_Angle, actual_q_0, ..."""
+    words = vocabulary()
+    moving = words.joint_words["rate"] | words.joint_words["acceleration"]
+    still = [column for column in free if not column.words & moving]
+    found = families(still, words.joint["position"], order=0)
+    if not found:
+        return None
+    fitting = [family for family in found if len(family.columns) == count] or found
+    best = [family for family in fitting if family.rank == min(f.rank for f in fitting)]
+    if len(best) > 1 and not all(len(family.columns) == 1 for family in best):
+        groups = "; ".join(listed(family.ordered()) for family in best)
+        message = f"found several groups of joint columns: {groups}, allowed: one; {OPTION}"
+        raise LogError(Finding(message, file=file))
+    if len(best) > 1:  # one plot a joint, each with a number of its own
+        columns = tuple(column for family in best for column in family.ordered())
+        return _Joints(columns, "their names; the order is the file's")
+    family = best[0]
+    lowest = min(family.columns)
+    first = lowest if len(family.columns) == 1 else min(lowest, 1)
+    gaps = [n for n in range(first, first + len(family.columns)) if n not in family.columns]
+    if gaps and not family.twins:  # a number that is there twice is told as such
+        missing = ", ".join(map(str, gaps))
+        said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
+        raise LogError(Finding(f"{said}, allowed: numbers without a gap; {OPTION}", file=file))
+    return _Joints(
+        family.ordered(), "their names, in the order of their numbers", tuple(sorted(family.columns))
+    )
+
+
+def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> None:
+    """Raise unless there are as many joint columns as the robot has joints, each once.
+
+    Raises:
+        LogError: With what was found and what the robot needs.
+    """
+    if len(set(joints)) < len(joints):
+        raise LogError(Finding(f"--joints: found {listed(joints)}, allowed: each column once", file=file))
+    if robot is None or len(joints) == len(robot.coordinates):
+        return
+    need = f"allowed: {len(robot.coordinates)}, as robot {robot.name} has"
+    message = f"found {len(joints)} joint columns ({listed(joints)}), {need}"
+    more = len(joints) > len(robot.coordinates)
+    raise LogError(Finding(f"{message}; {OPTION}" if more else message, file=file))
+
+
+def _derivative(role: str, numeric: Sequence[Column], joints: _Joints) -> tuple[Column, ...]:
+    """Return the recorded rates or accelerations of exactly these joints, or nothing."""
+    if joints.names:
+        return named_after(numeric, joints.names, role)
+    order = ("position", "rate", "acceleration").index(role)
+    asked = any(column.words & vocabulary().commanded for column in joints.columns)
+    matching = [
+        family
+        for family in families(numeric, vocabulary().joint[role], order=order)
+        if set(family.columns) == set(joints.numbers) and family.commanded == asked
+    ]
+    best = [family for family in matching if family.rank == min(f.rank for f in matching)]
+    return tuple(best[0].columns[n] for n in joints.numbers) if len(best) == 1 else ()
+
+
+def about_pose(pose: Pose) -> list[Inference]:
+    """Say which columns hold the recorded tool centre point."""
+    groups = (("recorded TCP", pose.position), ("recorded orientation", pose.rotation))
+    return [
+        Inference(what, ", ".join(column.name for column in group), pose.evidence)
+        for what, group in groups
+        if group
+    ]
+
+
+def _path(
+    columns: Sequence[Column],
+    numeric: Sequence[Column],
+    pose: Pose,
+    layouts: Sequence[Layout],
+    robot: Chain | None,
+    *,
+    path: bool,
+) -> Roles:
+    """Return the roles of a path; raise if it is none either."""
+    file = str(layouts[0].segment.path)
+    pose = pose if pose.position else find_pose(numeric, layouts, file)
+    if pose.position:
+        names = ", ".join(column.name for column in pose.position)
+        said = [Inference("path", names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
+        roles = Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms)
+        return _with_rest(roles, said, numeric)
+    if path:
+        need = 'x, y, z; name them so in the header, or in a map (--map): [tcp] position = ["A", "B", "C"]'
+        raise LogError(Finding(f"found no position in {listed(columns)}, allowed: {need}", file=file))
+    need = (
+        f"{len(robot.coordinates)} for robot {robot.name}" if robot else "such as q1, q2, ... or J1, J2, ..."
+    )
+    message = f"found no joint columns in {listed(columns)}, allowed: {need}; {OPTION}"
+    raise LogError(Finding(message, file=file))
+
+
+def _with_rest(roles: Roles, said: list[Inference], numeric: Sequence[Column]) -> Roles:
+    rest = [column for column in numeric if column not in roles.columns]
+    if rest:
+        said.append(Inference("columns not used", listed(rest, most=8), "no role is known for them"))
+    return replace(roles, inferences=tuple(said))

@@ -1,0 +1,1 @@
+"""Files as tables: encoding, delimiter, header, rows, and what is wrong with them."""

@@ -1,0 +1,106 @@
+"""Text logs whose rows say what each value is: `Time: 0.015  q values: [0.1, 0.2]  mode=3`.
+
+KUKA's FRI examples, console output and JSON lines are written so. The labels are learnt from the first rows:
+the same ones, in the same order, stand in all of them. Lines with none of them are other messages.
+"""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.cells.cell import is_number
+from urmpipe_pipeline.sources.tables.form import Form, spread_names, usual_length, words_around
+from urmpipe_pipeline.sources.tables.sniff import SAMPLED_LINES, Layout
+from urmpipe_pipeline.sources.tables.text import HeadLine, Segment, head_lines
+
+_ARRAY = r"\[[^\[\]]*\]|\([^()]*\)"
+_NUMBER = r"[-+]?(?:\d+(?:[.,]\d*)?|\.\d+)(?:[eE][-+]?\d+)?(?![\w.:]|\s*[:=])"
+_WORD = r"\"[^\"]*\"|[^\s,;|\[\](){}\"]+"
+_PAIR = re.compile(
+    rf"""(?P<before>[\s,;|{{]*["']?[^\W\d][^:=\[\](){{}}"',;|]*?["']?)
+    (?: \s*[:=]\s*(?P<told>{_ARRAY}|{_NUMBER}|{_WORD})
+      | \s*(?P<array>{_ARRAY})
+      | \s+(?P<number>{_NUMBER})
+      | (?P<glued>[-+]?\d+\.\d+(?![\w.:]|\s*[:=])) )""",
+    re.VERBOSE,
+)
+_TAIL = re.compile(r"[\s,;}]*\Z")
+_BARE = re.compile(r"""[\s{},;|"':=]+|\b(?i:values?)\b""")
+
+FEWEST_LABELS = 2
+"""A line with one label may be anything."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Labelled:
+    """A line, the label before each of its values, and what stands behind the last."""
+
+    line: HeadLine
+    labels: tuple[str, ...]
+    tail: str
+
+
+def sniff_labels(segment: Segment) -> Layout | None:
+    """Return how a text log with labels in its rows is written, as rows of plain cells; None if it has none.
+
+    Args:
+        segment: The log's text.
+    """
+    lines = head_lines(segment)[:SAMPLED_LINES]
+    labelled = [found for found in map(_labelled, lines) if found]
+    if not labelled or 2 * len(labelled) < len(lines):
+        return None
+    (labels, tail), count = Counter((found.labels, found.tail) for found in labelled).most_common(1)[0]
+    rows = [found.line for found in labelled if (found.labels, found.tail) == (labels, tail)]
+    if 2 * count < len(labelled):
+        return None
+    return _layout(segment, rows, labels, tail)
+
+
+def _labelled(line: HeadLine) -> _Labelled | None:
+    """Return a line whose values have a label each, or None."""
+    labels, place = [], 0
+    while match := _PAIR.match(line.text, place):
+        start = next(match.start(group) for group in ("told", "array", "number", "glued") if match[group])
+        labels.append(line.text[place:start].strip())
+        place = match.end()
+    tail = _TAIL.match(line.text, place)
+    signed = any(label.endswith((":", "=")) for label in labels)
+    if tail is None or not signed or len(labels) < FEWEST_LABELS:
+        return None
+    return _Labelled(line, tuple(labels), tail[0].strip())
+
+
+def _layout(segment: Segment, rows: Sequence[HeadLine], labels: tuple[str, ...], tail: str) -> Layout | None:
+    opening = next((sign for sign in "[(" if all(sign in row.text for row in rows)), "")
+    names = tuple(_BARE.sub(" ", label).strip() for label in labels)
+    form = Form(names, (0,) * len(names), ";", opening=opening, labels=labels, tail=tail)
+    form = replace(form, words=words_around(row.text for row in rows))
+    values = form.readable(row.text for row in rows)
+    if not values:
+        return None
+    lengths = tuple(usual_length(row[j] for row in values) for j in range(len(names)))
+    plain = [value for row in values for value in row if isinstance(value, str)]
+    decimal = "," if any(is_number(v, ",") and not is_number(v, ".") for v in plain) else "."
+    form = replace(form, lengths=lengths, decimal=decimal, opening=opening if any(lengths) else "")
+    sample = form.sampled(form.readable(row.text for row in rows))
+    if not sample or not any(is_number(cell, decimal) for cell in sample[0]):
+        return None
+    shown = " ".join(label.strip(",;{ ") for label in labels)
+    return Layout(
+        segment=segment,
+        delimiter=form.delimiter,
+        decimal=decimal,
+        names=tuple(spread_names(names, lengths)),
+        units=(),
+        header=rows[0].number,
+        first_line=rows[0].number,
+        offset=rows[0].offset,
+        sample=sample,
+        inferences=(Inference("labels", shown, "they stand before the values of every row"),),
+        form=form,
+    )

@@ -1,0 +1,120 @@
+"""The tables of a log: what its files are, which source wrote them, how each table is written."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TypeAlias
+
+from urmpipe_models.errors import OptionError, for_each
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables import coppeliasim
+from urmpipe_pipeline.sources.tables.arrays import sniff_arrays
+from urmpipe_pipeline.sources.tables.labels import sniff_labels
+from urmpipe_pipeline.sources.tables.ros2 import with_names
+from urmpipe_pipeline.sources.tables.sniff import Layout, across, sniff
+from urmpipe_pipeline.sources.tables.text import Segment, open_text
+from urmpipe_pipeline.sources.vocabulary import KnownSource, vocabulary
+
+COPPELIASIM, PATH, TABLE = "coppeliasim", "path", "table"
+
+
+def source_names() -> tuple[str, ...]:
+    """Return the names that `ReadOptions.source` takes."""
+    return (COPPELIASIM, *(source.name for source in vocabulary().sources), PATH, TABLE)
+
+
+@dataclass(frozen=True, slots=True)
+class Tables:
+    """The tables of a log before their columns are understood.
+
+    Attributes:
+        source: Name of the source.
+        known: What is known of it, if anything.
+        layouts: How each table is written.
+        titles: Title of each table: the file's stem, or the graph's path.
+        paths: The file of each table.
+        inferences: What was found out.
+    """
+
+    source: str
+    known: KnownSource | None
+    layouts: tuple[Layout, ...]
+    titles: tuple[str, ...]
+    inferences: tuple[Inference, ...]
+
+    @property
+    def paths(self) -> list[Path]:
+        """The file of each table."""
+        return [layout.segment.path for layout in self.layouts]
+
+
+Sniff: TypeAlias = Callable[[Segment, str | None, str | None], Layout]
+"""What finds out how a plain table is written, with delimiter and decimal sign as options give them."""
+
+
+def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff = sniff) -> Tables:
+    """Return the tables of a log's files.
+
+    Args:
+        files: The files.
+        options: What the user says.
+        sniff_plain: What finds out how a table without labels and arrays is written.
+
+    Raises:
+        LogError: If a file is no text table; all files are looked at first.
+        OptionError: If there is no file, or the source is unknown.
+    """
+    if not files:
+        raise OptionError("found no log file, allowed: one, or several if a source writes one a plot")
+    if options.source is not None and options.source not in source_names():
+        raise OptionError(f"--source: found {options.source!r}, allowed: {', '.join(source_names())}")
+    segments = for_each(lambda path: open_text(path, any_suffix=options.source is not None), files)
+    titled = [(file.stem, segment) for file, segment in zip(files, segments, strict=True)]
+    forced = options.source == COPPELIASIM
+    if len(files) == 1 and (forced or (options.source is None and coppeliasim.is_export(segments[0]))):
+        titled = coppeliasim.graphs(segments[0]) or titled
+        forced = True
+    layouts = for_each(lambda item: _layout(item[1], options, sniff_plain), titled)
+    if len(files) > 1:
+        layouts = [across(layout) for layout in layouts]
+    known, said = _known(layouts, options) if not forced else (None, _coppeliasim(titled, options))
+    name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
+    encoding = Inference(
+        "encoding", segments[0].encoding, "byte order mark" if segments[0].start else "its bytes"
+    )
+    return Tables(
+        source=name,
+        known=known,
+        layouts=tuple(layouts),
+        titles=tuple(title for title, _ in titled),
+        inferences=(encoding, said),
+    )
+
+
+def _layout(segment: Segment, options: ReadOptions, sniff_plain: Sniff) -> Layout:
+    """Return how a table is written: rows with labels, with arrays in their cells, or plain ones."""
+    given = options.delimiter, options.decimal
+    found = None if options.delimiter else sniff_labels(segment)
+    return found or sniff_arrays(segment, *given) or with_names(sniff_plain(segment, *given))
+
+
+def _known(layouts: Sequence[Layout], options: ReadOptions) -> tuple[KnownSource | None, Inference]:
+    """Return the source that the columns give away."""
+    if options.source is not None:
+        return vocabulary().source(options.source), Inference("source", options.source, "given as an option")
+    names = [
+        name for layout in layouts for name in (*layout.names, *(layout.form.labels if layout.form else ()))
+    ]
+    for source in vocabulary().sources:
+        if source.wrote(names):
+            return source, Inference("source", source.name, "the names of its columns")
+    return None, Inference("source", TABLE, "no source is known by these columns")
+
+
+def _coppeliasim(titled: Sequence[tuple[str, Segment]], options: ReadOptions) -> Inference:
+    graphs = ", ".join(title for title, _ in titled)
+    evidence = "given as an option" if options.source else f"each graph has its path and header: {graphs}"
+    return Inference("source", COPPELIASIM, evidence)

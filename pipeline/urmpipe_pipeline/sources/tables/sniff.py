@@ -1,0 +1,337 @@
+"""How a table is written: delimiter, decimal sign, header, where the data begin. Never from the locale."""
+
+from __future__ import annotations
+
+import re
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.cells.cell import (
+    DECIMALS,
+    DELIMITERS,
+    SPACE,
+    count_up,
+    is_missing,
+    is_number,
+    is_text,
+    printable,
+    split_line,
+)
+from urmpipe_pipeline.sources.cells.text_clock import looks_like_a_clock
+from urmpipe_pipeline.sources.tables.form import Form
+from urmpipe_pipeline.sources.tables.text import HEAD_BYTES, HeadLine, Segment, head_lines
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+COMMENTS = ("#", "%", "//")
+LEAST_FIT = 0.2
+"""A delimiter that fits less than this is not believed because it makes several columns."""
+
+SCORED_LINES = 60
+"""Lines that decide on the delimiter."""
+
+SAMPLED_LINES = 250
+"""Lines that decide on everything else."""
+
+_NAMES = {",": "comma", ";": "semicolon", "\t": "tab", SPACE: "spaces", "|": "bar", ".": "point"}
+_SIGNS = {name: sign for sign, name in _NAMES.items()} | {"\\t": "\t", "space": SPACE, "pipe": "|"}
+
+_TOLD = re.compile(r'"?sep=([,;|\t])"?', re.IGNORECASE)
+
+Row = list[str]
+
+
+@dataclass(frozen=True, slots=True)
+class Layout:
+    """How one table is written.
+
+    Attributes:
+        segment: Where it stands.
+        delimiter: Sign between cells; a space stands for any run of spaces and tabs.
+        decimal: Decimal sign.
+        names: Names of the columns as the header has them; 1, 2, ... without a header. One a cell of a
+            row: empty for an unnamed index and for what follows a trailing delimiter.
+        units: Texts of a second header line with units, or empty.
+        header: Line of the header, None without one.
+        first_line: Line of the file that holds row 1.
+        offset: Offset of that line in bytes.
+        sample: Cells of the first rows.
+        inferences: What was found out.
+        form: How its rows become rows of plain cells, if they hold arrays or labels.
+        across: Whether the rows of its only column stand side by side in one line.
+    """
+
+    segment: Segment
+    delimiter: str
+    decimal: str
+    names: tuple[str, ...]
+    units: tuple[str, ...]
+    header: int | None
+    first_line: int
+    offset: int
+    sample: tuple[tuple[str, ...], ...]
+    inferences: tuple[Inference, ...]
+    form: Form | None = None
+    across: bool = False
+
+    def cells(self, column: int) -> list[str]:
+        """Return the sampled cells of a column."""
+        return [row[column] for row in self.sample if column < len(row)]
+
+
+@dataclass(frozen=True, slots=True)
+class _Style:
+    """Delimiter and decimal sign, the width of most rows with them, and how well they fit, 0..1."""
+
+    delimiter: str
+    decimal: str
+    width: int = 0
+    fit: float = 0.0
+
+
+def sniff(
+    segment: Segment,
+    delimiter: str | None = None,
+    decimal: str | None = None,
+    lines: Sequence[HeadLine] | None = None,
+) -> Layout:
+    """Return how a table is written.
+
+    Args:
+        segment: The table's text.
+        delimiter: The sign between cells, or its name, if the file need not tell.
+        decimal: The decimal sign, or its name, if the file need not tell.
+        lines: The lines of its head with a plain cell for each array, if it holds arrays.
+
+    Raises:
+        LogError: If it holds no numbers, no rows, or a header that does not fit its rows.
+        OptionError: If delimiter or decimal is none that is allowed.
+    """
+    lines = head_lines(segment) if lines is None else lines
+    told, lines = _told_delimiter(lines)
+    delimiters = _choices("delimiter", delimiter or told, DELIMITERS)
+    decimals = _choices("decimal sign", decimal, DECIMALS)
+    body = [line for line in lines if not line.text.lstrip().startswith(COMMENTS)][:SAMPLED_LINES]
+    style = _best_style([line.text for line in body[:SCORED_LINES]], delimiters, decimals)
+    rows = [split_line(line.text, style.delimiter) for line in body]
+    width = _common_width(rows, style.decimal)
+    numeric = _numeric_columns(rows, width, style.decimal)
+    first = next((i for i in range(len(rows)) if _is_data(rows, i, numeric, style.decimal)), None)
+    if first is None:
+        raise LogError(_no_rows(segment, body))
+    _refuse_prose(segment, body[first:], [len(row) for row in rows[first:]], width)
+    before = [line for line in lines if line.number < body[first].number]
+    header, units = _header(before, style.delimiter, width)
+    names, said = _names(segment, header, rows[first:], width)
+    return Layout(
+        segment=segment,
+        delimiter=style.delimiter,
+        decimal=style.decimal,
+        names=names,
+        units=tuple(units),
+        header=header[0] if header else None,
+        first_line=body[first].number,
+        offset=body[first].offset,
+        sample=tuple(tuple(row) for row in rows[first:]),
+        inferences=(*_style_inferences(style, delimiter, decimal, told), said),
+    )
+
+
+def _told_delimiter(lines: Sequence[HeadLine]) -> tuple[str | None, Sequence[HeadLine]]:
+    """Return the delimiter that a first line sep=; tells (Excel), and the other lines."""
+    told = _TOLD.fullmatch(lines[0].text.rstrip("\r\n ")) if lines else None
+    return (told[1], lines[1:]) if told else (None, lines)
+
+
+def across(layout: Layout) -> Layout:
+    """Return a table of a single line of numbers as one column; any other as it is.
+
+    Args:
+        layout: How the table is written, as far as its beginning tells.
+    """
+    if layout.header is not None or len(layout.sample) != 1 or len(layout.names) < 3:
+        return layout
+    lines = layout.segment.lines()
+    if any(line.strip() for number, line in lines if number > layout.first_line):
+        return layout
+    longer = layout.segment.end - layout.segment.start > HEAD_BYTES  # then the last value is cut
+    cells = layout.sample[0][: -1 if longer else None][:SAMPLED_LINES]
+    column = tuple((cell,) for cell in cells)
+    return replace(layout, names=("1",), sample=column, across=True)
+
+
+def _choices(what: str, given: str | None, allowed: Sequence[str]) -> Sequence[str]:
+    """Return the signs to try: the one given by the user, or all."""
+    if given is None:
+        return allowed
+    sign = _SIGNS.get(given.lower(), given)
+    if sign not in allowed:
+        names = ", ".join(_NAMES[sign] for sign in allowed)
+        raise OptionError(f"{what}: found {given!r}, allowed: {names}, or the sign itself")
+    return (sign,)
+
+
+def _best_style(lines: Sequence[str], delimiters: Sequence[str], decimals: Sequence[str]) -> _Style:
+    """Return the style that fits best; of equals, the first.
+
+    A single column is believed only where no delimiter makes more: 0,1 is two numbers before it is 0.1.
+    """
+    best = _Style(delimiters[0], decimals[0])
+    for delimiter in delimiters:
+        rows = [split_line(line, delimiter) for line in lines]
+        for decimal in decimals:
+            width = _common_width(rows, decimal)
+            style = _Style(delimiter, decimal, width, _fit(rows, width, decimal))
+            if _credit(style) > _credit(best):
+                best = style
+        if best.width > 1 and best.fit == 1.0:
+            break
+    return best
+
+
+def _fit(rows: Sequence[Row], width: int, decimal: str) -> float:
+    """Return the share of rows of one width with numbers, times the share of their text that is numbers.
+
+    A date or a time counts as a number: 0.005 sec and 2021-04-11 22:27:21 are one cell.
+    """
+    full = [row for row in rows if len(row) == width and any(is_number(cell, decimal) for cell in row)]
+    cells = [cell for row in full for cell in row if not is_missing(cell)]
+    numbers = sum(len(cell) for cell in cells if is_number(cell, decimal) or looks_like_a_clock(cell))
+    return len(full) / len(rows) * numbers / sum(map(len, cells)) if full else 0.0
+
+
+def _credit(style: _Style) -> tuple[bool, float]:
+    return style.width > 1 and style.fit >= LEAST_FIT, style.fit
+
+
+def _style_inferences(
+    style: _Style, delimiter: str | None, decimal: str | None, told: str | None
+) -> list[Inference]:
+    parts, reads = f"it makes rows of {style.width} cells", "with it most cells are numbers"
+    parts = "the first line says so" if told else parts
+    given = "given as an option"
+    return [
+        Inference("delimiter", _NAMES[style.delimiter], given if delimiter else parts),
+        Inference("decimal sign", _NAMES[style.decimal], given if decimal else reads),
+    ]
+
+
+def _common_width(rows: Sequence[Row], decimal: str) -> int:
+    """Return the width of most rows, each counted as often as it has numbers."""
+    widths: Counter[int] = Counter()
+    for row in rows:
+        widths[len(row)] += sum(is_number(cell, decimal) for cell in row)
+    return widths.most_common(1)[0][0] if widths else 0
+
+
+def _numeric_columns(rows: Sequence[Row], width: int, decimal: str) -> list[int]:
+    """Return the columns in which at least half of the cells with content are numbers."""
+    full = [row for row in rows if len(row) == width]
+    result = []
+    for column in range(width):
+        cells = [row[column] for row in full if not is_missing(row[column])]
+        numbers = sum(is_number(cell, decimal) for cell in cells)
+        if numbers and 2 * numbers >= len(cells):
+            result.append(column)
+    return result
+
+
+def _is_data(rows: Sequence[Row], i: int, numeric: Sequence[int], decimal: str) -> bool:
+    """Return whether row i is data: at least half of it, where numbers belong, are numbers."""
+    cells = [rows[i][column] for column in numeric if column < len(rows[i])]
+    cells = [cell for cell in cells if not is_missing(cell)]
+    numbers = [cell for cell in cells if is_number(cell, decimal)]
+    return bool(numbers) and 2 * len(numbers) >= len(cells) and not _is_numbered_header(rows, i, numbers)
+
+
+def _is_numbered_header(rows: Sequence[Row], i: int, numbers: Sequence[str]) -> bool:
+    """Return whether the first row holds the numbers 0, 1, 2, ... that pandas gives unnamed columns.
+
+    pandas writes every float with a decimal point: whole numbers below mean that the row is data itself.
+    """
+    if i > 0 or len(rows) == 1 or len(numbers) < 3 or not count_up(numbers):
+        return False
+    others = len(rows[0]) - len(numbers)
+    return others <= 1 and not any(cell.isdigit() for cell in rows[1][others:])
+
+
+def _header(before: Sequence[HeadLine], delimiter: str, width: int) -> tuple[tuple[int, Row] | None, Row]:
+    """Return line and cells of the header, and the cells of a line of units between it and the data."""
+    units: Row = []
+    for line in reversed(before):
+        cells = _header_cells(line.text, delimiter, width)
+        comment = line.text.lstrip().startswith(COMMENTS)
+        if abs(len(cells) - width) > 1 and (comment or len(cells) == 1):
+            continue  # a comment or a title
+        if not units and line is not before[0] and _all_units(cells):
+            units = cells
+            continue
+        return (line.number, [printable(cell) for cell in cells]), units
+    return None, units
+
+
+def _header_cells(text: str, delimiter: str, width: int) -> Row:
+    """Split a header line, with its own delimiter if only that gives a name a column (numpy.savetxt)."""
+    text = text.strip(" " if delimiter == "\t" else None)  # a tab before the first name: an unnamed index
+    for comment in ("#", "//", "% "):
+        text = text.removeprefix(comment)
+    tried = [split_line(text, sign) for sign in (delimiter, *DELIMITERS)]
+    return next((cells for cells in tried if len(cells) == width), tried[0])
+
+
+def _all_units(cells: Row) -> bool:
+    words = [cell.strip("[]() ") for cell in cells]
+    return any(words) and all(not word or vocabulary().unit(word) for word in words)
+
+
+def _names(
+    segment: Segment, header: tuple[int, Row] | None, rows: Sequence[Row], width: int
+) -> tuple[tuple[str, ...], Inference]:
+    """Return a name for every cell of a row."""
+    full = [row for row in rows if len(row) == width]
+    trailing = not any(row[-1] for row in full)
+    if header is None:
+        names = tuple(str(k + 1) for k in range(width - trailing))
+        said = Inference("header", "none", "the first line is numbers: columns by number")
+        return names + ("",) * trailing, said
+    line, cells = header
+    found = Inference("header", f"line {line}", "the last line of names before the numbers")
+    if len(cells) == width:
+        return tuple(cells), found
+    if len(cells) == width + 1 and not cells[-1]:
+        return tuple(cells[:-1]), found
+    if len(cells) == width - 1 and trailing:
+        return (*cells, ""), Inference("header", f"line {line}", "each row ends with a delimiter")
+    if len(cells) == width - 1 and count_up([row[0] for row in full]):
+        return ("", *cells), Inference("header", f"line {line}", "the first column is an unnamed index")
+    number = abs(len(cells) - width)
+    remedy = f"{'add' if len(cells) < width else 'take out'} {number} name{'s' if number > 1 else ''}"
+    found_text = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column; {remedy}"
+    without = f"or delete line {line}: without names the columns are taken as joints in order"
+    raise LogError(Finding(f"{found_text}, {without}", file=str(segment.path), line=line))
+
+
+def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[int], width: int) -> None:
+    """Raise if most lines below the first with numbers are no rows of the same width."""
+    if 2 * widths.count(width) < len(widths):
+        shown = lines[0].text.strip()[:60]
+        message = f"found {shown!r} and lines of {min(widths)} to {max(widths)} cells, allowed: a table"
+        raise LogError(Finding(message, file=str(segment.path), line=lines[0].number))
+
+
+def _no_rows(segment: Segment, body: Sequence[HeadLine]) -> Finding:
+    """Say why no row of numbers was found."""
+    file = str(segment.path)
+    if not body:
+        return Finding("found no line with content, allowed: a table with a row a sample", file=file)
+    cells = [cell for line in body for cell in split_line(line.text, ",")]
+    if len(body) <= 2 and all(is_text(cell, ".") for cell in cells if cell):
+        return Finding("found a header and no rows, allowed: a row a sample", file=file, line=body[0].number)
+    shown = body[0].text.strip()[:60]
+    return Finding(
+        f"found {shown!r} and no row of numbers below it, allowed: a table with a row a sample",
+        file=file,
+        line=body[0].number,
+    )

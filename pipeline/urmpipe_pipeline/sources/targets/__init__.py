@@ -1,0 +1,1 @@
+"""Tables of targets: their header, rows that are wrong, orientations."""

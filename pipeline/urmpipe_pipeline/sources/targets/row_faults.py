@@ -1,0 +1,163 @@
+"""A table in which a wrong row does not stop the others: its rows, and what is wrong with which.
+
+A log is refused for one wrong cell, since a gap in a motion is a gap in everything computed from it. The
+rows of a table of targets stand each for itself.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.sources.cells.cell import split_line
+from urmpipe_pipeline.sources.checks import find_errors, rebuilt, unknown_times
+from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD, Clock
+from urmpipe_pipeline.sources.clocks.text_times import timed
+from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.plan import Plan
+from urmpipe_pipeline.sources.tables.blockwise import read_blockwise
+from urmpipe_pipeline.sources.tables.diagnose import data_lines
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.table import UNREADABLE, Numbers, read_fast
+
+ALLOWED = "a finite number"
+"""What the cells of such a table may hold."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Rows:
+    """The rows of a table, in the file's own units.
+
+    Attributes:
+        values: Of the columns of the plan, shape (n, columns); in a row with a fault without meaning.
+        clock: Times in [ns] on the file's clock, shape (n,); None without one. A row whose own time is
+            not known stands between its neighbours.
+        faults: Data row from 1, and what is wrong with it in one line.
+        inferences: What was found out about the clock.
+        warnings: What a person should know about the clock.
+    """
+
+    values: FloatArray
+    clock: IntArray | None
+    faults: Mapping[int, str]
+    inferences: tuple[Inference, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
+
+
+def read_rows(plan: Plan) -> Rows:
+    """Return the rows that a plan asks for, all in one table, with a fault where a row cannot be used.
+
+    A fault is a row that is not written like the others, a cell that is no finite number or a time that
+    is missing. Times that repeat or run backwards are an error of the file, as in a log: nothing tells
+    which of two rows is wrong.
+
+    Args:
+        plan: What is to be read.
+
+    Raises:
+        LogError: If there is no row, with what leaving out rows does not mend (the header again, a merge
+            conflict), or if the known times are no clock.
+    """
+    columns = plan.roles.columns
+    layout, clock = plan.tables.layouts[plan.main], plan.clocks[plan.main]
+    places = [column.index for column in columns]
+    read = read_fast(layout, places, clock.parts) or read_blockwise(layout, places, clock.parts, ALLOWED)
+    if read.lasting:
+        raise LogError(*read.lasting)
+    numbers = _without_blank_end(layout, timed(layout, clock.parts, read))
+    if not len(numbers.values):
+        raise LogError(Finding("found no row with a number, allowed: at least one", str(layout.segment.path)))
+    faults = _faults(numbers, columns, clock)
+    times, about = _whole_clock(layout, numbers, clock)
+    return Rows(numbers.values, times, faults, about.inferences, about.warnings)
+
+
+def _faults(numbers: Numbers, columns: Sequence[Column], clock: Clock) -> dict[int, str]:
+    """Return what is wrong with rows, in their order: all of it, each in one line."""
+    faults: dict[int, list[str]] = {row + 1: [said] for row, said in numbers.unread.items()}
+    for row, name, said in unknown_times(numbers, clock):
+        faults.setdefault(row, []).append(f"column {name}: {said}")
+    for row in np.flatnonzero(~np.isfinite(numbers.values).all(axis=1)).tolist():
+        told = faults.setdefault(row + 1, [])
+        if row in numbers.unread and not told[0].startswith("column "):
+            continue  # the row as a whole
+        reported = " ".join(told)
+        cells = zip(columns, numbers.values[row].tolist(), strict=True)
+        told += _not_finite((c, value) for c, value in cells if f"column {c.header}: " not in reported)
+    return {row: "; ".join(faults[row]) for row in sorted(faults)}
+
+
+def _not_finite(cells: Iterable[tuple[Column, float]]) -> Iterator[str]:
+    """Yield what is wrong with the numbers of a row, columns in which the same is found together."""
+    names: dict[str, list[str]] = {}
+    for column, value in cells:
+        if not math.isfinite(value):
+            names.setdefault("no number" if math.isnan(value) else str(value), []).append(column.header)
+    for found, of in names.items():
+        yield f"column{'s' * (len(of) > 1)} {', '.join(of)}: found {found}, allowed: {ALLOWED}"
+
+
+def _without_blank_end(layout: Layout, numbers: Numbers) -> Numbers:
+    """Return the numbers without rows at the end whose cells are all empty, as spreadsheets leave them."""
+    if not len(numbers.values) or not np.isnan(numbers.values[-1]).all():
+        return numbers
+    last = 0
+    for row, (_, text) in enumerate(data_lines(layout, layout.segment.lines()), start=1):
+        if any(split_line(text, layout.delimiter)):
+            last = row
+    kept = slice(0, last)
+    return replace(
+        numbers,
+        values=numbers.values[kept],
+        clock=None if numbers.clock is None else numbers.clock[kept],
+        texts=tuple(cells.at(np.arange(last)) for cells in numbers.texts),
+    )
+
+
+def _whole_clock(layout: Layout, numbers: Numbers, clock: Clock) -> tuple[IntArray | None, Numbers]:
+    """Return a time for every row, and what was found out about the known ones.
+
+    Raises:
+        LogError: If no time is known, or the known ones are no clock.
+    """
+    if numbers.clock is None:
+        return None, numbers
+    known = np.flatnonzero(numbers.clock > UNREADABLE)
+    if not len(known):
+        said = f"found no time in any of {len(numbers.clock)} rows, allowed: at least one"
+        said = f"{said}; --time none leaves the column out"
+        raise LogError(Finding(said, str(layout.segment.path), column=clock.columns[0].header))
+    told = replace(
+        numbers,
+        values=np.empty((len(known), 0)),
+        clock=numbers.clock[known],
+        texts=tuple(cells.at(known) for cells in numbers.texts),
+        findings=(),
+        wrong=0,
+        rows=known + 1,
+    )
+    told = rebuilt(told)
+    findings = find_errors(layout, told, (), clock)
+    if findings:
+        raise LogError(*findings)
+    assert told.clock is not None
+    return _between(known, told.clock, len(numbers.clock)), told
+
+
+def _between(known: IntArray, times: IntArray, rows: int) -> IntArray:
+    """Return a time for each row: known ones as they are, others in even steps between and around them."""
+    if len(known) == rows:
+        return times
+    step = int(np.median(np.diff(times) // np.diff(known))) if len(known) > 1 else int(PAPER_PERIOD * 1e9)
+    row = np.arange(rows)
+    before, after = times[0] + (row - known[0]) * step, times[-1] + (row - known[-1]) * step
+    inside = times[0] + np.rint(np.interp(row, known, times - times[0])).astype(np.int64)
+    filled = np.where(row < known[0], before, np.where(row > known[-1], after, inside))
+    filled[known] = times
+    return np.asarray(filled, dtype=np.int64)

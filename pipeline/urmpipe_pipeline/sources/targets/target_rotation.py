@@ -1,0 +1,162 @@
+"""The orientation of targets: its form and unit, its matrices, and the rows in which it is none."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.orientation import RotationForm, angles, matrices, quaternions
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.sources.columns.columns import Column, listed
+from urmpipe_pipeline.sources.columns.pose import ORTHOGONAL
+from urmpipe_pipeline.sources.columns.roles import Roles
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.units.rotation import PURE
+from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
+
+UNIT_NORM = 1e-3
+"""The norm of a quaternion may differ from 1 by this, as printed digits do; then it is divided by it."""
+
+MOST_RAD = 2 * np.pi * 1.01
+"""Angles of which none is told in a unit and most are beyond a turn in [rad] are hardly in rad."""
+
+MAP = 'a map (--map) says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+"""What helps where the names of columns do not tell an orientation."""
+
+_OURS = frozenset(("rx", "ry", "rz"))
+_KUKA = frozenset("abc")
+
+FEWEST = 3
+"""An orientation has at least so many columns."""
+
+
+def target_form(
+    roles: Roles, columns: Sequence[Column], file: str, options: ReadOptions
+) -> tuple[RotationForm | None, list[LogWarning]]:
+    """Return the form of the targets' orientation, None if they are positions, and what was assumed.
+
+    rz, ry, rx are angles about the moving axes Z, Y, X; a header in the order rx, ry, rz may also mean a
+    rotation vector, as UR writes: it is taken as the angles, with a warning.
+
+    Args:
+        roles: The columns of the poses.
+        columns: All columns of the file without its clock.
+        file: The file, for errors.
+        options: What the user says: the columns of the position, the form.
+
+    Raises:
+        LogError: If only a part of an orientation is there, its form cannot be told, or it is told of none.
+    """
+    found = roles.rotation
+    if not found:
+        unused = [column for column in columns if column not in roles.columns]
+        if options.rotation:
+            said = f"found {options.rotation} given for {listed(roles.position)} and no orientation"
+            raise LogError(Finding(f"--rotation: {said}, allowed: its columns beside them; {MAP}", file))
+        return None, [] if options.position else _without_orientation(roles, unused, file)
+    if len(roles.forms) == 1:
+        return roles.forms[0], []
+    if not all(column.words & _OURS for column in found):
+        hint = " or ".join(f"--rotation {form}" for form in roles.forms)
+        said = f"found {listed(found)}, which may be {' or '.join(roles.forms)}, allowed: one form"
+        raise LogError(Finding(f"{said}; {hint} says which", file))
+    if found[0].index > found[1].index > found[2].index:
+        return "rpy", []
+    said = "are taken as angles about the moving axes Z, Y, X (rz, ry, rx)"
+    said = f"{listed(found)} {said}; --rotation vector if they are a rotation vector, as UR writes"
+    return "rpy", [LogWarning("assumed-rotation", said)]
+
+
+def rotation_units(
+    columns: Sequence[Column], form: RotationForm, values: FloatArray, told: Sequence[Unit | None]
+) -> tuple[list[Unit], list[LogWarning]]:
+    """Return the unit of each column of an orientation, rad where none is told, and what was assumed.
+
+    That angles are in rad is the form of targets, and no assumption, unless most of them are beyond a turn
+    or they are called A, B, C as KUKA's, which are in degrees.
+
+    Args:
+        columns: The columns.
+        form: Their form.
+        values: Their finite rows as the file has them, shape (n, columns).
+        told: The unit that each tells, if it does.
+    """
+    if not angles(form):
+        return [PURE] * len(columns), []
+    known = [unit for unit in told if unit is not None]
+    if known:
+        return [unit or known[0] for unit in told], []
+    units = [vocabulary().units["rad"]] * len(columns)
+    beyond = len(values) > 0 and bool(np.median(np.abs(values).max(axis=1)) > MOST_RAD)
+    if not beyond and not any(column.key in _KUKA for column in columns):
+        return units, []
+    why = ", though most are beyond a turn" if beyond else ""
+    said = f"no unit is given for {listed(columns)}: they are taken as rad{why}"
+    hint = f"--unit {columns[0].header}=deg says otherwise"
+    return units, [LogWarning("assumed-unit", f"{said}; {hint}")]
+
+
+def target_rotations(
+    columns: Sequence[Column], form: RotationForm, values: FloatArray
+) -> tuple[FloatArray, dict[int, str]]:
+    """Return the rotation matrices, and what is wrong with rows that hold none.
+
+    Args:
+        columns: The columns, for messages.
+        form: Their form.
+        values: In [rad] or [-], shape (n, columns); a row with NaN stays NaN and is not told of.
+
+    Returns:
+        Shape (n, 3, 3), NaN where there is none, and the reasons by index.
+    """
+    names = f"columns {listed(columns)}"
+    faults = {row: f"{names}: {said}" for row, said in _no_rotations(values, form)}
+    sound = values.copy()
+    sound[list(faults)] = np.nan
+    return matrices(quaternions(sound, form)), faults
+
+
+def _no_rotations(values: FloatArray, form: RotationForm) -> Iterator[tuple[int, str]]:
+    """Yield index and reason of rows that hold no rotation: by a quaternion's norm, a matrix's R R^T."""
+    if form.startswith("quat"):
+        norm = np.linalg.norm(values, axis=1)
+        for row in np.flatnonzero(np.abs(norm - 1.0) > UNIT_NORM).tolist():
+            yield row, f"found a quaternion of norm {norm[row]:.6g}, allowed: 1 within {UNIT_NORM:g}"
+    elif form == "matrix":
+        r = values.reshape(-1, 3, 3)
+        off = np.abs(r @ r.transpose(0, 2, 1) - np.eye(3)).max(axis=(1, 2), initial=0.0)
+        with np.errstate(invalid="ignore"):  # rows with NaN, which are told of already
+            det = np.linalg.det(r)
+        for row in np.flatnonzero((off > ORTHOGONAL) | (det < 0)).tolist():
+            found = f"R R^T off I by {off[row]:.3g} and det R = {det[row]:.3g}"
+            yield row, f"found {found}, allowed: a rotation, {ORTHOGONAL:g} off at most, det R = 1"
+
+
+def _without_orientation(roles: Roles, unused: Sequence[Column], file: str) -> list[LogWarning]:
+    """Return a warning if enough columns are left for an orientation: else it would be left out in silence.
+
+    Raises:
+        LogError: If some are called as a part of an orientation is.
+    """
+    half = [column for column in unused if _is_part(column)]
+    if half:
+        allowed = f"all of rz, ry, rx or of qx, qy, qz, qw, or none; {MAP}"
+        raise LogError(Finding(f"found {listed(half)} as a part of an orientation, allowed: {allowed}", file))
+    numbers = [column for column in unused if not column.text and not column.counts_rows]
+    if len(numbers) < FEWEST:
+        return []
+    said = (
+        f"{listed(roles.position)} are targets without an orientation: {listed(numbers, most=8)} are not used"
+    )
+    return [LogWarning("columns-not-used", f"{said}; {MAP}")]
+
+
+def _is_part(column: Column) -> bool:
+    """Return whether a column is called as one of an orientation; KUKA's A, B, C may be anything."""
+    patterns = (
+        one for words in vocabulary().tcp_rotations if words.forms != ("zyx",) for one in words.patterns
+    )
+    return any("axis" in one.groupindex and one.search(column.key) for one in patterns)

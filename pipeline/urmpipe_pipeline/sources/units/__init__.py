@@ -1,0 +1,1 @@
+"""Units of the columns and forms of orientations: said, or told by the data."""

@@ -1,0 +1,125 @@
+"""What the arm's kinematics say about a log that recorded its tool centre point: units and the robot.
+
+The forward kinematics of the right robot, with the right units, come out at the recorded points; those of
+a wrong one do not. A tool that nobody told of only adds a constant offset in the frame of the tip:
+p_recorded = p + R d, with the d that fits best.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Mapping
+from dataclasses import dataclass
+from typing import TypeVar
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.orientation import angle_between, product
+
+Key = TypeVar("Key", bound=Hashable)
+
+SAMPLES = 400
+"""Rows that decide, spread evenly over the log."""
+
+CLOSE = 0.02
+"""Largest rms distance in [m] at which kinematics agree: an arm's own calibration moves it by millimetres."""
+
+CLOSE_WITH_TOOL = 0.006
+"""The same if a constant tool may be fitted: three numbers explain a part of any motion."""
+
+CLEARLY = 5.0
+"""The best of several explanations must be so many times nearer than the next one ..."""
+
+APART = 0.005
+"""... and by so much in [m]: two robots of one family differ by that somewhere in their space."""
+
+LEAST_MOTION = 0.02
+"""Spread of the recorded points in [m] below which a tool may explain anything."""
+
+_LEAST_ROWS = 5
+"""Rows needed to fit a tool: 3 numbers against 15."""
+
+
+@dataclass(frozen=True, slots=True)
+class Fit:
+    """How near the kinematics come to the recorded points.
+
+    Attributes:
+        distance: Root mean square distance in [m], the tool as the robot has it.
+        with_tool: The same after the constant tool offset that fits best; inf where it cannot be told.
+        tool: That offset in the frame of the tip, in [m].
+    """
+
+    distance: float
+    with_tool: float
+    tool: tuple[float, float, float]
+
+
+def spread(rows: int) -> slice:
+    """Return the rows that decide."""
+    return slice(None, None, max(1, rows // SAMPLES))
+
+
+def fit(robot: Chain, q: FloatArray, recorded: FloatArray) -> Fit | None:
+    """Return how near a robot comes to recorded points; None if no row has both.
+
+    Args:
+        robot: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints).
+        recorded: Recorded positions in [m], shape (n, 3).
+    """
+    known = np.isfinite(q).all(axis=1) & np.isfinite(recorded).all(axis=1)
+    q, recorded = q[known], recorded[known]
+    if not len(q):
+        return None
+    position, rotation = poses_over_log(robot, q)
+    miss = recorded - position
+    distance = _rms(miss)
+    if len(q) < _LEAST_ROWS or _rms(recorded - recorded.mean(axis=0)) < LEAST_MOTION:
+        return Fit(distance, np.inf, (0.0, 0.0, 0.0))
+    tool = (rotation.transpose(0, 2, 1) @ miss[:, :, np.newaxis]).mean(axis=0)  # least squares: R^T R = I
+    x, y, z = tool[:, 0].tolist()
+    return Fit(distance, _rms(miss - (rotation @ tool)[:, :, 0]), (x, y, z))
+
+
+def single_out(fits: Mapping[Key, Fit]) -> tuple[Key, bool] | None:
+    """Return the only explanation that agrees with the recorded points, and whether it needs a tool.
+
+    Args:
+        fits: How near each explanation comes.
+    """
+    for needs_tool, close in ((False, CLOSE), (True, CLOSE_WITH_TOOL)):
+        ranked = sorted(
+            (one.with_tool if needs_tool else one.distance, k) for k, one in enumerate(fits.values())
+        )
+        best, number = ranked[0]
+        second = ranked[1][0] if len(ranked) > 1 else np.inf
+        if best <= close and second >= CLEARLY * best and second >= best + APART:
+            return list(fits)[number], needs_tool
+    return None
+
+
+def _rms(vectors: FloatArray) -> float:
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
+
+
+def turned_apart(computed: FloatArray, recorded: FloatArray, *, tool: bool) -> float:
+    """Return the rms angle between orientations in [rad], with a tool after its constant turn that fits best.
+
+    The turn is the mean of the relative quaternions: the eigenvector of sum(q q^T) with the largest
+    eigenvalue (Markley et al. 2007, "Averaging quaternions", eq. 12).
+
+    Args:
+        computed: Orientation of the tip as unit quaternions x, y, z, w [-], shape (n, 4).
+        recorded: The recorded ones.
+        tool: Whether a tool may turn the recorded ones.
+    """
+    if not tool:
+        return float(np.sqrt(np.mean(angle_between(computed, recorded) ** 2)))
+    conjugate = computed * np.array([-1.0, -1.0, -1.0, 1.0])
+    relative = product(conjugate, recorded)
+    _, vectors = np.linalg.eigh(relative.T @ relative)
+    mean = np.broadcast_to(vectors[:, -1], relative.shape)
+    return float(np.sqrt(np.mean(angle_between(mean, relative) ** 2)))

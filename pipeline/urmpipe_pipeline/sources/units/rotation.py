@@ -1,0 +1,143 @@
+"""The recorded orientation: its form and unit, by the names of its columns or by the arm's kinematics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.orientation import RotationForm, angles, quaternions
+from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.units.evidence import turned_apart
+from urmpipe_pipeline.sources.units.unit_evidence import peak
+from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
+
+PURE = Unit("1", "ratio", 1.0)
+"""The unit of quaternions and of matrices."""
+
+CLOSE = 0.03
+"""Orientations agree with the kinematics within this angle in [rad] (1.7 deg) ..."""
+
+CLEARLY = 5.0
+"""... and so many times better than in any other form."""
+
+UNIT_LENGTH = 0.02
+"""The length of a quaternion may differ from 1 by this: they are printed with two digits or more."""
+
+
+@dataclass(frozen=True, slots=True)
+class Settled:
+    """What a recorded orientation is.
+
+    Attributes:
+        form: Its form; None if it cannot be told, and then it is not used.
+        units: The unit of each column.
+        inferences: What was found out.
+        warnings: What a person should know.
+    """
+
+    form: RotationForm | None = None
+    units: tuple[Unit, ...] = ()
+    inferences: tuple[Inference, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
+
+
+def settle_rotation(
+    columns: Sequence[Column],
+    forms: Sequence[RotationForm],
+    values: FloatArray,
+    told: Sequence[Unit | None],
+    arm: tuple[Chain, FloatArray] | None,
+) -> Settled:
+    """Return form and units of the columns of a recorded orientation.
+
+    Args:
+        columns: The columns.
+        forms: The forms that their names allow.
+        values: Their values as the file has them, shape (n, columns).
+        told: The unit that each column tells, if it does.
+        arm: The robot and the joint values in SI, shape (n, joints); None without a robot.
+    """
+    if not columns or np.isnan(values).any(axis=1).all():
+        return Settled()
+    names = ", ".join(column.name for column in columns)
+    sound = [form for form in forms if _is_sound(values, form)]
+    if not sound:
+        length = float(np.nanmedian(np.linalg.norm(values, axis=1)))
+        said = f"{names} hold quaternions of length {length:.4g}, allowed: 1; they are not used"
+        return Settled(warnings=(LogWarning("orientation", said),))
+    choices = [(form, units) for form in sound for units in _possible_units(form, values, told)]
+    if len(choices) == 1:
+        return _settled(names, choices[0], "their names")
+    best = _by_kinematics(choices, values, arm) if arm else None
+    if best is not None:
+        return _settled(names, *best)
+    if len(sound) == 1:
+        said = (
+            f"no unit is given for {names}: they are taken as {choices[0][1][0].name}; --unit says otherwise"
+        )
+        return _settled(names, choices[0], "their names", LogWarning("assumed-unit", said))
+    options = " or ".join(f"--rotation {form}" for form in sound)
+    said = f"{names} may be of several forms: the recorded orientation is not used; {options} says which"
+    return Settled(warnings=(LogWarning("orientation", said),))
+
+
+def _settled(
+    names: str, choice: tuple[RotationForm, tuple[Unit, ...]], evidence: str, *warnings: LogWarning
+) -> Settled:
+    form, units = choice
+    unit = "" if units[0] == PURE else f" in {units[0].name}"
+    return Settled(form, units, (Inference(f"form of {names}", f"{form}{unit}", evidence),), warnings)
+
+
+def _is_sound(values: FloatArray, form: RotationForm) -> bool:
+    """Return whether values can be of a form: quaternions have length 1."""
+    if not form.startswith("quat"):
+        return True
+    length = np.linalg.norm(values, axis=1)
+    return bool(np.nanmax(np.abs(length - 1.0)) <= UNIT_LENGTH)
+
+
+def _possible_units(
+    form: RotationForm, values: FloatArray, told: Sequence[Unit | None]
+) -> list[tuple[Unit, ...]]:
+    """Return the units that the columns may have: told, or deg and rad, or deg alone beyond two turns."""
+    if not angles(form):
+        return [(PURE,) * len(told)]
+    known = [unit for unit in told if unit is not None]
+    if known:
+        return [tuple(unit or known[0] for unit in told)]
+    units = vocabulary().units
+    likely = ("deg",) if peak(values) > 2 * np.pi * 1.01 else ("rad", "deg")
+    return [(units[name],) * len(told) for name in likely]
+
+
+def _by_kinematics(
+    choices: Sequence[tuple[RotationForm, tuple[Unit, ...]]],
+    values: FloatArray,
+    arm: tuple[Chain, FloatArray],
+) -> tuple[tuple[RotationForm, tuple[Unit, ...]], str] | None:
+    """Return the choice with which the kinematics agree, and by how much; None if none stands out."""
+    robot, q = arm
+    known = np.isfinite(q).all(axis=1) & np.isfinite(values).all(axis=1)
+    if not known.any():
+        return None
+    _, rotation = poses_over_log(robot, q[known])
+    computed = quaternions(rotation.reshape(-1, 9), "matrix")
+    recorded = [quaternions(values[known] * [unit.factor for unit in units], form) for form, units in choices]
+    for tool in (False, True):
+        distances = [turned_apart(computed, one, tool=tool) for one in recorded]
+        order = np.argsort(distances)
+        best, second = (distances[k] for k in order[:2])
+        if best <= CLOSE and second >= CLEARLY * best and second >= best + CLOSE:
+            form, units = choices[order[1]]
+            said = f"with it the arm's orientation agrees within {np.degrees(best):.2f} deg"
+            return choices[
+                order[0]
+            ], f"{said}, as {form} in {units[0].name} within {np.degrees(second):.2f} deg"
+    return None

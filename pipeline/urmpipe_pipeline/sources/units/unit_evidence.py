@@ -1,0 +1,114 @@
+"""What joint values say about their unit by themselves: their jumps, their speeds, the robot's limits."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+
+FULL_TURN_DEG = 360.0
+WRAP_SLACK_DEG = 20.0
+"""A step this near to 360 is a wrap in degrees: in radians it would be 57 turns between two rows."""
+
+FASTEST = 20.0
+"""Speed in [rad/s] that no joint of an arm keeps up (1146 deg/s)."""
+
+BEYOND = 3.0
+"""Values this many times beyond a joint's limit are no overshoot."""
+
+
+@dataclass(frozen=True, slots=True)
+class Bounds:
+    """What joints can do.
+
+    Attributes:
+        speed: No joint is faster for long, in [rad/s].
+        reach: Largest absolute value that each joint's limits allow, in [rad]; inf without limits.
+    """
+
+    speed: float = FASTEST
+    reach: tuple[float, ...] | float = math.inf
+
+    @classmethod
+    def of(cls, robot: Chain | None, turns: Sequence[int]) -> Bounds:
+        """Return the bounds of some joints of a robot, by their index among those that move."""
+        if robot is None:
+            return cls()
+        joints = [robot.moving[j] for j in turns]
+        speed = min(FASTEST, 2 * max(joint.velocity for joint in joints))
+        return cls(speed, tuple(max(abs(joint.lower), abs(joint.upper)) for joint in joints))
+
+
+@np.errstate(over="ignore", invalid="ignore")  # huge numbers: their steps are infinite
+def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds | None = None) -> str | None:
+    """Return why joint values cannot be in rad, or None if they can.
+
+    They cannot if they wrap by about 360, or if it is in degrees only that they are no faster than a joint
+    can be for a tenth of the time, or that they keep the robot's limits. Values within one turn in rad are
+    never doubted.
+
+    Args:
+        values: Joint values, shape (n, joints).
+        t_ns: Recorded times in [ns], shape (n,), or None.
+        bounds: What the robot's joints can do, or None.
+    """
+    if peak(values) <= math.tau:
+        return None
+    bounds = bounds or Bounds()
+    wraps, speed = 0, 0.0
+    for column in values.T:
+        steps = np.abs(np.diff(column))
+        wraps += int((np.abs(steps - FULL_TURN_DEG) <= WRAP_SLACK_DEG).sum())
+        if t_ns is not None:
+            speed = max(speed, _usual_speed(steps, t_ns))
+    if wraps:
+        return f"{wraps} step{'s' if wraps > 1 else ''} of about 360 from one row to the next"
+    if np.radians(speed) <= bounds.speed < speed:
+        return f"as rad it would turn at {speed:.3g} rad/s for a tenth of the time"
+    largest, reach = np.nanmax(np.abs(values), axis=0), np.asarray(bounds.reach)
+    if (np.radians(largest) <= reach).all() and (largest > BEYOND * reach).any():
+        return f"values up to {largest.max():.6g} are beyond the robot's limits as rad and within them as deg"
+    return None
+
+
+def radians_evidence(values: FloatArray) -> str | None:
+    """Return why joint values cannot be in deg, or None if they can.
+
+    They cannot if they stay within a turn in rad and wrap by about 2 pi: in deg all these jumps would be of
+    the same six degrees.
+
+    Args:
+        values: Joint values, shape (n, joints).
+    """
+    if peak(values) > math.tau:
+        return None
+    slack = math.radians(WRAP_SLACK_DEG)
+    wraps = int((np.abs(np.abs(np.diff(values, axis=0)) - math.tau) <= slack).sum())
+    if not wraps:
+        return None
+    return f"{wraps} step{'s' if wraps > 1 else ''} of about 6.28 from one row to the next"
+
+
+def peak(values: FloatArray) -> float:
+    """Return the largest absolute value, missing samples left out; NaN if there is none.
+
+    Args:
+        values: Shape (n, columns), n > 0.
+    """
+    largest = max(values.max(), -values.min())
+    if np.isnan(largest):  # slower, but deaf to NaN
+        largest = max(np.fmax.reduce(values, axis=None), -np.fmin.reduce(values, axis=None))
+    return float(largest)
+
+
+def _usual_speed(steps: FloatArray, t_ns: IntArray) -> float:
+    """Return the speed that is exceeded in a tenth of the steps, per second."""
+    rates = steps / (np.diff(t_ns) * 1e-9)
+    rates = rates[np.isfinite(rates)]
+    at = int(0.9 * (len(rates) - 1)) if len(rates) else 0
+    return float(np.partition(rates, at)[at]) if len(rates) else 0.0  # np.quantile imports numpy.ma

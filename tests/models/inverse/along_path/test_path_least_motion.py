@@ -1,0 +1,384 @@
+"""Paths without a closed form: least motion from sample to sample, limits, reach."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from urmpipe_datasets import LOGS
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.inverse.along_path import sliding_window
+from urmpipe_models.inverse.along_path.joint_path import JointPath
+from urmpipe_models.inverse.along_path.least_motion_path import LeastMotionPath
+from urmpipe_models.inverse.along_path.path import follow
+from urmpipe_models.inverse.along_path.sliding_window import SlidingWindow
+from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.kinematics.forward import jacobian_over_log
+from urmpipe_models.repolarizer import repolarize
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.transform import Transform, translation
+
+NANOMETRE = 1e-9
+"""What the solver promises: targets are met within it."""
+
+PERIOD = 5_000_000
+"""5 ms in ns."""
+
+
+def times(count: int) -> NDArray[np.int64]:
+    return PERIOD * np.arange(count, dtype=np.int64)
+
+
+@pytest.fixture(scope="module")
+def demo_path() -> FloatArray:
+    """The bundled path in m: 7383 samples at 5 ms."""
+    return np.loadtxt(LOGS / "path.csv", delimiter=",", skiprows=1)[:, 1:]
+
+
+@pytest.fixture(scope="module")
+def followed(demo_path: FloatArray) -> JointPath:
+    return follow(load_robot("urm6"), Targets(demo_path), times(len(demo_path)))
+
+
+def planar(count: int, lower: float = -math.inf, upper: float = math.inf) -> Chain:
+    """An arm of links of 1 m in a plane, limits of its first joint in rad."""
+    first = Joint("a1", lower=lower, upper=upper)
+    others = [Joint(f"a{k}", origin=translation(1.0, 0.0, 0.0)) for k in range(2, count + 1)]
+    return Chain("planar", (first, *others), tip=translation(1.0, 0.0, 0.0))
+
+
+def assert_met(path: JointPath, targets: Targets) -> None:
+    distance, turn = misses(path.chain, path.q, targets)
+    assert path.reached.all(), list(path.reasons[path.reasons != ""])
+    assert np.linalg.norm(distance, axis=1).max() <= NANOMETRE
+    # rad: the solver counts rotations as arcs of a quarter of the arm, 0.2 m and more of these arms
+    assert np.linalg.norm(turn, axis=1).max() <= 5.0 * NANOMETRE
+
+
+def assert_least_motion(path: JointPath, least_singular: float) -> None:
+    """Every step lies in the row space of J at its end: nothing of it could be left out."""
+    J = jacobian_over_log(path.chain, path.q)[1:, : 3 if path.position_only else 6]
+    _, sigma, rows = np.linalg.svd(J, full_matrices=False)
+    step = np.diff(path.q, axis=0)[:, :, None]
+    left = (step - rows.transpose(0, 2, 1) @ (rows @ step))[..., 0]
+    regular = sigma[:, -1] > least_singular
+    assert regular.mean() > 0.9
+    # rad: a sample has converged once a sweep moves it by less than 1e-10; its neighbours' errors add up
+    assert np.abs(left[regular]).max() < 1e-9
+
+
+def test_urm6_follows_the_demo_path_to_a_nanometre_without_a_jump(
+    followed: JointPath, demo_path: FloatArray
+) -> None:
+    assert_met(followed, Targets(demo_path))
+    assert followed.jumps == ()
+    assert followed.too_fast == ()
+    assert followed.singular == ()
+    assert set(followed.branch) == {"1"}
+    assert followed.method == "least motion"
+    assert not followed.shortfall.any()
+    # rad a sample: 0.59 m/s are 3 mm, over singular values down to 0.07 m/rad and briefly less
+    assert np.abs(np.diff(followed.q, axis=0)).max() < 0.015
+
+
+def test_the_demo_path_starts_in_the_calibration_pose(followed: JointPath) -> None:
+    # the path starts at its p7, to the nanometre that the file is written to, in a singular pose
+    np.testing.assert_allclose(followed.q[0], load_robot("urm6").start, rtol=0.0, atol=1e-15)
+
+
+def test_each_step_along_the_demo_path_is_least(followed: JointPath) -> None:
+    assert_least_motion(followed, 0.01)
+
+
+def test_the_distance_to_singular_poses_is_told_along_the_path(followed: JointPath) -> None:
+    smallest = followed.singularity.smallest
+    J = jacobian_over_log(followed.chain, followed.q)[:, :3] / followed.singularity.length
+    np.testing.assert_allclose(
+        smallest, np.linalg.svd(J, compute_uv=False)[:, -1], rtol=0.0, atol=1e-12
+    )  # the same matrix, decomposed twice
+    assert smallest[0] < 1e-12
+    assert smallest[1000:].min() > 1e-3
+
+
+def test_windows_give_what_one_sample_after_the_other_gives(
+    followed: JointPath, demo_path: FloatArray
+) -> None:
+    """Newton's method on min |q - q_{k-1}|^2 subject to FK(q) = x_k, written plainly, sample by sample."""
+    chain, rows = followed.chain, slice(1000, 1060)
+    expected = [followed.q[rows.start]]
+    for target in demo_path[rows.start + 1 : rows.stop]:
+        q = last = expected[-1]
+        for _ in range(6):
+            error, _ = misses(chain, q[None], Targets(target[None]))
+            J = jacobian_over_log(chain, q[None])[0, :3]
+            q = last + np.linalg.pinv(J) @ (error[0] + J @ (q - last))
+        expected.append(q)
+    # rad: 60 samples, each converged to 1e-10 and damped by 1e-8 m^2 / sigma^2 of a step of 1e-3
+    np.testing.assert_allclose(followed.q[rows], expected, rtol=0.0, atol=1e-6)
+
+
+@pytest.mark.parametrize("longest", [96, 1000])
+def test_windows_of_other_sizes_give_the_same_motion(
+    followed: JointPath, demo_path: FloatArray, longest: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sliding_window, "LONGEST", longest)
+    count = 1500
+    path = follow(followed.chain, Targets(demo_path[:count]), times(count))
+    # rad: at the singular start the nanometre leaves that open; what comes after goes on from there
+    np.testing.assert_allclose(path.q, followed.q[:count], rtol=0.0, atol=2e-6)
+    steps, expected = np.diff(path.q[1000:], axis=0), np.diff(followed.q[1000:count], axis=0)
+    # rad: where the nanometre is just kept or not, lambda^2 is 1e-8 or 1e-9 m2 of steps of 4e-3 over sigma^2
+    np.testing.assert_allclose(steps, expected, rtol=0.0, atol=2e-8)
+
+
+def test_at_the_singular_start_the_joints_do_not_follow_the_rounding_of_the_file(followed: JointPath) -> None:
+    # rad: 0.053 so; 0.086 by least motion alone, which steps by a nanometre over sigma
+    assert np.linalg.norm(np.diff(followed.q[:200], axis=0), axis=1).sum() < 0.06
+
+
+def test_joints_within_pi_are_unwrapped_by_the_repolarizer(
+    followed: JointPath, demo_path: FloatArray
+) -> None:
+    wrapped = follow(followed.chain, Targets(demo_path), followed.t_ns, within_pi=True)
+    assert np.abs(followed.q).max() > math.pi
+    assert wrapped.q.max() <= math.pi
+    assert wrapped.q.min() > -math.pi
+    dt = np.append(0.0, np.diff(followed.t_ns) * 1e-9)
+    again = repolarize(wrapped.q, dt)
+    assert len(again.rows) > 0
+    turns = followed.q[0] - again.q[0]
+    # rad: whole turns taken off and added again
+    np.testing.assert_allclose(again.q + turns, followed.q, rtol=0.0, atol=1e-13)
+    assert wrapped.jumps == ()
+
+
+def test_a_redundant_arm_follows_poses_within_its_limits() -> None:
+    panda = load_robot("panda")
+    t = np.linspace(0.0, 6.0, 500)[:, None]
+    q = np.array(panda.start) + 0.4 * np.sin(t * np.linspace(0.3, 1.0, 7))
+    targets = targets_of(panda, q)
+    path = follow(panda, targets, times(len(q)), start=q[0])
+    assert_met(path, targets)
+    assert path.jumps == ()
+    assert_least_motion(path, 0.01)
+    # a redundant arm finds a shorter way than the one that the poses were made from
+    assert np.square(np.diff(path.q, axis=0)).sum() < np.square(np.diff(q, axis=0)).sum()
+
+
+def test_a_joint_is_held_on_its_limit_and_let_go_again() -> None:
+    free, limited = planar(3), planar(3, upper=0.5)
+    start = np.array([0.2, -0.6, 0.3])
+    t = np.linspace(0.0, 2.0 * math.pi, 400)
+    circle = targets_of(free, start[None]).position + 0.6 * np.column_stack(
+        (np.cos(t) - 1.0, np.sin(t), np.zeros_like(t))
+    )
+    without = follow(free, Targets(circle), times(400), start=start)
+    path = follow(limited, Targets(circle), times(400), start=start)
+    assert without.q[:, 0].max() > 0.6
+    assert_met(path, Targets(circle))
+    assert path.q[:, 0].max() == 0.5
+    assert path.jumps == ()
+    on = path.q[:, 0] == 0.5
+    assert on.sum() > 20
+    assert not on[0]
+    assert not on[-1]
+    step = np.diff(path.q, axis=0)
+    J = jacobian_over_log(limited, path.q)[1:, :2]
+    for k in np.flatnonzero(~on[1:]):
+        assert np.abs(np.linalg.svd(J[k])[2][2] @ step[k]) < 1e-8  # rad: least motion of all three
+    for k in np.flatnonzero(on[1:] & on[:-1]):
+        y = np.linalg.solve(J[k, :, 1:].T, step[k, 1:])  # the two free joints move by J^T y ...
+        assert J[k, :, 0] @ y > -1e-8  # ... and the third one would go on outwards
+
+
+def test_what_is_out_of_reach_has_a_reason_and_the_path_goes_on_after_it() -> None:
+    arm = planar(3)
+    t = np.linspace(0.0, 1.0, 301)
+    reach = 2.5 + 1.2 * np.sin(math.pi * t)
+    line = np.column_stack((reach, np.zeros((301, 2))))
+    path = follow(arm, Targets(line), times(301), start=np.array([0.6, -1.0, 0.1]))
+    out = reach > 3.0
+    assert (path.reached == ~out).all()
+    assert np.isnan(path.q[out]).all()
+    assert all(path.reasons[out])
+    assert not any(path.reasons[~out])
+    assert (path.branch[out] == "").all()
+    distance, _ = misses(arm, path.q[~out], Targets(line[~out]))
+    assert np.abs(distance).max() <= NANOMETRE
+    assert path.jumps == ()
+
+
+def test_another_bend_after_a_gap_is_told_as_a_jump() -> None:
+    free, arm = planar(2), planar(2, upper=1.0)
+    q = np.array([0.9, -1.0]) + np.linspace(0.0, 0.2, 41)[:, None] * np.array([1.0, 0.0])
+    targets = Targets(targets_of(free, q).position)
+    targets.position[18:22] *= 2.0
+    path = follow(arm, targets, times(41), start=q[0])
+    assert (np.flatnonzero(~path.reached) == np.arange(18, 22)).all()
+    (jump,) = path.jumps
+    assert (jump.last, jump.sample, jump.from_branch, jump.to_branch) == (17, 22, "1", "2")
+    # rad: the mirror image about the line to the target
+    np.testing.assert_allclose(path.q[22], [q[22, 0] - 1.0, 1.0], rtol=0.0, atol=1e-8)
+
+
+def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
+    arm = planar(3)
+    reach = 2.9 + 0.102 * np.sin(np.linspace(0.0, math.pi, 101))
+    line = np.column_stack((reach, np.zeros((101, 2))))
+    path = follow(arm, Targets(line), times(101), start=np.array([0.3, -0.5, 0.1]), tolerance=0.003)
+    assert path.reached.all()
+    # m: along x the arm reaches 3 m; the nearest point is found to 1e-6 rad about it, so much better
+    np.testing.assert_allclose(path.shortfall, np.maximum(reach - 3.0, 0.0), rtol=0.0, atol=1e-9)
+
+
+def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
+    arm = load_robot("ur5e")
+    stretched = np.array([0.3, -0.9, 0.0, -0.7, 0.3, 0.3])
+    q = stretched + np.linspace(0.4, 0.0, 41)[:, None] * np.array([0.0, 0.0, 1.0, 0.0, 0.0, 0.0])
+    targets = targets_of(arm, q)
+    away = targets.position - np.array([0.0, 0.0, 0.1625])
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    targets.position[:] += np.linspace(0.0, 0.004, 41)[:, None] * away
+    path = LeastMotionPath(arm, targets, q[0], 0.0035, 20, 0, lambda share: None)
+    assert np.isfinite(path.q).all()
+    assert (path.shortfall > 0.0).sum() > 10
+    # rad: restarts find other turns of the same points, 6.28 away
+    assert np.abs(np.diff(path.q, axis=0)).max() < 1.0
+
+
+def test_a_sample_that_is_none_stops_no_other() -> None:
+    arm = planar(3)
+    line = np.column_stack((np.linspace(2.0, 2.2, 21), np.zeros((21, 2))))
+    whole = follow(arm, Targets(line), times(21), start=np.array([0.6, -1.0, 0.1]))
+    broken = line.copy()
+    broken[10] = math.nan
+    path = follow(arm, Targets(broken), times(21), start=np.array([0.6, -1.0, 0.1]))
+    assert path.reasons[10] == "the position is nan, nan, nan m, allowed: finite numbers"
+    assert path.reached.sum() == 20
+    # rad: least motion of two steps and of one, 0.01 m each, differ in second order
+    np.testing.assert_allclose(np.delete(path.q, 10, 0), np.delete(whole.q, 10, 0), rtol=0.0, atol=1e-4)
+
+
+def test_one_sample_and_equal_samples_are_paths_too() -> None:
+    arm = load_robot("urm6")
+    start = np.array([0.3, 2.0, 0.4, 2.5, 0.2, 1.0])
+    one = targets_of(arm, start[None] + 0.05)
+    assert_met(follow(arm, one, times(1), start=start), one)
+    twice = Targets(np.repeat(one.position, 2, axis=0))
+    path = follow(arm, twice, times(2), start=start)
+    assert_met(path, twice)
+    # rad: there is nothing to move for
+    np.testing.assert_allclose(path.q[0], path.q[1], rtol=0.0, atol=1e-9)
+
+
+@pytest.mark.parametrize("robot", ["ur5e", "arm6", "urm6"])
+@pytest.mark.parametrize("place", [math.nan, 9.0])
+def test_a_path_of_which_no_sample_has_a_solution_has_a_reason_each(robot: str, place: float) -> None:
+    arm = load_robot(robot)
+    targets = targets_of(arm, np.full((3, 6), 0.3))
+    targets.position[:] = place
+    path = follow(arm, targets, times(3), within_pi=True, restarts=2)
+    assert not path.reached.any()
+    assert all("finite numbers" in text if math.isnan(place) else " m" in text for text in path.reasons)
+    assert list(path.branch) == ["", "", ""]
+    assert path.jumps == ()
+    assert path.too_fast == ()
+    assert path.singular == ()
+
+
+def test_prismatic_joints_follow_too() -> None:
+    gantry = Chain(
+        "gantry",
+        (
+            Joint("x", "prismatic", axis=(1.0, 0.0, 0.0)),
+            Joint("y", "prismatic", axis=(0.0, 1.0, 0.0)),
+            Joint("z", "prismatic", upper=0.5),
+            Joint("c"),
+        ),
+        tip=Transform(),
+    )
+    t = np.linspace(0.0, 3.0, 100)
+    q = np.column_stack((np.sin(t), np.cos(t), 0.4 * np.sin(t), 0.7 * t))
+    targets = targets_of(gantry, q)
+    path = follow(gantry, targets, times(100), start=q[0])
+    # m and rad: linear in the lengths, so as near as targets are met
+    np.testing.assert_allclose(path.q, q, rtol=0.0, atol=5.0 * NANOMETRE)
+    positions = follow(gantry, Targets(targets.position), times(100), start=q[0])
+    np.testing.assert_allclose(positions.q[:, :3], q[:, :3], rtol=0.0, atol=NANOMETRE)
+    assert (positions.q[:, 3] == q[0, 3]).all()  # nothing asks the last joint to turn
+
+
+def test_far_apart_samples_are_followed_one_by_one() -> None:
+    arm = planar(3)
+    angles = np.linspace(0.0, 3.0, 7)
+    circle = np.column_stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), np.zeros(7)))
+    path = follow(arm, Targets(circle), times(7), start=np.array([0.8, -0.9, -0.9]))
+    assert_met(path, Targets(circle))
+    assert path.jumps == ()
+
+
+def test_from_a_nearly_singular_start_no_large_correction_is_trusted() -> None:
+    start = np.array([0.1, 0.02, 0.0])
+    target = Targets(np.array([[0.0, 1.2, 0.0]]))
+    path = follow(planar(3), target, times(1), start=start)
+    assert_met(path, target)
+    # rad: 2.07 by steps of 0.1; the whole first correction ends 8.03 away, after a turn in vain
+    assert np.linalg.norm(path.q[0] - start) < 2.5
+
+
+def test_after_a_rescue_no_joint_is_held_where_one_was_before() -> None:
+    free, limited = planar(3), planar(3, upper=0.5)
+    q = np.array([0.45, -0.6, 0.3]) + np.linspace(0.0, 0.3, 40)[:, None] * np.array([1.0, 0.3, 0.0])
+    elsewhere = np.array([-1.8, 0.4, 0.3])  # out of reach with joint 1 at 0.5 rad
+    targets = targets_of(free, np.vstack((q, elsewhere + np.linspace(0.0, 0.02, 20)[:, None])))
+    asked = []
+
+    def rescue(sample: int, last: FloatArray) -> FloatArray:
+        """The pose that the far samples were made from."""
+        asked.append(sample)
+        assert last[0] == 0.5
+        return elsewhere[None]
+
+    window = SlidingWindow(limited, Targets(targets.position), q[0], rescue)
+    found = window.slide(lambda share: None)
+    assert asked == [40]
+    assert (found[30:40, 0] == 0.5).all()
+    # rad: the joints go on from where the rescue brought them, 0.02 in 20 samples
+    assert np.abs(found[40:] - elsewhere).max() < 0.05
+
+
+@pytest.mark.parametrize("robot", ["urm6", "ur5e"])
+def test_the_share_that_is_done_rises_to_the_whole(robot: str) -> None:
+    arm = load_robot(robot)
+    targets = targets_of(arm, np.array(arm.start) + 0.3 + np.linspace(0.0, 0.5, 900)[:, None])
+    targets.position[300:400] += 9.0
+    told: list[float] = []
+    follow(arm, targets, times(900), start=np.array(arm.start) + 0.3, progress=told.append)
+    assert told == sorted(told)
+    assert told[-1] == 1.0
+    assert told[0] >= 0.0
+    if robot == "urm6":
+        assert len(set(told)) > 3  # window after window
+
+
+def test_a_far_step_starts_from_the_sample_before_turns_and_all() -> None:
+    arm = planar(3)
+    angles = np.append(np.linspace(0.0, 9.0, 400), [10.5, 12.0])
+    circle = np.column_stack((2.0 * np.cos(angles), 2.0 * np.sin(angles), np.zeros(402)))
+    start = np.array([0.8, -0.9, -0.9])
+    path = follow(arm, Targets(circle), times(402), start=start)
+    assert_met(path, Targets(circle))
+    assert path.q[-1, 0] - path.q[0, 0] > 9.0
+    assert np.abs(np.diff(path.q[-3:], axis=0)).max() < 2.0  # rad: the base turns by about 1.5 a step
+
+
+def test_the_same_seed_gives_the_same_motion_bit_for_bit() -> None:
+    arm = planar(3)
+    rng = np.random.default_rng(5)
+    targets = Targets(np.column_stack((rng.uniform(-2.5, 2.5, (8, 2)), np.zeros(8))))
+    one, other = (follow(arm, targets, times(8), seed=3, restarts=5) for _ in range(2))
+    assert np.array_equal(one.q, other.q, equal_nan=True)

@@ -1,0 +1,250 @@
+"""Arms that all but have a closed form: rounded in their files, or measured as they were built."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from spherical_arms import KINDS, assert_reached, away_from, random_arm, random_joints
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.closed.closed_form import closed_form, exact_form
+from urmpipe_models.inverse.closed.idealised import compact
+from urmpipe_models.inverse.closed.nearly import LOST, NearlyClosedForm
+from urmpipe_models.inverse.closed.trigonometric import wrapped
+from urmpipe_models.inverse.solutions import Solutions
+from urmpipe_models.inverse.solve import solve
+from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.kinematics.forward import jacobian_over_log, poses_over_log
+from urmpipe_models.kinematics.screws import chain_of, screws
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.robots.urdf_reader import read_urdf
+from urmpipe_models.robots.urdf_writer import urdf_text
+from urmpipe_models.transform import from_offset
+
+SINGULAR = 1e-2
+"""Least singular value of the Jacobian (m and rad) from which on no branch may be lost."""
+
+
+def rounded(chain: Chain, folder: Path, digits: int) -> Chain:
+    """Return an arm as its URDF has it with some decimals of the angles and lengths to the micrometre."""
+    file = folder / f"rounded{digits}.urdf"
+    text = urdf_text(replace(chain, visuals=()))
+    for attribute, decimals in (("rpy", digits), ("xyz", 6)):
+        pattern = rf'(<origin [^>]*{attribute}=")([^"]*)'
+        for before, numbers in set(re.findall(pattern, text)):
+            fewer = " ".join(f"{float(one):.{decimals}f}" for one in numbers.split())
+            text = text.replace(f'{before}{numbers}"', f'{before}{fewer}"')
+    file.write_text(text, encoding="utf-8")
+    return read_urdf(file)
+
+
+def as_built(chain: Chain, deviation: float, seed: int = 3) -> Chain:
+    """Return an arm each of whose joints is off in its frame by some m and rad, drawn from a Gaussian."""
+    off = np.random.default_rng(seed).normal(0.0, deviation, (len(chain.joints), 6))
+    joints = [
+        replace(joint, origin=joint.origin @ from_offset(one.tolist()))
+        for joint, one in zip(chain.joints, off, strict=True)
+    ]
+    return replace(chain, joints=tuple(joints), visuals=())
+
+
+def nearly(chain: Chain) -> NearlyClosedForm:
+    form = closed_form(chain)
+    assert isinstance(form, NearlyClosedForm)
+    return form
+
+
+def regular_joints(chain: Chain, count: int) -> FloatArray:
+    """Return random joint values away from singular poses."""
+    q = random_joints(np.random.default_rng(1), chain, count)
+    least = np.linalg.svd(jacobian_over_log(chain, q), compute_uv=False)[:, -1]
+    return q[least > SINGULAR]
+
+
+def assert_all_found(chain: Chain, q: FloatArray, solutions: Solutions) -> None:
+    """Hold solutions to their poses: each once, the joint values that the poses were made of among them."""
+    targets = targets_of(chain, q)
+    assert_reached(chain, targets, solutions)
+    assert away_from(chain, solutions, q).min(axis=1).max() < 1e-6
+    for k in range(1, solutions.q.shape[1]):
+        apart = np.abs(wrapped(solutions.q[:, :k] - solutions.q[:, [k]])).max(axis=2)
+        assert np.nanmin(apart) > 1e-6
+    assert ((solutions.reasons == "") == solutions.reached).all()
+
+
+@pytest.mark.parametrize("name", ["arm6", "ur5e"])
+@pytest.mark.parametrize("digits", [4, 6])
+def test_a_urdf_with_rounded_numbers_has_all_solutions_of_the_exact_arm(
+    tmp_path: Path, name: str, digits: int
+) -> None:
+    exact = load_robot(name)
+    chain = rounded(exact, tmp_path, digits)
+    before, form = closed_form(exact), closed_form(chain)
+    assert before is not None and form is not None
+    assert form.name in {before.name, f"{before.name}, nearly"}
+    assert form.branches == before.branches
+    q = regular_joints(chain, 1000)
+    solutions = form.solve(targets_of(chain, q))
+    assert_all_found(chain, q, solutions)
+    count = before.solve(targets_of(exact, q)).reached.sum(axis=1)
+    # a branch on the edge of the reach of one arm may be beyond that of the other
+    assert (solutions.reached.sum(axis=1) == count).mean() >= 0.997
+
+
+def test_arm6_rounded_has_its_form_nearly(tmp_path: Path) -> None:
+    chain = rounded(load_robot("arm6"), tmp_path, 4)
+    assert exact_form(chain) is None
+    assert nearly(chain).name == "spherical wrist, nearly"
+
+
+@pytest.mark.parametrize("name", ["arm6", "articulated6r", "ur5e"])
+def test_an_arm_as_built_has_every_branch_away_from_singular_poses(name: str) -> None:
+    exact = load_robot(name)
+    chain = as_built(exact, 1e-3)
+    form = nearly(chain)
+    assert form.name == f"{closed_form(exact).name}, nearly"  # type: ignore[union-attr]
+    q = regular_joints(chain, 400)
+    assert_all_found(chain, q, form.solve(targets_of(chain, q)))
+
+
+def test_random_arms_with_sliding_joints_are_solved_beside_their_forms() -> None:
+    generator = np.random.default_rng(5)
+    for kinds in ("RRR", "PRR", "RRP", "RPR"):
+        assert set(kinds) <= set(KINDS)
+        chain = as_built(random_arm(generator, kinds=kinds), 1e-5)
+        q = regular_joints(chain, 100)
+        solutions = nearly(chain).solve(targets_of(chain, q))
+        assert_reached(chain, targets_of(chain, q), solutions)
+        assert (away_from(chain, solutions, q).min(axis=1) < 1e-5).mean() >= 0.99
+
+
+def test_a_solution_stays_beside_that_of_the_idealised_arm(tmp_path: Path) -> None:
+    chain = rounded(load_robot("arm6"), tmp_path, 4)
+    form = nearly(chain)
+    targets = targets_of(chain, regular_joints(chain, 200))
+    mine, ideal = form.solve(targets), form.form.solve(targets)
+    apart = np.abs(wrapped(mine.q - ideal.q))[mine.reached & ideal.reached]
+    # 2e-5 m and rad over the least singular value, 0.01; the other branches may be nearer to singular
+    assert np.quantile(apart.max(axis=1), 0.95) < 2e-3
+
+
+def test_limits_are_not_asked() -> None:
+    chain = as_built(load_robot("ur5e"), 1e-4)
+    narrow = replace(chain, joints=tuple(replace(one, lower=-0.1, upper=0.1) for one in chain.joints))
+    targets = targets_of(chain, regular_joints(chain, 20))
+    np.testing.assert_array_equal(nearly(narrow).solve(targets).q, nearly(chain).solve(targets).q)
+
+
+def test_a_target_out_of_reach_or_not_finite_has_a_reason_and_stops_no_other() -> None:
+    chain = as_built(load_robot("arm6"), 1e-4)
+    good = targets_of(chain, regular_joints(chain, 3))
+    assert good.rotation is not None
+    position = good.position.copy()
+    position[1], position[2] = (9.0, 0.0, 0.0), np.nan
+    solutions = nearly(chain).solve(Targets(position, good.rotation))
+    assert solutions.reached.any(axis=1).tolist() == [True, False, False]
+    assert re.fullmatch(
+        r"the wrist centre is \d\.\d{3} m from axis 2, allowed: \d\.\d{3} to \d\.\d{3} m",
+        solutions.reasons[1, 0],
+    )
+    assert solutions.reason(2) == "the target is not finite, allowed: finite numbers"
+    stays = nearly(chain).solve(Targets(position, good.rotation), np.zeros(6))
+    assert stays.reached.any(axis=1).tolist() == [True, False, False]
+    alone = nearly(chain).solve(good)
+    np.testing.assert_array_equal(solutions.q[0], alone.q[0])
+
+
+def test_a_branch_that_is_lost_beside_a_singular_pose_says_so() -> None:
+    chain = as_built(load_robot("arm6"), 1e-3)
+    q = random_joints(np.random.default_rng(2), chain, 200)
+    q[:, 4] = np.random.default_rng(3).uniform(-2e-3, 2e-3, 200)  # about as far as the axes are off
+    solutions = nearly(chain).solve(targets_of(chain, q))
+    assert_reached(chain, targets_of(chain, q), solutions)
+    assert ((solutions.reasons == "") == solutions.reached).all()
+    assert (solutions.reasons == LOST).any()
+
+
+@pytest.mark.parametrize("near", [None, np.zeros(6)])
+def test_no_targets_have_no_solutions(near: FloatArray | None) -> None:
+    chain = as_built(load_robot("arm6"), 1e-4)
+    solutions = nearly(chain).solve(Targets(np.empty((0, 3)), np.empty((0, 3, 3))), near)
+    assert solutions.q.shape == (0, 8, 6)
+
+
+def test_positions_with_any_orientation_are_refused() -> None:
+    with pytest.raises(ValueError, match="allowed: poses"):
+        nearly(as_built(load_robot("arm6"), 1e-4)).solve(Targets(np.zeros((1, 3))))
+
+
+@pytest.mark.parametrize("name", ["arm6", "ur5e"])
+def test_arms_that_are_truly_different_are_not_taken(name: str) -> None:
+    chain = as_built(load_robot(name), 0.03)
+    assert closed_form(chain) is None
+    assert closed_form(load_robot("urm6")) is None
+
+
+def test_frames_far_along_their_axes_change_nothing() -> None:
+    found = screws(as_built(load_robot("ur5e"), 1e-4))
+    assert found is not None
+    far = replace(found, point=found.point + found.direction * np.array([[3, -50, 20, 70, 9, 1]]).T)
+    one, other = compact(found), compact(far)
+    np.testing.assert_allclose(one.point, other.point, atol=1e-9)  # feet on lines 1e-4 from parallel
+    assert one.size == pytest.approx(other.size, abs=1e-9)
+
+
+def test_a_chain_of_screws_has_these_screws() -> None:
+    chain = random_arm(np.random.default_rng(4), kinds="RPR")
+    found = screws(chain)
+    assert found is not None
+    q = random_joints(np.random.default_rng(1), chain, 20)
+    other = chain_of(found, chain.coordinates)
+    assert other.coordinates == chain.coordinates
+    for mine, theirs in zip(poses_over_log(other, q), poses_over_log(chain, q), strict=True):
+        np.testing.assert_allclose(mine, theirs, atol=1e-13)
+
+
+def test_the_documentation_has_every_word(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[4] / "docs" / "ik.md").read_text(encoding="utf-8")
+    for name in ("arm6", "ur5e"):
+        assert f"`{nearly(as_built(load_robot(name), 1e-4)).name}`" in text
+
+
+def test_what_stands_at_q0_is_a_pose_as_any_other(tmp_path: Path) -> None:
+    chain = rounded(load_robot("arm6"), tmp_path, 6)
+    q = np.tile((0.3, 0.4, -0.5, 0.7, 0.0, 0.2), (1, 1))  # the wrist aligned, to the rounding of the file
+    solutions = nearly(chain).solve(targets_of(chain, q))
+    assert_reached(chain, targets_of(chain, q), solutions)
+    assert solutions.reached.sum() >= 6
+    assert math.isfinite(nearly(chain).deviation[0])
+
+
+@pytest.mark.parametrize("name", ["arm6", "ur5e"])
+def test_beside_a_singular_pose_an_arm_stays_where_it_is_wished(name: str) -> None:
+    chain = as_built(load_robot(name), 3e-4)
+    q = np.random.default_rng(1).uniform(-1.5, 1.5, (100, 6))
+    q[:, 4] = 1e-3  # the wrist all but aligned
+    targets = targets_of(chain, q)
+    solutions = nearly(chain).solve(targets, q)
+    assert_reached(chain, targets, solutions)
+    assert away_from(chain, solutions, q).min(axis=1).max() < 1e-4
+    assert away_from(chain, nearly(chain).solve(targets), q).min(axis=1).max() > 0.1  # unasked
+
+
+def test_where_no_branch_is_left_a_target_is_searched_for_unless_only_a_closed_form_is_allowed() -> None:
+    chain = as_built(load_robot("ur5e"), 2e-3, seed=1)
+    q = np.random.default_rng(2).uniform(-np.pi, np.pi, (20000, 6))[[0, 14555]]
+    targets = targets_of(chain, q)
+    found = solve(chain, targets)
+    assert_reached(chain, targets, found)
+    assert found.reached[:, 0].all()
+    only = solve(chain, targets, method="closed")
+    assert only.reached[:, 0].tolist() == [True, False]  # else the second is no example any more
+    assert found.labels[:, 0].tolist() == [only.labels[0, 0], "found by search"]
+    assert np.array_equal(found.q[0], only.q[0])
+    assert found.reasons[:, 0].tolist() == ["", ""]

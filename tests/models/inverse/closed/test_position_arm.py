@@ -1,0 +1,108 @@
+"""The first three joints of an arm: as many postures as a search finds, and digits kept in special arms."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from spherical_arms import assert_reached, away_from, inverse_of, random_arm, random_joints
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.inverse.targets import targets_of
+
+NEARLY = {
+    "axes 1 and 2 nearly meet": "a1",
+    "axes 1 and 2 nearly parallel": "alpha1",
+    "axes 2 and 3 nearly meet": "a2",
+    "axes 2 and 3 nearly parallel": "alpha2",
+}
+
+
+def left_sides(
+    d: FloatArray, a: FloatArray, alpha: FloatArray, q3: FloatArray, wrist: FloatArray
+) -> FloatArray:
+    """Pieper's equation of q3, zero at every posture.
+
+    With the wrist at f(q3) before joint 2, r = |w - d1 z|^2 and h = z . w - d1 of the wrist centre w:
+    ((r - |f|^2 - a1^2) / (2 a1))^2 + ((h - f_z cos alpha1) / sin alpha1)^2 = f_x^2 + f_y^2.
+
+    Args:
+        d: d1 to d4 in [m].
+        a: a1 to a3 in [m].
+        alpha: alpha1 to alpha3 in [rad].
+        q3: The angle of joint 3, in [rad], shape (m,).
+        wrist: In frame 0 in [m], shape (3,).
+    """
+    u, v, w = a[2], -d[3] * math.sin(alpha[2]), d[3] * math.cos(alpha[2]) + d[2]
+    y = u * np.sin(q3) + v * np.cos(q3)
+    f_x = u * np.cos(q3) - v * np.sin(q3) + a[1]
+    f_y = y * math.cos(alpha[1]) - w * math.sin(alpha[1])
+    f_z = y * math.sin(alpha[1]) + w * math.cos(alpha[1]) + d[1]
+    height = wrist[2] - d[0]
+    square = wrist[0] ** 2 + wrist[1] ** 2 + height**2
+    along = (square - f_x**2 - f_y**2 - f_z**2 - a[0] ** 2) / (2.0 * a[0])
+    across = (height - f_z * math.cos(alpha[0])) / math.sin(alpha[0])
+    return np.asarray(along**2 + across**2 - f_x**2 - f_y**2)
+
+
+def test_a_general_arm_has_as_many_postures_as_pieper_s_equation_has_roots() -> None:
+    generator = np.random.default_rng(12)
+    counts = set()
+    q3 = np.linspace(-math.pi, math.pi, 20001)
+    for _ in range(30):
+        d, a = generator.uniform(-0.5, 0.5, 4), generator.uniform(-0.5, 0.5, 3)
+        alpha = generator.choice((-1, 1), 3) * generator.uniform(0.4, 2.7, 3)
+        parameters = {f"d{k}": value for k, value in enumerate(d, start=1)}
+        parameters |= {f"a{k}": value for k, value in enumerate(a, start=1)}
+        parameters |= {f"alpha{k}": value for k, value in enumerate(alpha, start=1)}
+        chain = random_arm(generator, "plain", "RRR", theta3=0.0, **parameters)
+        form = inverse_of(chain)
+        at_base = chain.base.inverse()
+        wrists = np.array(chain.base.rotation) @ generator.uniform(-0.6, 0.6, (3, 40))
+        wrists += np.array(chain.base.translation)[:, None]
+        postures = form.arm.solve(wrists)
+        for row, wrist in enumerate(wrists.T):
+            values = left_sides(d, a, alpha, q3, np.array(at_base.point(tuple(wrist))))
+            roots = np.flatnonzero(np.sign(values[1:]) != np.sign(values[:-1]))
+            if (len(roots) and np.diff(roots).min(initial=99) < 20) or _grazes(values):
+                continue  # near a double root the grid may miss both
+            found = np.sort(postures.q[2, np.isfinite(postures.q[2, :, row]), row])
+            np.testing.assert_allclose(found, q3[roots] + math.pi / 20000, rtol=0, atol=math.pi / 10000)
+            counts.add(len(found))
+    assert counts == {0, 2, 4}
+
+
+def _grazes(values: FloatArray) -> bool:
+    """Whether the equation has an extremum that just reaches or just misses zero."""
+    inner = values[1:-1]
+    extremal = (inner - values[:-2]) * (values[2:] - inner) <= 0
+    return bool((np.abs(inner[extremal]) < 1e-3 * np.abs(values).max()).any())
+
+
+@pytest.mark.parametrize("parameter", NEARLY.values(), ids=list(NEARLY))
+@pytest.mark.parametrize("off", [1e-2, 1e-4, 1e-6, 1e-7, 1e-8, 1e-10, 1e-12, 1e-14])
+def test_an_arm_that_is_almost_special_loses_no_digit(parameter: str, off: float) -> None:
+    generator = np.random.default_rng(13)
+    lost = count = 0
+    for _ in range(3):
+        chain = random_arm(generator, "plain", "RRR", **{parameter: off})
+        q = random_joints(generator, chain, 120)
+        targets = targets_of(chain, q)
+        solutions = inverse_of(chain).solve(targets)
+        assert_reached(chain, targets, solutions)
+        lost += int((away_from(chain, solutions, q).min(axis=1) > 2e-5).sum())
+        count += len(q)
+    # taken for special up to 1e-6, and polished from there: next to a fold a posture may be lost
+    assert lost <= (0.01 * count if 1e-8 <= off <= 1e-6 else 0)
+
+
+@pytest.mark.parametrize("off", [1e-7, 1e-8, 1e-10, 1e-12])
+def test_an_arm_that_is_almost_special_twice_loses_no_posture(off: float) -> None:
+    generator = np.random.default_rng(16)
+    chain = random_arm(generator, "plain", "RRR", a1=off, alpha2=off)
+    q = random_joints(generator, chain, 200)
+    targets = targets_of(chain, q)
+    solutions = inverse_of(chain).solve(targets)
+    assert_reached(chain, targets, solutions)
+    assert away_from(chain, solutions, q).min(axis=1).max() < 2e-5

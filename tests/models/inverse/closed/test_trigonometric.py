@@ -1,0 +1,156 @@
+"""Equations in cos x and sin x: their roots satisfy them, all are found, and the boundary is sharp."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import example, given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.inverse.closed.trigonometric import BOUNDARY, linear_roots, quadric_roots, wrapped
+
+ROUNDING = 4e-15  # an angle up to pi through atan2, a sum and a wrap
+factors = st.floats(-10.0, 10.0)
+angles = st.floats(-math.pi, math.pi, exclude_min=True)
+
+
+def left_side(k: FloatArray, x: FloatArray) -> FloatArray:
+    c, s = np.cos(x), np.sin(x)
+    return np.asarray(k[0] * c * c + k[1] * c * s + k[2] * s * s + k[3] * c + k[4] * s + k[5])
+
+
+def product(first: FloatArray, second: FloatArray) -> FloatArray:
+    """The quadric whose roots are those of two equations a c + b s = d."""
+    (a, b, d), (e, f, g) = first, second
+    return np.array([a * e, a * f + b * e, b * f, -(a * g + d * e), -(b * g + d * f), d * g])
+
+
+def through(x: float, y: float) -> FloatArray:
+    """The equation a c + b s = d with the roots x and y."""
+    middle, half = (x + y) / 2, (x - y) / 2
+    return np.array([math.cos(middle), math.sin(middle), math.cos(half)])
+
+
+def apart(x: FloatArray, y: FloatArray) -> FloatArray:
+    return np.asarray(np.abs(wrapped(x - y)))
+
+
+def roots_of(k: FloatArray) -> FloatArray:
+    return quadric_roots(k[:, None])[:, 0]
+
+
+def test_angles_are_wrapped_into_a_half_open_turn() -> None:
+    turns = np.array([0.0, math.pi, -math.pi, 3 * math.pi, 7.0, -7.0])
+    expected = [0.0, math.pi, math.pi, math.pi, 7.0 - 2 * math.pi, 2 * math.pi - 7.0]
+    np.testing.assert_allclose(wrapped(turns), expected, rtol=0, atol=ROUNDING)
+
+
+@given(a=factors, b=factors, x=angles)
+@example(a=1.0, b=0.0, x=math.pi)
+def test_a_root_put_in_is_found_and_the_first_one_falls(a: float, b: float, x: float) -> None:
+    r = math.hypot(a, b)
+    if r < 1e-100:
+        return
+    roots = np.array(linear_roots(np.array(a), np.array(b), np.array(a * math.cos(x) + b * math.sin(x))))
+    # near the double root an error of 1e-16 in c moves x by its square root
+    assert apart(roots, np.array(x)).min() < 5e-8
+    np.testing.assert_allclose(
+        a * np.cos(roots) + b * np.sin(roots), a * math.cos(x) + b * math.sin(x), atol=r * 1e-14
+    )
+    falling, rising = b * np.cos(roots) - a * np.sin(roots)
+    assert falling <= r * 1e-14
+    assert rising >= -r * 1e-14
+
+
+def test_the_boundary_counts_up_to_its_tolerance_and_not_beyond() -> None:
+    a, b = np.full(4, 3.0), np.full(4, 4.0)
+    inside, outside = 5.0 * (1.0 + BOUNDARY / 2), 5.0 * (1.0 + 2 * BOUNDARY)
+    first, second = linear_roots(a, b, np.array([inside, outside, -inside, -outside]))
+    stretched = math.atan2(4.0, 3.0)
+    np.testing.assert_allclose(first, [stretched, np.nan, stretched - math.pi, np.nan], rtol=0, atol=ROUNDING)
+    np.testing.assert_allclose(second, first, rtol=0, atol=ROUNDING)
+
+
+def test_no_angle_in_the_equation_and_nan_have_no_root() -> None:
+    first, second = linear_roots(np.array([0.0, np.nan, 1.0]), np.zeros(3), np.array([0.0, 0.5, np.nan]))
+    assert np.isnan(first).all()
+    assert np.isnan(second).all()
+
+
+@given(arrays(float, 4, elements=angles), st.floats(1e-3, 1e3))
+@example(np.array([math.pi, 1.0, -2.0, 0.5]), 1.0)
+@example(np.array([math.pi, 0.0, math.pi / 2, -math.pi / 2]), 1.0)
+@example(np.array([0.3, 0.3, -1.0, 2.0]), 1.0)
+@example(np.array([0.3, 0.3, 0.3, 0.3]), 1.0)
+@example(np.array([0.3, 0.3, -2.0, -2.0]), 1.0)
+def test_four_roots_put_in_are_found(put_in: FloatArray, factor: float) -> None:
+    k = factor * product(through(put_in[0], put_in[1]), through(put_in[2], put_in[3]))
+    roots = roots_of(k)
+    assert np.isfinite(roots).all()
+    # the worst, a fourfold root: the fourth root of the rounding, 1e-16 ** 0.25 = 1e-4
+    assert apart(roots[:, None], put_in[None, :]).min(axis=0).max() < 2e-3
+    np.testing.assert_allclose(left_side(k, roots), 0.0, atol=np.abs(k).sum() * BOUNDARY)
+
+
+@given(arrays(float, 4, elements=angles))
+def test_simple_roots_are_found_to_the_last_digits(put_in: FloatArray) -> None:
+    away = apart(put_in[:, None], put_in[None, :])[np.triu_indices(4, 1)].min()
+    if away < 0.1:
+        return
+    roots = roots_of(product(through(put_in[0], put_in[1]), through(put_in[2], put_in[3])))
+    np.testing.assert_allclose(
+        np.sort(apart(roots[:, None], put_in[None, :]).min(axis=0)), 0.0, atol=1e-11
+    )  # 1e-16 through slopes of 0.1 ** 3 and more
+
+
+@given(arrays(float, 6, elements=factors))
+def test_there_are_as_many_roots_as_the_left_side_changes_sign(k: FloatArray) -> None:
+    size = np.abs(k).sum()
+    if size < 1e-3:
+        return
+    x = np.linspace(-math.pi, math.pi, 2001)
+    values = left_side(k, x)
+    if np.abs(values).min() < 1e-9 * size:
+        return
+    changes = np.count_nonzero(np.sign(values[1:]) != np.sign(values[:-1]))
+    found = np.count_nonzero(np.isfinite(roots_of(k)))
+    assert found >= changes
+    assert found % 2 == 0
+
+
+def test_a_leading_coefficient_that_vanishes_loses_no_root() -> None:
+    k = np.array([2.0, 0.0, 2.0, 3.0, 4.0, -4.5])  # 3 c + 4 s = 2.5: c^2 + s^2 is no quadric at all
+    expected = np.sort(np.array(linear_roots(np.array(3.0), np.array(4.0), np.array(2.5))))
+    np.testing.assert_allclose(roots_of(k), [*expected, np.nan, np.nan], rtol=0, atol=1e-14)
+
+
+def test_roots_at_pi_are_roots_like_any_other() -> None:
+    k = product(through(math.pi, math.pi / 2), through(0.0, -math.pi / 2))
+    np.testing.assert_allclose(roots_of(k), [-math.pi / 2, 0.0, math.pi / 2, math.pi], rtol=0, atol=1e-14)
+
+
+@pytest.mark.parametrize("beyond", [1e-11, 1e-8, 1e-3])
+def test_an_extremum_that_fails_to_reach_zero_is_no_root(beyond: float) -> None:
+    k = np.array([0.0, 0.0, 0.0, 1.0, 0.0, -1.0 - beyond])
+    assert np.isnan(roots_of(k)).all()
+
+
+def test_an_extremum_within_the_rounding_is_a_double_root() -> None:
+    roots = roots_of(np.array([0.0, 0.0, 0.0, 1.0, 0.0, -1.0 - BOUNDARY / 10]))
+    np.testing.assert_allclose(roots, [0.0, 0.0, np.nan, np.nan], atol=1e-6)
+
+
+def test_rows_do_not_know_each_other() -> None:
+    generator = np.random.default_rng(7)
+    k = generator.normal(size=(6, 50))
+    k[:, 10] = np.nan
+    k[:, 20] = 0.0
+    k[0, 30] = np.inf
+    together = quadric_roots(k)
+    alone = np.stack([roots_of(k[:, i]) for i in range(50)], axis=1)
+    np.testing.assert_array_equal(together, alone)
+    assert np.isnan(together[:, [10, 20, 30]]).all()

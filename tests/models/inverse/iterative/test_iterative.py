@@ -1,0 +1,341 @@
+"""The iterative inverse: what it reaches, what it comes nearest to, and where joints may go meanwhile."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain, Joint, Mimic
+from urmpipe_models.errors import OptionError
+from urmpipe_models.inverse.iterative.descent import METHODS, Method
+from urmpipe_models.inverse.iterative.refine import refine
+from urmpipe_models.inverse.iterative.task import redundancy, task_of, turn_between, turn_length
+from urmpipe_models.inverse.limits import limits_of
+from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.kinematics.forward import jacobian_over_log
+from urmpipe_models.kinematics.singularity import characteristic_length
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.transform import from_offset, translation
+
+MET = 1e-10
+"""What is promised by default in [m] and [rad], and what forward kinematics confirms."""
+
+
+def within(chain: Chain, count: int, seed: int = 3) -> FloatArray:
+    """Return joint values, uniform within limits and one turn."""
+    lower, upper = limits_of(chain)
+    low, high = np.maximum(lower, -math.pi), np.minimum(upper, math.pi)
+    return np.random.default_rng(seed).uniform(low, high, (count, len(low)))
+
+
+def beside(chain: Chain, q: FloatArray, noise: float) -> FloatArray:
+    lower, upper = limits_of(chain)
+    return np.clip(q + np.random.default_rng(5).normal(0.0, noise, q.shape), lower, upper)
+
+
+def assert_met(chain: Chain, q: FloatArray, targets: Targets) -> None:
+    distance, turn = misses(chain, q, targets)
+    # beside the promise there is the rounding of the peer's own rotation vector
+    np.testing.assert_array_less(np.linalg.norm(distance, axis=1), 1.01 * MET)
+    np.testing.assert_array_less(np.linalg.norm(turn, axis=1), 1.01 * MET)
+
+
+def planar(*lengths: float) -> Chain:
+    """An arm in the plane, its joints about z."""
+    first = Joint("q1")
+    others = [Joint(f"q{k + 2}", origin=translation(a, 0.0, 0.0)) for k, a in enumerate(lengths[:-1])]
+    return Chain("planar", (first, *others), tip=translation(lengths[-1], 0.0, 0.0))
+
+
+def limited(chain: Chain, lower: float, upper: float) -> Chain:
+    return replace(chain, joints=tuple(replace(one, lower=lower, upper=upper) for one in chain.joints))
+
+
+# --- targets that can be met -------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("robot", ["urm6", "urm8", "ur5e", "panda", "iiwa14", "arm6"])
+@pytest.mark.parametrize("pose", [True, False], ids=["pose", "position"])
+def test_targets_near_the_start_are_met(robot: str, pose: bool) -> None:
+    chain = load_robot(robot)
+    q = within(chain, 200)
+    targets = targets_of(chain, q)
+    targets = targets if pose else Targets(targets.position)
+    refined = refine(chain, targets, beside(chain, q, 0.05))
+    assert refined.converged.mean() > 0.98  # the others start beyond a singular pose
+    assert_met(chain, refined.q[refined.converged], targets.rows(refined.converged))
+    lower, upper = limits_of(chain)
+    assert ((refined.q >= lower) & (refined.q <= upper)).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_each_method_meets_regular_targets_near_the_start(method: Method) -> None:
+    chain = load_robot("urm6")
+    q = within(chain, 300)
+    smallest = np.linalg.svd(jacobian_over_log(chain, q))[1][:, -1]
+    q = q[smallest > 0.05]  # damping by 0.05 l slows what moves little
+    refined = refine(chain, targets_of(chain, q), q + 0.01, method=method)
+    assert refined.converged.all()
+    assert_met(chain, refined.q, targets_of(chain, q))
+
+
+def test_the_pseudoinverse_and_marquardt_take_quadratic_steps() -> None:
+    """From 0.01 rad: 1e-2, 1e-4, 1e-8, 1e-16; damped least squares with its constant is linear."""
+    chain = load_robot("urm6")
+    q = within(chain, 300)
+    q = q[np.linalg.svd(jacobian_over_log(chain, q))[1][:, -1] > 0.05]
+    steps = {
+        name: np.median(refine(chain, targets_of(chain, q), q + 0.01, method=name).iterations)
+        for name in METHODS
+    }
+    assert steps["pinv"] <= 4
+    assert steps["lm"] <= 4
+    assert steps["dls"] > 2 * steps["pinv"]
+
+
+def test_what_a_radian_counts_as_does_not_depend_on_where_a_description_puts_frames() -> None:
+    chain = load_robot("ur5e")
+    there = Joint("aside", "fixed", translation(0.0, 0.0, 100.0))  # axis 2 of a calibrated arm
+    back = replace(chain.joints[2], origin=translation(0.0, 0.0, -100.0) @ chain.joints[2].origin)
+    other = replace(chain, joints=(*chain.joints[:2], there, back, *chain.joints[3:]), visuals=())
+    assert turn_length(other) == pytest.approx(turn_length(chain), rel=1e-12)
+    assert turn_length(chain) == characteristic_length(chain) / 4.0
+
+
+def test_a_pseudoinverse_step_is_the_moore_penrose_one() -> None:
+    chain = load_robot("urm8")
+    q = within(chain, 20)
+    start = q + 1e-3
+    targets = targets_of(chain, q)
+    length = turn_length(chain)
+    weights = np.array([1.0, 1.0, 1.0, length, length, length])
+    distance, turn = misses(chain, start, targets)
+    J = weights[:, None] * jacobian_over_log(chain, start)
+    peer = np.einsum("nij,nj->ni", np.linalg.pinv(J), weights * np.hstack([distance, turn]))
+    one = refine(chain, targets, start, method="pinv", iterations=1, metres=1e-15, home=start)
+    np.testing.assert_allclose(one.q - start, peer, atol=1e-9)  # steps of 1e-3, condition up to 1e3
+
+
+@settings(max_examples=30, deadline=None)
+@given(data=st.data())
+def test_chains_of_any_joints_are_solved(chains: SearchStrategy[Chain], data: st.DataObject) -> None:
+    """Prismatic joints, mimics, fixed frames, limits, few freedoms: a start on the target stays there."""
+    chain = data.draw(chains)
+    lower, upper = limits_of(chain)
+    q = np.clip(np.random.default_rng(1).uniform(-1.0, 1.0, (5, len(lower))), lower, upper)
+    targets = targets_of(chain, q)
+    refined = refine(chain, targets, np.clip(q + 1e-4, lower, upper))
+    assert ((refined.q >= lower) & (refined.q <= upper)).all()
+    assert_met(chain, refined.q[refined.converged], targets.rows(refined.converged))
+    exact = refine(chain, targets, q)
+    assert exact.converged.all()
+    np.testing.assert_array_equal(exact.iterations, 0)
+    np.testing.assert_allclose(exact.q, q, atol=1e-15)
+
+
+def test_a_joint_that_another_follows_is_solved_with_it() -> None:
+    followed = Joint("a", origin=translation(0.3, 0.0, 0.0))
+    follower = Joint("b", origin=translation(0.4, 0.0, 0.0), mimic=Mimic("a", -0.5, 0.1))
+    chain = Chain("mimic", (Joint("z"), followed, follower), tip=translation(0.2, 0.0, 0.0))
+    q = np.array([[0.3, 0.9]])
+    refined = refine(chain, targets_of(chain, q), q + 0.1)
+    np.testing.assert_allclose(refined.q, q, atol=1e-8)  # regular: a miss of 1e-10 over arms of 0.2 m
+
+
+def test_a_singular_target_is_met_from_beside_and_from_the_singular_pose_it_is_left() -> None:
+    arm = planar(0.5, 0.4)
+    stretched = Targets(np.array([[0.9, 0.0, 0.0]]))
+    assert refine(arm, stretched, np.array([0.3, -0.4])).converged.all()
+    bent = Targets(np.array([[0.6, 0.0, 0.0]]))
+    from_stretched = refine(arm, bent, np.array([0.3, 0.0]))
+    assert from_stretched.converged.all()
+
+
+# --- targets that cannot be met ----------------------------------------------------------------------
+
+
+def test_a_target_beyond_reach_takes_the_nearest_point() -> None:
+    arm = planar(0.5, 0.4)
+    refined = refine(arm, Targets(np.array([[0.0, 2.0, 0.0], [0.0, 0.6, 0.25]])), np.array([0.4, 0.7]))
+    assert not refined.converged.any()
+    np.testing.assert_allclose(refined.distance, [1.1, 0.25], atol=1e-9)  # 2 - 0.9; out of the plane
+    np.testing.assert_allclose(refined.q[0], [math.pi / 2, 0.0], atol=1e-3)  # flat: 1e-9 m is 1e-4 rad
+    np.testing.assert_allclose(refined.residual, refined.distance)
+
+
+def test_the_nearest_pose_is_that_of_another_solver() -> None:
+    """SciPy's trust region, on the same miss and from what was found, finds nothing nearer.
+
+    Row 3 once stood still: a step cut short by limits was foreseen to lead away, and did, as foreseen.
+    """
+    from scipy.optimize import least_squares
+
+    chain = limited(load_robot("urm6"), -2.0, 2.0)
+    rng = np.random.default_rng(2)
+    targets = targets_of(chain, rng.uniform(-2.0, 2.0, (8, 6)))
+    targets = Targets(targets.position + np.array([0.0, 0.0, 1.5]), targets.rotation)
+    refined = refine(chain, targets, rng.uniform(-2.0, 2.0, (8, 6)), iterations=400)
+    length = turn_length(chain)
+    assert not refined.converged.any()
+    for row in range(8):
+
+        def miss(q: FloatArray, one: int = row) -> FloatArray:
+            distance, turn = misses(chain, q[None], targets.rows(slice(one, one + 1)))
+            return np.concatenate([distance[0], length * turn[0]])
+
+        peer = least_squares(
+            miss, np.clip(refined.q[row], -1.999999, 1.999999), bounds=(-2.0, 2.0), xtol=1e-12, gtol=1e-12
+        )
+        found = np.linalg.norm(miss(refined.q[row]))
+        np.testing.assert_allclose(found, refined.residual[row], rtol=1e-9)
+        # a cosine of 1e-7 between miss and motion leaves 1e-14 of the miss, more where it is nearly flat
+        np.testing.assert_allclose(found, np.sqrt(2.0 * peer.cost), rtol=1e-6)
+
+
+def test_a_rough_descent_to_a_nearest_point_ends_early_and_not_far_from_it() -> None:
+    chain = load_robot("urm6")
+    targets = targets_of(chain, within(chain, 50))
+    targets = Targets(targets.position + np.array([0.0, 0.0, 3.0]), targets.rotation)
+    fine = refine(chain, targets, np.array(chain.start), iterations=500)
+    rough = refine(chain, targets, np.array(chain.start), iterations=500, stationary=1e-2)
+    assert rough.iterations.mean() < 0.5 * fine.iterations.mean()
+    # cosines of 1e-2 at most: 1e-4 of the miss, more where the way is curved
+    assert np.median(rough.residual / fine.residual) < 1.001
+
+
+def test_a_limit_that_is_in_the_way_is_stood_at_and_left_again() -> None:
+    """One joint held by its limit; its neighbour does what it can: |target - tool| is least there."""
+    arm = limited(planar(0.5, 0.4), -0.5, 0.5)
+    away = Targets(np.array([[0.0, 0.8, 0.0]]))
+    refined = refine(arm, away, np.array([0.0, 0.1]))
+    np.testing.assert_allclose(refined.q, [[0.5, 0.5]], atol=1e-12)
+    back = refine(arm, targets_of(arm, np.array([[0.1, -0.3]])), refined.q)
+    assert back.converged.all()
+    np.testing.assert_allclose(back.q, [[0.1, -0.3]], atol=1e-8)
+
+
+def test_joints_stay_within_limits_at_every_step() -> None:
+    chain = limited(load_robot("urm6"), -1.0, 1.0)
+    rng = np.random.default_rng(4)
+    targets = targets_of(chain, rng.uniform(-1.5, 1.5, (100, 6)))
+    start = rng.uniform(-1.2, 1.2, (100, 6))  # clipped
+    for method in METHODS:
+        for steps in range(6):
+            q = refine(chain, targets, start, method=method, iterations=steps).q
+            assert np.abs(q).max() <= 1.0, (method, steps)
+
+
+def test_no_step_leads_away_from_the_target() -> None:
+    """Limits cut steps short: what is left of one may lead away, and may have been foreseen to."""
+    chain = limited(load_robot("urm6"), -2.0, 2.0)
+    rng = np.random.default_rng(2)
+    targets = targets_of(chain, rng.uniform(-2.0, 2.0, (200, 6)))
+    targets = Targets(targets.position + np.array([0.0, 0.0, 1.5]), targets.rotation)
+    start = rng.uniform(-2.0, 2.0, (200, 6))
+    before = np.full(200, np.inf)
+    for steps in range(16):
+        now = refine(chain, targets, start, iterations=steps + 1).residual
+        assert (now <= before).all(), steps
+        before = now
+
+
+# --- rows beside each other --------------------------------------------------------------------------
+
+
+def test_a_bad_row_stops_no_other() -> None:
+    chain = load_robot("urm6")
+    q = within(chain, 3)
+    targets = targets_of(chain, q)
+    alone = refine(chain, targets, q + 0.05)
+    targets.position[1] = np.nan
+    refined = refine(chain, targets, q + 0.05)
+    np.testing.assert_array_equal(refined.converged, [True, False, True])
+    np.testing.assert_array_equal(refined.q[[0, 2]], alone.q[[0, 2]])
+    assert math.isnan(refined.residual[1])
+    assert refined.iterations[1] == 0
+
+
+@pytest.mark.parametrize("robot", ["urm6", "panda"])
+def test_rows_are_solved_to_the_same_bits_alone_and_in_any_company(
+    robot: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    chain = load_robot(robot)
+    q = within(chain, 40)
+    targets, start = targets_of(chain, q), beside(chain, q, 0.4)
+    whole = refine(chain, targets, start)
+    for row in range(0, 40, 7):
+        alone = refine(chain, targets.rows(slice(row, row + 1)), start[row])
+        np.testing.assert_array_equal(alone.q[0], whole.q[row])
+        assert alone.iterations[0] == whole.iterations[row]
+    monkeypatch.setattr("urmpipe_models.inverse.iterative.refine.BLOCK", 7)
+    np.testing.assert_array_equal(refine(chain, targets, start, threads=3).q, whole.q)
+
+
+def test_wrong_options_are_all_told() -> None:
+    chain = load_robot("urm6")
+    with pytest.raises(OptionError) as told:
+        refine(chain, targets_of(chain, np.zeros((2, 6))), np.zeros(5), method="newton")  # type: ignore[arg-type]
+    assert str(told.value).splitlines() == [
+        "method: found 'newton', allowed: lm, dls, pinv",
+        "starts: found an array of shape (5,), allowed: (6,) or (2, 6)",
+    ]
+
+
+# --- what the miss is --------------------------------------------------------------------------------
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    angle=st.floats(0.0, math.pi)
+    | st.sampled_from([0.0, 1e-12, 1e-7, math.pi - 1e-7, math.pi - 1e-12, math.pi]),
+    axis=st.tuples(*[st.floats(-1.0, 1.0)] * 3).filter(lambda v: math.hypot(*v) > 0.1),
+)
+def test_the_turn_between_two_frames_is_scipys_rotation_vector(
+    angle: float, axis: tuple[float, float, float]
+) -> None:
+    from scipy.spatial.transform import Rotation
+
+    vector = angle * np.array(axis) / math.hypot(*axis)
+    pose = from_offset((0.0, 0.0, 0.0, 0.4, -1.1, 2.0))
+    wanted = Rotation.from_rotvec(vector).as_matrix() @ np.array(pose.rotation)
+    found = turn_between(np.array(pose.columns)[..., None], wanted.T[..., None])[:, 0]
+    np.testing.assert_allclose(np.linalg.norm(found), angle, atol=1e-14 + 1e-15 / max(math.sin(angle), 1e-7))
+    again = Rotation.from_rotvec(found).as_matrix() @ np.array(pose.rotation)
+    np.testing.assert_allclose(again, wanted, atol=3e-8)  # within 1e-6 of half a turn the axis has 8 digits
+    if angle < 3.0:
+        np.testing.assert_allclose(found, vector, atol=1e-14)
+
+
+def test_the_jacobian_of_the_miss_is_its_derivative_in_the_limit_of_small_misses() -> None:
+    chain = load_robot("panda")
+    q = within(chain, 5)
+    task = task_of(chain, targets_of(chain, q))
+    h = 1e-6
+    for joint in range(7):
+        step = np.zeros((7, 1))
+        step[joint] = h
+        slope = (task.miss(q.T + step).error - task.miss(q.T - step).error) / (2 * h)
+        np.testing.assert_allclose(-slope, task.miss(q.T).jacobian[:, joint], atol=1e-9)  # h^2 and eps / h
+
+
+@pytest.mark.parametrize(
+    ("robot", "pose", "free"),
+    [("urm6", True, 0), ("urm6", False, 3), ("urm8", True, 2), ("panda", True, 1), ("iiwa14", False, 4)],
+)
+def test_the_freedoms_that_a_target_leaves_are_counted(robot: str, pose: bool, free: int) -> None:
+    chain = load_robot(robot)
+    targets = targets_of(chain, np.zeros((1, len(chain.coordinates))))
+    assert redundancy(chain, targets if pose else Targets(targets.position)) == free
+
+
+def test_the_freedoms_of_a_planar_arm_are_those_of_the_plane() -> None:
+    arm = planar(0.5, 0.4, 0.3)
+    assert redundancy(arm, targets_of(arm, np.zeros((1, 3)))) == 0
+    assert redundancy(arm, Targets(np.zeros((1, 3)))) == 1

@@ -1,0 +1,266 @@
+"""Several starts: what is solved, how many solutions there are, and why there are none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.inverse.closed.closed_form import closed_form
+from urmpipe_models.inverse.iterative.refine import refine
+from urmpipe_models.inverse.iterative.restarts import DISTINCT, ROUGH, random_starts, solve_iteratively
+from urmpipe_models.inverse.limits import limits_of, within_limits
+from urmpipe_models.inverse.solutions import NEAREST_POINT, Solutions
+from urmpipe_models.inverse.targets import Targets, misses, targets_of
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.transform import translation
+
+MET = 1.01e-10
+"""In [m] and [rad]: what is promised, and the rounding of the peer's rotation vector."""
+
+
+def random_targets(chain: Chain, count: int, seed: int = 6) -> Targets:
+    lower, upper = limits_of(chain)
+    low, high = np.maximum(lower, -math.pi), np.minimum(upper, math.pi)
+    return targets_of(chain, np.random.default_rng(seed).uniform(low, high, (count, len(low))))
+
+
+def assert_solved(chain: Chain, targets: Targets, solutions: Solutions) -> None:
+    for column in range(solutions.q.shape[1]):
+        rows = solutions.reached[:, column] & (solutions.shortfall[:, column] == 0.0)
+        distance, turn = misses(chain, solutions.q[rows, column], targets.rows(rows))
+        assert np.linalg.norm(distance, axis=1).max(initial=0.0) < MET
+        assert np.linalg.norm(turn, axis=1).max(initial=0.0) < MET
+
+
+def planar() -> Chain:
+    joints = (Joint("q1"), Joint("q2", origin=translation(0.5, 0.0, 0.0)))
+    return Chain("planar", joints, tip=translation(0.4, 0.0, 0.0))
+
+
+# --- what is solved ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("robot", ["urm6", "panda", "ur5e"])
+def test_random_reachable_poses_are_solved(robot: str) -> None:
+    chain = load_robot(robot)
+    targets = random_targets(chain, 60)
+    solutions = solve_iteratively(chain, targets, start=np.zeros(len(chain.coordinates)))
+    assert solutions.branches == ("1",)
+    assert solutions.reached.all()
+    assert_solved(chain, targets, solutions)
+    lower, upper = limits_of(chain)
+    assert ((solutions.q >= lower) & (solutions.q <= upper)).all()
+
+
+@pytest.mark.slow
+def test_random_poses_of_urm6_take_no_more_restarts_than_promised() -> None:
+    """995 of 1000 within 20 restarts, all within 200; the poses and the starts are uniformly random."""
+    chain = load_robot("urm6")
+    targets = random_targets(chain, 1000, seed=2021)
+    start = np.random.default_rng(9).uniform(-math.pi, math.pi, (1000, 6))
+    few = solve_iteratively(chain, targets, start=start, restarts=20)
+    print(f"within 20 restarts: {few.reached.sum()} of 1000")
+    assert few.reached.sum() >= 995
+    many = solve_iteratively(chain, targets, start=start, restarts=200)
+    print(f"within 200 restarts: {many.reached.sum()} of 1000")
+    assert many.reached.all()
+    assert_solved(chain, targets, many)
+
+
+def test_the_solution_from_the_start_is_kept_where_there_is_one() -> None:
+    chain = load_robot("urm6")
+    q = np.random.default_rng(1).uniform(-math.pi, math.pi, (50, 6))
+    solutions = solve_iteratively(chain, targets_of(chain, q), start=q + 1e-3)
+    np.testing.assert_allclose(solutions.q[:, 0], q, atol=1e-6)  # poses of conditions up to 1e4
+
+
+def test_a_singular_target_is_met_however_short_the_steps_towards_it() -> None:
+    """The wrist of this pose is aligned to 1e-5: the last of the way takes hundreds of steps."""
+    chain = load_robot("ur5e")
+    q = np.random.default_rng(1).uniform(-math.pi, math.pi, (1000, 6))[958:959]
+    targets = targets_of(chain, q)
+    found = solve_iteratively(chain, targets)
+    assert found.reached.all()
+    assert_solved(chain, targets, found)
+
+
+def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken() -> None:
+    """Attempts come one, two, four, ... at a time; here each is made alone."""
+    chain = load_robot("urm6")
+    targets, start = random_targets(chain, 80), np.array(chain.start)
+    found = solve_iteratively(chain, targets).q[:, 0]
+    restarts, others = random_starts(chain, 7, 0), 0
+    for row in np.flatnonzero(~refine(chain, targets, start).converged):
+        one = targets.rows(np.full(7, row))
+        refined = refine(chain, one, restarts, stationary=ROUGH)
+        for some in (slice(0, 1), slice(1, 3), slice(3, 7)):
+            if refined.converged[some].any():
+                q = refined.q[some][refined.converged[some]]
+                away = np.square(np.remainder(q - start + math.pi, 2 * math.pi) - math.pi).sum(axis=1)
+                nearest = q[np.argmin(away)]
+                turned = np.remainder(found[row] - nearest + math.pi, 2 * math.pi) - math.pi
+                np.testing.assert_allclose(turned, 0.0, atol=1e-9)  # whole turns apart
+                others += int(np.argmin(away) > 0)
+                break
+    assert others > 0  # of some the first is not the nearest
+
+
+# --- every solution ----------------------------------------------------------------------------------
+
+
+def test_both_solutions_of_a_planar_arm_are_found_nearest_to_the_start_first() -> None:
+    arm = planar()
+    q = np.array([[0.3, 0.8]])
+    found = solve_iteratively(arm, Targets(targets_of(arm, q).position), start=q[0] - 0.1, every=True)
+    angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
+    assert found.branches == ("1", "2")
+    np.testing.assert_allclose(found.q[0], [[0.3, 0.8], [0.3 + angle, -0.8]], atol=1e-8)
+
+
+def test_nearest_counts_the_way_that_limits_leave() -> None:
+    """From 3.0 rad a joint that ends at +-3.1 gets to -2.9 rad by 5.9 rad, not by 0.38."""
+    arm = planar()
+    arm = replace(arm, joints=tuple(replace(joint, lower=-3.1, upper=3.1) for joint in arm.joints))
+    position = Targets(targets_of(arm, np.array([[-2.9, 0.8]])).position)
+    start = np.array([3.0, 0.8])
+    angle = 2 * math.atan2(0.4 * math.sin(0.8), 0.5 + 0.4 * math.cos(0.8))
+    found = solve_iteratively(arm, position, start=start, every=True)
+    np.testing.assert_allclose(found.q[0], [[-2.9 + angle, -0.8], [-2.9, 0.8]], atol=1e-8)
+
+
+def test_every_solution_of_a_closed_form_is_found() -> None:
+    """Of the UR5e: as many as the three parallel axes have, the same values."""
+    chain = load_robot("ur5e")
+    targets = random_targets(chain, 12)
+    form = closed_form(chain)
+    assert form is not None
+    start = np.array(chain.start)
+    peer = within_limits(chain, form.solve(targets), start)
+    found = solve_iteratively(chain, targets, every=True, restarts=150)
+    for row in range(12):
+        ours = found.q[row][found.reached[row]]
+        theirs = peer.q[row][peer.reached[row]]
+        assert len(ours) == len(theirs)
+        for q in theirs:
+            away = np.remainder(ours - q + math.pi, 2 * math.pi) - math.pi
+            assert np.abs(away).max(axis=1).min() < 1e-6  # a miss of 1e-10, conditions up to 1e4
+
+
+def test_every_solution_is_distinct_ordered_and_met() -> None:
+    chain = load_robot("urm6")
+    targets = random_targets(chain, 30)
+    start = np.array(chain.start)
+    found = solve_iteratively(chain, targets, every=True)
+    assert_solved(chain, targets, found)
+    counts = found.reached.sum(axis=1)
+    assert counts.min() >= 1
+    assert counts.max() >= 6
+    distance = np.square(found.q - start).sum(axis=2)
+    for row, count in enumerate(counts):
+        assert found.reached[row, :count].all()
+        assert (np.diff(distance[row, :count]) >= -1e-9).all()
+        assert np.abs(found.q[row, :count] - start).max() <= math.pi + 1e-9
+        for a in range(count):
+            for b in range(a):
+                apart = np.remainder(found.q[row, a] - found.q[row, b] + math.pi, 2 * math.pi) - math.pi
+                assert np.abs(apart).max() > DISTINCT
+        assert set(found.reasons[row, count:]) <= {"no further solution in 20 restarts"}
+        assert set(found.reasons[row, :count]) == {""}
+
+
+# --- the same again ----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("robot", ["urm6", "urm8"])
+def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: str) -> None:
+    chain = load_robot(robot)
+    targets = random_targets(chain, 12)
+    first, again = (solve_iteratively(chain, targets, every=True, restarts=6, seed=4) for _ in range(2))
+    np.testing.assert_array_equal(first.q, again.q)
+    assert (random_starts(chain, 6, 4) != random_starts(chain, 6, 5)).all()
+    np.testing.assert_array_equal(random_starts(chain, 6, 4), random_starts(chain, 20, 4)[:6])
+
+
+@pytest.mark.parametrize("every", [False, True])
+def test_what_is_found_for_a_target_does_not_depend_on_the_others(every: bool) -> None:
+    chain = load_robot("urm6")
+    targets = random_targets(chain, 15)
+    together = solve_iteratively(chain, targets, every=every, restarts=8)
+    for row in (14, 3):
+        alone = solve_iteratively(chain, targets.rows(slice(row, row + 1)), every=every, restarts=8)
+        count = alone.q.shape[1]
+        np.testing.assert_array_equal(together.q[row, :count], alone.q[0])
+        assert not together.reached[row, count:].any()
+
+
+def test_random_starts_lie_within_limits() -> None:
+    ends = [(-math.inf, math.inf), (-0.5, 0.2), (1.0, math.inf), (-math.inf, -2.0)]
+    turning = [Joint(f"r{k}", lower=a, upper=b) for k, (a, b) in enumerate(ends)]
+    sliding = [Joint(f"p{k}", "prismatic", lower=a, upper=b) for k, (a, b) in enumerate(ends)]
+    chain = Chain("ends", (*turning, *sliding), tip=translation(3.0, 0.0, 0.0), start=(0, 0, 1, -2) * 2)
+    draws = random_starts(chain, 5000, 0)
+    turn, reach = 2 * math.pi, 3.0  # the arm is 3 m long
+    spans = [(-math.pi, math.pi), (-0.5, 0.2), (1.0, 1.0 + turn), (-2.0 - turn, -2.0)]
+    spans += [(-reach, reach), (-0.5, 0.2), (1.0, 1.0 + 2 * reach), (-2.0 - 2 * reach, -2.0)]
+    for column, (low, high) in zip(draws.T, spans, strict=True):
+        assert low <= column.min() < low + 0.01 * (high - low)
+        assert high >= column.max() > high - 0.01 * (high - low)
+
+
+# --- out of reach ------------------------------------------------------------------------------------
+
+
+def test_a_target_out_of_reach_says_how_near_the_tool_comes() -> None:
+    arm = planar()
+    found = solve_iteratively(arm, Targets(np.array([[1.2, 0.0, 0.0], [0.5, 0.1, 0.0]])), restarts=3)
+    assert found.reached[:, 0].tolist() == [False, True]
+    assert found.reason(0) == "no solution in 3 restarts; nearest: 0.3 m away"
+    pose = targets_of(arm, np.array([[0.0, 0.0]]))
+    found = solve_iteratively(arm, replace(pose, position=pose.position + 0.1), restarts=1)
+    assert found.reason(0) is not None
+    assert str(found.reason(0)).startswith("no solution in 1 restart; nearest: 0.1")
+    assert str(found.reason(0)).endswith(" rad away")
+    found = solve_iteratively(arm, Targets(np.array([[1.2, 0.0, 0.0]])), restarts=0, tolerance=0.29)
+    assert found.reason(0) == (
+        "no solution from the start; nearest: 0.3 m away, allowed: 0.29 m along each axis"
+    )
+
+
+def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
+    arm = planar()
+    targets = Targets(np.array([[0.903, 0.0, 0.0], [0.91, 0.0, 0.0], [0.5, 0.1, 0.0]]))
+    found = solve_iteratively(arm, targets, start=np.array([0.1, 0.2]), tolerance=0.0035)
+    assert found.reached[:, 0].tolist() == [True, False, True]
+    np.testing.assert_allclose(found.shortfall[:, 0], [0.003, 0.0, 0.0], atol=1e-9)
+    assert found.labels[:, 0].tolist() == [NEAREST_POINT, "1", "1"]
+    np.testing.assert_allclose(found.q[0, 0], [0.0, 0.0], atol=1e-3)  # flat there: 1e-9 m is 1e-4 rad
+    assert found.reason(0) is None
+
+
+def test_a_nearest_pose_that_is_turned_too_far_is_none() -> None:
+    """The point is met only with another orientation: the arm in the plane cannot tilt its tool."""
+    arm = planar()
+    tilted = targets_of(arm, np.array([[0.3, 0.8]]))
+    c, s = math.cos(0.1), math.sin(0.1)
+    tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
+    found = solve_iteratively(arm, replace(tilted, rotation=tilt @ tilted.rotation), tolerance=0.0035)
+    assert found.reason(0) is not None
+
+
+def test_a_target_that_is_not_finite_has_a_reason_and_stops_no_other() -> None:
+    chain = load_robot("urm6")
+    targets = random_targets(chain, 3)
+    targets.position[1, 2] = np.inf
+    found = solve_iteratively(chain, targets)
+    assert found.reached[:, 0].tolist() == [True, False, True]
+    assert found.reason(1) == "the target is not finite, allowed: finite numbers"
+
+
+def test_no_targets_have_no_solutions() -> None:
+    chain = load_robot("urm6")
+    found = solve_iteratively(chain, Targets(np.empty((0, 3)), np.empty((0, 3, 3))), every=True)
+    assert found.q.shape == (0, 1, 6)

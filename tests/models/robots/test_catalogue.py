@@ -1,0 +1,175 @@
+"""The robots that come along, and finding one by name or file."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from urmpipe_models.errors import OptionError, RobotError
+from urmpipe_models.kinematics.forward import forward, poses_over_log
+from urmpipe_models.robots.catalogue import load_robot, parse_offset, robot_names
+from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict
+from urmpipe_models.robots.urdf_writer import write_urdf
+from urmpipe_models.transform import from_offset
+
+NAMES = (
+    "arm6",
+    "articulated6r",
+    "iiwa14",
+    "panda",
+    "ur3",
+    "ur5",
+    "ur10",
+    "ur3e",
+    "ur5e",
+    "ur10e",
+    "urm4",
+    "urm6",
+    "urm8",
+)
+
+DH = {  # d1, a2, a3, d4, d5, d6 in m, as Universal Robots publishes them
+    "ur3": (0.1519, -0.24365, -0.21325, 0.11235, 0.08535, 0.0819),
+    "ur5": (0.089159, -0.425, -0.39225, 0.10915, 0.09465, 0.0823),
+    "ur10": (0.1273, -0.612, -0.5723, 0.163941, 0.1157, 0.0922),
+    "ur3e": (0.15185, -0.24355, -0.2132, 0.13105, 0.08535, 0.0921),
+    "ur5e": (0.1625, -0.425, -0.3922, 0.1333, 0.0997, 0.0996),
+    "ur10e": (0.1807, -0.6127, -0.57155, 0.17415, 0.11985, 0.11655),
+}
+SPEEDS = {"ur3": (180,) * 3 + (360,) * 3, "ur5": (180,) * 6, "ur10": (120,) * 2 + (180,) * 4}  # deg/s
+
+
+def test_all_robots_are_there_and_say_what_they_are() -> None:
+    assert robot_names() == NAMES
+    for name in NAMES:
+        chain = load_robot(name)
+        assert chain.name == name
+        assert chain.description
+        assert chain.source
+        assert chain_from_dict(chain_to_dict(chain)) == chain
+
+
+@pytest.mark.parametrize("name", list(DH))
+def test_universal_robots_geometry_limits_and_speeds(name: str) -> None:
+    d1, a2, a3, d4, d5, d6 = DH[name]
+    chain = load_robot(name)
+    assert chain.coordinates == (
+        "shoulder_pan_joint", "shoulder_lift_joint", "elbow_joint",
+        "wrist_1_joint", "wrist_2_joint", "wrist_3_joint",
+    )  # fmt: skip
+    # stretched along -x (a2, a3 < 0), the wrist's offsets d4 and d6 to -y, d5 down
+    tip = forward(chain, [0.0] * 6)[-1].translation
+    np.testing.assert_allclose(tip, [a2 + a3, -d4 - d6, d1 - d5], atol=1e-15)  # rounding
+    upright = forward(chain, chain.start)[-1].translation
+    np.testing.assert_allclose(upright, [0.0, -d4 - d6, d1 - a2 - a3 + d5], atol=1e-15)
+    assert [(joint.lower, joint.upper) for joint in chain.joints] == [(-2 * math.pi, 2 * math.pi)] * 6
+    expected = np.radians(SPEEDS[name.removesuffix("e")])
+    np.testing.assert_allclose([joint.velocity for joint in chain.joints], expected, rtol=1e-15)
+
+
+@pytest.mark.parametrize("modules", [4, 6, 8])
+def test_urm_arms_are_the_papers_modules(modules: int) -> None:
+    chain = load_robot(f"urm{modules}")
+    lengths = [joint.origin.translation[2] for joint in chain.joints[1:]] + [chain.tip.translation[2]]
+    assert lengths == [0.243215, *[0.21243] * (modules - 1), 0.042215]
+    assert chain.start == (0.0, math.pi) * (modules // 2)
+    assert chain.coordinates == tuple(f"phi{k}" for k in range(1, modules + 1))
+    assert len(chain.point_names) == modules + 1
+    for joint in chain.joints[1:]:
+        np.testing.assert_allclose(math.acos(joint.origin.rotation[0][0]), math.radians(52.0), rtol=1e-15)
+    for joint in chain.joints:
+        assert (joint.lower, joint.upper, joint.velocity) == (-math.inf, math.inf, math.inf)
+
+
+def test_arm6_is_the_papers_with_two_frames_that_do_not_move() -> None:
+    chain = load_robot("arm6")
+    assert chain.coordinates == tuple(f"theta{k}" for k in range(1, 7))
+    assert [joint.name for joint in chain.joints if joint.kind == "fixed"] == ["aux2", "aux5"]
+    tip = forward(chain, [0.0] * 6)[-1].translation
+    np.testing.assert_allclose(tip, [-0.069, 0.0, 0.112], rtol=0.0, atol=1e-16)  # rounding
+    assert chain.start == (0.0,) * 6
+
+
+def test_articulated6r_says_that_its_lengths_are_assumed() -> None:
+    chain = load_robot("articulated6r")
+    assert "its lengths are an assumption" in chain.source
+    tip = forward(chain, [0.0] * 6)[-1].translation
+    np.testing.assert_allclose(tip, [0.0, 0.0, 1.4], rtol=1e-15)  # straight up: the sum of its lengths
+
+
+URDFS = {  # robot, file, its link at the robot's tip, FK to [m, -], speeds and ranges to [rad/s, rad]
+    "panda of Gepetto": ("panda", "Gepetto_example-robot-data/panda.urdf", "panda_link8", 1e-15, 0.0),
+    # its right angles have 12 digits: 2.6e-12 rad times seven of them and 1 m
+    "panda of FancySafeBot": ("panda", "FancySafeBot_fsb-library/panda.urdf", "panda_link8", 5e-11, None),
+    # its limits are degrees cut to four digits: 2.0942 for 120 deg
+    "iiwa14 of ROS-Industrial": (
+        "iiwa14", "ros-industrial_kuka_experimental/lbr_iiwa_14_r820.urdf", "tool0", 1e-15, 3e-4,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("which", list(URDFS))
+def test_redundant_arms_are_those_of_urdfs_that_others_wrote(shared: Path, which: str) -> None:
+    robot, file, tip, rounding, cut = URDFS[which]
+    chain, other = load_robot(robot), load_robot(shared / "robots" / file, tip_link=tip)
+    assert chain.coordinates == other.coordinates
+    q = np.random.default_rng(3).uniform(-3.0, 3.0, (1000, 7))
+    for got, expected in zip(poses_over_log(chain, q), poses_over_log(other, q), strict=True):
+        np.testing.assert_allclose(got, expected, rtol=0.0, atol=rounding)
+    if cut is None:  # it gives other limits than the maker
+        return
+    ours, theirs = (
+        [(joint.lower, joint.upper, joint.velocity) for joint in arm.moving] for arm in (chain, other)
+    )
+    np.testing.assert_allclose(ours, theirs, rtol=0.0, atol=cut)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_start_lies_within_the_joint_ranges(name: str) -> None:
+    chain = load_robot(name)
+    for joint, value in zip(chain.moving, chain.start, strict=True):
+        assert joint.lower <= value <= joint.upper
+
+
+def test_an_unknown_name_gets_the_nearest_and_all_others() -> None:
+    with pytest.raises(RobotError) as caught:
+        load_robot("urm66")
+    allowed = f"allowed: {', '.join(NAMES)}, or a .toml or .urdf file"
+    assert str(caught.value) == f"unknown robot 'urm66' (did you mean urm6?); {allowed}"
+    with pytest.raises(RobotError) as caught:
+        load_robot("kuka")
+    assert str(caught.value) == f"unknown robot 'kuka'; {allowed}"
+    with pytest.raises(RobotError) as caught:
+        load_robot("iiwa")
+    assert str(caught.value) == f"unknown robot 'iiwa' (did you mean iiwa14?); {allowed}"
+
+
+def test_files_are_loaded_by_their_suffix(tmp_path: Path) -> None:
+    chain = load_robot("urm4")
+    write_urdf(chain, tmp_path / "a.urdf")
+    assert load_robot(tmp_path / "a.urdf").coordinates == chain.coordinates
+    assert load_robot(str(tmp_path / "a.urdf"), base_link="link1", tip_link="link3").coordinates == (
+        "phi2",
+        "phi3",
+    )
+    (tmp_path / "b.toml").write_text('kind = "urm"\nlengths = [1, 1]\ntilts = [1]', encoding="utf-8")
+    assert load_robot(tmp_path / "b.toml").name == "b"
+    with pytest.raises(OptionError) as caught:
+        load_robot("urm4", tip_link="link3")
+    assert str(caught.value) == "robot urm4: found a base or tip link, allowed only for a .urdf file"
+
+
+def test_offsets_are_read() -> None:
+    assert parse_offset("1,2,-3") == from_offset([1.0, 2.0, -3.0])
+    assert parse_offset(" 0, 0 ,0.15,0,1e-3,3.14") == from_offset([0.0, 0.0, 0.15, 0.0, 1e-3, 3.14])
+
+
+@pytest.mark.parametrize("text", ["", "1", "1,2", "1,2,3,4", "a,b,c", "1,2,nan", "1,2,inf", "1;2;3"])
+def test_other_offsets_are_refused(text: str) -> None:
+    with pytest.raises(OptionError) as caught:
+        parse_offset(text)
+    allowed = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15"
+    assert str(caught.value) == f"found {text!r}, {allowed}"

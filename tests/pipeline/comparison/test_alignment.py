@@ -1,0 +1,286 @@
+"""Moving a log in space: what each alignment takes out of a deviation, and what it leaves."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import LogError
+from urmpipe_models.kinematics.forward import point_over_log, poses_over_log
+from urmpipe_models.orientation import RotationForm
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.transform import Transform, from_offset, from_rpy
+from urmpipe_pipeline.comparison.alignment import RESOLVED, tool_with
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
+from urmpipe_pipeline.joint_log import JointLog, SourceFile
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.runs.results import Run
+
+ROUNDING = 1e-12
+"""Positions of some metres round at 1e-15, a fit over hundreds of them at some tens of that."""
+
+MADE = Provenance("ingest", {}, (), {}, "")
+FRAME = Rotation.from_rotvec([0.3, -0.5, 0.4])
+SHIFT = np.array([0.2, -0.1, 0.4])
+OFFSET = np.array([0.01, -0.02, 0.15])
+
+
+def pose_run(position: FloatArray, quat: FloatArray | None = None, name: str = "path") -> Run:
+    """A path of poses every 5 ms."""
+    t_ns = np.arange(len(position)) * 5_000_000
+    none = np.empty((len(position), 0))
+    form: RotationForm | None = None if quat is None else "quat_xyzw"
+    files = (SourceFile(f"{name}.csv", "0", 1),)
+    log = JointLog(
+        name, "table", files, t_ns, (), none, tcp_position=position, tcp_rotation=quat, rotation_form=form
+    )
+    return Run(name, log, None, 0.005, t_ns, none, none, none, None, position, (), (), MADE)
+
+
+def motion(count: int = 200) -> tuple[FloatArray, Rotation]:
+    t = np.linspace(0.0, 5.0, count)
+    position = np.column_stack([np.sin(t), np.cos(1.3 * t), 0.3 * t])
+    return position, Rotation.from_euler("ZYX", np.column_stack([t, 0.5 * np.sin(t), 0.2 * t]))
+
+
+def aligned(reference: Run, log: Run, mode: AlignMode) -> Deviation:
+    return compare_runs(reference, [log], CompareOptions(align=mode)).runs[0]
+
+
+def assert_formula(found: Alignment, before: FloatArray, turn: Rotation | None, after: FloatArray) -> None:
+    """p' = R p + t + R' tool, as the docstring of `Alignment` says."""
+    rotation = Rotation.from_matrix(found.rotation)
+    expected = rotation.apply(before) + found.translation
+    if turn is not None:
+        expected = expected + (rotation * turn).apply(found.tool)
+    np.testing.assert_allclose(after, expected, atol=ROUNDING)
+    assert np.linalg.det(found.rotation) == pytest.approx(1.0, abs=ROUNDING)
+    moved = np.linalg.norm(after - before, axis=1)
+    np.testing.assert_allclose(found.moved(after), moved, atol=ROUNDING)
+
+
+@pytest.mark.parametrize("mode", ["start", "rigid"])
+def test_a_motion_that_stands_elsewhere_is_brought_back(mode: AlignMode) -> None:
+    position, turn = motion()
+    before = FRAME.apply(position) + SHIFT
+    log = pose_run(before, (FRAME * turn).as_quat(), "log")
+    found = aligned(pose_run(position, turn.as_quat()), log, mode)
+    np.testing.assert_allclose(found.actual, position, atol=ROUNDING)
+    assert found.angle is not None
+    np.testing.assert_allclose(found.angle, 0.0, atol=ROUNDING)
+    assert found.alignment.mode == mode
+    assert found.alignment.angle == pytest.approx(FRAME.magnitude(), abs=ROUNDING)
+    assert found.alignment.tool == (0.0, 0.0, 0.0)
+    assert_formula(found.alignment, before, None, found.actual)
+
+
+def test_nothing_is_moved_without_being_asked() -> None:
+    position, _ = motion()
+    found = aligned(pose_run(position), pose_run(position + SHIFT, name="log"), "none")
+    assert found.alignment == Alignment()
+    assert found.alignment.angle == 0.0
+    assert found.alignment.moved(found.actual).max() == 0.0
+    np.testing.assert_array_equal(found.actual, position + SHIFT)
+
+
+@pytest.mark.parametrize("lacking", ["reference", "log"])
+def test_start_moves_by_the_translation_alone_where_a_side_has_no_orientation(lacking: str) -> None:
+    position, turn = motion()
+    quats = {name: None if name == lacking else turn.as_quat() for name in ("reference", "log")}
+    reference = pose_run(position, quats["reference"])
+    found = aligned(reference, pose_run(FRAME.apply(position) + SHIFT, quats["log"], "log"), "start")
+    assert found.alignment.rotation == Alignment().rotation
+    np.testing.assert_allclose(found.delta[0], 0.0, atol=1e-15)
+    np.testing.assert_allclose(found.actual, FRAME.apply(position - position[0]) + position[0], atol=ROUNDING)
+    assert found.angle is None
+
+
+def test_start_goes_by_the_first_pose_that_both_sides_have() -> None:
+    position, turn = motion()
+    quat = (FRAME * turn).as_quat()
+    quat[:7] = np.nan
+    found = aligned(pose_run(position, turn.as_quat()), pose_run(FRAME.apply(position), quat, "log"), "start")
+    assert len(found.sample) == 200
+    np.testing.assert_allclose(found.actual, position, atol=ROUNDING)
+    assert found.angle is not None
+    assert np.isnan(found.angle).tolist() == [True] * 7 + [False] * 193
+    assert found.statistics["angle"].sample_max >= 7
+
+
+def test_a_mirrored_motion_is_turned_and_not_mirrored_back() -> None:
+    position, _ = motion()
+    found = aligned(pose_run(position), pose_run(position * np.array([1.0, 1.0, -1.0]), name="log"), "rigid")
+    assert np.linalg.det(found.alignment.rotation) == pytest.approx(1.0, abs=ROUNDING)
+    assert found.statistics["norm"].max > 0.1
+
+
+def test_a_motion_in_a_plane_is_aligned() -> None:
+    position = motion()[0] * np.array([1.0, 1.0, 0.0])
+    found = aligned(pose_run(position), pose_run(FRAME.apply(position) + SHIFT, name="log"), "rigid")
+    assert found.statistics["norm"].max < ROUNDING
+    assert found.alignment.angle == pytest.approx(FRAME.magnitude(), abs=ROUNDING)
+
+
+@settings(max_examples=30, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1))
+def test_no_small_motion_more_makes_a_rigid_alignment_better(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    wanted, done = rng.normal(size=(2, 30, 3))
+    found = aligned(pose_run(wanted), pose_run(done, name="log"), "rigid")
+    best = float((found.delta[:, 3] ** 2).sum())
+    for _ in range(20):
+        turn, shift = Rotation.from_rotvec(rng.normal(0, 0.01, 3)), rng.normal(0, 0.01, 3)
+        assert ((turn.apply(found.actual) + shift - wanted) ** 2).sum() >= best - ROUNDING
+
+
+@pytest.mark.parametrize(
+    ("reference", "log", "said"),
+    [
+        (np.zeros((9, 3)), motion(9)[0], "compared positions in one point (within 0.0000 mm rms)"),
+        (motion(1)[0], motion(1)[0], "compared positions in one point (within 0.0000 mm rms)"),
+        (motion(2)[0], motion(2)[0], "compared positions on one line (within 0.0000 mm rms)"),
+        (
+            np.outer(np.arange(9.0), (1, 2, 2)),
+            motion(9)[0],
+            "compared positions on one line (within 0.0000 mm rms)",
+        ),
+        (
+            motion(100)[0] * np.array([1.0, 1e-5, 0.0]),
+            motion(100)[0],
+            "compared positions on one line (within 0.0059 mm rms)",
+        ),
+    ],
+)
+def test_positions_that_leave_the_rotation_open_are_refused(
+    reference: FloatArray, log: FloatArray, said: str
+) -> None:
+    with pytest.raises(LogError) as error:
+        aligned(pose_run(reference), pose_run(log, name="log"), "rigid")
+    assert str(error.value) == (
+        f"log.csv: --align rigid: found {said}, which leaves the rotation open, allowed: start, tool, none"
+    )
+
+
+def test_motions_without_anything_in_common_leave_the_rotation_open() -> None:
+    angle = np.arange(100) * 2 * np.pi / 100
+    once = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
+    twice = np.column_stack([np.cos(2 * angle), np.sin(2 * angle), 0 * angle])
+    with pytest.raises(LogError, match="found two motions without anything in common, which leaves"):
+        aligned(pose_run(once), pose_run(twice, name="log"), "rigid")
+
+
+def test_what_just_leaves_a_line_is_aligned() -> None:
+    position = np.column_stack(
+        [np.linspace(-1, 1, 100), np.tile([2 * RESOLVED, -2 * RESOLVED], 50), np.zeros(100)]
+    )
+    found = aligned(pose_run(position), pose_run(FRAME.apply(position), name="log"), "rigid")
+    assert found.statistics["norm"].max < ROUNDING
+
+
+def test_a_tool_is_found_and_stored() -> None:
+    position, turn = motion()
+    reference = position + turn.apply(OFFSET)
+    found = aligned(pose_run(reference), pose_run(position, turn.as_quat(), "log"), "tool")
+    np.testing.assert_allclose(found.alignment.tool, OFFSET, atol=ROUNDING)
+    assert found.alignment.rotation == Alignment().rotation
+    assert found.alignment.translation == (0.0, 0.0, 0.0)
+    assert found.statistics["norm"].max < ROUNDING
+    assert_formula(found.alignment, position, turn, found.actual)
+
+
+def test_the_tool_is_the_one_of_the_least_squares() -> None:
+    rng = np.random.default_rng(1)
+    position, turn = motion()
+    reference = position + turn.apply(OFFSET) + rng.normal(0, 0.01, position.shape)
+    found = aligned(pose_run(reference), pose_run(position, turn.as_quat(), "log"), "tool")
+    rows, right = turn.as_matrix().reshape(-1, 3), (reference - position).ravel()
+    np.testing.assert_allclose(found.alignment.tool, np.linalg.lstsq(rows, right)[0], atol=ROUNDING)
+
+
+def test_samples_without_an_orientation_cannot_carry_a_tool_and_are_left_out() -> None:
+    position, turn = motion()
+    quat = turn.as_quat()
+    quat[[0, 50]] = np.nan
+    result = compare_runs(
+        pose_run(position + turn.apply(OFFSET)),
+        [pose_run(position, quat, "log")],
+        CompareOptions(align="tool"),
+    )
+    found = result.runs[0]
+    assert (found.left_out, len(found.sample), found.sample[0]) == (2, 198, 1)
+    assert found.statistics["norm"].max < ROUNDING
+    assert [w.message for w in result.warnings] == ["log: 2 of 200 samples have no reference or no value"]
+
+
+@pytest.mark.parametrize("quat", [None, np.full((200, 4), np.nan)])
+def test_a_tool_without_an_orientation_is_refused(quat: FloatArray | None) -> None:
+    position, turn = motion()
+    with pytest.raises(LogError) as error:
+        aligned(pose_run(position, turn.as_quat()), pose_run(position, quat, "log"), "tool")
+    assert str(error.value) == (
+        "log.csv: --align tool: found no orientation of the log, allowed: joints with a --robot, or a"
+        " recorded orientation"
+    )
+
+
+def arm_run(recorded_with: Transform, tool: Transform | None = None) -> Run:
+    """A log of a UR5e that recorded its pose with one tool, and whose kinematics have another."""
+    bare = load_robot("ur5e")
+    t = np.linspace(0, 4, 300)
+    q = np.column_stack([0.6 * np.sin((1 + 0.3 * k) * t) + 0.5 * k - 1.2 for k in range(6)])
+    position, rotation = poses_over_log(bare.placed(tool=recorded_with), q)
+    robot = bare.placed(tool=tool)
+    t_ns, joints = np.arange(300) * 5_000_000, tuple(f"q{k}" for k in range(6))
+    log = JointLog(
+        "log", "table", (SourceFile("log.csv", "0", 1),), t_ns, joints, q, tcp_position=position,
+        tcp_rotation=rotation.reshape(-1, 9), rotation_form="matrix",
+    )  # fmt: skip
+    tcp = point_over_log(robot, q, 0 * q, 0 * q)
+    return Run("log", log, robot, 0.005, t_ns, q, 0 * q, 0 * q, tcp, position, (), (), MADE)
+
+
+@pytest.mark.parametrize("own", [(), (0.0, 0.0, 0.1), (0.01, 0.0, 0.1, 0.5, -0.4, 1.0)])
+def test_the_tool_that_is_advised_takes_the_deviation_away(own: tuple[float, ...]) -> None:
+    recorded_with = from_offset((0.02, -0.01, 0.17, *own[3:]))
+    run = arm_run(recorded_with, from_offset(own) if own else None)
+    found = compare_recorded(run, CompareOptions(align="tool")).runs[0]
+    assert found.statistics["norm"].max < ROUNDING
+    assert run.robot is not None
+    advised = tool_with(run.robot, found.alignment)
+    np.testing.assert_allclose(advised, (0.02, -0.01, 0.17, *own[3:]), atol=ROUNDING)
+    told = arm_run(recorded_with, from_offset(advised))
+    assert compare_recorded(told).runs[0].statistics["norm"].max < ROUNDING
+
+
+def test_one_log_alone_has_an_angle_between_kinematics_and_record() -> None:
+    run = arm_run(from_rpy(0.0, 0.0, 0.25))
+    found = compare_recorded(run).runs[0]
+    assert found.angle is not None
+    np.testing.assert_allclose(found.angle, 0.25, atol=ROUNDING)
+    start = compare_recorded(run, CompareOptions(align="start")).runs[0]
+    assert start.angle is not None
+    assert (start.angle[0], start.delta[0, 3]) == pytest.approx((0.0, 0.0), abs=ROUNDING)
+    assert start.alignment.angle == pytest.approx(0.25, abs=ROUNDING)
+
+
+def test_one_log_alone_without_a_recorded_orientation_has_no_angle() -> None:
+    run = arm_run(Transform())
+    run = replace(run, log=replace(run.log, tcp_rotation=None, rotation_form=None))
+    assert compare_recorded(run).runs[0].angle is None
+    assert compare_recorded(run, CompareOptions(align="tool")).runs[0].statistics["norm"].max < ROUNDING
+
+
+def test_orientations_turn_with_the_log() -> None:
+    position, turn = motion()
+    log = pose_run(FRAME.apply(position), turn.as_quat(), "log")  # turned in place only, not in orientation
+    found = aligned(pose_run(position, turn.as_quat()), log, "rigid")
+    assert found.angle is not None
+    np.testing.assert_allclose(found.angle, FRAME.magnitude(), atol=ROUNDING)

@@ -1,0 +1,205 @@
+"""What changed since a baseline, and what of it is worse."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.comparison.baseline import (
+    DEFAULT_NOISE,
+    Absent,
+    Difference,
+    against_baseline,
+    complete_noise,
+    parse_noise,
+)
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.trajectory import Sync
+from urmpipe_pipeline.runs.results import json_ready
+
+Compared = Callable[..., Comparison]
+
+ROUNDING = 1e-15
+"""Positions of 1 m round at 2e-16 m, and are taken apart twice."""
+
+
+def off(x: float, samples: int = 100) -> FloatArray:
+    """A deviation that grows from 0 to x along x."""
+    return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
+
+
+def test_the_same_comparison_did_not_change(arms: Compared) -> None:
+    result = arms({"a": np.full((50, 6), 0.001)}, tolerance={"axis": 0.001, "angle": 0.001, "joint": 0.002})
+    found = against_baseline(result, result, 0.0)
+    assert (found.verdict, found.worse, found.new, found.gone, found.differences) == ("pass", (), (), (), ())
+    assert [change.now.quantity for change in found.changes] == [
+        "x", "y", "z", "norm", "path", "angle", "q1", "q2", "q3", "q4", "q5", "q6",
+    ]  # fmt: skip
+    assert not any(change.changed or change.better for change in found.changes)
+    assert {(change.largest, change.t_largest, change.samples_shared) for change in found.changes} == {
+        (0.0, 0.0, 50)
+    }
+
+
+def test_what_grew_by_more_than_the_noise_is_worse(paths: Compared) -> None:
+    before, now = (paths({"a": off(size)}) for size in (0.001, 0.0012))
+    x = against_baseline(now, before).changes[0]
+    assert (x.worse, x.better, x.changed) == (("max", "rms"), (), True)
+    assert (x.before, x.now) == (before.runs[0].statistics["x"], now.runs[0].statistics["x"])
+    assert x.largest == pytest.approx(0.0002, abs=ROUNDING)
+    assert x.t_largest == 0.495
+    assert against_baseline(now, before).verdict == "fail"
+    back = against_baseline(before, now)
+    assert (back.changes[0].worse, back.changes[0].better, back.verdict) == ((), ("max", "rms"), "pass")
+
+
+def test_what_grew_within_the_noise_is_not(paths: Compared) -> None:
+    before, now = (paths({"a": off(size)}) for size in (0.001, 0.0012))
+    quiet = against_baseline(now, before, 0.0002 + ROUNDING)
+    assert quiet.verdict == "pass"
+    assert not any(change.changed for change in quiet.changes)
+    assert against_baseline(now, before, 0.0002 - 1e-9).verdict == "fail"
+
+
+def test_a_change_that_statistics_do_not_show_is_seen_at_its_sample(paths: Compared) -> None:
+    aside = [np.roll(off(size), 1, axis=1) for size in (0.001, -0.001)]
+    before, now = (paths({"a": one}) for one in aside)
+    y = against_baseline(now, before).changes[1]
+    assert (y.worse, y.better, y.changed) == ((), (), True)
+    assert y.largest == pytest.approx(0.002, abs=ROUNDING)
+    assert against_baseline(now, before).verdict == "pass"
+
+
+def test_more_samples_out_are_worse_unless_the_noise_put_them_there(paths: Compared) -> None:
+    steps = np.zeros((100, 3))
+    steps[:10, 0] = 0.0040  # out of 3.5 mm in both
+    steps[10:50, 0] = 0.003_499_8
+    nudged, moved = steps.copy(), steps.copy()
+    nudged[10:50, 0] += 0.000_000_5  # out by less than 1 um
+    moved[10:13, 0] = 0.0038
+    before = paths({"a": steps})
+    x = against_baseline(paths({"a": nudged}), before).changes[0]
+    assert (x.before.share_out, x.now.share_out, x.worse) == (0.1, 0.5, ())
+    x = against_baseline(paths({"a": moved}), before, {"x": 0.000_29}).changes[0]
+    assert (x.now.share_out, x.worse) == (0.13, ("share_out",))
+
+
+def test_shares_of_different_tolerances_do_not_compare(paths: Compared) -> None:
+    before = paths({"a": off(0.003)})
+    now = paths({"a": off(0.003)}, tolerance={"axis": 0.001})
+    found = against_baseline(now, before)
+    assert (found.changes[0].share_noise, found.changes[0].worse, found.verdict) == (None, (), "pass")
+    assert found.changes[0].changed  # the verdict did
+    assert found.differences == (Difference("tolerance", {"axis": 0.0035}, {"axis": 0.001}),)
+
+
+@settings(max_examples=60, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(
+    hnp.arrays(float, (40, 3), elements=st.floats(-0.005, 0.005)),
+    hnp.arrays(float, (40, 3), elements=st.floats(-1, 1)),
+    st.floats(1e-7, 1e-3),
+)
+def test_no_change_within_the_noise_is_ever_worse(
+    paths: Compared, values: FloatArray, change: FloatArray, noise: float
+) -> None:
+    """Of no share, largest or rms. The norm may change by sqrt(3) as much as an axis."""
+    before, now = paths({"a": values}), paths({"a": values + change * noise})
+    level = noise * np.sqrt(3) + ROUNDING
+    assert against_baseline(now, before, level).worse == ()
+
+
+def test_times_that_both_have_are_compared(paths: Compared) -> None:
+    before, now = (
+        paths({"a": off(0.001, 100), "b": off(0.0, 100)}),
+        paths({"a": off(0.001, 60), "b": off(0.0, 100)}),
+    )
+    found = against_baseline(now, before)
+    x = found.changes[0]
+    assert x.samples_shared == 60
+    assert x.t_largest == 0.295
+    assert Difference("samples of a", 100, 60) in found.differences
+
+
+def test_logs_and_quantities_that_only_one_has_are_told(paths: Compared, arms: Compared) -> None:
+    before, now = paths({"a": off(0.0), "old": off(0.0)}), paths({"new": off(0.0), "a": off(0.0)})
+    found = against_baseline(now, before)
+    assert (found.new, found.gone) == ((Absent("new"),), (Absent("old"),))
+    assert (found.verdict, found.worse) == ("fail", ())
+    with_joints = arms({"a": np.zeros((100, 6))})
+    assert [str(one) for one in against_baseline(paths({"a": off(0.0)}), with_joints).gone] == [
+        f"{name} of a" for name in ("angle", "q1", "q2", "q3", "q4", "q5", "q6")
+    ]
+    assert against_baseline(with_joints, paths({"a": off(0.0)})).gone == ()
+
+
+def test_what_was_made_otherwise_is_told(paths: Compared) -> None:
+    before = paths({"a": off(0.0)})
+    run = replace(before.runs[0], sync=Sync("given", 0.25))
+    made = replace(
+        before.provenance,
+        options={**before.provenance.options, "align": "rigid"},
+        versions={**before.provenance.versions, "numpy": "1.0"},
+    )
+    now = replace(before, runs=(run,), provenance=made, reference=replace(before.reference, name="other"))
+    assert against_baseline(now, before).differences == (
+        Difference("reference", "path", "other"),
+        Difference("align", "none", "rigid"),
+        Difference("version of numpy", before.provenance.versions["numpy"], "1.0"),
+        Difference("sync_offset of a", 0.0, 0.25),
+    )
+
+
+def test_the_result_is_json_in_the_comparison(paths: Compared) -> None:
+    before = replace(paths({"a": off(0.001), "old": off(0.0)}), recording=Path("old.rrd"))
+    now = paths({"a": off(0.002)})
+    held = replace(now, baseline=against_baseline(now, before))
+    assert (held.verdict, held.accepted, now.accepted, now.to_dict()["baseline"]) == (
+        "pass",
+        False,
+        True,
+        None,
+    )
+    told = json.loads(json.dumps(json_ready(held.to_dict())))["baseline"]
+    assert (told["name"], told["recording"], told["verdict"]) == ("against-path", "old.rrd", "fail")
+    assert told["noise"] == DEFAULT_NOISE
+    assert told["gone"] == [{"run": "old", "quantity": None}]
+    x = told["changes"][0]
+    assert (x["run"], x["quantity"], x["unit"], x["worse"]) == ("a", "x", "m", ["max", "rms"])
+    assert x["max"] == {
+        "before": before.runs[0].statistics["x"].max, "now": now.runs[0].statistics["x"].max,
+    }  # fmt: skip
+    assert x["verdict"] == {"before": "pass", "now": "pass"}
+
+
+def test_a_noise_is_of_all_lengths_or_of_kinds() -> None:
+    assert parse_noise("5um") == DEFAULT_NOISE | {"axis": 5e-6, "norm": 5e-6, "path": 5e-6}
+    assert parse_noise("0,angle=1mrad") == {
+        "axis": 0.0,
+        "norm": 0.0,
+        "path": 0.0,
+        "angle": 0.001,
+        "joint": 1e-6,
+    }
+    assert complete_noise(None) == DEFAULT_NOISE
+    assert complete_noise(5e-6) == parse_noise("5um")
+    assert complete_noise({"x": 0.0}) == DEFAULT_NOISE | {"x": 0.0}
+    allowed = (
+        "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad,"
+        " deg; m of a joint that slides)"
+    )
+    with pytest.raises(OptionError) as error:
+        parse_noise("lots,angle=-1")
+    assert str(error.value) == (f"--noise: found 'lots', {allowed}\n--noise: found 'angle=-1', {allowed}")
+    with pytest.raises(OptionError) as error:
+        complete_noise({"axis": -1.0})
+    assert str(error.value) == f"--noise: found axis=-1.0, {allowed}; 0 or positive"

@@ -1,0 +1,289 @@
+"""Deviation, statistics and verdict, from plain arrays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.chains.visual import Mesh, Visual
+from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.kinematics.forward import point_over_log, positions_over_log
+from urmpipe_models.transform import translation
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
+from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.repolarization.audit import audit_log
+from urmpipe_pipeline.runs.derivatives import derivatives
+from urmpipe_pipeline.runs.meshes import missing_visuals
+from urmpipe_pipeline.runs.results import Run
+
+URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
+TSP = 0.005
+COLUMNS = tuple(LogColumn(f"q{i + 1}", f"q{i + 1}", "joint", i, "rad") for i in range(6))
+PROVENANCE = Provenance("ingest", {}, (), {}, "")
+
+
+def arm_run(
+    q: FloatArray,
+    *,
+    name: str = "log",
+    robot: Chain | None = URM6,
+    start_ns: int = 0,
+    recorded: FloatArray | None = None,
+) -> Run:
+    """A run of joint values at 5 ms."""
+    t_ns = np.arange(len(q)) * 5_000_000 + start_ns
+    joints = tuple(f"q{i}" for i in range(1, 7))
+    log = JointLog(
+        name, "table", (SourceFile(f"{name}.csv", "0", 1),), t_ns, joints, q, tcp_position=recorded
+    )
+    qd, qdd = derivatives(q, TSP)
+    tcp = None if robot is None else point_over_log(robot, q, qd, qdd)
+    return Run(name, log, robot, TSP, t_ns, q, qd, qdd, tcp, recorded, (), (), PROVENANCE)
+
+
+def path_run(position: FloatArray, name: str = "path") -> Run:
+    """A path: a log without joints."""
+    t_ns = np.arange(len(position)) * 5_000_000
+    nothing = np.empty((len(position), 0))
+    file = SourceFile(f"{name}.csv", "0", 1)
+    log = JointLog(name, "table", (file,), t_ns, (), nothing, tcp_position=position)
+    return Run(name, log, None, TSP, t_ns, nothing, nothing, nothing, None, position, (), (), PROVENANCE)
+
+
+@pytest.fixture
+def q() -> FloatArray:
+    t = TSP * np.arange(500)
+    return np.column_stack([0.5 * np.sin(t * (1 + i)) + i for i in range(6)])
+
+
+def test_a_path_made_by_the_arm_itself_has_no_deviation(q: FloatArray) -> None:
+    result = compare_runs(path_run(positions_over_log(URM6, q)), [arm_run(q)])
+    assert result.verdict == "pass"
+    assert result.runs[0].delta.max() == 0.0
+    assert result.runs[0].left_out == 0
+    assert result.runs[0].sync.offset == 0.0
+    assert result.name == "log-against-path"
+
+
+def test_statistics_are_those_of_numpy_and_the_sign_is_reference_minus_actual(q: FloatArray) -> None:
+    rng = np.random.default_rng(5)
+    shift = rng.normal(0.001, 0.0005, (500, 3))
+    wanted = positions_over_log(URM6, q) + shift
+    deviation = compare_runs(path_run(wanted), [arm_run(q)]).runs[0]
+    np.testing.assert_allclose(deviation.delta[:, :3], shift, atol=1e-15)  # p of 1 m rounds at 2e-16
+    one = deviation.statistics["y"]
+    y = deviation.delta[:, 1]
+    worst = int(np.argmax(np.abs(y)))
+    assert (one.max, one.sample_max, one.t_max) == (np.abs(y).max(), worst, worst * 0.005)
+    assert one.rms == pytest.approx(np.sqrt(np.mean(y**2)), rel=1e-14)
+    assert (one.mean, one.std) == (float(np.mean(y)), float(np.std(y)))
+    assert one.p95 == np.percentile(np.abs(y), 95)
+    norm = deviation.statistics["norm"]
+    assert norm.verdict is None
+    assert norm.tolerance is None
+    assert norm.max == pytest.approx(np.linalg.norm(shift, axis=1).max(), rel=1e-12)
+    assert deviation.start == tuple(deviation.delta[0])
+
+
+def test_the_tolerance_decides_axis_by_axis(q: FloatArray) -> None:
+    wanted = positions_over_log(URM6, q)
+    wanted[100:110, 2] += 0.0036
+    result = compare_runs(path_run(wanted), [arm_run(q)])
+    deviation = result.runs[0]
+    verdicts = {axis: one.verdict for axis, one in deviation.statistics.items()}
+    assert verdicts == {"x": "pass", "y": "pass", "z": "fail", "norm": None, "path": None}
+    assert (result.verdict, deviation.verdict) == ("fail", "fail")
+    assert np.flatnonzero(deviation.outside).tolist() == list(range(100, 110))
+    assert deviation.share_out == 10 / 500
+    assert compare_runs(path_run(wanted), [arm_run(q)], CompareOptions({"axis": 0.0037})).verdict == "pass"
+
+
+def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q: FloatArray) -> None:
+    broken = q.copy()
+    broken[7, 3] = np.nan
+    result = compare_runs(path_run(positions_over_log(URM6, q)[:400]), [arm_run(broken)])
+    deviation = result.runs[0]
+    assert deviation.left_out == 101
+    assert 7 not in deviation.sample
+    assert deviation.sample[-1] == 399
+    assert [w.message for w in result.warnings] == ["log: 101 of 500 samples have no reference or no value"]
+
+
+def test_an_offset_shifts_the_log_against_the_reference(q: FloatArray) -> None:
+    wanted = path_run(positions_over_log(URM6, q))
+    late = compare_runs(wanted, [arm_run(q[100:])], CompareOptions(sync=0.5)).runs[0]
+    assert late.delta.max() == 0.0
+    assert late.sync.offset == 0.5
+    assert len(late.sample) == 400
+
+
+def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: FloatArray) -> None:
+    wanted = path_run(positions_over_log(URM6, q)[:450])
+    broken = q[100:].copy()
+    broken[30, 2] = np.nan
+    result = compare_runs(wanted, [arm_run(broken)], CompareOptions(sync="auto"))
+    late = result.runs[0]
+    assert (late.sync.mode, late.sync.offset, late.sync.by) == ("auto", 0.5, "position")
+    assert late.statistics["norm"].max < 1e-12  # the same samples
+    assert (late.left_out, late.reference_left_out) == (51, 100)
+    assert result.warnings == (
+        LogWarning("left-out", "log: 1 of 400 samples have no reference or no value"),
+        LogWarning(
+            "sync-left-out",
+            "log: the offset of 0.5 s leaves 50 of 400 samples and 100 of 450 samples of path without the"
+            " other side",
+        ),
+    )
+
+
+def test_an_estimate_that_is_not_certain_is_told(q: FloatArray) -> None:
+    rng = np.random.default_rng(3)
+    wanted = path_run(positions_over_log(URM6, q) + rng.normal(scale=0.011, size=(500, 3)))
+    result = compare_runs(wanted, [arm_run(q)], CompareOptions(sync="auto"))
+    precision = result.runs[0].sync.precision
+    assert precision is not None
+    assert precision > 0.1 * TSP
+    said = [one.message for one in result.warnings if one.kind == "sync-uncertain"]
+    assert len(said) == 1
+    assert f"is known to +-{1e3 * precision:.2g} ms (standard error); the period is 5 ms" in said[0]
+
+
+def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
+    log = arm_run(q, recorded=positions_over_log(URM6, q))
+    for sync in ("auto", 0.25):
+        with pytest.raises(OptionError) as error:
+            compare_recorded(log, CompareOptions(sync=sync))
+        assert str(error.value) == (
+            f"--sync: found {sync} for one log, allowed: start, since its joints and its recorded tool centre"
+            " point stand in the same rows"
+        )
+
+
+def test_logs_with_one_name_are_told_apart(q: FloatArray) -> None:
+    wanted = path_run(positions_over_log(URM6, q))
+    assert [r.name for r in compare_runs(wanted, [arm_run(q), arm_run(q), arm_run(q, name="b")]).runs] == [
+        "log", "log-2", "b",
+    ]  # fmt: skip
+
+
+def test_one_log_is_held_against_what_it_recorded_itself(q: FloatArray) -> None:
+    recorded = positions_over_log(URM6, q) + np.array([0.001, 0.0, 0.0])
+    recorded[3] = np.nan
+    result = compare_recorded(arm_run(q, recorded=recorded))
+    assert result.runs[0].statistics["x"].mean == pytest.approx(0.001, abs=1e-15)
+    assert result.runs[0].left_out == 1
+
+
+def test_a_verdict_that_fails_for_want_of_a_tool_says_so(q: FloatArray) -> None:
+    recorded = positions_over_log(URM6.placed(tool=translation(0.0, 0.0, 0.15)), q)
+    result = compare_recorded(arm_run(q, recorded=recorded))
+    assert result.runs[0].verdict == "fail"
+    assert [warning.kind for warning in result.warnings] == ["recorded-tcp-tool"]
+    told = arm_run(q, robot=URM6.placed(tool=translation(0.0, 0.0, 0.15)), recorded=recorded)
+    assert compare_recorded(told).warnings == ()
+
+
+def test_what_is_lacking_is_named(q: FloatArray) -> None:
+    wanted = path_run(positions_over_log(URM6, q))
+    with pytest.raises(LogError) as error:
+        compare_runs(wanted, [arm_run(q, robot=None)])
+    assert str(error.value) == ("log.csv: no robot, so no forward kinematics; allowed: --robot NAME|FILE")
+    with pytest.raises(LogError) as error:
+        compare_recorded(arm_run(q))
+    assert str(error.value) == (
+        "log.csv: one log, which recorded no tool centre point; allowed: a reference before the log"
+    )
+    with pytest.raises(LogError) as error:
+        compare_runs(wanted, [arm_run(q)], CompareOptions(sync=99.0))
+    assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
+    with pytest.raises(OptionError) as option_error:
+        CompareOptions({"axis": -1.0})
+    assert str(option_error.value) == (
+        "--tolerance: found axis=-1.0, allowed: a length in m, or axis=, x=, y=, z=, norm=,"
+        " path= (m, mm, um), angle=, joint= (rad, mrad, deg; m of a joint that slides); positive"
+    )
+
+
+def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
+    result = compare_runs(path_run(positions_over_log(URM6, q) + 0.004), [arm_run(q)])
+    frame = result.to_frame()
+    assert frame["quantity"].tolist() == ["x", "y", "z", "norm", "path"]
+    assert frame["verdict"].tolist()[:3] == ["fail"] * 3
+    as_dict = result.to_dict()
+    assert list(as_dict)[:3] == ["schema", "verdict", "tolerance"]
+    assert as_dict["tolerance"] == {"axis": 0.0035}
+    one = as_dict["runs"][0]
+    assert set(one) >= {"name", "samples", "left_out", "duration", "sync_offset", "delta", "worst",
+                        "out_of_tolerance", "share_out", "verdict", "warnings"}  # fmt: skip
+    assert set(one["delta"]["x"]) == {
+        "unit", "max", "rms", "mean", "std", "p95", "t_max", "sample_max", "tolerance", "out_of_tolerance",
+        "share_out", "verdict",
+    }  # fmt: skip
+    assert one["share_out"] == 1.0
+
+
+def test_an_unknown_tool_centre_point_is_refused() -> None:
+    with pytest.raises(OptionError) as error:
+        CompareOptions(tcp="x")  # type: ignore[arg-type]
+    assert str(error.value) == "--tcp: found x, allowed: fk, recorded"
+
+
+def test_what_is_wrong_with_the_reference_is_told(q: FloatArray) -> None:
+    doubt = LogWarning("assumed-unit", "taken as m", 3)
+    reference = replace(path_run(positions_over_log(URM6, q)), warnings=(doubt,))
+    result = compare_runs(reference, [arm_run(q)])
+    assert result.warnings == (LogWarning("assumed-unit", "path: taken as m", 3),)
+
+
+def test_an_offset_that_no_clock_holds_is_refused() -> None:
+    for offset in (1e300, -1e9, float("inf")):
+        with pytest.raises(OptionError, match=r"allowed: start, auto, or a time in s below 1e\+09"):
+            CompareOptions(sync=offset)
+
+
+def test_a_log_alone_is_compared_as_it_was_repaired() -> None:
+    t = TSP * np.arange(200)
+    true = np.column_stack([np.pi + 0.5 * (t - 0.5024), *(0.1 * np.sin(t + k) for k in range(5))])
+    there = (true + np.pi) % (2 * np.pi) - np.pi
+    wrap = int(np.argmax(np.abs(np.diff(there[:, 0])))) + 1
+    there[wrap, 0] = (there[wrap - 1, 0] + there[wrap + 1, 0]) / 2
+    log = replace(arm_run(there, recorded=positions_over_log(URM6, true)).log, columns=COLUMNS)
+    found = audit_log(log, URM6, repaired=True)
+    assert [entry.kind for entry in found.entries] == ["repaired", "wrap"]
+    run = replace(arm_run(found.q), log=log, audit=found.entries)
+    # A straight line between samples 5 ms apart misses a sine of 1 rad/s2 by 1e-5 rad at the most.
+    assert compare_recorded(run).runs[0].delta.max() < 1e-5
+    assert compare_recorded(replace(run, audit=())).runs[0].delta.max() > 0.1
+
+
+def test_kinematics_of_different_robots_are_told(q: FloatArray) -> None:
+    other = replace(URM6, name="urm6b")
+    result = compare_runs(arm_run(q, name="a"), [arm_run(q, name="b", robot=other)])
+    assert result.warnings == (
+        LogWarning("robots-differ", "the kinematics are those of different robots: a as urm6, b as urm6b"),
+    )
+    assert compare_runs(arm_run(q), [arm_run(q, robot=other)]).warnings  # logs of one name are two logs
+    path = path_run(positions_over_log(URM6, q))
+    assert not compare_runs(path, [arm_run(q)]).warnings
+
+
+def test_meshes_that_went_away_since_the_log_was_read_are_told_once(q: FloatArray, tmp_path: Path) -> None:
+    mesh = tmp_path / "link.stl"
+    mesh.write_bytes(b"solid")
+    shown = replace(URM6, visuals=(Visual("phi1", Mesh(str(mesh))),))
+    logs = [arm_run(q, name=name, robot=shown) for name in ("one", "other")]
+    path = path_run(positions_over_log(URM6, q))
+    assert compare_runs(path, logs).warnings == ()
+    mesh.unlink()
+    gone = missing_visuals(shown)
+    assert compare_runs(path, logs).warnings == tuple(gone)
+    assert [warning.kind for warning in gone] == ["visual-missing"]
+    told = [replace(log, warnings=tuple(gone)) for log in logs]  # read when they were gone already
+    assert compare_runs(path, told).warnings == ()

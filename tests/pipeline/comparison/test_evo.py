@@ -1,0 +1,133 @@
+"""The errors that evo finds (github.com/MichaelGrupp/evo), on the same poses at the same times."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from evo.core.metrics import APE, PoseRelation
+from evo.core.trajectory import PoseTrajectory3D
+from evo.tools.file_interface import read_tum_trajectory_file
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from scipy.spatial.transform import Rotation
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
+from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.trajectory import AlignMode
+from urmpipe_pipeline.export import ExportOptions, export_result
+from urmpipe_pipeline.joint_log import JointLog, SourceFile
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.sources import ReadOptions
+
+METRES = 1e-12
+"""Positions of some metres, turned and moved: some tens of rounding errors of 1e-15 m."""
+
+RADIANS = 1e-13
+"""evo turns matrices into rotation vectors: some hundreds of rounding errors of 1e-16, from 0 to pi alike."""
+
+LOGS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"
+
+
+def pose_run(name: str, position: FloatArray, quat: FloatArray) -> Run:
+    """A path of poses every 5 ms."""
+    t_ns = np.arange(len(position)) * 5_000_000
+    none = np.empty((len(position), 0))
+    files = (SourceFile(f"{name}.csv", "0", 1),)
+    log = JointLog(
+        name, "table", files, t_ns, (), none, tcp_position=position, tcp_rotation=quat,
+        rotation_form="quat_xyzw",
+    )  # fmt: skip
+    made = Provenance("ingest", {}, (), {}, "")
+    return Run(name, log, None, 0.005, t_ns, none, none, none, None, position, (), (), made)
+
+
+def evo_errors(
+    reference: PoseTrajectory3D, log: PoseTrajectory3D, align: AlignMode
+) -> tuple[FloatArray, FloatArray]:
+    """Return the translation part and the angle of evo's absolute pose error."""
+    np.testing.assert_array_equal(reference.timestamps, log.timestamps)  # nothing to associate
+    if align == "rigid":
+        log.align(reference, correct_scale=False)
+    elif align == "start":
+        log.align_origin(reference)
+    found = []
+    for relation in (PoseRelation.translation_part, PoseRelation.rotation_angle_rad):
+        metric = APE(relation)
+        metric.process_data((reference, log))
+        found.append(np.asarray(metric.error, dtype=np.float64))
+    return found[0], found[1]
+
+
+def as_evo(run: Run) -> PoseTrajectory3D:
+    assert run.log.tcp_rotation is not None
+    return PoseTrajectory3D(run.log.tcp_position, run.log.tcp_rotation[:, [3, 0, 1, 2]], run.t)
+
+
+def assert_agree(deviation: Deviation, reference: Run, log: Run, align: AlignMode) -> None:
+    distance, angle = evo_errors(as_evo(reference), as_evo(log), align)
+    np.testing.assert_allclose(deviation.delta[:, 3], distance, rtol=0, atol=METRES)
+    assert deviation.angle is not None
+    np.testing.assert_allclose(deviation.angle, angle, rtol=0, atol=RADIANS)
+    assert deviation.statistics["norm"].rms == pytest.approx(np.sqrt(np.mean(distance**2)), abs=METRES)
+
+
+@pytest.mark.parametrize("align", ["none", "start", "rigid"])
+@settings(max_examples=10, deadline=None)
+@given(seed=st.integers(0, 2**32 - 1), count=st.sampled_from([4, 17, 100]))
+def test_errors_of_random_trajectories_are_those_of_evo(align: AlignMode, seed: int, count: int) -> None:
+    rng = np.random.default_rng(seed)
+    runs = [
+        pose_run(name, rng.uniform(-2, 2, (count, 3)), Rotation.random(count, rng=rng).as_quat())
+        for name in ("reference", "log")
+    ]
+    deviation = compare_runs(runs[0], runs[1:], CompareOptions(align=align)).runs[0]
+    assert len(deviation.sample) == count
+    assert_agree(deviation, runs[0], runs[1], align)
+
+
+@pytest.mark.parametrize("align", ["none", "start", "rigid"])
+def test_errors_of_a_motion_turned_and_moved_are_those_of_evo(align: AlignMode) -> None:
+    rng = np.random.default_rng(11)
+    t = np.linspace(0.0, 10.0, 2000)
+    position = np.column_stack([np.sin(t), np.cos(1.3 * t), 0.3 * t])
+    turn = Rotation.from_euler("zyx", np.column_stack([t, 0.5 * np.sin(t), 0.2 * t]))
+    frame = Rotation.from_rotvec([0.1, -0.2, 0.15])
+    noise = Rotation.from_rotvec(rng.normal(0, 1e-3, (2000, 3)))
+    moved = frame.apply(position) + rng.normal((0.3, 0.1, -0.2), 1e-3, (2000, 3))
+    reference = pose_run("reference", position, turn.as_quat())
+    log = pose_run("log", moved, (frame * turn * noise).as_quat())
+    deviation = compare_runs(reference, [log], CompareOptions(align=align)).runs[0]
+    assert_agree(deviation, reference, log, align)
+    if align == "rigid":
+        assert deviation.alignment.angle == pytest.approx(frame.magnitude(), abs=1e-3)  # the noise
+        assert deviation.statistics["norm"].rms < 2e-3
+
+
+@pytest.fixture(scope="module")
+def exported(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Run], list[Path]]:
+    """Two logs of one motion, ingested, and the TUM files that `urmpipe export` writes of them."""
+    robot, read, folder = load_robot("urm6"), ReadOptions(units={"": "rad"}), tmp_path_factory.mktemp("tum")
+    runs = [ingest_log([LOGS / f"{name}.csv"], robot=robot, read=read) for name in ("coppeliasim", "matlab")]
+    files = [folder / f"{run.name}.tum" for run in runs]
+    for run, file in zip(runs, files, strict=True):
+        export_result(run, file, ExportOptions("tum"))
+    return runs, files
+
+
+@pytest.mark.parametrize("align", ["none", "start", "rigid"])
+def test_what_is_exported_gives_evo_the_same_errors(
+    align: AlignMode, exported: tuple[list[Run], list[Path]]
+) -> None:
+    (reference, log), files = exported
+    deviation = compare_runs(reference, [log], CompareOptions(align=align)).runs[0]
+    first, second = (read_tum_trajectory_file(file) for file in files)
+    distance, angle = evo_errors(first, second, align)
+    np.testing.assert_allclose(deviation.delta[:, 3], distance, rtol=0, atol=METRES)
+    assert deviation.angle is not None
+    np.testing.assert_allclose(deviation.angle, angle, rtol=0, atol=RADIANS)

@@ -1,0 +1,170 @@
+"""JUnit XML: read back by a parser, against what consumers need, and number by number."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ET
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import OutputError
+from urmpipe_pipeline.comparison.baseline import against_baseline
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.junit import write_junit
+from urmpipe_pipeline.outputs import guarded_output
+
+Compared = Callable[..., Comparison]
+
+
+def off(x: float, samples: int = 100) -> FloatArray:
+    """A deviation that grows from 0 to x along x."""
+    return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
+
+
+def written(result: Comparison, path: Path) -> ET.Element:
+    """Write a JUnit file as the command does, and parse it."""
+    with guarded_output(path, [], "junit") as part:
+        write_junit(result, part, path)
+    root = ET.parse(path).getroot()
+    assert_consumers_take_it(root)
+    return root
+
+
+def assert_consumers_take_it(root: ET.Element) -> None:
+    """Hold a file against the attributes that Jenkins' schema, GitLab and GitHub's actions ask for."""
+    assert root.tag == "testsuites"
+    counted = dict.fromkeys(("tests", "failures", "errors"), 0)
+    for suite in root:
+        assert suite.tag == "testsuite"
+        assert suite.get("name")
+        cases = suite.findall("testcase")
+        assert int(suite.attrib["tests"]) == len(cases)
+        assert int(suite.attrib["failures"]) == len(suite.findall("testcase/failure"))
+        assert suite.attrib["errors"] == suite.attrib["skipped"] == "0"
+        assert re.fullmatch(r"\d+\.\d+", suite.attrib["time"])  # no exponent
+        assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", suite.get("timestamp", "2026-01-01T00:00:00"))
+        order = [child.tag for child in suite]
+        assert order == [*["properties"] * order.count("properties"), *["testcase"] * len(cases)]
+        for properties in suite.findall("properties"):
+            assert len(properties) > 0
+            assert all(one.tag == "property" and set(one.attrib) == {"name", "value"} for one in properties)
+        for case in cases:
+            assert case.get("classname") and case.get("name") and float(case.attrib["time"]) >= 0.0
+            assert [child.tag for child in case] in ([], ["failure"])
+            for failure in case:
+                assert failure.get("type") and failure.get("message") == failure.text
+        for name in counted:
+            counted[name] += int(suite.attrib[name])
+    assert {name: int(root.attrib[name]) for name in counted} == counted
+    names = [(case.get("classname"), case.get("name")) for case in root.iter("testcase")]
+    assert len(set(names)) == len(names)
+
+
+def test_a_log_is_a_suite_and_a_judged_quantity_a_case(paths: Compared, tmp_path: Path) -> None:
+    result = paths({"good": off(0.001), "bad": off(0.004)}, tolerance={"axis": 0.0035, "norm": 0.01})
+    root = written(result, tmp_path / "verdict.xml")
+    assert {name: root.get(name) for name in ("name", "tests", "failures", "errors", "time")} == {
+        "name": "against-path", "tests": "8", "failures": "1", "errors": "0", "time": "0.990000000",
+    }  # fmt: skip
+    assert [suite.get("name") for suite in root] == ["good", "bad"]
+    assert [(case.get("classname"), case.get("name"), len(case)) for case in root[1].findall("testcase")] == [
+        ("bad", "x", 1), ("bad", "y", 0), ("bad", "z", 0), ("bad", "norm", 0),
+    ]  # fmt: skip
+    failure = root[1].findall("testcase/failure")[0]
+    x = result.runs[1].statistics["x"]
+    assert (failure.get("type"), failure.text) == (
+        "out-of-tolerance",
+        f"x: max {x.max!r} m, allowed 0.0035 m, at t = 0.495 s (sample 99); 13 samples out, share 0.13",
+    )
+    assert root[0].get("timestamp") == result.provenance.created[:19]
+
+
+def test_the_properties_are_the_statistics_bit_for_bit(arms: Compared, tmp_path: Path) -> None:
+    deltas = 0.001 * np.random.default_rng(1).normal(size=(60, 6))
+    result = arms({"a": deltas}, tolerance={"axis": 0.001, "joint": 0.002})
+    suite = written(result, tmp_path / "verdict.xml")[0]
+    told = {one.attrib["name"]: one.attrib["value"] for one in suite.iter("property")}
+    run = result.runs[0]
+    for one in run.all_statistics:
+        prefix = f"joint {one.quantity}" if one.kind == "joint" else one.quantity
+        for field, value in asdict(one).items():
+            text = told[f"{prefix}.{field}"]
+            assert text == "" if value is None else type(value)(text) == value, (prefix, field)
+    assert float(told["share_out"]) == run.share_out
+    assert float(told["speed_correlation"]) == run.speed_correlation
+    assert run.longest_out is not None
+    assert float(told["longest_out"]) == run.longest_out.duration
+
+
+def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared, tmp_path: Path) -> None:
+    result = arms({"a": np.full((20, 6), 0.01)}, tolerance={"axis": 1.0, "joint": 0.002})
+    run = result.runs[0]
+    renamed = {"x": replace(run.joint_statistics["q1"], quantity="x")}
+    changed = replace(result, runs=(replace(run, joint_statistics=renamed),))
+    cases = written(changed, tmp_path / "verdict.xml")[0].findall("testcase")
+    assert [case.get("name") for case in cases] == ["x", "y", "z", "joint x"]
+
+
+def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, tmp_path: Path) -> None:
+    before = paths({"a": off(0.001), "old": off(0.0)})
+    now = paths({"a": off(0.0015)})
+    result = replace(now, baseline=against_baseline(now, before))
+    root = written(result, tmp_path / "verdict.xml")
+    failures = {
+        (case.get("classname"), case.get("name")): case[0] for case in root.iter("testcase") if len(case)
+    }
+    assert {one.get("type") for one in failures.values()} == {"worse-than-baseline"}
+    assert list(failures) == [
+        ("a against baseline", "x"), ("a against baseline", "norm"),
+        ("old against baseline", "log is there"),
+    ]  # fmt: skip
+    old, new = (one.runs[0].statistics["x"] for one in (before, now))
+    assert failures["a against baseline", "x"].text == (
+        f"x: max {old.max!r} -> {new.max!r}, rms {old.rms!r} -> {new.rms!r} (noise 1e-06 m)"
+    )
+    assert failures["old against baseline", "log is there"].text == (
+        "old: a log of the baseline, not compared any more"
+    )
+    with_joints = arms({"a": np.zeros((100, 6))})
+    result = replace(now, baseline=against_baseline(now, with_joints))
+    lost = written(result, tmp_path / "verdict.xml").findall(".//testcase[@name='angle is there']/failure")
+    assert [one.text for one in lost] == ["angle: in the baseline, not compared any more"]
+
+
+@settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(st.text(st.characters(categories=["L", "N", "P", "S", "Z", "C"]), min_size=1, max_size=20))
+def test_any_name_of_a_file_is_held(paths: Compared, tmp_path: Path, name: str) -> None:
+    result = replace(paths({"a": off(0.0, 5)}), name=name)
+    result = replace(result, runs=(replace(result.runs[0], name=name),))
+    root = written(result, tmp_path / "verdict.xml")
+    if name.isprintable():
+        assert root[0].get("name") == root.get("name") == name
+
+
+def test_control_characters_stand_as_python_escapes_them(paths: Compared, tmp_path: Path) -> None:
+    result = replace(
+        paths({"a": off(0.0, 5)}), name="a\x00b\tc\nd\r\x85\udc80\uffff]]><&\"'\N{GRINNING FACE}"
+    )
+    assert written(result, tmp_path / "verdict.xml").get("name") == (
+        "a\\x00b\\tc\\nd\\r\\x85\\udc80\\uffff]]><&\"'\N{GRINNING FACE}"
+    )
+
+
+def test_a_junit_file_of_ours_is_replaced_and_no_other(paths: Compared, tmp_path: Path) -> None:
+    path = tmp_path / "verdict.xml"
+    for _ in range(2):
+        written(paths({"a": off(0.0, 5)}), path)
+    path.write_text('<?xml version="1.0" encoding="UTF-8"?>\n<testsuites/>\n')
+    with pytest.raises(OutputError) as error:
+        written(paths({"a": off(0.0, 5)}), path)
+    assert str(error.value) == (
+        f"{path}: found a file that is no JUnit file of urmpipe's, allowed: a new name,"
+        " or such a JUnit file to replace"
+    )

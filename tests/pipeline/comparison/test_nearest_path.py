@@ -1,0 +1,155 @@
+"""Distance from a path, against a look at every piece of it."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.comparison import nearest_path
+from urmpipe_pipeline.comparison.nearest_path import distance_from_path
+
+ROUNDING = 1e-12
+"""Distances of points up to 10 m away round at 2e-15; feet of perpendiculars on tiny pieces at some more."""
+
+
+def distance_by_hand(point: FloatArray, path: FloatArray, joined: NDArray[np.bool_]) -> float:
+    """Piece by piece, with the foot of the perpendicular."""
+    known: NDArray[np.bool_] = np.asarray(np.isfinite(path).all(axis=1))
+    found = [float(np.linalg.norm(point - vertex)) for vertex in path[known]]
+    for k in np.flatnonzero(joined & known[1:] & known[:-1]):
+        step = path[k + 1] - path[k]
+        length = float(np.linalg.norm(step))
+        if length > 0.0:
+            direction = step / length
+            along = float(np.clip((point - path[k]) @ direction, 0.0, length))
+            found.append(float(np.linalg.norm(point - path[k] - along * direction)))
+    return min(found)
+
+
+def assert_distances(points: FloatArray, path: FloatArray, joined: NDArray[np.bool_]) -> None:
+    expected = np.array([distance_by_hand(point, path, joined) for point in points])
+    assert_near(distance_from_path(points, path, joined), expected)
+
+
+def assert_near(found: FloatArray, expected: FloatArray, times: float = 1.0) -> None:
+    """Never too small, and too large by no more than so many times the accuracy that is promised."""
+    assert (found >= expected - ROUNDING).all()
+    assert (found <= expected + times * (1e-9 + 1e-6 * found) + ROUNDING).all()
+
+
+# On a coarse grid points lie on the path, vertices repeat and distances tie; the fine ones have no pattern.
+coordinates = st.integers(-3, 3).map(float) | st.floats(-10, 10).map(lambda value: round(value, 6))
+
+
+@settings(max_examples=100, deadline=None)
+@given(st.data())
+def test_the_distance_is_that_of_the_nearest_piece(data: st.DataObject) -> None:
+    count = data.draw(st.integers(1, 40))
+    path = data.draw(arrays(np.float64, (count, 3), elements=coordinates))
+    path[data.draw(st.lists(st.integers(1, count - 1), max_size=3)) if count > 1 else []] = np.nan
+    joined = data.draw(arrays(np.bool_, count - 1))
+    assert_distances(data.draw(arrays(np.float64, (6, 3), elements=coordinates)), path, joined)
+
+
+@pytest.mark.parametrize("far", [0.0, 0.01, 1.0])
+def test_a_long_path_with_loops_corners_and_dwells(far: float) -> None:
+    rng = np.random.default_rng(1)
+    t = np.linspace(0, 40, 3000)
+    path = np.column_stack([np.sin(0.9 * t), np.abs(np.cos(1.1 * t)), 0.2 * np.sin(5 * t)])
+    path[500:900] = path[500]  # stands
+    path[1500:1700] = path[1500] + rng.normal(0, 1e-6, (200, 3))  # stands and trembles
+    path[2000] = np.nan
+    joined = np.ones(2999, bool)
+    joined[2500] = False
+    points = path[np.isfinite(path).all(axis=1)][::150] + far
+    points += rng.normal(0, 1e-4, points.shape)
+    assert_distances(points, path, joined)
+
+
+def test_a_raster_of_long_lines_is_met_between_their_ends() -> None:
+    rows = np.arange(50)
+    ends = np.where(rows % 2 == 0, 0.0, 1.0)
+    path = np.column_stack([np.stack((ends, 1 - ends), 1).ravel(), np.repeat(rows * 0.001, 2), np.zeros(100)])
+    points = np.column_stack([np.full(40, 0.5), np.linspace(0, 0.049, 40), np.full(40, 0.0002)])
+    assert_distances(points, path, np.ones(99, bool))
+
+
+def test_a_path_of_one_point_and_a_gap() -> None:
+    point, path = np.array([[0.0, 0.0, 1.0]]), np.array([[-1.0, 0.0, 0.0], [1.0, 0.0, 0.0]])
+    assert distance_from_path(point, path[:1], np.empty(0, bool)).tolist() == [np.sqrt(2.0)]
+    assert distance_from_path(point, path, np.array([True])).tolist() == [1.0]
+    assert distance_from_path(point, path, np.array([False])).tolist() == [np.sqrt(2.0)]
+    assert distance_from_path(point, np.insert(path, 1, np.nan, axis=0), np.ones(2, bool)).tolist() == [
+        np.sqrt(2.0)
+    ]
+    assert distance_from_path(np.empty((0, 3)), path, np.array([True])).tolist() == []
+
+
+def test_the_middle_of_a_circle_is_as_far_from_every_piece() -> None:
+    angle = np.cumsum(np.random.default_rng(2).uniform(0.001, 0.004, 2000))
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(2000)])
+    assert_distances(np.random.default_rng(3).normal(0, 1e-7, (5, 3)), circle, np.ones(1999, bool))
+
+
+@pytest.mark.parametrize("far", [0.0, 0.9])
+def test_a_log_is_as_far_from_a_path_as_each_of_its_points(far: float) -> None:
+    t = np.linspace(0, 20, 5000)
+    path = np.column_stack([np.sin(0.9 * t), np.abs(np.cos(1.1 * t)), 0.2 * np.sin(5 * t)])
+    points = path + far + np.random.default_rng(5).normal(0, 1e-4, path.shape)
+    found = distance_from_path(points, path, np.ones(4999, bool))
+    expected = [distance_by_hand(point, path, np.ones(4999, bool)) for point in points[::1000]]
+    assert_near(found[::1000], np.array(expected))
+
+
+@pytest.fixture
+def looked(monkeypatch: pytest.MonkeyPatch) -> list[int]:
+    """How many pairs the search looks at, call by call."""
+    pairs: list[int] = []
+    distance = nearest_path._distance
+
+    def counted(points: FloatArray, start: FloatArray, step: FloatArray) -> FloatArray:
+        pairs.append(len(points))
+        return distance(points, start, step)
+
+    monkeypatch.setattr(nearest_path, "_distance", counted)
+    return pairs
+
+
+def test_a_log_in_the_middle_of_a_circle_is_not_held_against_every_piece(looked: list[int]) -> None:
+    angle = np.linspace(0, 6, 100_000)
+    circle = np.column_stack([np.cos(angle), np.sin(angle), np.zeros(100_000)])
+    points = np.random.default_rng(6).normal(0, 1e-7, (10_000, 3))
+    found = distance_from_path(points, circle, np.ones(99_999, bool))
+    np.testing.assert_allclose(found, 1.0, rtol=0, atol=1.001e-6 + 5e-7)  # that, and how far the points are
+    assert sum(looked) < 100 * len(points)  # not 1e9
+
+
+def test_where_a_path_stands_and_trembles_the_search_ends_early(
+    monkeypatch: pytest.MonkeyPatch, looked: list[int]
+) -> None:
+    rng = np.random.default_rng(4)
+    path = np.vstack([rng.normal(0, 1e-6, (3000, 3)), np.linspace((0, 0, 0), (0, 0, 10), 1000)])
+    points, joined = rng.normal(0, 1e-6, (100, 3)), np.ones(3999, bool)
+    exact = distance_from_path(points, path, joined)
+    whole = sum(looked)
+    looked.clear()
+    monkeypatch.setattr(nearest_path, "ENOUGH", 8)
+    near = distance_from_path(points, path, joined)
+    assert sum(looked) < whole / 4
+    assert (near >= exact - 1.1e-9).all()  # that of the other
+    assert (near <= exact + 1e-5).all()  # the size of the cloud
+
+
+def test_nothing_that_is_given_is_changed() -> None:
+    path = np.array([[0.0, 0, 0], [0, 0, 0], [np.nan, 0, 0], [1, 0, 0]])
+    points, joined = np.ones((2, 3)), np.ones(3, bool)
+    before = path.copy()
+    distance_from_path(points, path, joined)
+    np.testing.assert_array_equal(path, before)
+    assert joined.all()
+    assert (points == 1.0).all()

@@ -1,0 +1,359 @@
+"""`--sync auto`: the offset between two clocks by the motion, and what is said where it does not tell."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
+
+from urmpipe_datasets import LOGS
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.errors import LogError
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.comparison.compare import trajectory
+from urmpipe_pipeline.comparison.sync import sync_doubts, synchronise
+from urmpipe_pipeline.comparison.sync_coarse import similarity
+from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
+from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+
+Motion = Callable[[FloatArray], FloatArray]
+
+JOINTS = tuple(f"q{k}" for k in range(1, 7))
+ALLOWED = "allowed: one motion that does not repeat itself, half of it in both; --sync SECONDS or start"
+CLEAN = 1e-5
+"""In [s]: a fiftieth of the tenth of a period of 5 ms that is asked for. Lines between samples 5 to 10 ms
+apart miss the motions here by 1e-4 of their size, and that is nearly orthogonal to the rate."""
+
+
+def smooth(seed: int, channels: int) -> Motion:
+    """A motion of five frequencies up to 0.6 Hz a channel, about 1 in size."""
+    rng = np.random.default_rng(seed)
+    size, phase = rng.normal(size=(5, channels)), rng.uniform(0.0, 2.0 * np.pi, (5, channels))
+    turns = 2.0 * np.pi * rng.uniform(0.05, 0.6, (5, channels))
+    return lambda t: sum(size[k] * np.sin(np.outer(t, turns[k]) + phase[k]) for k in range(5))
+
+
+def moves(seed: int, channels: int) -> Motion:
+    """Moves from point to point, 1 to 2.5 s each with a rest at its end, over 100 s."""
+    rng = np.random.default_rng(seed)
+    ends, points = np.cumsum(rng.uniform(1.0, 2.5, 80)), rng.normal(size=(80, channels))
+    resting = rng.uniform(0.1, 0.5, 80)
+
+    def at(t: FloatArray) -> FloatArray:
+        k = np.clip(np.searchsorted(ends, t), 1, 79)
+        share = (t - ends[k - 1]) / ((ends[k] - ends[k - 1]) * (1.0 - resting[k]))
+        s = np.clip(share, 0.0, 1.0)
+        blend = 10.0 * s**3 - 15.0 * s**4 + 6.0 * s**5
+        return np.asarray(points[k - 1] + (points[k] - points[k - 1]) * blend[:, np.newaxis])
+
+    return at
+
+
+def times(start: float, duration: float, period: float) -> FloatArray:
+    return start + np.arange(0.0, duration, period)
+
+
+def joints(values: FloatArray, t: FloatArray, name: str = "log") -> Trajectory:
+    names = JOINTS[: values.shape[1]]
+    units = ("rad",) * len(names)
+    return replace(path(np.zeros((len(t), 3)), t, name), joints=names, joint_units=units, q=values)
+
+
+def path(position: FloatArray, t: FloatArray, name: str = "log") -> Trajectory:
+    t_ns = np.rint((t - t[0]) * 1e9).astype(np.int64)
+    return Trajectory(name, t_ns, position, (SourceFile(f"{name}.csv", "0", 1),))
+
+
+def rotation(seed: int) -> FloatArray:
+    q, r = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))
+    turned = q * np.sign(np.diag(r))
+    return np.asarray(turned * np.linalg.det(turned))
+
+
+def refused(reference: Trajectory, log: Trajectory, align: AlignMode = "none") -> str:
+    with pytest.raises(LogError) as error:
+        synchronise(reference, log, "auto", align)
+    return str(error.value)
+
+
+def shared(q: Motion, wanted: FloatArray, done: FloatArray) -> float:
+    """Share of a motion, as the energy of its rates, that both sides have; of the side with more of it."""
+    first, last = max(wanted[0], done[0]), min(wanted[-1], done[-1])
+    energies = [(np.diff(q(t), axis=0) ** 2).sum(axis=1) for t in (wanted, done)]
+    both = [(t[:-1] >= first) & (t[1:] <= last) for t in (wanted, done)]
+    return max(float(side[here].sum() / side.sum()) for side, here in zip(energies, both, strict=True))
+
+
+STARTS = st.floats(0.0, 6.0)
+LENGTHS = st.floats(14.0, 20.0)
+RATES = st.sampled_from([(0.005, 0.005), (0.005, 0.008), (0.008, 0.005), (0.004, 0.01)])
+SEEDS = st.integers(0, 2**32 - 1)
+
+
+@settings(max_examples=25, deadline=None)
+@given(SEEDS, STARTS, STARTS, LENGTHS, LENGTHS, RATES, st.sampled_from([smooth, moves]))
+@example(19933, 0.0, 6.0, 14.0, 15.0, (0.005, 0.005), smooth)  # 8 s in both, 0.49 of the motion
+@example(3262002750, 0.0, 6.0, 14.0, 14.0, (0.004, 0.01), moves)
+def test_any_offset_between_two_logs_of_the_joints_is_found_or_too_little_is_in_both(
+    seed: int, first: float, second: float, long: float, other: float, rate: tuple[float, float],
+    make: Callable[[int, int], Motion],
+) -> None:  # fmt: skip
+    q = make(seed, 6)
+    wanted, done = times(first, long, rate[0]), times(second, other, rate[1])
+    turns = 2.0 * np.pi * np.arange(6)  # two logs may count the turns of their start differently
+    reference, log = joints(q(wanted), wanted, "wanted"), joints(q(done) + turns, done)
+    try:
+        sync = synchronise(reference, log, "auto")
+    except LogError as error:
+        assert str(error).endswith(f"; {ALLOWED}")
+        # A period of up to 0.1 s at either end, of 8 s in both, is cut off: 0.02 of the motion.
+        assert shared(q, wanted, done) < 0.52
+        return
+    assert abs(sync.offset - (second - first)) < CLEAN
+    assert (sync.mode, sync.by) == ("auto", "joints")
+    assert sync.similarity is not None
+    assert sync.similarity > 0.999  # lines between samples leave less than 1e-3 unlike
+
+
+@settings(max_examples=25, deadline=None)
+@given(SEEDS, STARTS, STARTS, RATES, st.sampled_from([smooth, moves]), st.booleans())
+def test_any_offset_between_two_paths_is_found_wherever_they_stand(
+    seed: int, first: float, second: float, rate: tuple[float, float], make: Callable[[int, int], Motion],
+    turned: bool,
+) -> None:  # fmt: skip
+    p = make(seed, 3)
+    wanted, done = times(first, 40.0, rate[0]), times(second, 36.0, rate[1])
+    moved = p(done) @ (rotation(seed).T if turned else np.eye(3)) + [0.3, -2.0, 1.0]
+    reference, log = path(p(wanted), wanted, "wanted"), path(moved, done)
+    for align in ("none", "rigid", "start"):
+        sync = synchronise(reference, log, "auto", align)
+        assert abs(sync.offset - (second - first)) < CLEAN
+        assert sync.by == "position"
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_a_piece_is_found_in_the_whole_and_the_whole_about_a_piece(seed: int) -> None:
+    q = moves(seed, 6)
+    whole, piece = times(0.0, 60.0, 0.005), times(23.4567, 6.0, 0.008)
+    longer, shorter = joints(q(whole), whole), joints(q(piece), piece)
+    assert abs(synchronise(longer, shorter, "auto").offset - 23.4567) < CLEAN
+    assert abs(synchronise(shorter, longer, "auto").offset + 23.4567) < CLEAN
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_noise_and_gaps_leave_an_error_that_the_precision_tells(seed: int) -> None:
+    """Five standard errors: their own are known to a sixth from 20 blocks; a chance of 1e-5 a case."""
+    q, rng = smooth(seed, 6), np.random.default_rng(seed)
+    wanted, done = times(0.0, 30.0, 0.005), times(3.4021, 25.0, 0.008)
+    noisy = [q(t) + rng.normal(scale=0.01, size=(len(t), 6)) for t in (wanted, done)]
+    noisy[0][1000:1200] = np.nan
+    noisy[1][500:520, 2] = np.nan
+    there = np.ones(len(done), dtype=bool)
+    there[1500:1700] = False  # rows that the file does not have
+    log = joints(noisy[1][there], done[there])
+    sync = synchronise(joints(noisy[0], wanted), log, "auto")
+    assert sync.precision is not None
+    assert abs(sync.offset - 3.4021) < 5.0 * sync.precision
+    assert sync.precision < 0.1 * 0.008  # 0.01 rad of noise in 6 rad/s x 3000 samples: some 0.05 ms
+    assert sync_doubts("log", sync, 0.008) == []
+
+
+def test_a_tool_that_is_not_known_does_not_move_the_offset() -> None:
+    """A point 0.2 m off a turning flange goes another way: --align tool looks for both together."""
+    t = times(0.0, 30.0, 0.005)
+    turn = np.outer(np.sin(0.9 * t + 0.4), [0.6, 0.3, 0.2])
+    angle = np.linalg.norm(turn, axis=1, keepdims=True)
+    quat = np.hstack((turn * 0.5 * np.sinc(angle / (2.0 * np.pi)), np.cos(0.5 * angle)))
+    flange = smooth(3, 3)(t)
+    w, v = quat[:, 3:], quat[:, :3]
+    tool = np.array([[0.05, 0.0, 0.2]]).repeat(len(t), axis=0)
+    tip = flange + tool + 2.0 * np.cross(v, np.cross(v, tool) + w * tool)
+    late = replace(path(flange[700:], t[700:]), quat_xyzw=quat[700:])
+    assert abs(synchronise(path(tip, t), late, "auto", "tool").offset - 3.5) < 1e-8  # exact but for rounding
+    assert abs(synchronise(path(tip, t), late, "auto", "none").offset - 3.5) > CLEAN
+
+
+def test_two_arms_that_follow_one_path_with_other_joints_are_matched_by_the_path() -> None:
+    t = times(0.0, 20.0, 0.005)
+    p, one, other = smooth(1, 3)(t), smooth(2, 6)(t), smooth(3, 6)(t)
+    reference, log = (replace(joints(q, t), position=p) for q in (one, other))
+    log = replace(log, t_ns=log.t_ns[:-400], position=p[400:], q=other[400:])
+    assert synchronise(reference, log, "auto").by == "position"
+    assert synchronise(reference, log, "auto").offset == 2.0
+
+
+def test_joints_are_put_together_by_name() -> None:
+    t = times(0.0, 20.0, 0.005)
+    q = smooth(4, 6)(t)
+    log = joints(q[200:, ::-1], t[200:])
+    log = replace(log, joints=JOINTS[::-1])
+    assert synchronise(joints(q, t), log, "auto").offset == 1.0
+
+
+def test_a_million_samples_are_looked_at_in_less() -> None:
+    t = times(0.0, 5000.0, 0.005)
+    q = smooth(5, 6)(t)
+    sync = synchronise(joints(q, t), joints(q[12345:], t[12345:]), "auto")
+    assert sync.offset == 12345 * 0.005
+
+
+def test_the_inputs_stay_as_they_are() -> None:
+    t = times(0.0, 20.0, 0.005)
+    p = smooth(6, 3)(t)
+    kept = p.copy()
+    synchronise(path(p, t), path(p[100:], t[100:]), "auto", "rigid")
+    np.testing.assert_array_equal(p, kept)
+
+
+def test_start_and_seconds_look_at_nothing() -> None:
+    nowhere = path(np.full((3, 3), np.nan), times(0.0, 0.015, 0.005))
+    assert synchronise(nowhere, nowhere, "start") == Sync()
+    assert synchronise(nowhere, nowhere, 0.25) == Sync("given", 0.25)
+
+
+def test_no_motion_tells_no_offset() -> None:
+    t = times(0.0, 20.0, 0.005)
+    still = np.ones((len(t), 6))
+    moving, resting = joints(smooth(7, 6)(t), t, "wanted"), joints(still, t)
+    assert refused(moving, resting) == (
+        f"log.csv: --sync auto: found no motion of the joints in this log; {ALLOWED}"
+    )
+    assert refused(resting, moving) == (
+        f"wanted.csv: --sync auto: found no motion of the joints in log; {ALLOWED}"
+    )
+    one, other = np.random.default_rng(1).normal(scale=1e-4, size=(2, len(t), 6))
+    assert "found no likeness of the joints" in refused(joints(one, t), joints(other, t))
+
+
+def test_a_motion_that_repeats_itself_names_the_offsets() -> None:
+    t = times(0.0, 10.0, 0.005)
+    swing = np.column_stack([np.sin(np.pi * t), np.cos(np.pi * t)])  # every 2 s
+    assert refused(joints(swing, t, "wanted"), joints(swing[100:], t[100:])) == (
+        "log.csv: --sync auto: found a motion of the joints that several offsets to wanted explain alike"
+        " (similarity): 0.5 s (1.000), -1.5 s (1.000), 2.5 s (1.000), -3.5 s (1.000), 4.5 s (1.000);"
+        f" {ALLOWED}"
+    )
+
+
+def test_cycles_that_begin_and_end_at_rest_do_not_repeat_themselves() -> None:
+    t = times(0.0, 20.0, 0.005)
+    swing = np.sin(np.pi * np.clip(t - 1.0, 0.0, 16.0))[:, np.newaxis] ** 2
+    log = joints(swing[100:], t[100:])
+    assert synchronise(joints(swing, t), log, "auto").offset == 0.5
+
+
+def test_a_steady_motion_tells_no_offset_but_its_ramps_do() -> None:
+    t = times(0.0, 10.0, 0.005)
+    steady = joints(np.outer(t, [1.0, -0.5]), t, "wanted")
+    said = refused(steady, joints(np.outer(t, [1.0, -0.5]), t))
+    assert said.startswith("log.csv: --sync auto: found no clear best offset to wanted by the joints: about ")
+    assert said.endswith(f" s with a similarity of 1.000; {ALLOWED}")
+    ramp = np.outer(np.clip(t - 2.0, 0.0, 6.0), [1.0, -0.5])
+    assert synchronise(joints(ramp, t), joints(ramp[50:], t[50:]), "auto").offset == 0.25
+
+
+def test_a_turn_on_a_circle_tells_an_offset_only_where_the_frames_are_known() -> None:
+    t = times(0.0, 5.0, 0.005)
+    circle = np.column_stack([np.cos(t), np.sin(t), 0.0 * t])
+    assert synchronise(path(circle, t), path(circle[100:], t[100:]), "auto").offset == 0.5
+    assert "no clear best offset" in refused(path(circle, t), path(circle[100:], t[100:]), "rigid")
+
+
+def test_two_motions_without_likeness_are_told() -> None:
+    t = times(0.0, 20.0, 0.005)
+    said = refused(joints(smooth(8, 6)(t), t, "wanted"), joints(smooth(9, 6)(t), t))
+    assert said.startswith("log.csv: --sync auto: found no likeness of the joints to wanted: ")
+    assert said.endswith(f" at best, 0.8 is needed; {ALLOWED}")
+
+
+def test_random_motions_are_not_taken_for_each_other() -> None:
+    t = times(0.0, 20.0, 0.01)
+    for seed in range(40):
+        make = (smooth, moves)[seed % 2]
+        for side, channels in ((joints, 6), (path, 3)):
+            one, other = (side(make(1000 + 2 * seed + k, channels)(t), t) for k in (0, 1))
+            assert refused(one, other).startswith("log.csv: --sync auto: found no ")
+
+
+def test_logs_without_samples_to_speak_of_are_refused() -> None:
+    t = times(0.0, 20.0, 0.005)
+    q = smooth(10, 2)(t)
+    whole = joints(q, t, "wanted")
+    for log in (joints(q[:1], t[:1]), joints(np.full_like(q, np.nan), t)):
+        assert "found no motion of the joints in this log" in refused(whole, log)
+    for rows in (2, 3, 5):
+        assert refused(whole, joints(q[:rows], t[:rows])).startswith("log.csv: --sync auto: found ")
+
+
+def test_a_log_without_two_values_in_a_row_has_no_rates() -> None:
+    t = times(0.0, 20.0, 0.005)
+    q = smooth(11, 2)(t)
+    holes, crossed = q.copy(), q.copy()
+    holes[::2] = np.nan
+    crossed[::2, 0] = crossed[1::4, 1] = np.nan  # each joint has rates, but never both
+    for log in (holes, crossed):
+        assert refused(joints(q, t, "wanted"), joints(log, t)) == (
+            f"log.csv: --sync auto: found no offset at which the joints move as in wanted; {ALLOWED}"
+        )
+
+
+def test_what_is_not_known_well_is_told() -> None:
+    assert sync_doubts("log", Sync("auto", 0.25, "joints", 0.0005, 0.9), 0.005) == []
+    assert sync_doubts("log", Sync("given", 0.25), 0.005) == []
+    assert sync_doubts("log", Sync("auto", 0.25, "joints", 0.00084, 0.85), 0.005) == [
+        LogWarning(
+            "sync-uncertain",
+            "log: the offset of 0.25 s, estimated by the joints, is known to +-0.84 ms (standard error); the"
+            " period is 5 ms",
+        ),
+        LogWarning(
+            "sync-unlike",
+            "log: the offset of 0.25 s, estimated by the joints, leaves the two motions alike by 0.85 only,"
+            " of 1: are they one motion?",
+        ),
+    ]
+
+
+def test_similarity_is_that_of_the_best_turn_where_frames_may_be_turned() -> None:
+    a = np.random.default_rng(2).normal(size=(500, 3))
+    turned = a @ rotation(5).T
+    assert similarity(a, turned, True) == pytest.approx(1.0, abs=1e-12)
+    assert similarity(a, turned, False) < 0.9
+    assert similarity(a, a @ np.diag([1.0, 1.0, -1.0]), True) < 0.5  # a mirror is no turn
+    assert similarity(a, 0.5 * a, False) == pytest.approx(0.8, abs=1e-12)  # 2 (1/2) / (1 + 1/4)
+
+
+@pytest.fixture(scope="module")
+def demo() -> dict[str, Trajectory]:
+    robot = load_robot("urm6")
+    from urmpipe_pipeline.operands import load_run
+
+    names = ("path.csv", "coppeliasim.csv", "matlab.csv", "solidworks", "counter_rotating.csv")
+    return {name.split(".")[0]: trajectory(load_run(LOGS / name, robot=robot)) for name in names}
+
+
+def test_the_offsets_of_the_demo_logs_are_found(demo: dict[str, Trajectory]) -> None:
+    def offset(name: str, align: AlignMode = "none") -> float:
+        return synchronise(demo["path"], demo[name], "auto", align).offset
+
+    for align in ("none", "rigid", "tool"):
+        # The path is written to the nanometre, the log to 15 digits: 4 ms come back to a microsecond.
+        assert abs(offset("matlab", align) + 0.004) < 1e-6
+        assert abs(offset("solidworks", align)) < 1e-6  # 2.5 mm to the side, and rounded to 1e-4 deg
+        # Its solver stops within 2.5 mm of the path, behind it: 0.7 ms at its speed, a seventh of a period.
+        assert abs(offset("coppeliasim", align) + 0.0007) < 1e-4
+    assert abs(synchronise(demo["matlab"], demo["solidworks"], "auto").offset - 0.004) < 1e-6
+
+
+def test_an_arm_that_counts_one_joint_backwards_makes_another_motion(demo: dict[str, Trajectory]) -> None:
+    assert refused(demo["path"], demo["counter_rotating"]) == (
+        "counter_rotating.csv: --sync auto: found no likeness of the position to path: -1.36 s with a"
+        f" similarity of 0.598 at best, 0.8 is needed; {ALLOWED}"
+    )
+    assert "counter_rotating.csv: --sync auto: found no clear best offset to coppeliasim by the joints" in (
+        refused(demo["coppeliasim"], demo["counter_rotating"])
+    )

@@ -1,0 +1,125 @@
+"""Tolerances as they are written, and what they are for."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.comparison.tolerance import (
+    DEGREE,
+    UNITS,
+    allowed_for,
+    check_tolerance,
+    parse_tolerance,
+)
+
+ALLOWED = (
+    "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
+    " m of a joint that slides)"
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("0.0035", {"axis": 0.0035}),
+        ("3.5mm", {"axis": 0.0035}),
+        ("1.1 mm", {"axis": 0.0011}),
+        ("7um", {"axis": 7e-6}),
+        ("1e-3", {"axis": 0.001}),
+        (".5mm", {"axis": 0.0005}),
+        ("0.0035,norm=5mm", {"axis": 0.0035, "norm": 0.005}),
+        (" axis = 3.5 mm , z=2mm ", {"axis": 0.0035, "z": 0.002}),
+        (
+            "axis=0.0035,norm=0.005,angle=0.01,joint=0.002",
+            {"axis": 0.0035, "norm": 0.005, "angle": 0.01, "joint": 0.002},
+        ),
+        ("path=0.1mm,angle=10mrad,joint=2mrad", {"path": 1e-4, "angle": 0.01, "joint": 0.002}),
+        ("angle=0.5deg", {"angle": math.pi / 360}),
+    ],
+)
+def test_what_is_written_is_found_in_si(text: str, found: dict[str, float]) -> None:
+    assert parse_tolerance(text) == found
+
+
+@given(st.floats(1e-9, 1e3), st.sampled_from(sorted(UNITS)))
+def test_a_number_in_si_comes_back_bit_for_bit(value: float, kind: str) -> None:
+    assert parse_tolerance(f"{kind}={value!r}") == {kind: value}
+
+
+@given(st.integers(1, 999_999))
+def test_a_unit_is_a_shift_of_the_decimal_point(number: int) -> None:
+    assert parse_tolerance(f"{number}um") == parse_tolerance(f"{number}e-6")
+    assert parse_tolerance(f"{number}mm") == parse_tolerance(f"{number}e-3")
+
+
+def test_a_degree_is_that_of_pi() -> None:
+    assert float(DEGREE) == math.pi / 180
+
+
+@pytest.mark.parametrize(
+    ("part", "said"),
+    [
+        ("", "''"),
+        ("3 inch", "'3 inch'"),
+        ("-1mm", "'-1mm'"),
+        ("0", "'0'"),
+        ("nan", "'nan'"),
+        ("inf", "'inf'"),
+        ("1_0", "'1_0'"),
+        ("1e400", "'1e400'"),
+        ("tcp=1mm", "'tcp=1mm'"),
+        ("=1mm", "'=1mm'"),
+        ("axis=", "'axis='"),
+        ("angle=3mm", "'angle=3mm'"),
+        ("norm=1deg", "'norm=1deg'"),
+        ("joint=2mm", "'joint=2mm'"),  # of joints that turn it would be 2 mrad
+        ("a=b=1", "'a=b=1'"),
+    ],
+)
+def test_what_is_no_tolerance_is_one_line(part: str, said: str) -> None:
+    with pytest.raises(OptionError) as error:
+        parse_tolerance(part)
+    assert str(error.value) == f"--tolerance: found {said}, {ALLOWED}"
+
+
+def test_everything_that_is_wrong_is_told_at_once() -> None:
+    with pytest.raises(OptionError) as error:
+        parse_tolerance("1mm, foo=2, axis=3mm,norm=x,,norm=4mm,norm=5mm", "--noise")
+    assert [str(one) for one in error.value.findings] == [
+        f"--noise: found 'foo=2', {ALLOWED}",
+        f"--noise: found 'axis=3mm' twice, {ALLOWED}",
+        f"--noise: found 'norm=x', {ALLOWED}",
+        f"--noise: found '', {ALLOWED}",
+        f"--noise: found 'norm=5mm' twice, {ALLOWED}",
+    ]
+
+
+def test_a_bare_length_may_be_for_several_kinds_and_zero() -> None:
+    assert parse_tolerance("0", bare=("axis", "norm"), zero=True) == {"axis": 0.0, "norm": 0.0}
+
+
+def test_a_tolerance_in_numbers_is_checked_whole() -> None:
+    check_tolerance({"axis": 1, "joint": 0.1})
+    check_tolerance({"axis": 0.0}, zero=True)
+    with pytest.raises(OptionError) as error:
+        check_tolerance({"foo": 1.0, "axis": 0.0, "norm": math.nan, "path": "1mm"})  # type: ignore[dict-item]
+    assert [str(one) for one in error.value.findings] == [
+        f"--tolerance: found {found}, {ALLOWED}; positive"
+        for found in ("foo=1.0", "axis=0.0", "norm=nan", "path=1mm")
+    ]
+    with pytest.raises(OptionError) as error:
+        check_tolerance({})
+    assert str(error.value) == f"--tolerance: found nothing, {ALLOWED}"
+
+
+def test_a_coordinate_goes_before_the_axes_and_a_joint_of_that_name_does_not() -> None:
+    tolerance = {"axis": 1.0, "z": 2.0, "joint": 3.0}
+    assert allowed_for("x", "axis", tolerance) == 1.0
+    assert allowed_for("z", "axis", tolerance) == 2.0
+    assert allowed_for("z", "joint", tolerance) == 3.0
+    assert allowed_for("norm", "norm", tolerance) is None
