@@ -271,7 +271,13 @@ def test_a_ring_counts_when_modules_are_loaded_and_not_in_functions_or_for_type_
         models__urmpipe_models__f="if TYPE_CHECKING:\n    import urmpipe_models.e\n",
     )
     ring = "urmpipe_models.a ~ urmpipe_models.b ~ urmpipe_models.c"
-    assert faults(house) == {"rings of modules": (ring,), "rings of folders": (ring,)}
+    assert faults(house) == {
+        "rings of modules": (ring,),
+        "rings of folders": (
+            f"{ring}: urmpipe_models.a -> urmpipe_models.b, urmpipe_models.b -> urmpipe_models.c,"
+            " urmpipe_models.c -> urmpipe_models.a",
+        ),
+    }
 
 
 def test_a_ring_of_folders_needs_no_ring_of_modules(tmp_path: Path) -> None:
@@ -282,7 +288,11 @@ def test_a_ring_of_folders_needs_no_ring_of_modules(tmp_path: Path) -> None:
         cli__urmpipe__two__b="import urmpipe.one.b\n",
         cli__urmpipe__one__b="",
     )
-    assert faults(house) == {"rings of folders": ("urmpipe.one ~ urmpipe.two",)}
+    assert faults(house) == {
+        "rings of folders": (
+            "urmpipe.one ~ urmpipe.two: urmpipe.one.a -> urmpipe.two.a, urmpipe.two.b -> urmpipe.one.b",
+        )
+    }
 
 
 def test_rings_are_the_strongly_connected_components() -> None:

@@ -23,12 +23,14 @@ from survey.sizes import (
     FUNCTION_MEDIAN,
     FUNCTION_MOST,
     Spread,
+    deepest,
     file_sizes,
     function_sizes,
     long_files,
     long_functions,
+    many_arguments,
 )
-from survey.source import AREAS, PACKAGES, Definition, Source, read_sources
+from survey.source import AREAS, PACKAGES, Source, read_sources
 
 DOCUMENTED = (*PACKAGES, "benchmarks", "docs")
 """The areas that are held to docstrings. A test says what it holds by its name."""
@@ -61,7 +63,8 @@ class House:
         wrong_ways: Imports against the direction that is allowed.
         module_rings: Modules that import each other.
         folder_rings: Folders likewise.
-        definitions: Everything that is defined, for tables of single functions.
+        many_arguments: Functions that take many, most first.
+        deepest: Functions that nest deepest.
     """
 
     areas: tuple[Area, ...]
@@ -72,7 +75,8 @@ class House:
     wrong_ways: tuple[str, ...]
     module_rings: tuple[str, ...]
     folder_rings: tuple[str, ...]
-    definitions: tuple[Definition, ...]
+    many_arguments: tuple[str, ...]
+    deepest: tuple[str, ...]
 
     def faults(self) -> dict[str, tuple[str, ...]]:
         """Return what is over each bound, as an editor finds it."""
@@ -122,8 +126,9 @@ def measured(sources: Sequence[Source], reasons: dict[str, dict[str, str]]) -> H
         between_areas(sources),
         tuple(wrong_ways(sources)),
         tuple(" ~ ".join(ring) for ring in module_rings(sources)),
-        tuple(" ~ ".join(ring) for ring in folder_rings(sources)),
-        tuple(made for source in sources for made in source.definitions),
+        tuple(folder_rings(sources)),
+        tuple(many_arguments(sources)),
+        tuple(deepest(sources)),
     )
 
 

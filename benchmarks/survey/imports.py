@@ -5,6 +5,7 @@ from __future__ import annotations
 import ast
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import permutations
 
 from survey.source import PACKAGES, Function, Source, statements_below
 
@@ -67,15 +68,25 @@ def module_rings(sources: Sequence[Source]) -> list[tuple[str, ...]]:
     return rings(module_graph(sources))
 
 
-def folder_rings(sources: Sequence[Source]) -> list[tuple[str, ...]]:
+def folder_rings(sources: Sequence[Source]) -> list[str]:
     """Return the rings of folders below an area whose modules import each other when they are loaded.
 
-    A module that stands beside the folders is a member of its own.
+    A module that stands beside the folders is a member of its own. A ring tells one import a pair of folders.
     """
+    crossing: dict[tuple[str, str], str] = {}
     graph: dict[str, set[str]] = {}
     for module, others in module_graph(sources).items():
-        graph.setdefault(_folder(module), set()).update(_folder(other) for other in others)
-    return rings({folder: others - {folder} for folder, others in graph.items()})
+        for other in sorted(others):
+            pair = _folder(module), _folder(other)
+            if pair[0] != pair[1]:
+                graph.setdefault(pair[0], set()).add(pair[1])
+                crossing.setdefault(pair, f"{module} -> {other}")
+    return [
+        " ~ ".join(ring)
+        + ": "
+        + ", ".join(crossing[pair] for pair in permutations(ring, 2) if pair in crossing)
+        for ring in rings(graph)
+    ]
 
 
 def module_graph(sources: Sequence[Source]) -> dict[str, set[str]]:

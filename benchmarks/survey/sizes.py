@@ -15,6 +15,9 @@ FUNCTION_MEDIAN, FUNCTION_MOST = 10, 60
 MANY_ARGUMENTS = 8
 """Above this a function is listed: no bound, as a kinematic function takes q, qd, qdd, chain and more."""
 
+DEEPEST = 10
+"""How many of the functions that nest deepest are listed."""
+
 _NESTS = (ast.If, ast.For, ast.AsyncFor, ast.While, ast.With, ast.AsyncWith, ast.Try, ast.TryStar, ast.Match)
 
 
@@ -51,6 +54,20 @@ def long_functions(sources: Sequence[Source]) -> list[Definition]:
     """Return the functions over the bound, longest first."""
     made = [made for source in sources for made, _ in source.functions()]
     return sorted((one for one in made if one.size > FUNCTION_MOST), key=lambda one: -one.size)
+
+
+def many_arguments(sources: Sequence[Source]) -> list[str]:
+    """Return the functions that take many arguments, and how many, most first."""
+    counts = [(argument_count(node), made) for source in sources for made, node in source.functions()]
+    over = sorted((one for one in counts if one[0] > MANY_ARGUMENTS), key=lambda one: (-one[0], one[1].key))
+    return [f"{made.place}: {count}" for count, made in over]
+
+
+def deepest(sources: Sequence[Source]) -> list[str]:
+    """Return the functions that nest deepest, and how deep."""
+    depths = [(nesting(node), made) for source in sources for made, node in source.functions()]
+    first = sorted(depths, key=lambda one: (-one[0], one[1].key))[:DEEPEST]
+    return [f"{made.place}: {depth} blocks" for depth, made in first]
 
 
 def argument_count(node: Function) -> int:

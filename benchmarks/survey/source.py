@@ -13,6 +13,9 @@ PACKAGES = ("models", "fmus", "pipeline", "cli", "datasets")
 
 AREAS = (*PACKAGES, "benchmarks", "docs", "tests")
 
+_BLOCKS = ("body", "handlers", "orelse", "finalbody", "cases")
+"""Where a statement holds others."""
+
 Function: TypeAlias = ast.FunctionDef | ast.AsyncFunctionDef
 
 
@@ -111,9 +114,8 @@ def read_source(path: Path, root: Path) -> Source:
 
 def statements_below(node: ast.AST) -> Iterator[ast.AST]:
     """Yield the statements directly below a node; the arms of `try` and `match` are such nodes too."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.stmt | ast.ExceptHandler | ast.match_case):
-            yield child
+    for block in _BLOCKS:
+        yield from getattr(node, block, ())
 
 
 def _statements(node: ast.AST) -> Iterator[ast.AST]:

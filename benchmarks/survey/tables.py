@@ -2,16 +2,12 @@
 
 from __future__ import annotations
 
-import ast
 from collections.abc import Iterable, Sequence
 
 from survey.house import Area, House
 from survey.imports import ALLOWED
-from survey.sizes import MANY_ARGUMENTS, argument_count, nesting
-from survey.source import AREAS, Definition
-
-DEEPEST = 10
-"""How many of the functions that nest deepest are listed."""
+from survey.sizes import MANY_ARGUMENTS
+from survey.source import AREAS
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
@@ -54,8 +50,8 @@ def full(house: House) -> list[str]:
         *table(("imports of modules in", *AREAS), _import_rows(house)),
         "",
         *_listed("Over a bound with a reason", _excused(house)),
-        *_listed(f"More than {MANY_ARGUMENTS} arguments", _many_arguments(house.definitions)),
-        *_listed("Deepest nesting", _deepest(house.definitions)),
+        *_listed(f"More than {MANY_ARGUMENTS} arguments", house.many_arguments),
+        *_listed("Deepest nesting", house.deepest),
         *(line for what, places in house.faults().items() for line in _listed(what.capitalize(), places)),
     ]
 
@@ -97,22 +93,6 @@ def _barred(area: str, other: str) -> bool:
 def _excused(house: House) -> list[str]:
     judged = (house.files, house.functions, house.duplicates)
     return [f"{what}: {reason}" for one in judged for what, reason in one.excused]
-
-
-def _many_arguments(definitions: Sequence[Definition]) -> list[str]:
-    counts = [
-        (argument_count(made.node), made) for made in definitions if not isinstance(made.node, ast.ClassDef)
-    ]
-    over = sorted(
-        (pair for pair in counts if pair[0] > MANY_ARGUMENTS), key=lambda pair: (-pair[0], pair[1].key)
-    )
-    return [f"{made.place}: {count}" for count, made in over]
-
-
-def _deepest(definitions: Sequence[Definition]) -> list[str]:
-    depths = [(nesting(made.node), made) for made in definitions if not isinstance(made.node, ast.ClassDef)]
-    deepest = sorted(depths, key=lambda pair: (-pair[0], pair[1].key))[:DEEPEST]
-    return [f"{made.place}: {depth} blocks" for depth, made in deepest]
 
 
 def _listed(title: str, lines: Sequence[str]) -> list[str]:
