@@ -223,8 +223,8 @@ def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray
         q: Joint values in [rad] or [m], shape (n, coordinates).
 
     Returns:
-        Positions [m], shape (n, joints + 1, 3), and rotations [-], shape (n, joints + 1, 3, 3): the base's, then
-        those of the moving frame of every joint, fixed ones and mimics included.
+        Positions [m], shape (n, joints + 1, 3), and rotations [-], shape (n, joints + 1, 3, 3): of the base,
+        then of the moving frame of every joint, fixed ones and mimics included.
     """
     count = len(chain.joints) + 1
     position, rotation = np.empty((count, 3, len(q))), np.empty((count, 3, 3, len(q)))
