@@ -114,7 +114,9 @@ def test_a_reason_excuses_and_one_for_nothing_is_told(tmp_path: Path) -> None:
     house = measured(tmp_path, reasons, models__arm=function(61) + small)
     assert faults(house) == {"reasons for nothing": ("models/arm.py:gone",)}
     assert "- models/arm.py:2 turn: 61 lines: one table" in full(house)
-    assert summary(house)[-1] == "Over a bound with a reason: 0 files, 1 functions, 0 duplicates."
+    assert summary(house)[-1] == (
+        "Over a bound, with a reason in `benchmarks/survey/reasons.toml`: files 0, functions 1, duplicates 0."
+    )
 
 
 def test_an_empty_reason_and_an_unknown_kind_are_refused(tmp_path: Path) -> None:

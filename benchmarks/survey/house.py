@@ -78,9 +78,12 @@ class House:
     many_arguments: tuple[str, ...]
     deepest: tuple[str, ...]
 
+    def judged(self) -> dict[str, Judged]:
+        """Return what reasons may excuse, by kind."""
+        return {"files": self.files, "functions": self.functions, "duplicates": self.duplicates}
+
     def faults(self) -> dict[str, tuple[str, ...]]:
         """Return what is over each bound, as an editor finds it."""
-        judged = (self.files, self.functions, self.duplicates)
         held = [area for area in self.areas if area.name in DOCUMENTED]
         return {
             f"files over {FILE_MOST} lines without a reason": self.files.faults,
@@ -95,7 +98,7 @@ class House:
             "rings of modules": self.module_rings,
             "rings of folders": self.folder_rings,
             f"duplicates of {LEAST} lines and more without a reason": self.duplicates.faults,
-            "reasons for nothing": tuple(key for one in judged for key in one.stale),
+            "reasons for nothing": tuple(key for one in self.judged().values() for key in one.stale),
         }
 
     def bounds(self) -> list[Bound]:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 
-from survey.house import Area, House
+from survey.house import DOCUMENTED, Area, House
 from survey.imports import ALLOWED
-from survey.sizes import MANY_ARGUMENTS
-from survey.source import AREAS
+from survey.sizes import MANY_ARGUMENTS, Spread
+from survey.source import AREAS, PACKAGES
 
 
 def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
@@ -16,24 +17,60 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[object]]) -> list[str]:
 
 
 def summary(house: House) -> list[str]:
-    """Return the table that CONTRIBUTING shows: what most commits leave as it is."""
+    """Return the table that CONTRIBUTING shows: what is held, in figures that few commits change."""
     heads = (
         "area",
-        "file: median, largest",
+        "file: median, largest, to the next ten",
         "function: median, largest",
         "docstrings",
         "units and shapes",
         "annotations",
     )
-    excused = ", ".join(
-        f"{len(judged.excused)} {what}"
-        for what, judged in (
-            ("files", house.files),
-            ("functions", house.functions),
-            ("duplicates", house.duplicates),
+    rows = [
+        (
+            area.name,
+            f"{_next_ten(area.files.median)}, {_next_ten(area.files.largest)}",
+            f"{area.functions.median:g}, {area.functions.largest}",
+            _documented(area) if area.name in DOCUMENTED else "-",
+            _with_units(area) if area.name in PACKAGES else "-",
+            _annotated(area),
         )
+        for area in house.areas
+    ]
+    excused = ", ".join(f"{what} {len(judged.excused)}" for what, judged in house.judged().items())
+    return [
+        *table(heads, rows),
+        "",
+        f"Over a bound, with a reason in `benchmarks/survey/reasons.toml`: {excused}.",
+    ]
+
+
+def details(house: House) -> list[str]:
+    """Return the table of all figures, those too that nothing is asked of."""
+    heads = (
+        "area",
+        "files: count, median, largest",
+        "functions: count, median, largest",
+        "public",
+        "docstrings",
+        "with arrays",
+        "units and shapes",
+        "annotations",
     )
-    return [*table(heads, map(_area_row, house.areas)), "", f"Over a bound with a reason: {excused}."]
+    rows = [
+        (
+            area.name,
+            _spread(area.files),
+            _spread(area.functions),
+            area.documented.public,
+            _documented(area),
+            area.arrays.passing,
+            _with_units(area),
+            _annotated(area),
+        )
+        for area in house.areas
+    ]
+    return table(heads, rows)
 
 
 def full(house: House) -> list[str]:
@@ -45,7 +82,7 @@ def full(house: House) -> list[str]:
         "units and shapes: of what is public and takes, gives or holds arrays. The same tree gives the same",
         "figures.",
         "",
-        *summary(house),
+        *details(house),
         "",
         *table(("imports of modules in", *AREAS), _import_rows(house)),
         "",
@@ -60,17 +97,24 @@ def _row(cells: Iterable[object]) -> str:
     return "| " + " | ".join(map(str, cells)) + " |"
 
 
-def _area_row(area: Area) -> tuple[object, ...]:
-    """Return the row of an area."""
-    functions = area.functions.count
-    return (
-        area.name,
-        f"{area.files.median:g}, {area.files.largest}",
-        f"{area.functions.median:g}, {area.functions.largest}",
-        _share(area.documented.public, len(area.documented.bare)),
-        _share(area.arrays.passing, len(area.arrays.incomplete)),
-        _share(functions, len(area.unannotated)),
-    )
+def _next_ten(lines: float) -> int:
+    return 10 * math.ceil(lines / 10)
+
+
+def _spread(spread: Spread) -> str:
+    return f"{spread.count}, {spread.median:g}, {spread.largest}"
+
+
+def _documented(area: Area) -> str:
+    return _share(area.documented.public, len(area.documented.bare))
+
+
+def _with_units(area: Area) -> str:
+    return _share(area.arrays.passing, len(area.arrays.incomplete))
+
+
+def _annotated(area: Area) -> str:
+    return _share(area.functions.count, len(area.unannotated))
 
 
 def _share(count: int, without: int) -> str:
@@ -91,8 +135,7 @@ def _barred(area: str, other: str) -> bool:
 
 
 def _excused(house: House) -> list[str]:
-    judged = (house.files, house.functions, house.duplicates)
-    return [f"{what}: {reason}" for one in judged for what, reason in one.excused]
+    return [f"{what}: {reason}" for one in house.judged().values() for what, reason in one.excused]
 
 
 def _listed(title: str, lines: Sequence[str]) -> list[str]:
