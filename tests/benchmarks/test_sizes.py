@@ -55,10 +55,13 @@ def test_a_reason_excuses_and_one_for_nothing_is_told(tmp_path: Path) -> None:
     )
 
 
-def test_an_empty_reason_and_an_unknown_kind_are_refused(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("text", "wrong"), [('[functions]\n"a.py:f" = " "\n', "a.py:f"), ("[classes]\n", "classes")]
+)
+def test_an_empty_reason_and_an_unknown_kind_are_refused(tmp_path: Path, text: str, wrong: str) -> None:
     file = tmp_path / "reasons.toml"
-    file.write_text('[functions]\n"a.py:f" = " "\n[classes]\n', encoding="utf-8")
-    with pytest.raises(ValueError, match=r"^reasons.toml: classes, a.py:f; allowed: files, functions, dup"):
+    file.write_text(text, encoding="utf-8")
+    with pytest.raises(ValueError, match=f"^reasons.toml: {wrong}; allowed: files, functions, dup"):
         read_reasons(file)
 
 
