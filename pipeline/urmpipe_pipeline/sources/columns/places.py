@@ -194,5 +194,6 @@ def _by_place(
 def _about_rest(robot: Chain, joints: Sequence[Column], rest: Sequence[Column]) -> LogWarning:
     """Say that a table has more columns than the robot has joints, and no header that tells them apart."""
     count = f"{len(joints) + len(rest)} columns without names, and {robot.name} has {len(joints)} joints"
-    said = f"{count}: {listed(rest, most=8)} left out; another --robot, or --joints A,B,C?"
+    which = f"column {listed(rest)} is" if len(rest) == 1 else f"columns {listed(rest, most=8)} are"
+    said = f"{count}: {which} left out; another --robot, or --joints A,B,C?"
     return LogWarning("columns-not-used", said)
