@@ -193,7 +193,8 @@ def test_without_header_the_columns_are_joints(read: Read, arm: Arm) -> None:
         "assumed-period", "columns-not-used", "assumed-unit",
     ]  # fmt: skip
     assert log.warnings[1].message == (
-        "4 columns without names, and arm has 3 joints: column 4 is left out; another --robot, or --joints A,B,C?"
+        "4 columns without names, and arm has 3 joints: column 4 is left out; another --robot, or --joints"
+        " A,B,C?"
     )
 
 
