@@ -7,13 +7,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.clock import Clock
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
 from urmpipe_pipeline.sources.clocks.quantised import behind_repeated
+from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.tables.diagnose import SHOWN_FINDINGS, lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.table import NO_TIME, UNREADABLE, Numbers
@@ -142,20 +143,24 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
     return findings
 
 
-def missing_samples(values: FloatArray, names: Sequence[str]) -> list[LogWarning]:
-    """Return one warning for each column in which samples are missing.
+def missing_samples(groups: Iterable[tuple[FloatArray, Sequence[str]]]) -> list[LogWarning]:
+    """Return a warning for the columns in which samples are missing, those that lack the same rows together.
 
     Args:
-        values: The columns, shape (n, columns).
-        names: Their names.
+        groups: Values of some columns, shape (n, columns), and their names.
     """
+    alike: dict[bytes, tuple[BoolArray, list[str]]] = {}
+    for values, names in groups:
+        for j in _unusual(values):
+            missing = np.isnan(values[:, j])
+            if missing.any():
+                alike.setdefault(missing.tobytes(), (missing, []))[1].append(names[j])
     warnings = []
-    for j in _unusual(values):
-        missing = np.flatnonzero(np.isnan(values[:, j]))
-        if len(missing):
-            first = int(missing[0]) + 1
-            said = f"{names[j]} has no value in {len(missing)} of {len(values)} rows, first in this one"
-            warnings.append(LogWarning("missing", said, first))
+    for missing, lacking in alike.values():
+        verb = "has" if len(lacking) == 1 else "have"
+        count = f"{np.count_nonzero(missing)} of {len(missing)} rows"
+        said = f"{', '.join(lacking)} {verb} no value in {count}, first in this one"
+        warnings.append(LogWarning("missing", said, int(np.argmax(missing)) + 1))
     return warnings
 
 
@@ -235,8 +240,9 @@ def _folds(times: IntArray, clock: Clock) -> Iterable[tuple[int, str, str]]:
     row = int(np.flatnonzero(jumps)[0])
     after, before = (f"{times[k] / one:.15g}" for k in (row + 1, row))
     said = f"found {after} after {before}, as a time of day hhmmss goes on, allowed: a clock of one unit"
-    hint = f"write it as hh:mm:ss, or say that it is no time of day with --unit {clock.columns[0].name}"
-    yield row + 2, clock.columns[0].header, f"{said}; {hint}={clock.unit}"
+    hint = "write it as hh:mm:ss, or say that it is no time of day with"
+    told = option("--unit", f"{clock.columns[0].name}={clock.unit}")
+    yield row + 2, clock.columns[0].header, f"{said}; {hint} {told}"
 
 
 def _second_logs(times: IntArray, steps: IntArray) -> set[int]:
