@@ -9,6 +9,7 @@ import click
 
 import urmpipe
 from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.types import OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -19,7 +20,7 @@ if TYPE_CHECKING:
 @click.argument("recording", metavar="RUN.rrd", type=click.Path(path_type=Path))
 @click.option(
     "--to",
-    type=click.Choice(["csv", "parquet", "mat", "tum"]),
+    type=OneOf(["csv", "parquet", "mat", "tum"]),
     help="The format [default: by the suffix of the output].",
 )
 @click.option(
@@ -27,12 +28,12 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--rows",
-    type=click.Choice(["grid", "file"]),
+    type=OneOf(["grid", "file"]),
     help="The run on its grid in SI, or the file's own rows, names and units [default: grid].",
 )
 @click.option(
     "--tcp",
-    type=click.Choice(["fk", "recorded"]),
+    type=OneOf(["fk", "recorded"]),
     help="Poses for --to tum: by the joints, or as the log recorded them [default: fk].",
 )
 @output_options

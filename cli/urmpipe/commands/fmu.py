@@ -11,7 +11,8 @@ import urmpipe
 from urmpipe.options.named import NamedType, named_values, option_names, option_value
 from urmpipe.options.output import Terminal, output_options
 from urmpipe.options.reading import MAP_OPTION
-from urmpipe.options.types import ROBOT, UNIT, NamesType
+from urmpipe.options.types import ROBOT, UNIT, NamesType, OneOf
+from urmpipe.usage import Group
 
 PLATFORMS = ("linux64", "win64")
 
@@ -27,7 +28,7 @@ def _platforms(
     return named
 
 
-@click.group(short_help="List units, build and check FMUs.")
+@click.group(cls=Group, short_help="List units, build and check FMUs.")
 def fmu() -> None:
     """List the units that urmpipe brings along, package them or your own as FMUs, and check any FMU.
 
@@ -71,7 +72,7 @@ def list_(terminal: Terminal) -> int:
 )
 @click.option(
     "--backend",
-    type=click.Choice(["native", "python"]),
+    type=OneOf(["native", "python"]),
     help="native: C inside, needs nothing on the target. python: needs Python with NumPy there"
     " [default: native if it can be built here].",
 )

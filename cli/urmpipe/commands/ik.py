@@ -11,7 +11,7 @@ from click.core import ParameterSource
 import urmpipe
 from urmpipe.options.output import Terminal, output_options
 from urmpipe.options.reading import TableOptions, table_options
-from urmpipe.options.types import DURATION, JointValuesType
+from urmpipe.options.types import DURATION, JointValuesType, OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -70,7 +70,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 )
 @click.option(
     "--method",
-    type=click.Choice(["auto", "closed", "iterative"]),
+    type=OneOf(["auto", "closed", "iterative"]),
     default="auto",
     show_default=True,
     help="How it is solved; auto: by the closed form of the arm if it has one.",

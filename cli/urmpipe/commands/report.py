@@ -10,6 +10,7 @@ import click
 import urmpipe
 from urmpipe.options.given import options_given
 from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.types import OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -35,7 +36,7 @@ FORMATS: dict[str, tuple[FigureFormat, ...]] = {
 @click.option(
     "--format",
     "figure_format",
-    type=click.Choice(list(FORMATS)),
+    type=OneOf(list(FORMATS)),
     default="both",
     show_default=True,
     help="What the files of figures are.",

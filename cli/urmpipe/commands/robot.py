@@ -10,12 +10,13 @@ import click
 from urmpipe.options.output import Terminal, output_options
 from urmpipe.options.reading import PlacingOptions, placing_options
 from urmpipe.options.types import ROBOT, JointValuesType
+from urmpipe.usage import Group
 
 if TYPE_CHECKING:
     from urmpipe_models.chains.chain import Chain
 
 
-@click.group(short_help="List, show and export robots.")
+@click.group(cls=Group, short_help="List, show and export robots.")
 def robot() -> None:
     """List, show and export robots: those that urmpipe brings along, and your own files.
 

@@ -10,7 +10,7 @@ import click
 import urmpipe
 from urmpipe.options.named import NamedType, argument_names, named_values
 from urmpipe.options.output import Terminal, output_options
-from urmpipe.options.types import DURATION, SYSTEM
+from urmpipe.options.types import DURATION, SYSTEM, OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--backend",
-    type=click.Choice(["native", "python"]),
+    type=OneOf(["native", "python"]),
     help="What the units run as [default: native if it can be built here].",
 )
 @output_options

@@ -29,18 +29,22 @@ class Terminal:
     quiet: bool
 
     def answer(self, result: Callable[[], Any], text: Callable[[], None]) -> None:
-        """Print the result of a command.
+        """Print the result of a command; a reader that leaves early changes nothing.
 
         Args:
             result: Makes the object for --json.
             text: Prints the result for people.
         """
-        if self.as_json:
-            from urmpipe.printing.terminal import print_json
+        from urmpipe.boundary import leave_output
+        from urmpipe.printing.terminal import print_json
 
-            print_json(result())
-        elif not self.quiet:
-            text()
+        try:
+            if self.as_json:
+                print_json(result())
+            elif not self.quiet:
+                text()
+        except BrokenPipeError:  # the reader left, as head does: the exit code is what it is all the same
+            leave_output()
 
     def warn(self, warnings: Sequence[LogWarning], log: str = "") -> None:
         """Print warnings on standard error, behind the name of their log if given."""
@@ -100,5 +104,5 @@ def _tell_defaults(ctx: click.Context, param: click.Parameter, quiet: bool) -> b
     if ctx.obj and not quiet:
         from urmpipe.printing.terminal import say
 
-        say(ctx.obj, err=True)
+        say(f"note: {ctx.obj}", err=True)
     return quiet
