@@ -90,7 +90,7 @@ def cli() -> None:
       urmpipe compare path.csv log.csv --robot urm6 --tolerance 0.0035
       urmpipe report log-against-path.rrd
       urmpipe view log-against-path.rrd
-      urmpipe ik path.csv --robot urm6 -o log.csv
+      urmpipe ik path.csv --robot urm6 -o joints.csv
 
     Exit codes: 0 within tolerance, 1 out of tolerance (ik: a target not reached, a jump, or a joint too
     fast; fmu check: a problem), 2 bad input or usage.

@@ -12,7 +12,7 @@ import click
 import urmpipe
 from urmpipe.options.given import about_recordings, options_given
 from urmpipe.options.grouped import Command
-from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import LogOptions, log_options
 from urmpipe.options.types import TIMES, OneOf, ParsedType, parsed, quantity
 from urmpipe.process import tune_pyarrow
@@ -54,20 +54,15 @@ def _noise(text: str) -> dict[str, float]:
     return parse_noise(text)
 
 
-def _file(name: str, *names: str, help: str) -> Callable[[Command], Command]:
+def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command], Command]:
     """Return an option that names a file to write or to read."""
-    return click.option(name, *names, metavar="FILE", type=click.Path(path_type=Path), help=help)
+    return click.option(name, *names, metavar=metavar, type=click.Path(path_type=Path), help=help)
 
 
 @click.command(short_help="Hold logs against a reference and give a verdict.")
 @click.argument("reference", type=click.Path(path_type=Path))
 @click.argument("logs", metavar="[LOG...]", nargs=-1, type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    help="The recording [default: LOG-against-REFERENCE.rrd here].",
-)
+@output_option("RUN.rrd", "The recording [default: LOG-against-REFERENCE.rrd here].")
 @click.option(
     "--tolerance",
     default=[str(DEFAULT_TOLERANCE)],
@@ -90,7 +85,8 @@ def _file(name: str, *names: str, help: str) -> Callable[[Command], Command]:
     "--sync",
     default="start",
     show_default=True,
-    type=ParsedType("start|auto|SECONDS", _sync),
+    type=ParsedType("sync", _sync),
+    metavar="start|auto|SECONDS",
     help="Start both together, find the offset by the motion, or t_reference = t_log + SECONDS.",
 )
 @click.option(
@@ -100,9 +96,18 @@ def _file(name: str, *names: str, help: str) -> Callable[[Command], Command]:
     show_default=True,
     help="Move the log first: to the same start pose, by the best rigid motion, by the best tool offset.",
 )
-@_file("--junit", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
-@_file("--csv", "statistics", help="Write the statistics as a table, one line a log and quantity.")
-@_file("--baseline", help="Tell what changed since an earlier comparison (its .rrd); worse is exit code 1.")
+@_file("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
+@_file(
+    "--csv",
+    "statistics",
+    metavar="FILE.csv",
+    help="Write the statistics as a table, one line a log and quantity.",
+)
+@_file(
+    "--baseline",
+    metavar="RUN.rrd",
+    help="Tell what changed since an earlier comparison (its .rrd); worse is exit code 1.",
+)
 @click.option(
     "--noise",
     type=ParsedType("M|KIND=VALUE,...", _noise),

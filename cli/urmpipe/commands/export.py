@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
-from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.types import OneOf
 from urmpipe.process import tune_pyarrow
 
@@ -23,9 +23,7 @@ if TYPE_CHECKING:
     type=OneOf(["csv", "parquet", "mat", "tum"]),
     help="The format [default: by the suffix of the output].",
 )
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The file [default: RUN-ROWS.FORMAT here]."
-)
+@output_option("FILE", "The file [default: RUN-ROWS.FORMAT here].")
 @click.option(
     "--rows",
     type=OneOf(["grid", "file"]),

@@ -54,10 +54,13 @@ def list_(terminal: Terminal) -> int:
 
 
 @fmu.command(short_help="Package a unit as an FMU.")
-@click.argument("unit", type=UNIT)
+@click.argument("unit", metavar="UNIT|FILE.py", type=UNIT)
 @click.option("--robot", type=ROBOT, help="The arm of a unit that has one.")
 @click.option(
-    "--log", type=click.Path(path_type=Path), help="The log of a unit that plays one: CSV, or a folder."
+    "--log",
+    metavar="LOG",
+    type=click.Path(path_type=Path),
+    help="The log of a unit that plays one.",
 )
 @MAP_OPTION
 @click.option(
@@ -68,7 +71,7 @@ def list_(terminal: Terminal) -> int:
     multiple=True,
     callback=named_values,
     metavar="NAME=VALUE",
-    help="A further option of the unit, such as joints=6 or rates=true.",
+    help="A further option of the unit, such as joints=6 or rates=true; `urmpipe fmu list` shows them.",
 )
 @click.option(
     "--backend",
@@ -82,7 +85,7 @@ def list_(terminal: Terminal) -> int:
     multiple=True,
     callback=_platforms,
     metavar="A,B",
-    help="linux64, win64, or both, with the extra `cross` [default: this one].",
+    help="linux64, win64, or both, with the extra `cross` [default: this one; python: all].",
 )
 @click.option(
     "-o",

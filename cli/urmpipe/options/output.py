@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -67,6 +68,16 @@ class Terminal:
         from urmpipe.printing.terminal import progress_bar
 
         return progress_bar(title, quiet=self.quiet or not shown)
+
+
+def output_option(metavar: str, told: str) -> Callable[[Command], Command]:
+    """Return the option -o, which names the file that a command writes.
+
+    Args:
+        metavar: What the file is called in the help.
+        told: The help.
+    """
+    return click.option("-o", "--output", metavar=metavar, type=click.Path(path_type=Path), help=told)
 
 
 def debug_option(command: Command) -> Command:
