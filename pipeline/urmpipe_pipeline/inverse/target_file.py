@@ -115,7 +115,7 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
 
 
 def _plain_length(asked: ReadOptions) -> tuple[ReadOptions, Unit | None]:
-    """Return the options without the unit of no column (--unit mm) if it is a length, and that: of x, y, z."""
+    """Return the options without a plain length (--unit mm), and that unit, which is of x, y, z here."""
     unit = vocabulary().unit(asked.units.get("", ""))
     if unit is None or unit.quantity != "length" or unit.order:
         return asked, None
