@@ -152,6 +152,7 @@ def compare(
         options["noise"] = None  # what a lab says for the calls that have a baseline
     reading = log.reading()
     target = None if made else output or Path(default_name(reference, logs))
+    replaces = target is not None and target.exists()
     with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
         result = urmpipe.compare(
             made or reference,
@@ -166,11 +167,11 @@ def compare(
         terminal.warn(one.run.warnings, one.name)
     terminal.warn(result.warnings)
     written = {"JUnit": options["junit"], "Statistics": options["statistics"]}
-    terminal.answer(result.to_dict, lambda: _print(result, written))
+    terminal.answer(result.to_dict, lambda: _print(result, replaces, written))
     return 0 if result.accepted else 1
 
 
-def _print(result: Comparison, written: dict[str, Path | None]) -> None:
+def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:
     """Print a comparison, and what was written."""
     from urmpipe.printing.comparison import print_comparison
     from urmpipe.printing.terminal import print_recording, say
@@ -179,7 +180,7 @@ def _print(result: Comparison, written: dict[str, Path | None]) -> None:
     for title, path in written.items():
         if path:
             say(f"{title}: {path}")
-    print_recording(result.recording)
+    print_recording(result.recording, replaced=replaces)
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:
