@@ -345,6 +345,7 @@ def bits(chain: Chain) -> bytes:
     return np.array(numbers, dtype=float).tobytes()
 
 
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_a_dictionary_through_json_is_the_same_chain_bit_by_bit(
     chains: SearchStrategy[Chain], data: st.DataObject
@@ -356,7 +357,7 @@ def test_a_dictionary_through_json_is_the_same_chain_bit_by_bit(
     assert bits(back) == bits(chain)
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_toml_file_is_the_same_chain_bit_by_bit(
     chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path

@@ -293,7 +293,7 @@ def assert_same(chain: Chain, back: Chain) -> None:
         np.testing.assert_allclose(a.rotation, b.rotation, rtol=0.0, atol=SAME)
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_the_file_read_back_is_the_same_chain(
     chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
@@ -303,7 +303,7 @@ def test_the_file_read_back_is_the_same_chain(
     assert_same(chain, read_urdf(tmp_path / "chain.urdf"))
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_dh_arms_come_back(dh_rows: SearchStrategy[list[DHRow]], data: st.DataObject, tmp_path: Path) -> None:
     chain = dh_chain("arm", data.draw(dh_rows), tool=from_offset([0.1, 0.2, 0.3, 1.0, 2.0, 3.0]))
@@ -320,7 +320,7 @@ def test_the_catalogues_arms_come_back(name: str, tmp_path: Path) -> None:
     assert back.point_names == chain.point_names
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50)
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25)
 @given(data=st.data())
 def test_pinocchio_reads_the_file_as_the_same_chain(
     chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
