@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.provenance import Provenance
@@ -94,8 +95,8 @@ class Stretch:
     duration: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Deviation:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Deviation(Shown):
     """The deviation of one log from the reference.
 
     Attributes:
@@ -214,6 +215,31 @@ class Deviation:
         held = [one for one in self.all_statistics if one.used is not None]
         return max(held, key=lambda one: one.used or 0.0, default=self.statistics["norm"])
 
+    def _headline(self) -> str:
+        """Return its verdict, and by what it is decided."""
+        one = self.decisive
+        return line_of(
+            self.name, self.verdict, f"{one.quantity} up to {one.max:.4g} {one.unit}", self._rows()
+        )
+
+    def _rows(self) -> str:
+        """Return how many samples were compared."""
+        return f"{number_of(len(self.sample), 'sample')} compared"
+
+    def _notes(self) -> list[str]:
+        """Return what is to be known of the log."""
+        return [warning.message for warning in self.run.warnings]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a compared sample: t [s], then every quantity, in [m] or [rad].
+
+        Its columns are called as its statistics: x, y, z, norm, path, angle where there is one, the joints.
+        """
+        import pandas as pd
+
+        names = [one.quantity for one in self.all_statistics]
+        return pd.DataFrame({"t": self.t, **dict(zip(names, self.values, strict=True))})
+
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of one run."""
         worst, longest = self.worst, self.longest_out
@@ -247,8 +273,8 @@ class Deviation:
         }
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Comparison(Shown):
     """Some logs held against one reference.
 
     Attributes:
@@ -293,6 +319,16 @@ class Comparison:
         for run in self.runs:
             for one in run.all_statistics:
                 yield {"run": run.name, "sync_offset": run.sync.offset, **asdict(one)}
+
+    def _headline(self) -> str:
+        """Return its verdict, and that of each log."""
+        logs = (f"{one.name} {one.verdict} ({one.decisive.max:.4g} {one.decisive.unit})" for one in self.runs)
+        return line_of(f"{self.name}: {self.verdict}", *logs)
+
+    def _notes(self) -> list[str]:
+        """Return what is to be known of it, and of its logs."""
+        of_logs = [w.of(one.name).message for one in self.runs for w in one.run.warnings]
+        return [*(warning.message for warning in self.warnings), *of_logs]
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a log and quantity, as `rows`."""
