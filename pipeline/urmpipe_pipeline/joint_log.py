@@ -197,9 +197,8 @@ class JointLog(Shown):
     def _headline(self) -> str:
         """Return its name, its source and how long it is."""
         joints = number_of(len(self.joints), "joint") if self.joints else "a path"
-        return line_of(
-            self.name, self.source, joints, f"{number_of(self.rows, 'row')}, {self.period:g} s apart"
-        )
+        rows = f"{number_of(self.rows, 'row')} {self.period:g} s apart"
+        return line_of(self.name, self.source, joints, rows)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a row of the file: t [s], the joints, and what else was recorded, in SI."""

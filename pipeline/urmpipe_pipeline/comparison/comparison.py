@@ -217,14 +217,9 @@ class Deviation(Shown):
 
     def _headline(self) -> str:
         """Return its verdict, and by what it is decided."""
-        one = self.decisive
-        return line_of(
-            self.name, self.verdict, f"{one.quantity} up to {one.max:.4g} {one.unit}", self._rows()
-        )
-
-    def _rows(self) -> str:
-        """Return how many samples were compared."""
-        return f"{number_of(len(self.sample), 'sample')} compared"
+        one, samples = self.decisive, number_of(len(self.sample), "sample")
+        largest = f"{one.quantity} up to {one.max:.4g} {one.unit}"
+        return line_of(self.name, self.verdict, largest, f"{samples} compared")
 
     def _notes(self) -> list[str]:
         """Return what is to be known of the log."""

@@ -88,9 +88,7 @@ class Exported(Shown):
         """Return one row a file: its path and its rows."""
         import pandas as pd
 
-        return pd.DataFrame(
-            {"file": [str(one.path) for one in self.files], "rows": [one.rows for one in self.files]}
-        )
+        return pd.DataFrame([(str(one.path), one.rows) for one in self.files], columns=["file", "rows"])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe export --json` prints."""
