@@ -42,11 +42,14 @@ class Spelling:
 _SHOWN = r"[A-Z][A-Z|]*(?:\.[a-z]+)?"
 """What stands for a value, such as SECONDS, NAME|FILE, FILE.csv."""
 
+_FRAME = r"-?[0-9][0-9.e+-]*(?:,-?[0-9][0-9.e+-]*)*"
+"""A frame as X,Y,Z and the like."""
+
 SPELLINGS = {
     "--align": Spelling("align", "none|start|rigid|tool"),
     "--all": Spelling("every"),
     "--audit": Spelling("audit", _SHOWN),
-    "--base": Spelling("base", r"-?[0-9][0-9.,e+-]*"),
+    "--base": Spelling("base", _FRAME),
     "--base-link": Spelling("base_link", _SHOWN),
     "--baseline": Spelling("baseline", _SHOWN),
     "--decimal": Spelling("decimal", _SHOWN, "text"),
@@ -76,7 +79,7 @@ SPELLINGS = {
     "--tip": Spelling("tip_link", _SHOWN),
     "--to": Spelling("to", r"csv\|parquet\|mat\|tum|csv|parquet|mat|tum"),
     "--tolerance": Spelling("tolerance"),
-    "--tool": Spelling("tool", r"-?[0-9][0-9.,e+-]*"),
+    "--tool": Spelling("tool", _FRAME),
     "--tsp": Spelling("tsp", rf"{_SHOWN}|[0-9][0-9.e-]*"),
     "--unit": Spelling("units", r"[^;,()=]*=[A-Za-z]\w*|(?:rad|deg|mm|m|s|ms|us|ns)(?![\w:])", "units"),
     "--write-map": Spelling("write_map", _SHOWN),
@@ -131,7 +134,7 @@ def _in_python(one: Spelling, found: re.Match[str]) -> str:
     value = found["value"]
     if not one.in_read:
         return f"{one.keyword}={_quoted(value)}" if value else one.keyword
-    if found["subject"] is not None and not value:
+    if found["subject"] is not None and not value and one.shape != "flag":
         return f"ReadOptions.{one.keyword}"
     return f"read=ReadOptions({one.keyword}={_written(one.shape, value)})"
 
