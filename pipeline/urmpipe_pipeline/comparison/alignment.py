@@ -134,7 +134,7 @@ def _moved(matched: Matched, alignment: Alignment) -> Matched:
 
 
 def _with_tool(matched: Matched, run: Run) -> Matched:
-    """Move the log by the d of the least squared |p_reference - p - R d|, the mean of R^T (p_reference - p)."""
+    """Move the log by the d of the least |p_reference - p - R d|^2, the mean of R^T (p_reference - p)."""
     quat = matched.actual_quat
     known = np.zeros(0, np.intp) if quat is None else np.flatnonzero(np.isfinite(quat).all(axis=1))
     if quat is None or not len(known):

@@ -7,6 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from urmpipe_models.display import Shown, line_of
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation, Kind, Statistics, Stretch, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
@@ -20,8 +21,8 @@ if TYPE_CHECKING:
 __all__ = ["AXES", "Comparison", "Deviation", "Kind", "Statistics", "Stretch", "Verdict"]
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Comparison(Shown):
     """Some logs held against one reference.
 
     Attributes:
@@ -78,6 +79,16 @@ class Comparison:
         for run in self.runs:
             for one in run.all_statistics:
                 yield {"run": run.name, "sync_offset": run.sync.offset, **asdict(one)}
+
+    def _headline(self) -> str:
+        """Return its verdict, and that of each log."""
+        logs = (f"{one.name} {one.verdict} ({one.decisive.max:.4g} {one.decisive.unit})" for one in self.runs)
+        return line_of(f"{self.name}: {self.verdict}", *logs)
+
+    def _notes(self) -> list[str]:
+        """Return what is to be known of it, and of its logs."""
+        of_logs = [w.of(one.name).message for one in self.runs for w in one.run.warnings]
+        return [*(warning.message for warning in self.warnings), *of_logs]
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a log and quantity, as `rows`."""

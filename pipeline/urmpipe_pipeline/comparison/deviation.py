@@ -4,15 +4,19 @@ from __future__ import annotations
 
 import math
 from dataclasses import asdict, dataclass
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.runs.results import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Verdict = Literal["pass", "fail"]
 
@@ -96,8 +100,8 @@ class Stretch:
     duration: float
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Deviation:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Deviation(Shown):
     """The deviation of one log from the reference.
 
     Attributes:
@@ -221,6 +225,26 @@ class Deviation:
         """The quantity that uses up most of its tolerance; the norm where nothing has one."""
         held = [one for one in self.all_statistics if one.used is not None]
         return max(held, key=lambda one: one.used or 0.0, default=self.statistics["norm"])
+
+    def _headline(self) -> str:
+        """Return its verdict, and by what it is decided."""
+        one, samples = self.decisive, number_of(len(self.sample), "sample")
+        largest = f"{one.quantity} up to {one.max:.4g} {one.unit}"
+        return line_of(self.name, self.verdict, largest, f"{samples} compared")
+
+    def _notes(self) -> list[str]:
+        """Return what is to be known of the log."""
+        return [warning.message for warning in self.run.warnings]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a compared sample: t [s], then every quantity, in [m] or [rad].
+
+        Its columns are called as its statistics: x, y, z, norm, path, angle where there is one, the joints.
+        """
+        import pandas as pd
+
+        names = [one.quantity for one in self.all_statistics]
+        return pd.DataFrame({"t": self.t, **dict(zip(names, self.values, strict=True))})
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of one run."""

@@ -10,8 +10,8 @@ There is no one schema. What the consumers take, and what is written here:
     error        the same, of a test case that could not be run
     system-out   behind the test cases: the warnings of a log
 
-GitLab shows the class names in place of the suites, and of a failure the text alone. Times are 0: consumers add
-them up as run times, and nothing was timed; that of the motion is the property duration. A test case is a
+GitLab shows the class names in place of the suites, and of a failure the text alone. Times are 0: consumers
+add them up as run times, and nothing was timed; that of the motion is the property duration. A test case is a
 quantity with a tolerance and, against a baseline, a quantity that both comparisons have; of a comparison that
 could not be made, what was wrong. XML holds no control characters and no lone surrogates: they are written as
 they are escaped in Python.
