@@ -28,7 +28,7 @@ def print_comparison(result: Comparison) -> None:
     from urmpipe.printing.baseline import print_baseline
 
     console = new_console()
-    print_verdict(console, result)
+    _print_verdict(console, result)
     ranked = result.ranking
     if len(ranked) > 1:
         print_columns(console, "From best to worst", list(_ranking(result)))
@@ -44,7 +44,14 @@ def print_comparison(result: Comparison) -> None:
         print_baseline(console, result.baseline)
 
 
-def print_verdict(console: Console, result: Comparison) -> None:
+def print_verdict(result: Comparison, *, err: bool = False) -> None:
+    """Print the verdict alone, on standard error if asked to: why a quiet command fails."""
+    console = new_console()
+    console.stderr = err
+    _print_verdict(console, result)
+
+
+def _print_verdict(console: Console, result: Comparison) -> None:
     """Print pass or fail, and which quantity uses up most of its tolerance: how much, when and where."""
     console.print(judged_line(result.verdict, verdict_words(result)), soft_wrap=True)
     worst = result.ranking[-1]
