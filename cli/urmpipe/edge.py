@@ -1,4 +1,4 @@
-"""The edge of the public functions: what they are given is checked, what they say is said in Python's words."""
+"""The edge of the public functions: keywords are checked, and messages are in Python's words."""
 
 from __future__ import annotations
 
@@ -93,8 +93,8 @@ KINDS = {
 def public(function: Callable[Parameters, Made]) -> Callable[Parameters, Made]:
     """Return a public function that checks its keywords and speaks to whom calls it.
 
-    Called from Python, its errors and warnings name keywords, and its warnings are shown as `UrmpipeWarning`s.
-    A command has checked its options itself, prints its warnings, and its user knows options alone.
+    Called from Python, its errors and warnings name keywords, and its warnings are shown as
+    `UrmpipeWarning`s. A command has checked its options itself, and prints its warnings.
     """
     known = signature(function)
 

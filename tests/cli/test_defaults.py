@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from urmpipe.main import run
-from urmpipe.options import FORMS
+from urmpipe.options.reading import FORMS
 from urmpipe_models import orientation
 
 LOG = "t [s],a,b,c,d,e,f\n" + "".join(f"{k * 0.005},{k},1,2,3,4,5\n" for k in range(20))

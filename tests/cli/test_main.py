@@ -103,7 +103,7 @@ def test_wrong_options_say_what_is_allowed(urmpipe: RunCommand, arguments: list[
 
 
 def test_shell_completion_offers_commands_and_robots() -> None:
-    from urmpipe.options import RobotType
+    from urmpipe.options.types import ROBOT
 
-    robots = RobotType().shell_complete(click.Context(cli), click.Option(["--robot"]), "ur5")
+    robots = ROBOT.shell_complete(click.Context(cli), click.Option(["--robot"]), "ur5")
     assert {item.value for item in robots} >= {"ur5", "ur5e"}

@@ -7,10 +7,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 import urmpipe
-from urmpipe.options import Command, about_recordings, log_options, output_options, take_log_options
+from urmpipe.options.given import about_recordings, options_given
+from urmpipe.options.grouped import Command
+from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.reading import LogOptions, log_options
 from urmpipe.process import tune_pyarrow
 from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE
 
@@ -109,8 +111,8 @@ def compare(
     reference: Path,
     logs: tuple[Path, ...],
     output: Path | None,
-    as_json: bool,
-    quiet: bool,
+    log: LogOptions,
+    terminal: Terminal,
     **options: Any,
 ) -> int:
     """Hold logs against a reference: deviation, statistics, verdict.
@@ -131,45 +133,42 @@ def compare(
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
     """
     tune_pyarrow()
-    from urmpipe.printing.comparison import print_comparison
-    from urmpipe.printing.terminal import print_json, print_recording, print_warnings, progress_bar, say
-
     said = about_recordings(ctx, (reference, *logs))
-    if said and not quiet:
-        say(f"note: {said}", err=True)
+    if said:
+        terminal.note(said)
     made = None if logs or not options["baseline"] else _made_before(ctx, reference)
-    if not options["baseline"] and ctx.get_parameter_source("noise") != ParameterSource.COMMANDLINE:
+    if not options["baseline"] and not options_given(ctx, "noise".__eq__):
         options["noise"] = None  # what a lab says for the calls that have a baseline
-    robot, read = take_log_options(options)
-    names = (
-        "tsp", "derivative", "strict", "tolerance", "tcp", "sync", "align", "baseline", "noise", "junit",
-        "statistics",
-    )  # fmt: skip
-    shared = {name: options.pop(name) for name in names}
+    reading = log.reading()
     target = None if made else output or Path(default_name(reference, logs))
-    with progress_bar(f"Writing {target}", quiet=quiet or made is not None) as progress:
+    with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
         result = urmpipe.compare(
             made or reference,
             logs,
-            robot=robot,
-            read=read,
+            robot=reading.arm,
+            read=reading.options,
             output=target,
             progress=progress,
-            **shared,
+            **options,
         )
-    if not quiet:
-        for one in result.runs:
-            print_warnings(one.run.warnings, one.name)
-        print_warnings(result.warnings)
-    if as_json:
-        print_json(result.to_dict())
-    elif not quiet:
-        print_comparison(result)
-        for title, path in (("JUnit", shared["junit"]), ("Statistics", shared["statistics"])):
-            if path:
-                say(f"{title}: {path}")
-        print_recording(result.recording)
+    for one in result.runs:
+        terminal.warn(one.run.warnings, one.name)
+    terminal.warn(result.warnings)
+    written = {"JUnit": options["junit"], "Statistics": options["statistics"]}
+    terminal.answer(result.to_dict, lambda: _print(result, written))
     return 0 if result.accepted else 1
+
+
+def _print(result: Comparison, written: dict[str, Path | None]) -> None:
+    """Print a comparison, and what was written."""
+    from urmpipe.printing.comparison import print_comparison
+    from urmpipe.printing.terminal import print_recording, say
+
+    print_comparison(result)
+    for title, path in written.items():
+        if path:
+            say(f"{title}: {path}")
+    print_recording(result.recording)
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:
@@ -181,13 +180,7 @@ def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:
     from urmpipe_pipeline.operands import load_comparison
 
     made = load_comparison(reference)
-    given = [
-        max(param.opts, key=len)
-        for param in ctx.command.params
-        if isinstance(param, click.Option)
-        and param.name not in OF_RESULTS
-        and ctx.get_parameter_source(param.name or "") == ParameterSource.COMMANDLINE
-    ]
+    given = options_given(ctx, lambda name: name not in OF_RESULTS)
     if made is not None and given:
         raise click.UsageError(
             f"{', '.join(given)}: found with the recording of a comparison ({reference}), which stands as it"

@@ -6,13 +6,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from click.core import ParameterSource
 
 import urmpipe
-from urmpipe.options import output_options
+from urmpipe.options.given import options_given
+from urmpipe.options.output import Terminal, output_options
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
+    from urmpipe.api.report import Report
     from urmpipe_pipeline.report.headless import FigureFormat
 
 FORMATS: dict[str, tuple[FigureFormat, ...]] = {
@@ -48,8 +49,7 @@ def report(
     output: Path | None,
     figures: Path | None,
     figure_format: str,
-    as_json: bool,
-    quiet: bool,
+    terminal: Terminal,
 ) -> int:
     """Write one self-contained HTML file about recordings that ingest, compare or simulate wrote.
 
@@ -63,21 +63,22 @@ def report(
       urmpipe report monday.rrd tuesday.rrd -o week.html
       urmpipe report log-against-path.rrd --figures figures --format svg
     """
-    source = ctx.get_parameter_source("figure_format")
-    if figures is None and source == ParameterSource.COMMANDLINE:
+    if figures is None and options_given(ctx, "figure_format".__eq__):
         raise click.UsageError("--format: found without --figures, allowed: with --figures DIR")
     tune_pyarrow()
-    from urmpipe.printing.terminal import print_json, progress_bar, say
-
     target = output or Path(f"{recordings[0].stem}.html")
-    with progress_bar(f"Writing {target}", quiet=quiet) as progress:
+    with terminal.progress(f"Writing {target}") as progress:
         result = urmpipe.report(
             recordings, target, figures=figures, formats=FORMATS[figure_format], progress=progress
         )
-    if as_json:
-        print_json(result.to_dict())
-    elif not quiet:
-        say(f"Report: {result.path}  (open it in any browser)")
-        if figures:
-            say(f"Figures: {len(result.figures)} files in {figures}")
+    terminal.answer(result.to_dict, lambda: _print(result, figures))
     return 0
+
+
+def _print(result: Report, figures: Path | None) -> None:
+    """Print what was written."""
+    from urmpipe.printing.terminal import say
+
+    say(f"Report: {result.path}  (open it in any browser)")
+    if figures:
+        say(f"Figures: {len(result.figures)} files in {figures}")

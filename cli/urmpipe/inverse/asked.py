@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe.guards import Robot, place_robot
+from urmpipe.guards import Frame, Robot, place_robot
 from urmpipe.inverse.output import Written
 from urmpipe.inverse.targets import GivenTargets
 from urmpipe_models.arrays import FloatArray
@@ -18,7 +18,6 @@ from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.solve import METHODS, Method
 from urmpipe_models.robots.catalogue import robot_names
-from urmpipe_models.transform import Transform
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -118,7 +117,7 @@ def _what_no_path_has(asked: Asked, kind: Written | None) -> Iterator[str]:
         )
 
 
-def start_of(arm: Chain, start: Sequence[float] | None) -> FloatArray | None:
+def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
     """Return the start as an array, shape (joints,).
 
     Raises:
@@ -138,7 +137,7 @@ def start_of(arm: Chain, start: Sequence[float] | None) -> FloatArray | None:
     return values
 
 
-def arm_of(robot: Robot | None, base: Transform | None, tool: Transform | None) -> Chain:
+def arm_of(robot: Robot | None, base: Frame | None, tool: Frame | None) -> Chain:
     """Return the arm on its base and with its tool.
 
     Raises:
