@@ -18,6 +18,7 @@ from urmpipe.inverse.solving import solutions_of, solved
 from urmpipe.inverse.targets import TargetsLike, given_targets
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import for_each
+from urmpipe_models.inverse.search import USUAL_SEARCH, Search
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.solve import Method
 from urmpipe_pipeline.joint_log import LogWarning
@@ -28,7 +29,7 @@ from urmpipe_pipeline.sources import ReadOptions
 SOLVING = 0.7
 """Share of the work that solving is where something is written, too."""
 
-RESTARTS = 20
+RESTARTS = USUAL_SEARCH.restarts
 """Random starts of the iterative solver for a target that it does not reach from the start."""
 
 
@@ -93,9 +94,8 @@ def ik(
     )
     arm, kind, given = for_each(lambda make: make(), parts)
     solving, writing = _parts(progress, path is not None)
-    asked = Asked(
-        arm, given, start_of(arm, start), every, tolerance, within_pi, method, restarts, seed, solving
-    )
+    search = Search(tolerance, restarts, seed)
+    asked = Asked(arm, given, start_of(arm, start), every, within_pi, method, search, solving)
     refuse_unsolvable(asked, kind)
 
     kept = [Path(one) for one in (*([targets] if isinstance(targets, (str, Path)) else []), *inputs)]
