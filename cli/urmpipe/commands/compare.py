@@ -156,7 +156,7 @@ def compare(
     terminal.warn(result.warnings)
     written = {"JUnit": options["junit"], "Statistics": options["statistics"]}
     terminal.answer(result.to_dict, lambda: _print(result, written))
-    return 0 if result.accepted else 1
+    return 0 if result.verdict == "pass" else 1
 
 
 def _print(result: Comparison, written: dict[str, Path | None]) -> None:
