@@ -27,6 +27,7 @@ the counter-rotating module does not."""
 @click.option(
     "-o",
     "--output",
+    metavar="DIR",
     type=click.Path(path_type=Path),
     default=Path("urmpipe-demo"),
     show_default=True,

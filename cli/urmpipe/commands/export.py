@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
-from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.types import OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -19,20 +20,18 @@ if TYPE_CHECKING:
 @click.argument("recording", metavar="RUN.rrd", type=click.Path(path_type=Path))
 @click.option(
     "--to",
-    type=click.Choice(["csv", "parquet", "mat", "tum"]),
+    type=OneOf(["csv", "parquet", "mat", "tum"]),
     help="The format [default: by the suffix of the output].",
 )
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The file [default: RUN-ROWS.FORMAT here]."
-)
+@output_option("FILE", "The file [default: RUN-ROWS.FORMAT here].")
 @click.option(
     "--rows",
-    type=click.Choice(["grid", "file"]),
+    type=OneOf(["grid", "file"]),
     help="The run on its grid in SI, or the file's own rows, names and units [default: grid].",
 )
 @click.option(
     "--tcp",
-    type=click.Choice(["fk", "recorded"]),
+    type=OneOf(["fk", "recorded"]),
     help="Poses for --to tum: by the joints, or as the log recorded them [default: fk].",
 )
 @output_options

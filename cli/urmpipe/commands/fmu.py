@@ -11,7 +11,8 @@ import urmpipe
 from urmpipe.options.named import NamedType, named_values, option_names, option_value
 from urmpipe.options.output import Terminal, output_options
 from urmpipe.options.reading import MAP_OPTION
-from urmpipe.options.types import ROBOT, UNIT, NamesType
+from urmpipe.options.types import ROBOT, UNIT, NamesType, OneOf
+from urmpipe.usage import Group
 
 PLATFORMS = ("linux64", "win64")
 
@@ -27,7 +28,7 @@ def _platforms(
     return named
 
 
-@click.group(short_help="List units, build and check FMUs.")
+@click.group(cls=Group, short_help="List units, build and check FMUs.")
 def fmu() -> None:
     """List the units that urmpipe brings along, package them or your own as FMUs, and check any FMU.
 
@@ -53,10 +54,13 @@ def list_(terminal: Terminal) -> int:
 
 
 @fmu.command(short_help="Package a unit as an FMU.")
-@click.argument("unit", type=UNIT)
+@click.argument("unit", metavar="UNIT|FILE.py", type=UNIT)
 @click.option("--robot", type=ROBOT, help="The arm of a unit that has one.")
 @click.option(
-    "--log", type=click.Path(path_type=Path), help="The log of a unit that plays one: CSV, or a folder."
+    "--log",
+    metavar="LOG",
+    type=click.Path(path_type=Path),
+    help="The log of a unit that plays one.",
 )
 @MAP_OPTION
 @click.option(
@@ -67,11 +71,11 @@ def list_(terminal: Terminal) -> int:
     multiple=True,
     callback=named_values,
     metavar="NAME=VALUE",
-    help="A further option of the unit, such as joints=6 or rates=true.",
+    help="A further option of the unit, such as joints=6 or rates=true; `urmpipe fmu list` shows them.",
 )
 @click.option(
     "--backend",
-    type=click.Choice(["native", "python"]),
+    type=OneOf(["native", "python"]),
     help="native: C inside, needs nothing on the target. python: needs Python with NumPy there"
     " [default: native if it can be built here].",
 )
@@ -81,7 +85,7 @@ def list_(terminal: Terminal) -> int:
     multiple=True,
     callback=_platforms,
     metavar="A,B",
-    help="linux64, win64, or both, with the extra `cross` [default: this one].",
+    help="linux64, win64, or both, with the extra `cross` [default: this one; python: all].",
 )
 @click.option(
     "-o",

@@ -9,9 +9,9 @@ import click
 from click.core import ParameterSource
 
 import urmpipe
-from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import TableOptions, table_options
-from urmpipe.options.types import DURATION, JointValuesType
+from urmpipe.options.types import DURATION, JointValuesType, OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -40,13 +40,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 
 @click.command(short_help="Find joint values for poses of the tool.")
 @click.argument("targets", metavar="TARGETS|PATH", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    metavar="LOG.csv|RUN.rrd",
-    type=click.Path(path_type=Path),
-    help="Write a joint log that ingest reads, or a recording.",
-)
+@output_option("LOG.csv|RUN.rrd", "Write a joint log that ingest reads, or a recording.")
 @click.option(
     "--all",
     "every",
@@ -70,7 +64,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 )
 @click.option(
     "--method",
-    type=click.Choice(["auto", "closed", "iterative"]),
+    type=OneOf(["auto", "closed", "iterative"]),
     default="auto",
     show_default=True,
     help="How it is solved; auto: by the closed form of the arm if it has one.",
@@ -106,7 +100,7 @@ def ik(
       urmpipe ik targets.csv --robot arm6
       urmpipe ik targets.csv --robot ur5e --all --json
       urmpipe ik targets.csv --robot panda --start 0,-0.8,0,-2.4,0,1.6,0.8 -o targets.rrd --all
-      urmpipe ik path.csv --robot urm6 -o log.csv
+      urmpipe ik path.csv --robot urm6 -o joints.csv
       urmpipe ik path.csv --robot ur5e --tolerance 3.5mm -o run.rrd
 
     Exit codes: 0 every target reached, 1 not so (rows that hold no target count, and along a path jumps and

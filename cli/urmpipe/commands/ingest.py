@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
-from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import LogOptions, log_options
 from urmpipe.process import tune_pyarrow
 
@@ -18,9 +18,7 @@ if TYPE_CHECKING:
 
 @click.command(short_help="Turn one log into a recording.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: LOG.rrd here]."
-)
+@output_option("RUN.rrd", "The recording [default: LOG.rrd here].")
 @click.option(
     "--explain",
     is_flag=True,

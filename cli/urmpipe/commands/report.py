@@ -9,7 +9,8 @@ import click
 
 import urmpipe
 from urmpipe.options.given import options_given
-from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.types import OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -25,7 +26,7 @@ FORMATS: dict[str, tuple[FigureFormat, ...]] = {
 
 @click.command(short_help="Write the HTML report of recordings.")
 @click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="The report [default: RUN.html here].")
+@output_option("FILE.html", "The report [default: RUN.html here].")
 @click.option(
     "--figures",
     metavar="DIR",
@@ -35,7 +36,7 @@ FORMATS: dict[str, tuple[FigureFormat, ...]] = {
 @click.option(
     "--format",
     "figure_format",
-    type=click.Choice(list(FORMATS)),
+    type=OneOf(list(FORMATS)),
     default="both",
     show_default=True,
     help="What the files of figures are.",

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 import click
 
-from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import PlacingOptions, placing_options
 from urmpipe.options.types import ROBOT, JointValuesType
+from urmpipe.usage import Group
 
 if TYPE_CHECKING:
     from urmpipe_models.chains.chain import Chain
 
 
-@click.group(short_help="List, show and export robots.")
+@click.group(cls=Group, short_help="List, show and export robots.")
 def robot() -> None:
     """List, show and export robots: those that urmpipe brings along, and your own files.
 
@@ -87,9 +88,7 @@ def show(
 
 @robot.command(short_help="Write a robot as URDF or TOML.")
 @click.argument("name", metavar="NAME|FILE", type=ROBOT)
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="A .urdf or .toml file [default: NAME.urdf here]."
-)
+@output_option("FILE", "A .urdf or .toml file [default: NAME.urdf here].")
 @placing_options
 @output_options
 def export(name: str, output: Path | None, placing: PlacingOptions, terminal: Terminal) -> int:

@@ -9,8 +9,8 @@ import click
 
 import urmpipe
 from urmpipe.options.named import NamedType, argument_names, named_values
-from urmpipe.options.output import Terminal, output_options
-from urmpipe.options.types import DURATION, SYSTEM
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.types import DURATION, SYSTEM, OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -18,11 +18,9 @@ if TYPE_CHECKING:
 
 
 @click.command(short_help="Run a system of blocks.")
-@click.argument("system", type=SYSTEM, required=False)
+@click.argument("system", metavar="[SYSTEM|FILE.toml]", type=SYSTEM, required=False)
 @click.option("--list", "listed", is_flag=True, help="List the systems that urmpipe brings along.")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: SYSTEM.rrd here]."
-)
+@output_option("RUN.rrd", "The recording [default: SYSTEM.rrd, of a file FILE.rrd, here].")
 @click.option(
     "--set",
     "arguments",
@@ -43,7 +41,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--backend",
-    type=click.Choice(["native", "python"]),
+    type=OneOf(["native", "python"]),
     help="What the units run as [default: native if it can be built here].",
 )
 @output_options

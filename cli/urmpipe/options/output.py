@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
@@ -29,18 +30,22 @@ class Terminal:
     quiet: bool
 
     def answer(self, result: Callable[[], Any], text: Callable[[], None]) -> None:
-        """Print the result of a command.
+        """Print the result of a command; a reader that leaves early changes nothing.
 
         Args:
             result: Makes the object for --json.
             text: Prints the result for people.
         """
-        if self.as_json:
-            from urmpipe.printing.terminal import print_json
+        from urmpipe.boundary import leave_output
+        from urmpipe.printing.terminal import print_json
 
-            print_json(result())
-        elif not self.quiet:
-            text()
+        try:
+            if self.as_json:
+                print_json(result())
+            elif not self.quiet:
+                text()
+        except BrokenPipeError:  # the reader left, as head does: the exit code is what it is all the same
+            leave_output()
 
     def warn(self, warnings: Sequence[LogWarning], log: str = "") -> None:
         """Print warnings on standard error, behind the name of their log if given."""
@@ -63,6 +68,16 @@ class Terminal:
         from urmpipe.printing.terminal import progress_bar
 
         return progress_bar(title, quiet=self.quiet or not shown)
+
+
+def output_option(metavar: str, told: str) -> Callable[[Command], Command]:
+    """Return the option -o, which names the file that a command writes.
+
+    Args:
+        metavar: What the file is called in the help.
+        told: The help.
+    """
+    return click.option("-o", "--output", metavar=metavar, type=click.Path(path_type=Path), help=told)
 
 
 def debug_option(command: Command) -> Command:
@@ -100,5 +115,5 @@ def _tell_defaults(ctx: click.Context, param: click.Parameter, quiet: bool) -> b
     if ctx.obj and not quiet:
         from urmpipe.printing.terminal import say
 
-        say(ctx.obj, err=True)
+        say(f"note: {ctx.obj}", err=True)
     return quiet

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from urmpipe.options.grouped import Command, grouped, names_of, with_options
-from urmpipe.options.types import DURATION, ROBOT, NamesType, OffsetType
+from urmpipe.options.types import DURATION, ROBOT, NamesType, OffsetType, OneOf
 
 if TYPE_CHECKING:
     from urmpipe_models.chains.chain import Chain
@@ -169,11 +169,9 @@ PLACING = (
 )
 TABLE = (
     MAP_OPTION,
-    click.option(
-        "--rotation", type=click.Choice(FORMS), help="Form of the recorded orientation, if it is open."
-    ),
+    click.option("--rotation", type=OneOf(FORMS), help="Form of the recorded orientation, if it is open."),
     click.option("--delimiter", metavar="CHAR", help="What parts the columns: , ; tab space."),
-    click.option("--decimal", type=click.Choice([".", ","]), help="The decimal sign."),
+    click.option("--decimal", type=OneOf([".", ","]), help="The decimal sign."),
     click.option("--time", metavar="COLUMN", help="The time column."),
     click.option(
         "--unit",
@@ -202,7 +200,7 @@ LOG = (
     click.option("--tsp", type=DURATION, help="Period of the grid [default: the log's own]."),
     click.option(
         "--derivative",
-        type=click.Choice(["central", "savgol"]),
+        type=OneOf(["central", "savgol"]),
         help="How joints are differentiated [default: by the digits].",
     ),
     click.option("--skip-bad", is_flag=True, help="Leave out rows that cannot be read, up to 1 %."),

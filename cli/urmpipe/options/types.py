@@ -4,11 +4,16 @@ from __future__ import annotations
 
 import math
 import re
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
+
+TIMES = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
+LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+ANGLES = {"": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
+"""Units that a value on the command line may have behind it, in the SI unit; without one it is in that."""
 
 
 class CatalogueType(click.ParamType[str]):
@@ -62,16 +67,81 @@ SYSTEM = CatalogueType("SYSTEM|FILE", _systems)
 """A shipped system's name, or a system file."""
 
 
+class OneOf(click.Choice[str]):
+    """One of some words."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        """Return what was found, what may have been meant, and what is allowed."""
+        from urmpipe_models.names import not_among
+
+        return not_among(str(value), self.choices)
+
+
+def parsed(
+    parse: Callable[[str], Any], text: str, ctx: click.Context | None, param: click.Parameter | None
+) -> Any:
+    """Return what a function of another package makes of a text.
+
+    Raises:
+        OptionError: With everything that is wrong with it, by the option or the key that says it.
+    """
+    from urmpipe.usage import place_of
+    from urmpipe_models.errors import OptionError, UrmpipeError
+
+    try:
+        return parse(text)
+    except UrmpipeError as error:
+        if param is None:
+            raise
+        own = f"{max(param.opts, key=len)}: "
+        found = [one.message.removeprefix(own) for one in error.findings]
+        raise OptionError(*(place_of(ctx, param, said) for said in found)) from None
+
+
+class ParsedType(click.ParamType[Any]):
+    """What a function of another package reads, which tells of what is wrong by an `UrmpipeError`.
+
+    Args:
+        name: What the value is called in the help.
+        parse: Returns the value of a text.
+    """
+
+    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
+        self.name = name
+        self._parse = parse
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the value."""
+        return parsed(self._parse, value, ctx, param) if isinstance(value, str) else value
+
+
+def quantity(text: str, units: Mapping[str, float]) -> float:
+    """Return a number with its unit behind it in SI; one without a unit is in SI; NaN if it is none."""
+    match = re.fullmatch(r"(.*?)\s*([a-z]*)", text.strip())
+    try:
+        return float(match[1]) * units[match[2]] if match else math.nan
+    except (ValueError, KeyError):
+        return math.nan
+
+
 class OffsetType(click.ParamType[Any]):
-    """A frame as X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad."""
+    """A frame as X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, or with units: 0,0,150mm."""
 
     name = "X,Y,Z[,RX,RY,RZ]"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
         """Return the transform."""
-        from urmpipe_models.robots.catalogue import parse_offset
+        from urmpipe_models.transform import from_offset
 
-        return parse_offset(value) if isinstance(value, str) else value
+        if not isinstance(value, str):
+            return value
+        parts = value.split(",")
+        values = [quantity(part, LENGTHS) for part in parts[:3]]
+        values += [quantity(part, ANGLES) for part in parts[3:]]
+        if len(values) not in (3, 6) or not all(map(math.isfinite, values)):
+            allowed = "X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
+            self.fail(f"found {value!r}, allowed: {allowed}", param, ctx)
+        return from_offset(values)
 
 
 class NamesType(click.ParamType[Any]):
@@ -104,28 +174,19 @@ class JointValuesType(click.ParamType[tuple[float, ...]]):
         return values
 
 
-class QuantityType(click.ParamType[float]):
-    """A positive number in the SI unit, or with its unit behind it: 0.005 or 5ms."""
+class DurationType(click.ParamType[float]):
+    """A positive time in s, or with its unit behind it: 0.005 or 5ms."""
 
-    def __init__(self, name: str, units: dict[str, float], example: str) -> None:
-        self.name = name
-        self.units = {"": 1.0} | units
-        self.example = example
+    name = "SECONDS"
 
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
-        """Return the quantity in SI."""
+        """Return the time in [s]."""
         if isinstance(value, float):
             return value
-        match = re.fullmatch(r"(.*?)\s*([a-z]*)", str(value).strip())
-        try:
-            number = float(match[1]) * self.units[match[2]] if match else math.nan
-        except (ValueError, KeyError):
-            number = math.nan
-        if not 0.0 < number < math.inf:
-            self.fail(f"found {value!r}, allowed: {self.example}", param, ctx)
-        return number
+        seconds = quantity(str(value), TIMES)
+        if not 0.0 < seconds < math.inf:
+            self.fail(f"found {value!r}, allowed: a positive time in s, such as 0.005 or 5ms", param, ctx)
+        return seconds
 
 
-DURATION = QuantityType(
-    "SECONDS", {"s": 1.0, "ms": 1e-3, "us": 1e-6}, "a positive time in s, such as 0.005 or 5ms"
-)
+DURATION = DurationType()
