@@ -49,7 +49,7 @@ if TYPE_CHECKING:
     from urmpipe_models.robots.catalogue import robot_names as robot_names
     from urmpipe_models.transform import Transform as Transform
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
-    from urmpipe_pipeline.comparison.comparison import Deviation as Deviation
+    from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
     from urmpipe_pipeline.export import Exported as Exported
     from urmpipe_pipeline.joint_log import JointLog as JointLog
     from urmpipe_pipeline.runs.results import Run as Run
@@ -64,7 +64,7 @@ _HOME = {
     "Chain": "urmpipe_models.chains.chain",
     "Comparison": "urmpipe_pipeline.comparison.comparison",
     "CosimulationError": "urmpipe_models.errors",
-    "Deviation": "urmpipe_pipeline.comparison.comparison",
+    "Deviation": "urmpipe_pipeline.comparison.deviation",
     "Exported": "urmpipe_pipeline.export",
     "FmuError": "urmpipe_models.errors",
     "InverseResult": "urmpipe.inverse.result",

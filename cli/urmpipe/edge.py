@@ -133,11 +133,13 @@ def _checked(known: Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any])
 
 def _doubts(made: Any, given: Iterable[Any]) -> Iterator[str]:
     """Yield the warnings of a result that were not shown when what it was made of was made."""
-    seen = [one for value in given for one in (value if isinstance(value, (list, tuple)) else (value,))]
-    if any(made is one for one in seen):
+    operands = [one for value in given for one in (value if isinstance(value, (list, tuple)) else (value,))]
+    seen = {warning.message for one in operands for warning in getattr(one, "warnings", ())}
+    if not hasattr(made, "to_frame"):
         return
     for warning in getattr(made, "warnings", ()):
-        yield warning.message
+        if warning.message not in seen:
+            yield warning.message
     for deviation in getattr(made, "runs", ()):
-        if not any(deviation.run is one for one in seen):
-            yield from (warning.of(deviation.name).message for warning in deviation.run.warnings)
+        doubts = (one for one in deviation.run.warnings if one.message not in seen)
+        yield from (one.of(deviation.name).message for one in doubts)

@@ -167,7 +167,12 @@ def refuse_foreign(files: Sequence[Path]) -> None:
 def refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:
     """Raise a `LogError` with all warnings if they are to be errors."""
     if strict and warnings:
-        raise LogError(*(Finding(f"{w.kind}: {w.message} (--strict)", row=w.row) for w in warnings))
+        raise LogError(*(Finding(f"{_told(one)} (--strict)", row=one.row) for one in warnings))
+
+
+def _told(warning: LogWarning) -> str:
+    """Return a warning with its kind and its row, as the terminal prints it."""
+    return ": ".join(filter(None, (warning.kind, warning.row and f"row {warning.row}", warning.message)))
 
 
 def offset_of(frame: Transform) -> tuple[float, ...]:

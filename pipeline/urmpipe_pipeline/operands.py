@@ -40,7 +40,7 @@ def load_runs(
 
     Args:
         operands: Recordings, logs, paths, folders; runs as they are.
-        robot: The arm; of a recording it replaces the one inside.
+        robot: The arm; of a recording or a run it replaces the one inside.
         read: How to read the CSV files; `options_of_each` tells which of it holds for which.
         tsp: Period of the grid in [s], of the CSV files.
         derivative: How the joints of CSV files are differentiated.
@@ -55,7 +55,7 @@ def load_runs(
     def run_of(operand: Path | Run) -> Run:
         """Return the run that an operand is, or is read as."""
         if isinstance(operand, Run):
-            return operand
+            return on_robot(operand, robot)
         own = None if _is_recording(operand) else next(each)
         return load_run(operand, robot=robot, read=own, tsp=tsp, derivative=derivative)
 

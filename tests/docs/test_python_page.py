@@ -75,7 +75,7 @@ def test_both_sides_find_the_same(sides: dict[str, Path]) -> None:
     assert frames[0].equals(frames[1])
     joints = [np.loadtxt(folder / "joints.csv", delimiter=",", skiprows=1) for folder in sides.values()]
     assert (joints[0] == joints[1]).all()
-    assert joints[0].shape == (ROWS, 7)
+    assert len(joints[0]) == ROWS
     maps = [(folder / "lab.toml").read_bytes() for folder in sides.values()]
     assert maps[0] == maps[1]
 
@@ -94,9 +94,7 @@ def options() -> dict[str, set[str]]:
         assert command is not None
         for one in command.commands.values() if isinstance(command, click.Group) else [command]:
             if name not in ("demo", "robot") and one.name != "check":
-                longest = {
-                    max(param.opts, key=len) for param in one.params if isinstance(param, click.Option)
-                }
+                params = [param for param in one.params if isinstance(param, click.Option)]
                 found[f"{name} {one.name}"] = {max(param.opts, key=len) for param in params}
     return found
 

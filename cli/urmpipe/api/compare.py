@@ -21,17 +21,18 @@ from urmpipe.guards import (
 )
 from urmpipe.words import by_command_line
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
+from urmpipe_models.errors import Finding, OptionError, RecordingError
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.junit import write_junit
+from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
 from urmpipe_pipeline.comparison.statistics_table import write_statistics
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.operands import load_comparison, load_run, on_robot
+from urmpipe_pipeline.operands import load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.recording import is_recording, read_recording, record
 from urmpipe_pipeline.runs.derivatives import Method
@@ -98,21 +99,21 @@ def compare(
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
-    operands = one_or_many(logs)
-    refuse_others("operands", [reference, *operands], (Run, Comparison), OPERANDS)
-    allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
-    options = CompareOptions(allowed, tcp, sync, align)
-    level = _noise_level(noise, baseline)
-    given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
-    given.refuse_unused([reference, *operands])
+    operands = [reference, *one_or_many(logs)]
+    refuse_others("operands", operands, (Run, Comparison), OPERANDS)
+    kept = [*_files([*operands, baseline]), *map(Path, inputs)]
     outputs: dict[OutputKind, PathLike | None] = {
         "recording": output, "junit": junit, "statistics": statistics,
     }  # fmt: skip
-    earlier = None if baseline is None else _earlier(baseline)
-    kept = [*_files([reference, *operands, baseline]), *map(Path, inputs)]
-    with guarded_outputs(outputs, kept) as parts:
-        made = None if operands or earlier is None else _made_before(reference, output)
-        made = made or _compared(reference, operands, given, options)
+    with told_in_junit(None if junit is None else Path(junit), kept), guarded_outputs(outputs, kept) as parts:
+        allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
+        options = CompareOptions(allowed, tcp, sync, align)
+        level = _noise_level(noise, baseline)
+        given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
+        given.refuse_unused(operands)
+        earlier = None if baseline is None else _earlier(baseline)
+        made = None if operands[1:] or earlier is None else _made_before(reference, output)
+        made = made or _compared(operands, given, options)
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         if junit is not None:
@@ -131,13 +132,12 @@ class _Given:
     tsp: float | None
     derivative: Method | None
 
-    def run_of(self, operand: Operand) -> Run:
-        """Return the run that an operand is, or is read as."""
-        if isinstance(operand, Run):
-            return on_robot(operand, self.robot)
-        return load_run(
-            Path(operand), robot=self.robot, read=self.read, tsp=self.tsp, derivative=self.derivative
-        )
+    def runs(self, operands: Sequence[Operand]) -> list[Run]:
+        """Return the runs that operands are, or are read as."""
+        return load_runs(
+            [one if isinstance(one, Run) else Path(one) for one in operands],
+            robot=self.robot, read=self.read, tsp=self.tsp, derivative=self.derivative,
+        )  # fmt: skip
 
     def refuse_unused(self, operands: Sequence[Operand | Comparison]) -> None:
         """Raise an `OptionError` if it is said how logs are read, and every operand was ingested before.
@@ -173,16 +173,13 @@ def _noise_level(
     return complete_noise(noise)
 
 
-def _compared(
-    reference: Operand | Comparison,
-    logs: Sequence[Operand],
-    given: _Given,
-    options: CompareOptions,
-) -> Comparison:
+def _compared(operands: Sequence[Operand | Comparison], given: _Given, options: CompareOptions) -> Comparison:
     """Return the comparison of some logs with a reference, or of one log with what it recorded itself."""
-    if isinstance(reference, Comparison):
-        raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
-    first, *others = for_each(given.run_of, (reference, *logs))
+    made = [one for one in operands if isinstance(one, Comparison)]
+    if made:
+        allowed = "a Comparison alone, with a baseline"
+        raise OptionError(f"found {made[0].name}, a Comparison, among what is compared, allowed: {allowed}")
+    first, *others = given.runs([one for one in operands if not isinstance(one, Comparison)])
     return compare_runs(first, others, options) if others else compare_recorded(first, options)
 
 
