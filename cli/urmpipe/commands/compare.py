@@ -168,7 +168,9 @@ def compare(
     terminal.warn(result.warnings)
     written = {"JUnit": options["junit"], "Statistics": options["statistics"]}
     terminal.answer(result.to_dict, lambda: _print(result, replaces, written))
-    return 0 if result.accepted else 1
+    if terminal.quiet and result.verdict == "fail":
+        _tell_failure(result)
+    return 0 if result.verdict == "pass" else 1
 
 
 def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:
@@ -181,6 +183,13 @@ def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) 
         if path:
             say(f"{title}: {path}")
     print_recording(result.recording, replaced=replaces)
+
+
+def _tell_failure(result: Comparison) -> None:
+    """Print the verdict alone on standard error: a job that fails says why, however quiet it is."""
+    from urmpipe.printing.comparison import print_verdict
+
+    print_verdict(result, err=True)
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:

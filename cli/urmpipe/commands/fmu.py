@@ -120,7 +120,7 @@ def build(
       urmpipe fmu build my_unit.py
     """
     from urmpipe.guards import place_robot
-    from urmpipe.printing.fmu import built_dict, print_built
+    from urmpipe.printing.fmu import print_built
     from urmpipe.printing.terminal import prints_apart
     from urmpipe.systems.log_tables import read_table
     from urmpipe.systems.units import column_names
@@ -141,7 +141,7 @@ def build(
         made = urmpipe.build_fmu(
             unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
         )
-    terminal.answer(lambda: built_dict(made), lambda: print_built(made))
+    terminal.answer(made.to_dict, lambda: print_built(made))
     return 0
 
 

@@ -78,7 +78,7 @@ def ingest(
             read=reading.options,
             output=target,
             audit=audit,
-            log_map=map_output,
+            write_map=map_output,
             map_robot=reading.robot,
             inputs=reading.files,
             progress=progress,

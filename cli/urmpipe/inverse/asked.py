@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe.guards import Robot, place_robot
+from urmpipe.guards import Frame, Robot, place_robot
 from urmpipe.inverse.output import Written
 from urmpipe.inverse.targets import GivenTargets
 from urmpipe_models.arrays import FloatArray
@@ -19,7 +19,6 @@ from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, e
 from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import METHODS, Method
 from urmpipe_models.robots.catalogue import robot_names
-from urmpipe_models.transform import Transform
 
 TYPED = 1e-3
 """A start beyond a limit by this, in [rad] or [m], is on it: people type limits with few digits."""
@@ -113,7 +112,7 @@ def _what_no_path_has(asked: Asked, kind: Written | None) -> Iterator[str]:
         )
 
 
-def start_of(arm: Chain, start: Sequence[float] | None) -> FloatArray | None:
+def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
     """Return the start as an array in [rad] and [m], shape (joints,).
 
     Raises:
@@ -146,7 +145,7 @@ def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[str]:
             yield f"--start: found {joint.name} = {value:g}, allowed: {limits}{degrees}"
 
 
-def arm_of(robot: Robot | None, base: Transform | None, tool: Transform | None) -> Chain:
+def arm_of(robot: Robot | None, base: Frame | None, tool: Frame | None) -> Chain:
     """Return the arm on its base and with its tool.
 
     Raises:
