@@ -54,6 +54,9 @@ def _noise(text: str) -> dict[str, float]:
     return parse_noise(text)
 
 
+SYNC = ParsedType("sync", _sync)
+
+
 def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command], Command]:
     """Return an option that names a file to write or to read."""
     return click.option(name, *names, metavar=metavar, type=click.Path(path_type=Path), help=help)
@@ -85,7 +88,7 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
     "--sync",
     default="start",
     show_default=True,
-    type=ParsedType("sync", _sync),
+    type=SYNC,
     metavar="start|auto|SECONDS",
     help="Start both together, find the offset by the motion, or t_reference = t_log + SECONDS.",
 )
