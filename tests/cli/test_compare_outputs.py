@@ -185,16 +185,20 @@ def test_options_complete_in_the_shell() -> None:
         assert [item.type for item in shell.get_completions(["compare", option], "")] == ["file"]
 
 
-def test_a_verdict_of_fail_writes_all_and_bad_input_nothing(folder: Path, capsys: Captured) -> None:
+def test_a_verdict_of_fail_writes_all_and_bad_input_nothing_but_its_error(
+    folder: Path, capsys: Captured
+) -> None:
     files = ["--junit", "v.xml", "--csv", "v.csv", "-o", "v.rrd"]
     assert compare("bad.csv", *files) == 1
     out = capsys.readouterr().out.splitlines()
     assert {"JUnit: v.xml", "Statistics: v.csv"} <= set(out)
     assert names() == {"v.xml", "v.csv", "v.rrd"}
     before = {name: (folder / name).read_bytes() for name in names()}
-    assert compare("good.csv", "missing.csv", *files, "-q") == 2
-    assert compare("good.csv", "--strict", "--tsp", "7ms", *files, "-q") == 2
-    assert compare("good.csv", "--tolerance", "0", *files, "-q") == 2
+    for wrong in (["missing.csv"], ["--strict", "--tsp", "7ms"], ["--tolerance", "0"]):
+        assert compare("good.csv", *wrong, *files, "-q") == 2
+        told = (folder / "v.xml").read_text(encoding="utf-8")
+        assert ("<error" in told) == (wrong[0] != "--tolerance")  # click refuses that one before
+        (folder / "v.xml").write_bytes(before["v.xml"])
     (folder / "notes.txt").write_text("mine")
     assert compare("good.csv", "--junit", "v.xml", "--csv", "notes.txt", "-o", "v.rrd", "-q") == 2
     assert compare("good.csv", "--junit", "v.xml", "--csv", "v.csv", "-o", "notes.txt", "-q") == 2
@@ -348,7 +352,7 @@ def test_results_are_operands_of_the_function() -> None:
     )
     with pytest.raises(OptionError) as error:
         urmpipe.compare(before, baseline=before, output="a.rrd")
-    assert str(error.value) == "-o: found a.rrd with a comparison that stands already, allowed: without"
+    assert str(error.value) == "output: found a.rrd with a comparison that stands already, allowed: without"
 
 
 def test_the_option_of_a_file_is_a_path() -> None:
