@@ -254,7 +254,8 @@ def _run_part(run: Run, ident: str) -> Part:
     """Return the part of one log that was only ingested."""
     missed = log_tables.missed_table(run)
     blocks = (*((missed,) if missed else ()), *gallery.run_figures(run), *_run_tables(run))
-    return Part(f"Log {run.name}", blocks, (), ident, "", run_facts(run))
+    title = f"Log {run.name}" if run.goals is None else f"Targets {run.name}"
+    return Part(title, blocks, (), ident, "", run_facts(run))
 
 
 def _run_tables(run: Run) -> tuple[Block, ...]:
