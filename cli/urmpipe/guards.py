@@ -2,25 +2,35 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import TypeVar
 
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_models.transform import Transform, from_offset, rpy_of
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.recording import is_recording
 
 PathLike = str | Path
 Robot = Chain | str | Path
+Frame = Transform | Sequence[float] | FloatArray
+"""A frame: x, y, z in [m] and, if it turns, rx, ry, rz in [rad]; or a 4 by 4 matrix; or a `Transform`."""
+
+FRAME_ALLOWED = "x, y, z in m and rx, ry, rz in rad (3 or 6 numbers), a 4 x 4 matrix, or a Transform"
+
+Given = TypeVar("Given")
 
 
 def place_robot(
     robot: Robot | None,
-    base: Transform | None = None,
-    tool: Transform | None = None,
+    base: Frame | None = None,
+    tool: Frame | None = None,
     *,
     base_link: str | None = None,
     tip_link: str | None = None,
@@ -38,16 +48,52 @@ def place_robot(
         RobotError: If the robot is unknown, or with everything that is wrong with its file.
         OptionError: If the arm is placed or cut, but there is none.
     """
+    frames = (frame_of("base", base), frame_of("tool", tool))
     if robot is not None:
         chain = (
             robot if isinstance(robot, Chain) else load_robot(robot, base_link=base_link, tip_link=tip_link)
         )
-        return chain.placed(base, tool)
+        return chain.placed(*frames)
     if any(value is not None for value in (base, tool, base_link, tip_link)):
         raise OptionError(
             "found --base, --tool, --base-link or --tip without a robot; allowed: with --robot NAME|FILE"
         )
     return None
+
+
+def frame_of(name: str, given: Frame | None) -> Transform | None:
+    """Return the frame that was given; None for none.
+
+    Args:
+        name: The keyword, for messages.
+        given: x, y, z in [m] and optionally rx, ry, rz in [rad]; a homogeneous matrix, shape (4, 4); a transform.
+
+    Raises:
+        OptionError: If it is anything else, or its matrix does not turn.
+    """
+    if given is None or isinstance(given, Transform):
+        return given
+    found = f"found {given!r}" if isinstance(given, str) else f"found a {type(given).__name__}"
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise OptionError(f"{name}: {found}, allowed: {FRAME_ALLOWED}") from None
+    if values.shape not in ((3,), (6,), (4, 4)) or not np.isfinite(values).all():
+        raise OptionError(f"{name}: {found} of shape {values.shape}, allowed: {FRAME_ALLOWED}, all finite")
+    if values.ndim == 1:
+        return from_offset(values.tolist())
+    turn = values[:3, :3]
+    proper = np.abs(turn @ turn.T - np.eye(3)).max() < ROTATION_TOLERANCE and np.linalg.det(turn) > 0.0
+    if not proper or np.abs(values[3] - (0.0, 0.0, 0.0, 1.0)).max() > ROTATION_TOLERANCE:
+        raise OptionError(f"{name}: found a matrix that is no rigid motion, allowed: a rotation and a translation")
+    x, y, z = (tuple(map(float, row)) for row in turn)
+    return Transform((x, y, z), tuple(map(float, values[:3, 3])))
+
+
+def one_or_many(given: Given | Sequence[Given]) -> list[Given]:
+    """Return what was given as a list: a path, a run or another result alone is a list of one."""
+    alone = isinstance(given, (str, Path)) or not isinstance(given, Iterable) or isinstance(given, Mapping)
+    return [given] if alone else list(given)
 
 
 def refuse_shared(targets: Mapping[OutputKind, Path]) -> None:

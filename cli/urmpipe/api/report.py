@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.guards import PathLike, refuse_foreign
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import read_recording
@@ -21,8 +22,8 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.report.headless import FigureFormat
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Report:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Report(Shown):
     """A report that was written.
 
     Attributes:
@@ -34,6 +35,11 @@ class Report:
     path: Path
     results: tuple[Result, ...]
     figures: tuple[FigureFile, ...] = ()
+
+    def _headline(self) -> str:
+        """Return the file, and what it shows."""
+        figures = number_of(len(self.figures), "figure file") if self.figures else ""
+        return line_of(str(self.path), number_of(len(self.results), "result"), figures)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a compared log and quantity, as `Comparison.to_frame`, for all comparisons in it."""

@@ -169,7 +169,7 @@ def compare(
             if path:
                 say(f"{title}: {path}")
         print_recording(result.recording)
-    return 0 if result.accepted else 1
+    return 0 if result.verdict == "pass" else 1
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:

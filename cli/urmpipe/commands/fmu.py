@@ -124,7 +124,7 @@ def build(
       urmpipe fmu build my_unit.py
     """
     from urmpipe.guards import place_robot
-    from urmpipe.printing.fmu import built_dict, print_built
+    from urmpipe.printing.fmu import print_built
     from urmpipe.printing.terminal import print_json, print_warnings, prints_apart, say
     from urmpipe.systems.log_tables import read_table
     from urmpipe.systems.units import column_names
@@ -147,7 +147,7 @@ def build(
             unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
         )
     if as_json:
-        print_json(built_dict(made))
+        print_json(made.to_dict())
     elif not quiet:
         print_built(made)
     return 0
