@@ -58,7 +58,9 @@ def banner(comparisons: Sequence[Comparison], runs: Sequence[Run], links: Sequen
         headline = f"{_who(failed, total)} out of tolerance{_named(failed, total)}"
     else:
         headline = f"{_who([one for one, _ in places], total)} within tolerance"
-    state = "fail" if failed else "pass"
+    state = "fail" if any(one.verdict == "fail" for one in comparisons) else "pass"
+    if state == "fail" and not failed:
+        headline += ", but worse than the baseline"
     return Banner(state, state.upper(), headline, (*_decisive(run, href), *_against(comparisons)))
 
 
@@ -83,9 +85,18 @@ def _decisive(run: Deviation, href: str) -> tuple[Fact, ...]:
     return (
         Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", run.name, href=href),
         Fact("How much", amount),
+        *_joint_furthest_off(run),
         Fact("When", f"t = {text.seconds(one.t_max)} s"),
-        Fact("Where (x, y, z)", f"{text.point(run.place(one))} m"),
+        Fact("Where the log was (x, y, z)", f"{text.point(run.place(one))} m"),
     )
+
+
+def _joint_furthest_off(run: Deviation) -> tuple[Fact, ...]:
+    """Return the joint that deviates most, of a log that is out of tolerance by something else."""
+    joint = run.furthest_joint("rad") or run.furthest_joint("m")
+    if run.verdict == "pass" or joint is None or run.decisive.kind == "joint" or not joint.max:
+        return ()
+    return (Fact("Joint furthest off", f"{joint.quantity}: {text.quantity(joint.max, joint.unit)}"),)
 
 
 def _against(comparisons: Sequence[Comparison]) -> tuple[Fact, ...]:

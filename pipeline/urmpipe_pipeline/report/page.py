@@ -203,7 +203,10 @@ def _summary(comparison: Comparison, links: Sequence[str]) -> Summary:
     return Summary(
         f"Verdict{'s' if several else ''} against {comparison.reference.name}"
         f"{', best to worst' if several else ''}",
-        tuple(card(run, link) for run, link in zip(comparison.ranking, links, strict=True)),
+        tuple(
+            card(run, link, comparison.covered(run))
+            for run, link in zip(comparison.ranking, links, strict=True)
+        ),
         verdict_tables.ranking_tables(comparison, links) if several else (),
         f"Tolerance: {tolerance_words(comparison)}. The bars show how much of it is used up.",
     )
