@@ -1,4 +1,4 @@
-"""The edge of the public functions: what they are given is checked, what they say is said in Python's words."""
+"""The edge of the public functions: keywords are checked, and messages are in Python's words."""
 
 from __future__ import annotations
 
@@ -93,8 +93,8 @@ KINDS = {
 def public(function: Callable[Parameters, Made]) -> Callable[Parameters, Made]:
     """Return a public function that checks its keywords and speaks to whom calls it.
 
-    Called from Python, its errors and warnings name keywords, and its warnings are shown as `UrmpipeWarning`s.
-    A command has checked its options itself, prints its warnings, and its user knows options alone.
+    Called from Python, its errors and warnings name keywords, and its warnings are shown as
+    `UrmpipeWarning`s. A command has checked its options itself, and prints its warnings.
     """
     known = signature(function)
 
@@ -133,11 +133,13 @@ def _checked(known: Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any])
 
 def _doubts(made: Any, given: Iterable[Any]) -> Iterator[str]:
     """Yield the warnings of a result that were not shown when what it was made of was made."""
-    seen = [one for value in given for one in (value if isinstance(value, (list, tuple)) else (value,))]
-    if any(made is one for one in seen):
+    operands = [one for value in given for one in (value if isinstance(value, (list, tuple)) else (value,))]
+    seen = {warning.message for one in operands for warning in getattr(one, "warnings", ())}
+    if not hasattr(made, "to_frame"):
         return
     for warning in getattr(made, "warnings", ()):
-        yield warning.message
+        if warning.message not in seen:
+            yield warning.message
     for deviation in getattr(made, "runs", ()):
-        if not any(deviation.run is one for one in seen):
-            yield from (warning.of(deviation.name).message for warning in deviation.run.warnings)
+        doubts = (one for one in deviation.run.warnings if one.message not in seen)
+        yield from (one.of(deviation.name).message for one in doubts)

@@ -110,7 +110,9 @@ def keywords(message: str) -> str:
         parts += [_spelled(message[end : foreign.start()]), foreign[0]]
         end = foreign.end()
     text = "".join([*parts, _spelled(message[end:])])
-    return _CALLED.sub(r"\1(\2)", _TOGETHER.sub(r"read=ReadOptions(\1, \2)", text)) if text != message else text
+    if text == message:
+        return message
+    return _CALLED.sub(r"\1(\2)", _TOGETHER.sub(r"read=ReadOptions(\1, \2)", text))
 
 
 def _spelled(text: str) -> str:
@@ -143,20 +145,15 @@ def _written(shape: Shape, value: str | None) -> str:
     """Return a value of a field of `ReadOptions` as Python writes it."""
     if shape == "flag":
         return "True"
-    if not value:
-        return "..."
-    key, _, own = value.rpartition("=")
-    match shape:
-        case "units":
-            return f'{{"{key}": "{own}"}}'
-        case "interval":
-            return f'{{"{key}": (LOW, HIGH)}}'
-        case "list":
-            cells = (part if part == "..." else f'"{part}"' for part in value.split(","))
-            return f"[{', '.join(cells)}]"
-        case "text" if value != value.upper() or value[0].isdigit():
-            return f'"{value}"'
-    return value
+    key, _, own = (value or "...").rpartition("=")
+    if value and shape == "units":
+        return f'{{"{key}": "{own}"}}'
+    if value and shape == "interval":
+        return f'{{"{key}": (LOW, HIGH)}}'
+    if value and shape == "list":
+        cells = (part if part == "..." else f'"{part}"' for part in value.split(","))
+        return f"[{', '.join(cells)}]"
+    return f'"{own}"' if shape == "text" and not own.isupper() and value else own
 
 
 def _quoted(value: str) -> str:

@@ -14,7 +14,7 @@ LEAST_LIKE = 0.6
 def did_you_mean(name: str, allowed: Iterable[str]) -> str:
     """Return ` (did you mean NAME?)` with the allowed name most like another, or nothing if none is.
 
-    Small and capital letters count as the same.
+    Small and capital letters count as the same, hyphens, underscores and spaces for nothing.
     """
     near = _nearest_first(name, allowed, LEAST_LIKE)
     return f" (did you mean {near[0]}?)" if near else ""
@@ -37,5 +37,11 @@ def listed(name: str, allowed: Iterable[str]) -> str:
 
 def _nearest_first(name: str, allowed: Iterable[str], least: float) -> list[str]:
     """Return the names that are at least so much like another, the nearest first, else in their order."""
-    like = {one: SequenceMatcher(None, one.lower(), name.lower()).ratio() for one in allowed}
+    wanted = _letters(name)
+    like = {one: SequenceMatcher(None, _letters(one), wanted).ratio() for one in allowed}
     return sorted((one for one in like if like[one] >= least), key=lambda one: -like[one])
+
+
+def _letters(name: str) -> str:
+    """Return a name without what is easily written otherwise."""
+    return name.lower().translate(dict.fromkeys(map(ord, "-_ ")))

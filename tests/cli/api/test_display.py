@@ -6,13 +6,15 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import urmpipe
 from urmpipe_datasets import LOGS
 from urmpipe_models.display import Shown
+from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
-OTHERS = {"ReadOptions", "Targets", "Transform"}
+OTHERS = {"LogMap", "ReadOptions", "Targets", "Transform"}
 """Public classes that are no results: what they hold is what they show."""
 
 
@@ -20,11 +22,19 @@ OTHERS = {"ReadOptions", "Targets", "Transform"}
 def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
     """One of each public result class, by its name."""
     folder = tmp_path_factory.mktemp("results")
-    run = replace(urmpipe.ingest(LOGS / "matlab.csv", robot="urm6"), name="<b>&log")
-    comparison = urmpipe.compare(LOGS / "path.csv", [run])
+    for name in ("matlab", "path"):
+        head = (LOGS / f"{name}.csv").read_text(encoding="utf-8").splitlines()[:101]
+        (folder / f"{name}.csv").write_text("\n".join(head) + "\n", encoding="utf-8")
+    run = replace(urmpipe.ingest(folder / "matlab.csv", "urm6"), name="<b>&log")
+    comparison = urmpipe.compare(folder / "path.csv", run)
+    simulation = Simulation(
+        name="system", description="", t_ns=np.arange(2), step=0.005, system_svg="", system_text="",
+        signals=(Signal("meter", "norm", np.zeros(2)),), blocks=(), failed=None, warnings=(),
+        provenance=run.provenance,
+    )  # fmt: skip
     made = [
         run, run.log, comparison, comparison.runs[0], urmpipe.load_robot("urm6"),
-        urmpipe.ik([[0.4, 0.1, 0.4]], "ur5e"), urmpipe.simulate("one-drive", duration=0.1, backend="python"),
+        urmpipe.ik([[0.4, 0.1, 0.4]], "ur5e"), simulation,
         urmpipe.build_fmu("dc_drive", backend="python", output=folder),
         urmpipe.export(run, folder / "log.csv"), urmpipe.report([run], folder / "report.html"),
     ]  # fmt: skip
@@ -63,8 +73,9 @@ def test_each_result_has_a_dictionary_and_all_but_the_arm_a_frame(results: dict[
 
 
 def test_the_lines_say_what_each_holds(results: dict[str, Any]) -> None:
-    assert repr(results["Run"]) == "<Run <b>&log: urm6, 7383 rows in 36.91 s, grid of 7383 samples>"
-    assert repr(results["Comparison"]).startswith("<Comparison path: pass: <b>&log pass (")
+    assert repr(results["Run"]) == "<Run <b>&log: urm6, 100 rows in 0.495 s, grid of 100 samples, 1 warning>"
+    line = "<Comparison <b>&log-against-path: pass: <b>&log pass (4.56e-05 m), 2 warnings>"
+    assert repr(results["Comparison"]) == line
     assert repr(results["InverseResult"]) == (
         "<InverseResult targets: pass, ur5e, 1 of 1 target reached, iterative>"
     )
