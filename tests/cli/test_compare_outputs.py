@@ -19,6 +19,7 @@ from click.shell_completion import ShellComplete
 from numpy.typing import NDArray
 
 import urmpipe
+from urmpipe.commands.compare import SYNC
 from urmpipe.main import cli, run
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.comparison import Comparison, Statistics
@@ -302,6 +303,30 @@ def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
     assert said(capsys) == "error: --noise: found without --baseline, allowed: with an earlier comparison"
     assert compare("good.csv", "--baseline", "good.rrd", "--noise", "-1", "-q") == 2
     assert said(capsys) == f"error: --noise: found '-1', {ALLOWED}"
+
+
+@pytest.mark.parametrize("flags", [("-q",), ("-q", "--json")])
+def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[str, ...]) -> None:
+    assert compare("good.csv", *flags) == 0
+    assert capsys.readouterr().err == ""
+    assert compare("bad.csv", *flags) == 1
+    out, err = capsys.readouterr()
+    assert bool(out) == ("--json" in flags)
+    assert err.startswith("FAIL  bad out of tolerance against wanted\n      max |")
+    assert err.count("\n") == 2
+
+
+def test_tolerances_add_up(capsys: Captured) -> None:
+    assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "norm=2mm", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.001, "norm": 0.002}
+    assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "axis=2mm") == 2
+
+
+@pytest.mark.parametrize("offset", ["0.2", "200ms", "0.2 s", "-200 ms"])
+def test_an_offset_of_clocks_may_have_its_unit(offset: str) -> None:
+    seconds = SYNC.convert(offset, None, None)
+    assert abs(seconds) == 0.2
+    assert (seconds < 0.0) == offset.startswith("-")
 
 
 def test_a_baseline_is_never_replaced(capsys: Captured) -> None:
