@@ -2,18 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, RecordingError
+from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_recording, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.ingest import OF_ROBOT, ingest_log, kinematics
+from urmpipe_pipeline.runs.ingest import OF_ROBOT, UNUSED_PERIOD, ingest_log, kinematics
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.sources.options_of_each import options_of_each
 
 COMPARISON = (
     "found the recording of a comparison, allowed: one that ingest wrote; to hold it against another"
@@ -24,6 +26,47 @@ SIMULATION = (
     "found the recording of a simulation, allowed: one that ingest wrote; a simulation is judged by the delta"
     " meters in it: urmpipe report shows what they found"
 )
+
+
+def load_runs(
+    operands: Sequence[Path | Run],
+    *,
+    robot: Chain | None = None,
+    read: ReadOptions | None = None,
+    tsp: float | None = None,
+    derivative: Method | None = None,
+) -> list[Run]:
+    """Return the runs of several operands; what is said of their logs holds for those that it fits.
+
+    Args:
+        operands: Recordings, logs, paths, folders; runs as they are.
+        robot: The arm; of a recording or a run it replaces the one inside.
+        read: How to read the CSV files; `options_of_each` tells which of it holds for which.
+        tsp: Period of the grid in [s], of the CSV files.
+        derivative: How the joints of CSV files are differentiated.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with any of them.
+    """
+    given = read or ReadOptions()
+    logs = [one for one in operands if not isinstance(one, Run) and not _is_recording(one)]
+    each = iter(options_of_each(for_each(log_files, logs), given, robot))
+
+    def run_of(operand: Path | Run) -> Run:
+        """Return the run that an operand is, or is read as."""
+        if isinstance(operand, Run):
+            return on_robot(operand, robot)
+        own = None if _is_recording(operand) else next(each)
+        return load_run(operand, robot=robot, read=own, tsp=tsp, derivative=derivative)
+
+    return _without_period_doubts(for_each(run_of, operands))
+
+
+def _without_period_doubts(runs: Sequence[Run]) -> list[Run]:
+    """Return the runs; a period that one of them needed is no doubt about the others."""
+    if all(UNUSED_PERIOD in run.warnings for run in runs):
+        return list(runs)
+    return [replace(run, warnings=tuple(one for one in run.warnings if one != UNUSED_PERIOD)) for run in runs]
 
 
 def load_run(
@@ -57,12 +100,17 @@ def load_run(
         raise RecordingError(Finding(COMPARISON, file=str(operand)))
     if isinstance(result, Simulation):
         raise RecordingError(Finding(SIMULATION, file=str(operand)))
-    if robot is not None and robot != result.robot:
-        tcp, warnings = kinematics(robot, result.q, result.qd, result.qdd)
-        others = [warning for warning in result.warnings if warning.kind not in OF_ROBOT]
-        made = replace(result.provenance, options={**result.provenance.options, "robot": robot.name})
-        return replace(result, robot=robot, tcp=tcp, warnings=(*others, *warnings), provenance=made)
-    return result
+    return on_robot(result, robot)
+
+
+def on_robot(run: Run, robot: Chain | None) -> Run:
+    """Return a run with the kinematics of an arm; as it is without one."""
+    if robot is None or robot == run.robot:
+        return run
+    tcp, warnings = kinematics(robot, run.q, run.qd, run.qdd)
+    others = [warning for warning in run.warnings if warning.kind not in OF_ROBOT]
+    made = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
+    return replace(run, robot=robot, tcp=tcp, warnings=(*others, *warnings), provenance=made)
 
 
 def load_comparison(operand: Path) -> Comparison | None:

@@ -82,6 +82,8 @@ def used(statistics: Statistics) -> str:
     share = statistics.used
     if share is None:
         return ""
+    if statistics.missing:
+        return f"no value at {statistics.missing} of {(statistics.samples or 0) + statistics.missing} samples"
     return f"{percent(share)} of the tolerance" if share <= 1.0 else f"{_times(share)} times the tolerance"
 
 

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from urmpipe.options.named import option_value
 from urmpipe.systems.log_tables import read_table
 from urmpipe.systems.units import unit_of
-from urmpipe.unit_options import option_value
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.units import unit_names
 from urmpipe_models.errors import UrmpipeError

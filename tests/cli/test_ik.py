@@ -422,7 +422,7 @@ def test_a_labs_defaults(capsys: Captured, folder: Path) -> None:
     )
     assert run(["ik", "default.csv"]) == 0
     assert capsys.readouterr().err.startswith(
-        f"defaults of {folder}/urmpipe.toml: robot=arm6, tolerance=axis=2mm,angle=0.5deg, seed=3\n"
+        f"note: defaults of {folder}/urmpipe.toml: robot=arm6, tolerance=axis=2mm,angle=0.5deg, seed=3\n"
     )
     (folder / "urmpipe.toml").write_text('robot = "arm6"\n[ik]\nall = true\noutput = "x.csv"\n')
     assert run(["ik", "default.csv"]) == 2

@@ -178,7 +178,7 @@ def test_a_method_that_a_path_does_not_take(capsys: Captured) -> None:
         ),
         ("--restarts", "-1", "-1 is not in the range x>=0."),
         ("--seed", "-1", "-1 is not in the range x>=0."),
-        ("--method", "magic", "'magic' is not one of 'auto', 'closed', 'iterative'."),
+        ("--method", "magic", "found 'magic', allowed: auto, closed, iterative"),
     ],
 )
 def test_values_that_make_no_sense(capsys: Captured, option: str, value: str, said: str) -> None:

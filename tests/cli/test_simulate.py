@@ -19,7 +19,7 @@ import urmpipe
 from urmpipe.api.simulate import simulate
 from urmpipe.commands.simulate import simulate as command
 from urmpipe.main import cli
-from urmpipe.unit_options import UnitType
+from urmpipe.options.types import UNIT
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.kinematics.forward import point_over_log
@@ -271,7 +271,7 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "Error: found neither a system nor --list, allowed: one of both"),
+        ((), "error: found neither a system nor --list, allowed: one of both"),
         (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of log-to-delta"),
         (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo', allowed: log"),
         (("log-to-delta", "--set", "log"), "found 'log', allowed: NAME=VALUE, each name once"),
@@ -361,7 +361,7 @@ def test_an_fmu_that_fails_at_once_leaves_an_empty_recording(following: Path, tm
 def test_names_complete_in_the_shell() -> None:
     context, argument = click.Context(command), command.params[0]
     assert argument.type.shell_complete(context, argument, "six")[0].value == "six-drives"
-    units = UnitType().shell_complete(context, argument, "dc")
+    units = UNIT.shell_complete(context, argument, "dc")
     assert [(one.value, one.type) for one in units] == [("dc_drive", "plain"), ("dc", "file")]
 
 

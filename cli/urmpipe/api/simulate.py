@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import fmpy  # noqa: F401 - Rerun is imported beside: what both import must be there before
 
 from urmpipe import __version__
+from urmpipe.edge import public
 from urmpipe.guards import PathLike, refuse_shared
 from urmpipe.systems.blocks import Blocks
 from urmpipe.systems.result import check_meters, simulation_of
@@ -30,6 +31,7 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.sources import ReadOptions
 
 
+@public
 def simulate(
     system: PathLike,
     *,

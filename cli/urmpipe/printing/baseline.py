@@ -8,14 +8,14 @@ from typing import TYPE_CHECKING
 from urmpipe.printing.columns import Column, print_columns
 from urmpipe.printing.terminal import LISTED, judged_line
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.baseline import Absent, BaselineComparison, Change, Worse
+from urmpipe_pipeline.comparison.change import Absent, BaselineComparison, Change, Worse
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 ARROW = " → "
 
-WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out"}
+WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out", "samples": "samples"}
 """What people call what may be worse."""
 
 

@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.visual import Visual
 from urmpipe_models.errors import RobotError
+from urmpipe_models.names import did_you_mean
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
     KINDS,
@@ -77,8 +77,7 @@ def _choose(tree: UrdfTree, base: str | None, tip: str | None) -> list[Edge]:
 def _is_link(tree: UrdfTree, role: str, link: str) -> bool:
     if link in tree.links:
         return True
-    near = get_close_matches(link, tree.links, 1)
-    hint = f" (did you mean {near[0]}?)" if near else ""
+    hint = did_you_mean(link, tree.links)
     tree.fault(f"{role} link {link!r} is not in the file{hint}; allowed: {_listed(tree.links)}")
     return False
 

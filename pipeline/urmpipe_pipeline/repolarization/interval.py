@@ -16,6 +16,7 @@ from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import over_rows
+from urmpipe_pipeline.sources.option_text import option
 
 Interval = tuple[float, float]
 
@@ -110,7 +111,7 @@ def double_turns(
         Finding(
             f"found {np.count_nonzero(doubles == j)} steps of about 4 pi and"
             f" {np.count_nonzero(fixed.joints == j)} of about 2 pi, allowed: wraps of one interval;"
-            f" say which with --interval {log.joints[j]}=LOW:HIGH",
+            f" say which with {option('--interval', f'{log.joints[j]}=LOW:HIGH')}",
             log.files[0].name if log.files else log.name,
             column=log.joints[j],
         )

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.sources.option_text import option
 
 _OPTIONS = {
     "encoding": "save the file as UTF-8",
@@ -40,11 +41,11 @@ def otherwise(inference: Inference) -> str:
         return "--rotation FORM"
     if inference.what.startswith("interval of "):
         joint = inference.what.removeprefix("interval of ").split(", ")[0]
-        return f"--interval {joint}=LOW:HIGH"
+        return option("--interval", f"{joint}=LOW:HIGH")
     other = _OTHER_UNIT.get(inference.value)
     if inference.what == "unit of the time" and other:
         return f"{other} with --unit COLUMN={other}"
     if inference.what.startswith("unit of ") and other:
         column = inference.what.removeprefix("unit of ").split(", ")[0]
-        return f"{other} with --unit {column}={other}"
+        return f"{other} with {option('--unit', f'{column}={other}')}"
     return ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -13,6 +13,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.sources.option_text import joints_option, option
 from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, fit, spread
 
 LACKING_TOOL = "recorded-tcp-tool"
@@ -21,12 +22,15 @@ LACKING_TOOL = "recorded-tcp-tool"
 FAR = 0.03
 """Root mean square distance in [m] that no calibration and no rounding explain."""
 
+FINEST = 1e-4
+"""Options are told to a tenth of a millimetre: where kinematics are nearer than this in [m], none helps."""
+
 
 def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     """Return a warning if the kinematics of a robot do not come near the recorded tool centre point.
 
-    A constant tool is allowed for. What would bring them together is said: another base, or two joints
-    exchanged. A log that hardly moves tells nothing, since some tool always fits.
+    A constant tool is allowed for. What would bring them together is said: two joints exchanged, one that
+    turns the other way, another base. A log that hardly moves tells nothing, since some tool always fits.
 
     Args:
         robot: The arm, or None.
@@ -43,13 +47,13 @@ def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
         f"the kinematics of {robot.name} stay {found.distance * 1e3:.1f} mm (rms) from the recorded TCP"
         f" ({found.with_tool * 1e3:.1f} mm with the tool that fits best)"
     )
-    unknown = "robot, base, units, signs or order of the joints may differ"
+    unknown = "robot, base, units, zeros, signs or order of the joints may differ"
     remedy = next(_remedies(robot, log, q, recorded), unknown)
     return [LogWarning("recorded-tcp-far", f"{said}: {remedy}")]
 
 
 def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
-    """Return a warning if kinematics and recorded tool centre point lie apart by what a tool explains.
+    """Return a warning if kinematics and recorded tool centre point lie apart by what tool or base explain.
 
     Args:
         robot: The arm.
@@ -60,30 +64,37 @@ def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
     rows = spread(log.rows)
     q, recorded = log.q[rows], log.tcp_position[rows]
     found, bare = fit(robot, q, recorded), fit(replace(robot, tool=Transform()), q, recorded)
-    if found is None or bare is None or found.distance <= CLOSE_WITH_TOOL:
+    if found is None or bare is None or found.distance <= FINEST:
         return []
     apart = f"the kinematics of {robot.name} stay {found.distance * 1e3:.1f} mm (rms) from the recorded TCP"
     if not np.isfinite(found.with_tool):
         said = f"{apart}, and the log moves too little to tell why: is a --tool or a --base missing?"
-    elif CLEARLY * found.with_tool <= found.distance and found.with_tool <= CLOSE_WITH_TOOL:
-        tool = ",".join(f"{round(value, 4) + 0.0:.4f}" for value in bare.tool)  # + 0.0: no -0.0
-        said = f"{apart}, but {found.with_tool * 1e3:.2f} mm with --tool {tool}"
     else:
-        return []
+        base, distance = _base(robot, q, recorded)
+        remedies = {f"--tool {_frame(bare.tool)}": found.with_tool, f"--base {base}": distance}
+        near = min(CLOSE_WITH_TOOL, found.distance / CLEARLY)
+        helping = [f"{left * 1e3:.2f} mm with {said}" for said, left in remedies.items() if left <= near]
+        if not helping:
+            return []
+        said = f"{apart}, but {' or '.join(helping)}"
     return [LogWarning(LACKING_TOOL, said)]
 
 
 def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[str]:
     """Yield what brings kinematics and recorded points together."""
     columns = [column for column in log.columns if column.role == "joint"]
-    called = [column.header or str(column.number) for column in columns] or log.joints
     for first, second in combinations(range(q.shape[1]), 2):
         order = list(range(q.shape[1]))
         order[first], order[second] = second, first
         found = fit(robot, q[:, order], recorded)
         if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
-            names = ",".join(called[j] for j in order)
-            yield f"with {log.joints[first]} and {log.joints[second]} exchanged they agree (--joints {names})"
+            names = option("--joints", ",".join(log.joints[j] for j in order))
+            said = joints_option([columns[j] for j in order]) if columns else names
+            yield f"with {log.joints[first]} and {log.joints[second]} exchanged they agree ({said})"
+    for j, name in enumerate(log.joints):
+        found = fit(robot, q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0), recorded)
+        if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
+            yield f"with {name} counted the other way they agree (sign = -1 of its column in a --map)"
     base, distance = _base(robot, q, recorded)
     if distance <= CLOSE_WITH_TOOL:
         yield f"on another base they agree within {distance * 1e3:.2f} mm (--base {base})"
@@ -104,4 +115,10 @@ def _base(robot: Chain, q: FloatArray, recorded: FloatArray) -> tuple[str, float
     miss = computed @ turn.T + shift - wanted
     x, y, z = (tuple(row) for row in turn.tolist())
     numbers = (*shift.tolist(), *rpy_of((x, y, z)))
-    return ",".join(f"{value:.4f}" for value in numbers), float(np.sqrt((miss**2).sum(axis=1).mean()))
+    return _frame(numbers), float(np.sqrt((miss**2).sum(axis=1).mean()))
+
+
+def _frame(numbers: Sequence[float]) -> str:
+    """Return X,Y,Z[,RX,RY,RZ] with tenths of a millimetre or of a milliradian; no turn if it is none."""
+    told = [f"{round(value, 4) + 0.0:.4f}" for value in numbers]  # + 0.0: no -0.0
+    return ",".join(told if any(map(float, told[3:])) else told[:3])

@@ -12,6 +12,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.orientation import NAMES, angles
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, seconds
@@ -26,8 +27,8 @@ if TYPE_CHECKING:
 SCHEMA = 1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Run:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Run(Shown):
     """One ingested log: repolarized, on a uniform grid, with the arm's kinematics.
 
     Attributes:
@@ -122,6 +123,13 @@ class Run:
             per: What divides it: "", "/s" or "/s2".
         """
         return " or ".join(f"{unit}{per}" for unit in sorted(set(self.joint_units) or {"rad"}, reverse=True))
+
+    def _headline(self) -> str:
+        """Return its name, its arm and how long it is."""
+        arm = self.robot.name if self.robot else "no robot"
+        rows = number_of(self.log.rows, "row")
+        grid = f"grid of {number_of(len(self.t_ns), 'sample')}"
+        return line_of(self.name, arm, f"{rows} in {self.duration:g} s", grid)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a grid sample: t [s], the joints, their rates, and the TCP where there is one."""

@@ -141,7 +141,8 @@ def _measured(
     lengths = finder.positions(roles.position, tcp) if roles.position else []
     q = _in_si(q, units)
     told = finder.rotations(roles.rotation, roles.forms)
-    turned = settle_rotation(roles.rotation, roles.forms, rotation, told, (robot, q) if robot else None)
+    arm = (robot, q) if robot and roles.joints else None
+    turned = settle_rotation(roles.rotation, roles.forms, rotation, told, arm)
     return _Measured(
         groups=(
             _Group(roles.joints, q, units),

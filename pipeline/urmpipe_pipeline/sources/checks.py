@@ -14,6 +14,7 @@ from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.clock import Clock
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
 from urmpipe_pipeline.sources.clocks.quantised import behind_repeated
+from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.tables.diagnose import SHOWN_FINDINGS, lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.table import NO_TIME, UNREADABLE, Numbers
@@ -235,8 +236,9 @@ def _folds(times: IntArray, clock: Clock) -> Iterable[tuple[int, str, str]]:
     row = int(np.flatnonzero(jumps)[0])
     after, before = (f"{times[k] / one:.15g}" for k in (row + 1, row))
     said = f"found {after} after {before}, as a time of day hhmmss goes on, allowed: a clock of one unit"
-    hint = f"write it as hh:mm:ss, or say that it is no time of day with --unit {clock.columns[0].name}"
-    yield row + 2, clock.columns[0].header, f"{said}; {hint}={clock.unit}"
+    hint = "write it as hh:mm:ss, or say that it is no time of day with"
+    told = option("--unit", f"{clock.columns[0].name}={clock.unit}")
+    yield row + 2, clock.columns[0].header, f"{said}; {hint} {told}"
 
 
 def _second_logs(times: IntArray, steps: IntArray) -> set[int]:

@@ -48,13 +48,24 @@ def test_exchanged_joints_are_found() -> None:
 
 def test_exchanged_joints_are_named_as_the_file_names_its_columns() -> None:
     exchanged = log(Q[:, [0, 2, 1, 3, 4, 5]], positions_over_log(UR5E, Q))
-    for headers, option in ((["A"] + [""] * 5, "A,9,8,10,11,12"), (list("ABCDEF"), "A,C,B,D,E,F")):
+    named = [f"J{k} [rad]" for k in range(1, 7)]
+    for headers, option in (
+        (["A"] + [""] * 5, "A,9,8,10,11,12"),
+        (list("ABCDEF"), "A,C,B,D,E,F"),
+        (named, "J1,J3,J2,J4,J5,J6"),
+        (["Achse 1 (rad)", "A,2", "A3", "A", "A", "A6"], "'Achse 1,A3,8,10,11,A6'"),
+    ):
         columns = tuple(
             LogColumn(exchanged.joints[k], header, "joint", k, "rad", number=k + 7)
             for k, header in enumerate(headers)
         )
         (warning,) = far_from_recorded(UR5E, replace(exchanged, columns=columns))
         assert warning.message.endswith(f"(--joints {option})")
+
+
+def test_a_joint_that_is_counted_the_other_way_is_found() -> None:
+    message = said(Q * np.array([1, 1, -1, 1, 1, 1]), positions_over_log(UR5E, Q))
+    assert message.endswith(": with q3 counted the other way they agree (sign = -1 of its column in a --map)")
 
 
 def test_another_base_is_found_and_its_option_helps() -> None:
@@ -71,7 +82,7 @@ def test_another_base_is_found_and_its_option_helps() -> None:
 
 def test_another_robot_is_only_told_of() -> None:
     message = said(Q, 1.3 * positions_over_log(UR5E, Q) + np.sin(9 * T))
-    assert message.endswith(": robot, base, units, signs or order of the joints may differ")
+    assert message.endswith(": robot, base, units, zeros, signs or order of the joints may differ")
 
 
 def test_nothing_is_said_without_motion_robot_or_recorded_tcp() -> None:
@@ -92,6 +103,19 @@ def test_a_tool_that_was_not_told_is_found() -> None:
     assert lacking_tool(UR5E.placed(tool=translation(0.02, 0.0, 0.15)), log(Q, recorded)) == []
     (other,) = lacking_tool(UR5E.placed(tool=translation(0.0, 0.0, 0.1)), log(Q, recorded))
     assert other.message.endswith("with --tool 0.0200,0.0000,0.1500")  # the whole tool, not what is lacking
+
+
+@pytest.mark.parametrize(
+    ("base", "said"),
+    [
+        ((0.0, 0.02, -0.005), "0.0000,0.0200,-0.0050"),
+        ((0.0, 0.0, 0.0, 0.0, 0.0, 0.1), "0.0000,0.0000,0.0000,0.0000,0.0000,0.1000"),
+    ],
+)
+def test_a_small_shift_of_the_base_is_found(base: tuple[float, ...], said: str) -> None:
+    recorded = positions_over_log(UR5E.placed(base=from_offset(base)), Q)
+    (warning,) = lacking_tool(UR5E, log(Q, recorded))
+    assert warning.message.endswith(f" mm (rms) from the recorded TCP, but 0.00 mm with --base {said}")
 
 
 def test_no_tool_is_found_for_a_log_that_hardly_moves_or_needs_more_than_a_tool() -> None:

@@ -18,6 +18,7 @@ from urmpipe_pipeline.sources.clocks.clock_columns import time_columns, times_of
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS, unit_of
 from urmpipe_pipeline.sources.clocks.stamps import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.table import ClockColumn
@@ -164,7 +165,7 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
     for value in times_of(layout.cells(time.index), layout)[:1]:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
             message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
-            hint = f"say the unit with --unit {time.name}=ns"
+            hint = f"say the unit with {option('--unit', f'{time.name}=ns')}"
             if unit == "s" and _DATES[0] <= value < _DATES[1]:
                 hint = "a date is read if it is written as 2021-04-11 22:27:21.5"
             raise LogError(

@@ -8,6 +8,7 @@ from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock_columns import steps_of, times_of
 from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
 
@@ -91,7 +92,7 @@ def _short(time: Column, layout: Layout, step: float) -> Found:
     """Return s for short steps, or for none; raise where they are too short for a log."""
     if 0 < step < _IMPOSSIBLE:
         said = f"found steps of {step:.3g}, as of days or hours, allowed: times in {_UNITS}"
-        hint = f"convert them, or say that it is so with --unit {time.name}=s"
+        hint = f"convert them, or say that it is so with {option('--unit', f'{time.name}=s')}"
         raise _error(f"{said}; {hint}", time, layout)
     return "s", "the usual unit", (_assumed(time, step),) if 0 < step < _UNUSUAL else ()
 
@@ -102,7 +103,7 @@ def _assumed(time: Column, step: float) -> LogWarning:
 
 def _question(time: Column, layout: Layout, found: str, units: list[str]) -> LogError:
     """Ask which of some units is meant."""
-    options = " or ".join(f"--unit {time.name}={unit}" for unit in units)
+    options = " or ".join(option("--unit", f"{time.name}={unit}") for unit in units)
     return _error(f"found {found}, which may be {' or '.join(units)}: say which with {options}", time, layout)
 
 

@@ -14,6 +14,7 @@ from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.cells.text_clock import DAY_NS, TIME_OF_DAY, Form
 from urmpipe_pipeline.sources.clocks.stamps import read_cells
+from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.table import REPORTED, UNREADABLE, ClockColumn, Numbers
 
@@ -160,6 +161,6 @@ def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[R
     keys = dict.fromkeys(key for form in choices[place] for key in form.keys if key not in shared)
     column = layout.names[parts[place].column]
     shown = layout.cells(parts[place].column)[0]
-    options = " or ".join(f"--unit {column}={key}" for key in keys)
+    options = " or ".join(option("--unit", f"{column}={key}") for key in keys)
     message = f"found {shown!r}, which may be {names}: say which with {options}"
     return Finding(message, str(layout.segment.path), layout.first_line, 1, column)

@@ -114,17 +114,22 @@ def find_column(columns: Sequence[Column], text: str, option: str) -> Column:
     Raises:
         LogError: If no column or more than one is meant.
     """
-    named = [column for column in columns if text in (column.header, column.name)]
-    named = named or [column for column in columns if key(text) == column.key != ""]
-    if len(named) == 1:
-        return named[0]
-    if named:
-        numbers = ", ".join(str(column.number) for column in named)
+    found = called(columns, text)
+    if len(found) == 1:
+        return found[0]
+    if found:
+        numbers = ", ".join(str(column.number) for column in found)
         raise LogError(f"{option}: found {text!r} as columns {numbers}, allowed: one; give its number")
     for column in columns:
         if text == str(column.number):
             return column
     raise LogError(f"{option}: found no column {text!r}, allowed: {listed(columns)}")
+
+
+def called(columns: Sequence[Column], text: str) -> list[Column]:
+    """Return the columns of a name, with or without unit."""
+    exact = [column for column in columns if text in (column.header, column.name)]
+    return exact or [column for column in columns if key(text) == column.key != ""]
 
 
 def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Unit]:

@@ -22,12 +22,14 @@ class Family:
     Attributes:
         rank: Index of the pattern that found them: the lower, the surer.
         name: Their name with # in the number's place.
+        order: How often they are differentiated in time: 0 for positions.
         columns: The columns by their number.
         twins: Columns that share a number with one of them.
     """
 
     rank: int
     name: str
+    order: int = 0
     columns: dict[int, Column] = field(default_factory=dict)
     twins: list[Column] = field(default_factory=list)
 
@@ -36,9 +38,15 @@ class Family:
         return tuple(self.columns[n] for n in sorted(self.columns))
 
     @property
+    def words(self) -> frozenset[str]:
+        """The words of their name; the d of a derivative, which also stands for desired, is none."""
+        words = self.name.split("_")
+        return frozenset(words[1:] if self.order and words[0] == "d" else words)
+
+    @property
     def commanded(self) -> bool:
         """Whether they hold what was asked for, not what was measured."""
-        return bool(frozenset(self.name.split("_")) & vocabulary().commanded)
+        return bool(self.words & vocabulary().commanded)
 
 
 def families(columns: Iterable[Column], patterns: Patterns, order: int) -> list[Family]:
@@ -58,12 +66,12 @@ def families(columns: Iterable[Column], patterns: Patterns, order: int) -> list[
         rank, place = match
         number, start, end = _number(place)
         name = f"{column.key[:start]}#{column.key[end:]}"
-        family = found.setdefault((rank, name), Family(rank, name))
+        family = found.setdefault((rank, name), Family(rank, name, order))
         if number in family.columns:
             family.twins.append(column)
         family.columns.setdefault(number, column)
     ranked = sorted(found.values(), key=lambda family: family.rank)
-    return measured(ranked, lambda family: frozenset(family.name.split("_")))
+    return measured(ranked, lambda family: family.words)
 
 
 def measured(items: Sequence[T], words: Callable[[T], frozenset[str]]) -> list[T]:

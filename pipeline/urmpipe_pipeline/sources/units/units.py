@@ -15,6 +15,7 @@ from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.orientation import RotationForm, angles
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.units.kinematic_units import KinematicUnits
 from urmpipe_pipeline.sources.units.unit_evidence import Bounds, degrees_evidence, peak, radians_evidence
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Quantity, Unit, vocabulary
@@ -179,7 +180,7 @@ class UnitFinder:
             if evidence == GIVEN:
                 said = f"{told} {unit.name}, though as {better.name} it would fit: {by_how_much}"
             else:
-                said = f"{told} {better.name}: {by_how_much}; --unit {first}={unit.name} says otherwise"
+                said = f"{told} {better.name}: {by_how_much}; {option('--unit', f'{first}={unit.name}')} says otherwise"
             yield LogWarning("unit-contradiction", said)
 
     def _first_told(self, column: Column, kind: JointKind | None) -> tuple[Unit | None, str]:
@@ -199,7 +200,7 @@ class UnitFinder:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
             message = f"found the unit {column.unit_text!r}, allowed: rad, deg, m, mm, cm"
-            hint = f"say which with --unit {column.name}={likely}"
+            hint = f"say which with {option('--unit', f'{column.name}={likely}')}"
             raise LogError(Finding(f"{message}; {hint}", self.file, column=column.header))
         return column.unit
 

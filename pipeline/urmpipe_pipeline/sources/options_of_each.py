@@ -1,0 +1,197 @@
+"""Options that are given once for several logs: each holds for the logs that it fits.
+
+An option that names columns (--joints, --time, --unit COLUMN=, those of a map) holds for the logs that have
+them; one that says how a table is written (--delimiter, --decimal, --source, --rotation) for those that can
+be read so; a unit of all joints for those whose names tell no other. What fits none of them is an error.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import Finding, LogError, UrmpipeError
+from urmpipe_pipeline.sources.columns.columns import Column, called, columns_of, listed
+from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.plan import Plan, make_plan
+from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+ALL_JOINTS = ""
+"""Stands among the units for all joints that turn."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Named:
+    """Columns that an option names.
+
+    Attributes:
+        option: How it was given.
+        columns: Names or numbers of the columns.
+    """
+
+    option: str
+    columns: tuple[str, ...]
+
+    def found(self, columns: Sequence[Column]) -> bool:
+        """Tell whether a log has one of them by its name, or all of them by their numbers."""
+        numbers = range(1, len(columns) + 1)
+        return self.names(columns) or all(text.isdigit() and int(text) in numbers for text in self.columns)
+
+    def names(self, columns: Sequence[Column]) -> bool:
+        """Tell whether a log has one of them by its name."""
+        return any(called(columns, text) for text in self.columns)
+
+    def left_out(self, options: ReadOptions) -> ReadOptions:
+        """Return the options without this one."""
+        if self.option == "--joints":
+            return replace(options, joints=(), names=(), signs=(), offsets=())
+        if self.option == "--time":
+            return replace(options, time=None)
+        if self.option == "position":
+            return replace(options, position=(), orientation=())
+        kept = {text: unit for text, unit in options.units.items() if text not in self.columns}
+        return replace(options, units=kept)
+
+
+@dataclass(frozen=True, slots=True)
+class _Fitted:
+    """How one of several logs is read.
+
+    Attributes:
+        file: Its first file.
+        options: What holds for it.
+        taken: The options that name columns of it.
+        columns: Its columns; none if it cannot be opened.
+        plan: What is read of it; None if that cannot be told.
+    """
+
+    file: Path
+    options: ReadOptions
+    taken: tuple[_Named, ...] = ()
+    columns: tuple[Column, ...] = ()
+    plan: Plan | None = None
+
+    @property
+    def joints(self) -> tuple[Column, ...]:
+        """Its joints; none of a path, or if they cannot be told."""
+        return self.plan.roles.joints if self.plan else ()
+
+    def tells_other_than(self, unit: str | None) -> bool:
+        """Tell whether the names of all joints tell another unit than this one."""
+        told = [column.unit for column in self.joints]
+        return unit is not None and bool(told) and None not in told and vocabulary().unit(unit) not in told
+
+
+def options_of_each(
+    logs: Sequence[Sequence[Path]], options: ReadOptions, robot: Chain | None = None
+) -> list[ReadOptions]:
+    """Return how to read each of several logs.
+
+    Args:
+        logs: The files of each log.
+        options: What the user says of all of them; of a single log all of it holds.
+        robot: The arm, or None.
+
+    Raises:
+        LogError: If an option names columns that no log has.
+    """
+    if len(logs) < 2 or options == ReadOptions():
+        return [options] * len(logs)
+    named = list(_named(options))
+    fitted = [_fit(files, options, named, robot) for files in logs]
+    unused = [one for one in named if not any(one in log.taken for log in fitted)]
+    if unused and all(log.columns for log in fitted):
+        raise LogError(*(_nowhere(one, fitted) for one in unused))
+    return [replace(log.options, **_of_joints(log, fitted, options)) for log in fitted]
+
+
+def _named(options: ReadOptions) -> Iterator[_Named]:
+    """Yield the options that name columns."""
+    if options.joints:
+        yield _Named("--joints", options.joints)
+    if options.time is not None and options.time.lower() != "none":
+        yield _Named("--time", (options.time,))
+    if options.position:
+        yield _Named("position", (*options.position, *options.orientation))
+    for text in options.units:
+        if text != ALL_JOINTS:
+            yield _Named("--unit", (text,))
+
+
+def _fit(
+    files: Sequence[Path], options: ReadOptions, named: Sequence[_Named], robot: Chain | None
+) -> _Fitted:
+    """Return how one log is read: as the options say it is written, if it can be and has their columns."""
+    as_told = _sound(files, options, named, robot)
+    plain = replace(options, delimiter=None, decimal=None, source=None)
+    if plain == options or (as_told.plan and (as_told.taken or not named)):
+        return as_told
+    otherwise = _sound(files, plain, named, robot)
+    return otherwise if otherwise.plan else as_told
+
+
+def _sound(
+    files: Sequence[Path], options: ReadOptions, named: Sequence[_Named], robot: Chain | None
+) -> _Fitted:
+    """Return how one log is read; without the form of an orientation that it does not have."""
+    found = _fitted(files, options, named, robot)
+    if found.plan is None and options.rotation is not None:
+        otherwise = _fitted(files, replace(options, rotation=None), named, robot)
+        return otherwise if otherwise.plan else found
+    return found
+
+
+def _fitted(
+    files: Sequence[Path], options: ReadOptions, named: Sequence[_Named], robot: Chain | None
+) -> _Fitted:
+    """Return how one log is read with the options whose columns it has."""
+    try:
+        tables = open_tables(files, options)
+    except UrmpipeError:
+        return _Fitted(files[0], options)  # to be told when it is read
+    columns = columns_of(tables.layouts, tables.titles)
+    taken = [
+        one for one in named if one.found(columns) and not _numbers_of_path(one, columns, tables, options)
+    ]
+    for one in named:
+        options = options if one in taken else one.left_out(options)
+    return _Fitted(files[0], options, tuple(taken), columns, _plan(tables, options, robot))
+
+
+def _plan(tables: Tables, options: ReadOptions, robot: Chain | None = None) -> Plan | None:
+    """Return what is read of a log; None if that cannot be told."""
+    try:
+        return make_plan(tables, options, robot)
+    except UrmpipeError:
+        return None
+
+
+def _numbers_of_path(named: _Named, columns: Sequence[Column], tables: Tables, options: ReadOptions) -> bool:
+    """Tell whether joints are named by numbers alone, and the log is a path by the names that it has."""
+    if named.option != "--joints" or named.names(columns):
+        return False
+    plan = _plan(tables, named.left_out(options))
+    return plan is not None and not plan.roles.joints
+
+
+def _of_joints(log: _Fitted, logs: Sequence[_Fitted], options: ReadOptions) -> dict[str, Any]:
+    """Return the intervals and the units that hold for one log: those of its joints."""
+    known = {column.name for one in logs for column in one.joints}
+    own = {column.name for column in log.joints}
+    interval = {name: ends for name, ends in options.interval.items() if name in own or name not in known}
+    unit = options.units.get(ALL_JOINTS)
+    units = dict(log.options.units)
+    if log.tells_other_than(unit) and any(one.joints and not one.tells_other_than(unit) for one in logs):
+        del units[ALL_JOINTS]
+    return {"interval": interval, "units": units}
+
+
+def _nowhere(named: _Named, logs: Sequence[_Fitted]) -> Finding:
+    """Say that an option names columns that no log has."""
+    columns = "; ".join(f"{listed(log.columns)} of {log.file}" for log in logs)
+    said = ", ".join(repr(text) for text in named.columns)
+    return Finding(f"{named.option}: found no column {said} in any log, allowed: {columns}")
