@@ -46,6 +46,8 @@ def _columns(changes: Sequence[Change]) -> Iterator[Column]:
     yield Column("worse", [", ".join(WORDS[name] for name in one.worse) or None for one in changes])
     for name in ("max", "rms"):
         yield Column(name, [_both(one, name) for one in changes])
+    if any("samples" in (*one.worse, *one.better) for one in changes):
+        yield Column("samples", [f"{one.before.samples}{ARROW}{one.now.samples}" for one in changes])
     if any(one.before.share_out or one.now.share_out for one in changes):
         yield Column("out", [_shares(one) for one in changes])
     yield Column("most at\none sample", [text.number(one.largest, one.now.unit) for one in changes])

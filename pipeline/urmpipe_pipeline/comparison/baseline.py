@@ -201,10 +201,10 @@ def _facts(run: Deviation) -> dict[str, Any]:
         "log": run.name,
         "robot": arm.name if arm else None,
         "base": _frame(arm.base) if arm else None,
-        "tool of the robot": _frame(arm.tool) if arm else None,
+        "robot tool": _frame(arm.tool) if arm else None,
         "tsp": run.run.tsp,
         "samples": len(run.sample),
         "sync_offset": run.sync.offset,
         "translation": list(run.alignment.translation),
-        "tool of the alignment": list(run.alignment.tool),
+        "tool": list(run.alignment.tool),
     }

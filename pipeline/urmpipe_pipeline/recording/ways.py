@@ -73,6 +73,7 @@ class Way:
         track: The moving point.
         label: What the moving point is called in the view; empty for no label.
         gone: When there is no moving point.
+        factor: How many times as far from the reference it is drawn as it was.
     """
 
     path: str
@@ -83,6 +84,7 @@ class Way:
     track: Track
     label: str = ""
     gone: Gone = NEVER
+    factor: int = 1
 
 
 def track_of(

@@ -57,7 +57,7 @@ def deviation_figure(deviation: Deviation) -> Figure:
     if speed:
         drawn = line(deviation.t, deviation.speed, "speed", MUTED, "m/s")
         panels.append(Panel("‖v‖ [m/s]", [drawn], from_zero=True))
-    t_worst, duration = float(deviation.t[deviation.worst]), deviation.run.duration
+    at, duration = deviation.decisive.t_max, deviation.run.duration
     largest = ", ".join(
         f"{symbol} {_most(deviation.statistics[name])} at {text.seconds(deviation.statistics[name].t_max)} s"
         for (name, symbol, _), _ in columns
@@ -66,10 +66,10 @@ def deviation_figure(deviation: Deviation) -> Figure:
         "Deviation" + (" and speed" if speed else "") + " over time",
         "Δ is reference minus actual at the same time; path is the distance from the reference's path, time"
         " left out. Dashed: the tolerance; tinted: out of it. Diamonds: the largest value of each. Dotted:"
-        " the worst moment.",
+        " when the verdict was decided.",
         f"Deviation of {deviation.name} from the reference over time. Largest absolute values: {largest}."
         f" {_out_of_tolerance(deviation)}",
-        stacked(panels, duration, [instant(t_worst, f"worst {text.seconds(t_worst)} s", duration)]),
+        stacked(panels, duration, [instant(at, f"decides at {text.seconds(at)} s", duration)]),
         PANEL_PX * len(panels) + AROUND_PX,
     )
 

@@ -224,7 +224,7 @@ def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
                         "out_of_tolerance", "share_out", "verdict", "warnings"}  # fmt: skip
     assert set(one["delta"]["x"]) == {
         "unit", "max", "rms", "mean", "std", "p95", "t_max", "sample_max", "tolerance", "out_of_tolerance",
-        "share_out", "verdict",
+        "share_out", "verdict", "samples", "missing",
     }  # fmt: skip
     assert one["share_out"] == 1.0
 

@@ -352,14 +352,14 @@ def test_axes_say_what_they_measure(comparison: Comparison) -> None:
         assert all(title.endswith("]") and "[" in title for title in titles)
 
 
-def test_the_scene_has_equal_scales_and_shows_the_worst_point(comparison: Comparison) -> None:
+def test_the_scene_has_equal_scales_and_shows_the_place_that_decides(comparison: Comparison) -> None:
     deviation = comparison.runs[1]
     spec = path_figure(deviation).spec
     assert spec["layout"]["scene"]["aspectmode"] == "data"
-    (worst,) = [trace for trace in spec["data"] if trace["name"] == "worst"]
-    place = [numbers(worst[axis])[0] for axis in "xyz"]
+    (decides,) = [trace for trace in spec["data"] if trace["name"] == "decides"]
+    place = [numbers(decides[axis])[0] for axis in "xyz"]
     # drawn in single precision: 24 bits of mantissa of a coordinate below 2 m
-    np.testing.assert_allclose(place, deviation.actual[deviation.worst], rtol=0, atol=2**-23)
+    np.testing.assert_allclose(place, deviation.place(deviation.decisive), rtol=0, atol=2**-23)
     (actual,) = [trace for trace in spec["data"] if trace["name"] == "actual"]
     assert numbers(actual["customdata"])[:, 1].max() == deviation.statistics["norm"].max * 1e3
 
