@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass, is_dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, Literal, TypeVar
 
 from urmpipe_models.errors import UrmpipeError
@@ -121,7 +121,7 @@ def _spelled(text: str) -> str:
     """Return a text with each option of the table as Python writes it."""
     for option in sorted(SPELLINGS, key=len, reverse=True):
         if option in text:
-            text = _pattern(option).sub(lambda found, one=SPELLINGS[option]: _in_python(one, found), text)
+            text = _pattern(option).sub(partial(_in_python, SPELLINGS[option]), text)
     return text
 
 

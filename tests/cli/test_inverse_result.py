@@ -18,7 +18,7 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.inverse.targets import misses, targets_of
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.orientation import quaternions
-from urmpipe_pipeline.runs.results import json_ready
+from urmpipe_pipeline.json_values import json_ready
 
 Q = np.array([[0.3, 0.8, -0.6, 0.5, 0.7, 0.2], [-1.0, 0.5, -0.2, 1.0, -0.8, 2.0]])
 ARM = urmpipe.load_robot("arm6")

@@ -26,8 +26,8 @@ from urmpipe_pipeline.simulations.simulation import Signal, SimulatedBlock, Simu
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"`(\w+)`", PAGE))
 FREE = {
-    "steps", "units", "tolerance", "noise", "before", "now", "delta", "start", "joints", "joint_turns", "points",
-    "arguments",
+    "steps", "units", "tolerance", "noise", "before", "now", "delta", "start", "joints", "joint_turns",
+    "arguments", "points",
 }  # fmt: skip
 """Objects whose keys are names of columns, axes, joints, kinds or options."""
 

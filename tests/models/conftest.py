@@ -51,7 +51,7 @@ def drawn_joint(draw: DrawFn, name: str, leaders: list[str]) -> Joint:
         return Joint(name, "fixed", draw(frames))
     kind = "revolute" if kind == "fixed" else kind
     mimic = None
-    if leaders and draw(one_in_four):
+    if leaders and bool(draw(one_in_four)):
         mimic = Mimic(draw(st.sampled_from(leaders)), draw(lengths), draw(lengths))
     lower, upper = draw(limits)
     return Joint(name, kind, draw(frames), draw(axes), lower, upper, draw(velocities), mimic)

@@ -31,7 +31,7 @@ PIPE_WIDTH = 120
 
 def print_json(value: Any) -> None:
     """Print one JSON object, NaN as null."""
-    from urmpipe_pipeline.runs.results import json_ready
+    from urmpipe_pipeline.json_values import json_ready
 
     echo_json(json_ready(value), indent=2)
 

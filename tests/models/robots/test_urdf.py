@@ -108,9 +108,23 @@ def test_of_several_ends_the_one_with_most_moving_joints_is_the_tip(urdf: Any) -
     branches = [link("r"), link("a"), link("b"), link("c"), joint("j1", "r", "a"), joint("j2", "a", "b")]
     assert urdf(robot(*branches, joint("camera", "a", "c", "fixed"))).coordinates == ("j1", "j2")
     assert complaint(urdf, robot(*branches, joint("j3", "a", "c"))) == [
-        "arm.urdf: found 2 ends with 2 moving joints; choose a tip link: b, c"
+        "arm.urdf: found 2 ends with 2 moving joints; choose a tip link (--tip, tip_link): b, c"
     ]
     assert urdf(robot(*branches, joint("j3", "a", "c")), tip_link="c").coordinates == ("j1", "j3")
+
+
+def test_joints_that_the_arm_carries_beside_its_tip_need_a_choice_and_wheels_below_it_do_not(
+    urdf: Any,
+) -> None:
+    arm = [link("r"), link("a"), link("b"), link("c"), link("d"), joint("j1", "r", "a")]
+    arm += [joint("j2", "a", "b"), joint("left", "b", "c")]
+    finger = joint("right", "b", "d", inside='<mimic joint="left"/>')
+    assert complaint(urdf, robot(*arm, finger)) == [
+        "arm.urdf: found right on the arm beside the way to c, as of a gripper; choose a tip link"
+        " (--tip, tip_link): b, c, d"
+    ]
+    assert urdf(robot(*arm, finger), tip_link="b").coordinates == ("j1", "j2")
+    assert urdf(robot(*arm, joint("wheel", "r", "d"))).coordinates == ("j1", "j2", "left")
 
 
 def test_several_roots_need_a_choice(urdf: Any) -> None:
@@ -190,7 +204,7 @@ def test_a_mimic_of_a_joint_outside_the_chain_is_refused(urdf: Any) -> None:
     links = [link(name) for name in "rabc"]
     follower = joint("j3", "a", "c", inside='<mimic joint="j2"/>')
     text = robot(*links, joint("j1", "r", "a"), joint("j2", "a", "b"), follower)
-    assert urdf(text).coordinates == ("j1", "j2")
+    assert urdf(text, tip_link="b").coordinates == ("j1", "j2")
     assert complaint(urdf, text, tip_link="c") == [
         "arm.urdf:8: joint j3: mimics j2, which is not on the chain r to c; allowed: j1"
     ]
@@ -264,7 +278,13 @@ def test_a_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
 
 def test_the_fingers_of_a_gripper(shared: Path) -> None:
     path = shared / "robots" / "Gepetto_example-robot-data" / "panda.urdf"
-    assert read_urdf(path).coordinates[-1] == "panda_finger_joint1"  # the end with most moving joints
+    with pytest.raises(RobotError) as caught:
+        read_urdf(path)
+    assert str(caught.value) == (
+        f"{path}: found panda_finger_joint2 on the arm beside the way to panda_leftfinger, as of a gripper;"
+        " choose a tip link (--tip, tip_link): panda_hand, panda_hand_tcp, panda_leftfinger,"
+        " panda_rightfinger"
+    )
     with pytest.raises(RobotError) as caught:
         read_urdf(path, tip_link="panda_rightfinger")
     assert "joint panda_finger_joint2: mimics panda_finger_joint1, which is not on the chain" in str(
