@@ -17,7 +17,7 @@ from urmpipe_models.row_blocks import THREADS
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
-from urmpipe_pipeline.runs.derivatives import Method, derivatives, recorded_agree
+from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree
 from urmpipe_pipeline.runs.grid import Grid, make_grid
 from urmpipe_pipeline.runs.meshes import VISUAL_MISSING, missing_visuals
 from urmpipe_pipeline.runs.plausibility import implausible
@@ -175,19 +175,16 @@ def _rates(
     computed = derivatives(q, grid.tsp, method, broken)
     recorded = (log.qd, log.qdd)
     result = []
-    for values, own, word in zip(computed, recorded, ("rates", "accelerations"), strict=True):
+    for order, values, own, word in zip((1, 2), computed, recorded, ("rates", "accelerations"), strict=True):
         on_grid = None if own is None else grid.resample(own)
         if on_grid is None or len(q) < 3 or recorded_agree(on_grid, values):
             result.append(values if on_grid is None else on_grid)
             continue
         result.append(values)
-        warnings.append(
-            LogWarning(
-                f"recorded-{word}",
-                f"the recorded {word} do not agree with the differences of the joint values;"
-                " the differences are used",
-            )
-        )
+        said = f"the recorded {word} do not agree with the differences of the joint values"
+        unit = other_unit(on_grid, values, order)
+        because = f", but would {unit}" if unit else ""
+        warnings.append(LogWarning(f"recorded-{word}", f"{said}{because}; the differences are used"))
     return result[0], result[1]
 
 
