@@ -28,22 +28,25 @@ class Usage:
 
 @dataclass(frozen=True, slots=True)
 class Bound:
-    """What a figure may be: below `under`, or at least `least`."""
+    """What a figure may be: below `under`, at most `most`, or at least `least`."""
 
     what: str
     found: float
     under: float = math.inf
     least: float = -math.inf
+    most: float = math.inf
 
     @property
     def held(self) -> bool:
         """Whether the figure is within the bound."""
-        return self.least <= self.found < self.under
+        return self.least <= self.found < self.under and self.found <= self.most
 
     def __str__(self) -> str:
         """Return the line of the table."""
-        allowed = f"under {self.under:g}" if self.under < math.inf else f"at least {self.least:g}"
-        return f"| {self.what} | {self.found:.2f} | {allowed} | {'held' if self.held else 'MISSED'} |"
+        limits = {"under": self.under, "at most": self.most, "at least": self.least}
+        allowed = " and ".join(f"{word} {limit:g}" for word, limit in limits.items() if math.isfinite(limit))
+        found = str(self.found) if isinstance(self.found, int) else f"{self.found:.2f}"
+        return f"| {self.what} | {found} | {allowed} | {'held' if self.held else 'MISSED'} |"
 
 
 def timed(job: Callable[[], object]) -> float:

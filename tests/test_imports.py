@@ -2,22 +2,16 @@
 
 from __future__ import annotations
 
-import ast
 import subprocess
 import sys
 from pathlib import Path
 
 import pytest
+from survey.imports import top_level, wrong_ways
+from survey.source import PACKAGES, Source, read_sources
 
 ROOT = Path(__file__).resolve().parents[1]
-AREAS = {"models", "fmus", "pipeline", "cli", "datasets"}
-ALLOWED: dict[str, set[str]] = {
-    "datasets": set(),
-    "models": {"datasets"},
-    "fmus": {"models", "datasets"},
-    "pipeline": {"models", "datasets"},
-    "cli": {"models", "fmus", "pipeline", "datasets"},
-}
+SOURCES = read_sources(ROOT, PACKAGES)
 ONLY = {  # who alone may import a distribution
     "rerun": "pipeline/urmpipe_pipeline/recording/",
     "click": "cli/",
@@ -27,32 +21,17 @@ ONLY = {  # who alone may import a distribution
 MODELS_MAY_IMPORT = {"numpy", "scipy"}
 
 
-def modules() -> list[Path]:
-    return sorted(path for area in AREAS for path in (ROOT / area).rglob("*.py"))
+def test_imports_run_one_way() -> None:
+    assert {source.area for source in SOURCES} == set(PACKAGES)
+    assert wrong_ways(SOURCES) == []
 
 
-def imported(path: Path) -> set[str]:
-    names: set[str] = set()
-    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-        if isinstance(node, ast.Import):
-            names |= {alias.name.split(".")[0] for alias in node.names}
-        elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-            names.add(node.module.split(".")[0])
-    return names
-
-
-@pytest.mark.parametrize("path", modules(), ids=lambda path: path.relative_to(ROOT).as_posix())
-def test_imports_run_one_way(path: Path) -> None:
-    place = path.relative_to(ROOT).as_posix()
-    area = place.split("/")[0]
-    names = imported(path)
-    areas = {other for other in AREAS if f"urmpipe_{other}" in names} | (
-        {"cli"} if "urmpipe" in names else set()
-    )
-    assert areas - {area} <= ALLOWED[area]
+@pytest.mark.parametrize("source", SOURCES, ids=lambda source: source.path)
+def test_libraries_keep_their_place(source: Source) -> None:
+    names = top_level([source])
     for name, home in ONLY.items():
-        assert name not in names or place.startswith(home), f"{name} belongs to {home}"
-    if area == "models":
+        assert name not in names or source.path.startswith(home), f"{name} belongs to {home}"
+    if source.area == "models":
         known = set(sys.stdlib_module_names) | {"urmpipe_models", "urmpipe_datasets"} | MODELS_MAY_IMPORT
         assert names <= known
 

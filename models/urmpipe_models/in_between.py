@@ -30,14 +30,14 @@ def beside_wraps(q: FloatArray, x: FloatArray, t: FloatArray, wraps: IntArray, p
     never lies between its neighbours, whatever the noise or the speed.
 
     Args:
-        q: Values in the file's turns that are not missing, shape (n,).
-        x: The same repolarized, shape (n,).
+        q: Values in the file's turns that are not missing, in the unit of the period, shape (n,).
+        x: The same repolarized, in the unit of the period, shape (n,).
         t: Their times in [s], shape (n,).
         wraps: Index of every value to which a wrap leads, shape (r,).
-        period: P.
+        period: P, 2 pi for [rad], 360 for [deg].
 
     Returns:
-        Their indices, ascending.
+        Their indices, ascending, shape (b,).
     """
     at = np.unique(np.concatenate((wraps - 1, wraps)))
     at = at[(at > 0) & (at < len(q) - 1)]
@@ -59,9 +59,13 @@ def off_line(x: FloatArray, t: FloatArray, at: IntArray) -> FloatArray:
     """Return how far samples lie from the straight line, in time, through their neighbours.
 
     Args:
-        x: Values, shape (n,).
+        x: Values in any unit, shape (n,).
         t: Their times in [s], shape (n,).
-        at: Indices of the samples, neither the first nor the last.
+        at: Indices of the samples, neither the first nor the last, shape (b,).
+
+    Returns:
+        Signed distances x_s - (x_{s-1} + (t_s - t_{s-1}) / (t_{s+1} - t_{s-1}) (x_{s+1} - x_{s-1})) in the
+        unit of x, shape (b,).
     """
     share = (t[at] - t[at - 1]) / (t[at + 1] - t[at - 1])
     return np.asarray(x[at] - x[at - 1] - share * (x[at + 1] - x[at - 1]), dtype=np.float64)
@@ -71,12 +75,12 @@ def repair(x: FloatArray, t: FloatArray, in_between: IntArray) -> FloatArray:
     """Return repolarized values with the in-between samples on the straight line through their neighbours.
 
     Args:
-        x: Repolarized values of the joints, shape (n, joints); NaN where a sample is missing.
+        x: Repolarized values of the joints in any unit, shape (n, joints); NaN where a sample is missing.
         t: Time of each row in [s], shape (n,).
         in_between: Row and joint index of each in-between sample, shape (b, 2).
 
     Returns:
-        A new array; every other value is the same bit for bit.
+        A new array in the unit and shape of x; every other value is the same bit for bit.
     """
     repaired = x.copy()
     for j in np.unique(in_between[:, 1]):

@@ -77,9 +77,10 @@ def quaternions(rotation: FloatArray, form: RotationForm) -> FloatArray:
 
 
 def matrices(quat_xyzw: FloatArray) -> FloatArray:
-    """Return rotation matrices, shape (n, 3, 3) [-], of unit quaternions x, y, z, w, shape (n, 4) [-].
+    """Return rotation matrices, R = I + 2 w [v]x + 2 [v]x [v]x, shape (n, 3, 3) [-].
 
-    R = I + 2 w [v]x + 2 [v]x [v]x.
+    Args:
+        quat_xyzw: Unit quaternions x, y, z, w [-], shape (n, 4).
     """
     x, y, z, w = quat_xyzw.T
     rows = [
@@ -91,7 +92,11 @@ def matrices(quat_xyzw: FloatArray) -> FloatArray:
 
 
 def conjugate(quat_xyzw: FloatArray) -> FloatArray:
-    """Return the opposite rotations of unit quaternions x, y, z, w, shape (n, 4) [-]."""
+    """Return the opposite rotations, -v and w, shape (n, 4) [-].
+
+    Args:
+        quat_xyzw: Unit quaternions x, y, z, w [-], shape (n, 4).
+    """
     return np.asarray(quat_xyzw * np.array([-1.0, -1.0, -1.0, 1.0]))
 
 
@@ -100,7 +105,7 @@ def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
 
     Args:
         first: Unit quaternions x, y, z, w [-], shape (n, 4).
-        second: The same.
+        second: Likewise [-], shape (n, 4).
 
     Returns:
         In [rad], shape (n,).
@@ -119,8 +124,8 @@ def slerp(first: FloatArray, second: FloatArray, share: FloatArray) -> FloatArra
 
     Args:
         first: Unit quaternions x, y, z, w [-], shape (n, 4).
-        second: The same.
-        share: s, 0 to 1, shape (n,).
+        second: Likewise [-], shape (n, 4).
+        share: s, 0 to 1 [-], shape (n,).
 
     Returns:
         Shape (n, 4) [-]; NaN between two of which one is missing.
@@ -149,11 +154,11 @@ def _about(axis: str, angle: FloatArray) -> FloatArray:
 
 
 def product(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the product of quaternions x, y, z, w: the second rotation followed by the first.
+    """Return the product of quaternions x, y, z, w, shape (n, 4) [-]: the second rotation, then the first.
 
     Args:
         first: Shape (n, 4) [-].
-        second: The same.
+        second: Likewise, shape (n, 4) [-].
     """
     x, y, z, w = first.T
     a, b, c, d = second.T

@@ -78,10 +78,10 @@ class Repolarized(NamedTuple):
     """A log's joint values, repolarized.
 
     Attributes:
-        q: Repolarized values, shape (n, joints).
+        q: Repolarized values in the unit of the period, shape (n, joints); NaN where a sample is missing.
         rows: Row index of every repolarization, from 0, ascending, shape (r,).
         joints: Joint index of each, shape (r,).
-        change: Change of k at each, shape (r,).
+        change: Change of k at each, -1 or 1, shape (r,).
         unexplained: Row and joint index of every unexplained step, shape (u, 2), without those to an
             in-between sample, which the step after explains.
         in_between: Row and joint index of every in-between sample, shape (b, 2).
@@ -146,7 +146,15 @@ def notice(
 
 
 def turned(q: Element, turns: Element, period: Element) -> Element:
-    """Return q + P k, and q itself, bit for bit, where k = 0 (eq. 15)."""
+    """Return q + P k in the unit of the period, and q itself, bit for bit, where k = 0.
+
+    Args:
+        q: A value as measured, in the unit of the period.
+        turns: k, whole.
+        period: P.
+
+    Source: [UrmArm2021]_ eq. 15.
+    """
     return np.where(turns == 0.0, q, q + period * turns)
 
 
@@ -202,7 +210,7 @@ def repolarize(
     Args:
         q: Joint values in the unit of the period, shape (n, joints); NaN where a sample is missing.
         dt: Time from the row before in [s], shape (n,); the first is not used.
-        period: P, shape (joints,) or one for all.
+        period: P, 2 pi for [rad], 360 for [deg], shape (joints,) or one for all.
         max_speed: Largest speeds in the period's unit per second, shape (joints,) or one for all.
     """
     joints = q.shape[1]

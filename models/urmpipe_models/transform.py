@@ -69,12 +69,12 @@ class Transform:
 
     @property
     def columns(self) -> tuple[Vector, Vector, Vector]:
-        """The axes x, y, z of the frame: the columns of R."""
+        """The axes x, y, z of B seen from A: the columns of R [-]."""
         x, y, z = self.rotation
         return (x[0], y[0], z[0]), (x[1], y[1], z[1]), (x[2], y[2], z[2])
 
     def rotate(self, vector: Vector) -> Vector:
-        """Return R v, a direction given in B seen from A."""
+        """Return R v, a direction given in B seen from A, in whatever unit v has."""
         return dot(self.rotation[0], vector), dot(self.rotation[1], vector), dot(self.rotation[2], vector)
 
     def point(self, position: Vector) -> Vector:

@@ -73,7 +73,7 @@ class GeometricModel:
 
     @property
     def equations(self) -> tuple[Element, ...]:
-        """The twelve direct geometric model equations: p, then x_n, y_n, z_n, eq. 14."""
+        """The twelve direct geometric model equations: p in [m], then x_n, y_n, z_n [-], in T_0, eq. 14."""
         x, y, z = Transform(self.rotations[-1]).columns
         return (*self.positions[-1], *x, *y, *z)
 

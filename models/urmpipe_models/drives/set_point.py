@@ -117,7 +117,17 @@ def set_point(
     speed: Element,
     acceleration: Element,
 ) -> JointMotion:
-    """Return the set point of a kind: 0 the step, 1 the ramp, 2 the trapezoid; the rest as they take it."""
+    """Return the set point of a kind: where the joint shall be at that time.
+
+    Args:
+        kind: 0 for `step`, 1 for `ramp`, 2 for `trapezoid`.
+        time: In [s].
+        begin: When it starts, in [s].
+        initial: Where from, in [rad].
+        target: Where to, in [rad].
+        speed: Of the ramp, and the largest of the trapezoid, in [rad/s], above 0; a step needs none.
+        acceleration: The largest of the trapezoid, in [rad/s2], above 0; the others need none.
+    """
     forms = (
         step(time, begin, initial, target),
         ramp(time, begin, initial, target, speed),

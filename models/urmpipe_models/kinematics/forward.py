@@ -46,7 +46,12 @@ def forward(chain: Chain, q: Sequence[Element]) -> tuple[Transform, ...]:
 
 
 def tip_pose(chain: Chain, q: Sequence[Element]) -> Transform:
-    """Return the pose of the tool centre point alone: the last of `forward`, at less cost."""
+    """Return the pose of the tool centre point alone, in the world: the last of `forward`, at less cost.
+
+    Args:
+        chain: The arm.
+        q: One element per coordinate, in [rad] or [m].
+    """
     for frame in frames(chain, q):
         last = frame
     return last @ chain.tip @ chain.tool
@@ -115,7 +120,12 @@ class PointLog:
 
 
 def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
-    """Return the tool centre point in [m], shape (n, 3), of joint values q, shape (n, joints)."""
+    """Return the position of the tool centre point in the world [m], shape (n, 3).
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints).
+    """
     position = np.empty((3, len(q)))
 
     def work(block: slice) -> None:
@@ -127,11 +137,14 @@ def positions_over_log(chain: Chain, q: FloatArray) -> FloatArray:
 
 
 def poses_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return position [m], shape (n, 3), and rotation, shape (n, 3, 3), of the tool centre point.
+    """Return position [m], shape (n, 3), and rotation [-], shape (n, 3, 3), of the tool centre point.
 
     Args:
         chain: The arm.
         q: Joint values in [rad] or [m], shape (n, joints).
+
+    Returns:
+        Both in the world: x_world = R x_tool + p.
     """
     position, rotation = np.empty((3, len(q))), np.empty((3, 3, len(q)))
 
@@ -184,7 +197,12 @@ def point_over_log(
 
 
 def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
-    """Return the positions of the base and of p1..pn in [m], shape (n, points + 1, 3): the arm's skeleton."""
+    """Return the arm's skeleton: the base and p1..pn in the world [m], shape (n, points + 1, 3).
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints).
+    """
     skeleton = np.empty((len(chain.joints) + 1, 3, len(q)))
     _fill(skeleton[0], chain.base.translation)
 
@@ -198,14 +216,15 @@ def points_over_log(chain: Chain, q: FloatArray) -> FloatArray:
 
 
 def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return positions [m], shape (n, joints + 1, 3), and rotations, shape (n, joints + 1, 3, 3), of frames.
+    """Return where the frames of an arm are, in the world, over a log.
 
     Args:
         chain: The arm.
         q: Joint values in [rad] or [m], shape (n, coordinates).
 
     Returns:
-        The base's, then those of the moving frame of every joint, fixed ones and mimics included.
+        Positions [m], shape (n, joints + 1, 3), and rotations [-], shape (n, joints + 1, 3, 3): of the base,
+        then of the moving frame of every joint, fixed ones and mimics included.
     """
     count = len(chain.joints) + 1
     position, rotation = np.empty((count, 3, len(q))), np.empty((count, 3, 3, len(q)))
@@ -222,7 +241,17 @@ def frames_over_log(chain: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def jacobian_over_log(chain: Chain, q: FloatArray, point: int = -1) -> FloatArray:
-    """Return the geometric Jacobian of a point for every row of q: shape (n, 6, joints)."""
+    """Return the geometric Jacobian of a point p1..pn, in the world, for every row of q.
+
+    Args:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints).
+        point: Index of the point, -1 for the tool centre point.
+
+    Returns:
+        Shape (n, 6, joints): rows vx, vy, vz in [m/s] and wx, wy, wz in [rad/s] per unit rate of each joint,
+        [rad/s] of a revolute and [m/s] of a prismatic one; see `jacobian`.
+    """
     result = np.empty((len(chain.coordinates), 6, len(q)))
 
     def work(block: slice) -> None:

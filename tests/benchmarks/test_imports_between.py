@@ -1,0 +1,77 @@
+"""Imports between areas, and rings of modules and folders."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from survey.imports import rings
+from survey.tables import full
+
+from measured_tree import faults, measured
+
+
+def test_imports_the_wrong_way_are_told_wherever_they_stand(tmp_path: Path) -> None:
+    house = measured(
+        tmp_path,
+        models__urmpipe_models__arm="def _f() -> None:\n    from urmpipe import main\n",
+        pipeline__urmpipe_pipeline__log="import urmpipe_models.arm\n",
+    )
+    assert faults(house) == {"imports the wrong way": ("models/urmpipe_models/arm.py imports cli",)}
+    assert house.imports == {("models", "cli"): 1, ("pipeline", "models"): 1}
+
+
+def test_a_ring_counts_when_modules_are_loaded_and_not_in_functions_or_for_type_checkers(
+    tmp_path: Path,
+) -> None:
+    house = measured(
+        tmp_path,
+        models__urmpipe_models__a="from urmpipe_models import b\n",
+        models__urmpipe_models__b="try:\n    import urmpipe_models.c\nfinally:\n    pass\n",
+        models__urmpipe_models__c="from urmpipe_models.a import X\n",
+        models__urmpipe_models__d="def _f() -> None:\n    import urmpipe_models.e\n",
+        models__urmpipe_models__e="import urmpipe_models.f\nimport urmpipe_models.d\n",
+        models__urmpipe_models__f="if TYPE_CHECKING:\n    import urmpipe_models.e\n",
+    )
+    ring = "urmpipe_models.a ~ urmpipe_models.b ~ urmpipe_models.c"
+    assert faults(house) == {
+        "rings of modules": (ring,),
+        "rings of folders": (
+            f"{ring}: urmpipe_models.a -> urmpipe_models.b, urmpipe_models.b -> urmpipe_models.c,"
+            " urmpipe_models.c -> urmpipe_models.a",
+        ),
+    }
+
+
+def test_a_ring_of_folders_needs_no_ring_of_modules(tmp_path: Path) -> None:
+    house = measured(
+        tmp_path,
+        cli__urmpipe__one__a="import urmpipe.two.a\n",
+        cli__urmpipe__two__a="",
+        cli__urmpipe__two__b="import urmpipe.one.b\n",
+        cli__urmpipe__one__b="",
+    )
+    assert faults(house) == {
+        "rings of folders": (
+            "urmpipe.one ~ urmpipe.two: urmpipe.one.a -> urmpipe.two.a, urmpipe.two.b -> urmpipe.one.b",
+        )
+    }
+
+
+def test_rings_are_the_strongly_connected_components() -> None:
+    graph = {"a": {"b"}, "b": {"c", "d"}, "c": {"a"}, "d": {"e"}, "e": {"d"}, "f": {"a", "f"}}
+    assert rings(graph) == [("d", "e"), ("a", "b", "c")]
+
+
+def test_what_runs_where_types_are_not_checked_counts(tmp_path: Path) -> None:
+    house = measured(
+        tmp_path,
+        models__urmpipe_models__a="if TYPE_CHECKING:\n    pass\nelse:\n    import urmpipe_models.b\n",
+        models__urmpipe_models__b="import urmpipe_models.a\n",
+    )
+    assert house.module_rings == ("urmpipe_models.a ~ urmpipe_models.b",)
+
+
+def test_the_table_of_imports_has_a_dot_where_none_is_allowed(tmp_path: Path) -> None:
+    house = measured(tmp_path, cli__urmpipe__a="import urmpipe_models.b\n", models__urmpipe_models__b="")
+    assert "| cli | 1 | 0 | 0 | . | 0 | . | . | . |" in full(house)
+    assert "| models | . | . | . | . | 0 | . | . | . |" in full(house)
