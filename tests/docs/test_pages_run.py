@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
-from pages import command_lines, lay_files, pages, run_in_process
+from pages import ROOT, command_lines, lay_files, pages, run_in_process, text_of
 
 ELSEWHERE = {
     "urmpipe view ": "needs a display: tests/cli/test_view.py",
@@ -50,6 +51,25 @@ def test_the_commands_of_a_page_run(
     if any(line.startswith("urmpipe fmu check") for line in lines):
         lines = ["urmpipe fmu build kinematic_chain --robot urm6 --backend python", *lines]
     assert {line: run_in_process(line) for line in lines} == dict.fromkeys(lines, 0)
+
+
+def test_every_link_of_a_page_leads_somewhere() -> None:
+    for page in pages():
+        for link in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text_of(page)):
+            assert "://" in link or (ROOT / page).parent.joinpath(link).exists(), f"{page}: {link}"
+
+
+def test_every_page_is_linked_from_the_readme_or_a_page_that_is() -> None:
+    reached, new = set[str](), {"README.md"}
+    while new:
+        reached |= new
+        found = {
+            (ROOT / page).parent.joinpath(link).resolve().relative_to(ROOT).as_posix()
+            for page in new
+            for link in re.findall(r"\]\(([^)#:\s]+\.md)", text_of(page))
+        }
+        new = {one for one in found if one in pages()} - reached
+    assert set(pages()) - reached == set()
 
 
 def test_readme_shows_every_command() -> None:
