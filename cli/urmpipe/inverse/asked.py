@@ -146,7 +146,7 @@ def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[str]:
 
 
 def arm_of(robot: Robot | None, base: Frame | None, tool: Frame | None) -> Chain:
-    """Return the arm on its base and with its tool.
+    """Return the arm on its base and with its tool, frames in [m] and [rad] as 6 numbers or of shape (4, 4).
 
     Raises:
         OptionError: If there is none.
