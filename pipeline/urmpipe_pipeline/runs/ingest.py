@@ -25,6 +25,7 @@ from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
 from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources.option_text import option
 
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
@@ -183,9 +184,18 @@ def _rates(
         result.append(values)
         said = f"the recorded {word} do not agree with the differences of the joint values"
         unit = other_unit(on_grid, values, order)
-        because = f", but would {unit}" if unit else ""
+        because = f", but would {unit}{_option_of(log, unit)}" if unit else ""
         warnings.append(LogWarning(f"recorded-{word}", f"{said}{because}; the differences are used"))
     return result[0], result[1]
+
+
+def _option_of(log: JointLog, unit: str) -> str:
+    """Return the option that reads the clock in the unit in which the recorded rates agree."""
+    name = next((column.name for column in log.columns if column.role == "time"), None)
+    wanted = unit.removeprefix("with the time in ").split(",")[0]
+    if name is None or wanted == unit:
+        return ""
+    return f" ({option('--unit', f'{name}={wanted}')})"
 
 
 def kinematics(
