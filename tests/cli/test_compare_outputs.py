@@ -312,7 +312,7 @@ def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[st
     assert compare("bad.csv", *flags) == 1
     out, err = capsys.readouterr()
     assert bool(out) == ("--json" in flags)
-    assert err.startswith("FAIL  bad out of tolerance against wanted\n      max |")
+    assert err.startswith("FAIL  bad out of tolerance against wanted, by the joints on both sides\n      max |")
     assert err.count("\n") == 2
 
 
