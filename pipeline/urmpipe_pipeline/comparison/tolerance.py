@@ -34,9 +34,8 @@ ALLOWED_NUMBERS = (
     "numbers of axis, x, y, z, norm, path in m, of angle, joint in rad (m of a joint that slides)"
 )
 
-QUANTITY = re.compile(
-    r"\s*(?:±|\+-)?\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?|\.[0-9]+(?:[eE][-+]?[0-9]+)?)\s*([a-z]*)\s*"
-)
+NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+QUANTITY = re.compile(rf"\s*(?:±|\+-)?\s*({NUMBER})\s*([a-z]*)\s*")
 """A number in plain digits and its unit, ± before it or not."""
 
 DECIMAL_COMMA = re.compile(r"\s*[0-9]+,[0-9]+\s*[a-z]*\s*")
