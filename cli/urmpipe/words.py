@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass, is_dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, Literal, TypeVar
 
 from urmpipe_models.errors import UrmpipeError
@@ -66,9 +66,11 @@ SPELLINGS = {
     "--output": Spelling("output", _SHOWN),
     "--period": Spelling("period", _SHOWN, "number"),
     "--repair": Spelling("repair", "", "flag"),
+    "--restarts": Spelling("restarts"),
     "--robot": Spelling("robot", _SHOWN),
     "--rotation": Spelling("rotation", r"FORM|[a-z][a-z_|]+(?=[ ;,|]|$)", "text"),
     "--rows": Spelling("rows", "grid|file"),
+    "--seed": Spelling("seed"),
     "--skip-bad": Spelling("skip_bad", "", "flag"),
     "--source": Spelling("source", "NAME|path", "text"),
     "--start": Spelling("start"),
@@ -119,7 +121,7 @@ def _spelled(text: str) -> str:
     """Return a text with each option of the table as Python writes it."""
     for option in sorted(SPELLINGS, key=len, reverse=True):
         if option in text:
-            text = _pattern(option).sub(lambda found, one=SPELLINGS[option]: _in_python(one, found), text)
+            text = _pattern(option).sub(partial(_in_python, SPELLINGS[option]), text)
     return text
 
 

@@ -36,10 +36,10 @@ def listed(name: str, allowed: Iterable[str]) -> str:
 
 
 def _nearest_first(name: str, allowed: Iterable[str], least: float) -> list[str]:
-    """Return the names that are at least so much like another, the nearest first, else in their order."""
+    """Return the names that are at least so much like another, the nearest first; of equal ones the last."""
     wanted = _letters(name)
     like = {one: SequenceMatcher(None, _letters(one), wanted).ratio() for one in allowed}
-    return sorted((one for one in like if like[one] >= least), key=lambda one: -like[one])
+    return sorted((one for one in like if like[one] >= least), key=lambda one: (like[one], one), reverse=True)
 
 
 def _letters(name: str) -> str:

@@ -177,6 +177,12 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
         return f"found no folder {path.parent}, allowed: a folder that exists"
     if not path.exists():
         return None
+    return _irreplaceable(path, inputs, kind)
+
+
+def _irreplaceable(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None:
+    """Return what speaks against replacing what is there, or None."""
+    noun = NOUNS.get(kind, kind)
     if any(one.exists() and path.samefile(one) for one in inputs):
         return f"found an input of this command, allowed: any other name for the {noun}"
     if not path.is_file() or not _is_ours(path, kind):

@@ -224,9 +224,11 @@ def test_the_demo_goes_the_whole_way(urmpipe: RunCommand, tmp_path: Path) -> Non
     assert (folder / "report.html").stat().st_size < 15e6
     again = urmpipe("demo")
     assert again.code == 0
-    *_, as_expected, more, report, recording = again.out.splitlines()
+    assert again.out.startswith("Four logs of one motion: three should pass; the fourth, ")
+    *_, as_expected, more, logs, report, recording = again.out.splitlines()
     assert as_expected.startswith("The verdicts are as they should be: ")
     assert more == "the counter-rotating module does not."
+    assert logs == f"Logs:      {LOGS}  (to look at, or to try the commands with)"
     assert report == f"Report:    {Path('urmpipe-demo', 'report.html')}  (open it in any browser)"
     assert recording.startswith(f"Recording: {Path('urmpipe-demo', 'demo.rrd')}  (open it: ")
 

@@ -49,7 +49,7 @@ def test_the_gradient_of_the_squared_miss_is_minus_j_transposed_e_at_any_target(
     gradients(task_of(chain, targets if pose else Targets(targets.position)), columns(chain, 20, 2))
 
 
-@settings(max_examples=30, deadline=None)
+@settings(max_examples=20, deadline=None)
 @given(data=st.data(), pose=st.booleans())
 def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObject, pose: bool) -> None:
     chain = data.draw(chains)

@@ -123,7 +123,7 @@ def test_a_recording_has_a_name_that_rerun_can_open(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "kind", "meant"),
-    [("run.csv", "recording", "run.rrd"), ("run.html", "recording", "run.rrd"), ("a.PNG", "drawing", "a.svg")],
+    [("run.csv", "recording", "run.rrd"), ("a.html", "recording", "a.rrd"), ("a.PNG", "drawing", "a.svg")],
 )
 def test_a_name_that_ends_as_those_of_another_kind_is_refused(
     tmp_path: Path, name: str, kind: OutputKind, meant: str

@@ -9,6 +9,8 @@ from urmpipe.printing.columns import Column, print_columns
 from urmpipe.printing.terminal import LISTED, judged_line
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison, Change, Worse
+from urmpipe_pipeline.comparison.symbols import symbol
+from urmpipe_pipeline.json_values import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -41,7 +43,7 @@ def _columns(changes: Sequence[Change]) -> Iterator[Column]:
     """Yield the columns of the table of changes."""
     yield Column("Log", [one.run for one in changes], key=True)
     yield Column(
-        "Quantity", [f"{text.symbol(one.now)} [{text.SHOWN[one.now.unit][0]}]" for one in changes], key=True
+        "Quantity", [f"{symbol(one.now)} [{text.SHOWN[one.now.unit][0]}]" for one in changes], key=True
     )
     yield Column("worse", [", ".join(WORDS[name] for name in one.worse) or None for one in changes])
     for name in ("max", "rms"):
@@ -87,7 +89,7 @@ def _lines(found: BaselineComparison) -> Iterator[str]:
         if absent:
             yield f"{word}: {_listed(absent)}"
     for one in found.differences:
-        yield f"made otherwise: {one.what}: {text.plain(one.before)}{ARROW}{text.plain(one.now)}"
+        yield f"made otherwise: {one.what}: {plain(one.before)}{ARROW}{plain(one.now)}"
 
 
 def _unit(kind: str) -> str:

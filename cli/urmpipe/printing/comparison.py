@@ -11,6 +11,7 @@ from urmpipe.printing.terminal import judged, judged_line, new_console
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import SYMBOLS, size_of, symbol, used_words
 from urmpipe_pipeline.comparison.wording import correlation, lacking_words, of_allowed
 
 if TYPE_CHECKING:
@@ -77,12 +78,12 @@ def _decisive(run: Deviation, *, named: bool) -> str:
     """Say which quantity uses up most of its tolerance: how much of how much, when and where."""
     one = run.decisive
     if one.tolerance is not None and one.missing:
-        return f"{text.size_of(one)}{f' of {run.name}' if named else ''}: {lacking_words(one)}"
+        return f"{size_of(one)}{f' of {run.name}' if named else ''}: {lacking_words(one)}"
     place = text.point(run.place(one))
     of = f" of {run.name}" if named else ""
-    used = f" ({text.used(one)})" if one.tolerance is not None else ""
+    used = f" ({used_words(one)})" if one.tolerance is not None else ""
     return (
-        f"max {text.size_of(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
+        f"max {size_of(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
         f"{used}, at t = {text.seconds(one.t_max)} s (row {run.row(one)}), at ({place}) m"
     )
 
@@ -93,11 +94,11 @@ def _ranking(result: Comparison) -> Iterator[Column]:
     yield Column("Log", [run.name for run in runs], key=True)
     yield Column("Verdict", [judged(run.verdict) for run in runs])
     quantities: dict[str, Callable[[Deviation], Statistics | None]] = {
-        f"max |{text.SYMBOLS[axis]}|": lambda run, axis=axis: run.statistics[axis]  # type: ignore[misc]
+        f"max |{SYMBOLS[axis]}|": lambda run, axis=axis: run.statistics[axis]  # type: ignore[misc]
         for axis in "xyz"
     }
     quantities |= {
-        f"max {text.SYMBOLS['norm']}": lambda run: run.statistics["norm"],
+        f"max {SYMBOLS['norm']}": lambda run: run.statistics["norm"],
         "max path": lambda run: run.statistics["path"],
         "max angle": lambda run: run.statistics.get("angle"),
         "max joint": lambda run: run.furthest_joint("rad"),
@@ -142,7 +143,7 @@ def _statistics(run: Deviation) -> Iterator[Column]:
     """Yield the columns of the statistics of one log, a row a quantity."""
     every = run.all_statistics
     start = dict(zip(AXES, run.start, strict=True))
-    yield Column("Quantity", [f"{text.symbol(one)} [{text.SHOWN[one.unit][0]}]" for one in every], key=True)
+    yield Column("Quantity", [f"{symbol(one)} [{text.SHOWN[one.unit][0]}]" for one in every], key=True)
     yield Column("Verdict", [judged(one.verdict) for one in every])
     yield Column("tolerance", [text.limit(one.tolerance, one.unit) for one in every])
     yield Column("max", [_cell(one) for one in every])

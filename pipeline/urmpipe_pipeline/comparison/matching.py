@@ -26,10 +26,10 @@ class Matched:
         reference: Where the reference was, in [m], shape (m, 3).
         actual: Where the log was, aligned, in [m], shape (m, 3).
         reference_quat: Orientation of the reference x, y, z, w [-], shape (m, 4); None without one.
-        actual_quat: The same of the log.
+        actual_quat: Orientation of the log x, y, z, w [-], shape (m, 4); None without one.
         reference_q: Joints of the reference, in the log's order, in [rad] or [m], shape (m, joints); None
             where `joints_apart` tells why not.
-        actual_q: The same of the log.
+        actual_q: Joints of the log in [rad] or [m], shape (m, joints); None where the reference's are.
         left_out: Samples of the log that were not compared.
         reference_left_out: Samples of the reference outside the log's time.
         sync: How the clocks were put together.
@@ -50,7 +50,11 @@ class Matched:
     alignment: Alignment
 
     def at(self, kept: NDArray[np.intp]) -> Matched:
-        """Return both sides at some of these samples alone, by index; the others are left out."""
+        """Return both sides at some of these samples alone; the others are left out.
+
+        Args:
+            kept: Indices of the samples [-], shape (k,).
+        """
         return replace(
             self,
             sample=self.sample[kept],

@@ -25,7 +25,7 @@ class Measured:
         quantity: x, y, z, norm, path, angle, or a joint's name.
         kind: What it is measured of.
         unit: m or rad.
-        values: In that unit, shape (m,); NaN where a side has no value.
+        values: In [m] or [rad], as the unit says, shape (m,); NaN where a side has no value.
     """
 
     quantity: str
@@ -92,7 +92,7 @@ def correlation(first: FloatArray, second: FloatArray) -> float | None:
 
     Args:
         first: Shape (m,), in [m] or [m/s]; NaN where there is no value.
-        second: The same.
+        second: Shape (m,), in [m] or [m/s]; NaN where there is no value.
     """
     both = np.isfinite(first) & np.isfinite(second)
     if not both.any():

@@ -9,16 +9,12 @@ from decimal import Decimal
 from numbers import Real
 
 from urmpipe_models.errors import OptionError
+from urmpipe_models.measure_units import units_of
 
 DEFAULT_TOLERANCE = 0.0035
 """Largest deviation allowed on an axis in [m]. Source: [UrmArm2021]_ section 2.4."""
 
-SI, MILLI, MICRO = Decimal(1), Decimal("1e-3"), Decimal("1e-6")
-DEGREE = Decimal("0.01745329251994329576923690768")
-"""pi / 180."""
-
-LENGTHS = {"": SI, "m": SI, "mm": MILLI, "um": MICRO}
-ANGLES = {"": SI, "rad": SI, "mrad": MILLI, "deg": DEGREE}
+LENGTHS, ANGLES = ({"": Decimal(1), **units_of(si)} for si in ("m", "rad"))
 UNITS: dict[str, dict[str, Decimal]] = {
     **dict.fromkeys(("axis", "x", "y", "z", "norm", "path"), LENGTHS),
     **dict.fromkeys(("angle", "joint"), ANGLES),

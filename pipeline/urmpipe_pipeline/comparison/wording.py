@@ -8,6 +8,7 @@ from urmpipe_pipeline.comparison.alignment import tool_with
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Statistics
+from urmpipe_pipeline.comparison.symbols import allowed_words
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 
 
@@ -36,7 +37,7 @@ def of_allowed(one: Statistics) -> str:
 def tolerance_words(comparison: Comparison) -> str:
     """Return what a comparison allows, that of joints in the units of those that were compared."""
     units = {one.unit for run in comparison.runs for one in run.joint_statistics.values()}
-    return text.tolerance(comparison.tolerance, units or {"rad"})
+    return allowed_words(comparison.tolerance, units or {"rad"})
 
 
 def meter_words(one: DeltaVerdict) -> str:

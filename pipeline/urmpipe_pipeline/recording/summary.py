@@ -11,6 +11,7 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation
+from urmpipe_pipeline.comparison.symbols import used_words
 from urmpipe_pipeline.comparison.wording import alignment_words, excess, sync_words, tolerance_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import ghost_colour_word, run_colour_word
@@ -104,7 +105,7 @@ def _of_comparison(result: Comparison) -> Iterator[str]:
 def _worst(one: Deviation, several: bool) -> str:
     """Return how much, where and when of the log that comes out worst."""
     decisive = one.decisive
-    used = "" if decisive.used is None else f" ({text.used(decisive)})"
+    used = "" if decisive.used is None else f" ({used_words(decisive)})"
     said = f"**{shown(one.name)}**: " if several else ""
     said += f"{shown(excess(decisive))}{used}, at {text.seconds(decisive.t_max)} s."
     if one.verdict == "fail":

@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.symbols import size_of
 from urmpipe_pipeline.comparison.wording import of_allowed, tolerance_words
 from urmpipe_pipeline.report.facts import Fact
 from urmpipe_pipeline.runs.results import Run
@@ -81,7 +82,7 @@ def _named(runs: Sequence[Deviation], total: int) -> str:
 def _decisive(run: Deviation, href: str) -> tuple[Fact, ...]:
     """Return which quantity uses up the largest share of its tolerance, how much, when and where."""
     one = run.decisive
-    amount = f"{text.size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
+    amount = f"{size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
     return (
         Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", run.name, href=href),
         Fact("How much", amount),

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import size_of, used_words
 from urmpipe_pipeline.report.facts import (
     Fact,
     alignment_value,
@@ -57,11 +58,11 @@ def card(deviation: Deviation, href: str, covered: float) -> Card:
         name=deviation.name,
         href=href,
         state=deviation.verdict,
-        size=text.size_of(decisive),
+        size=size_of(decisive),
         amount=text.quantity(decisive.max, decisive.unit, tolerance),
         allowed="" if tolerance is None else f"{text.limit(tolerance, decisive.unit)} {shown}",
         share=None if decisive.used is None else min(decisive.used, 1.0),
-        used=text.used(decisive),
+        used=used_words(decisive),
         facts=tuple(fact for fact in _facts(deviation, covered) if fact.value),
     )
 

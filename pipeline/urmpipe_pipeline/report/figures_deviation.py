@@ -9,6 +9,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import AXES, Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import SYMBOLS
 from urmpipe_pipeline.comparison.wording import correlation
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, joint_colour
 from urmpipe_pipeline.report.spec import MUTED, Figure, Panel, Spec, axis, base_layout, stacked, typed
@@ -47,7 +48,7 @@ STRENGTHS = ((0.7, "strongly"), (0.4, "moderately"), (0.2, "weakly"))
 
 def deviation_figure(deviation: Deviation) -> Figure:
     """Return delta, its norm and the distance from the path with tolerances, and the tool's speed."""
-    named = [(name, text.SYMBOLS[name], AXIS_COLOURS[name]) for name in AXES]
+    named = [(name, SYMBOLS[name], AXIS_COLOURS[name]) for name in AXES]
     columns = [*zip(named, deviation.delta.T, strict=True), (("path", "path", MUTED), deviation.path)]
     panels = [
         _panel(deviation, deviation.statistics[name], symbol, colour, values)

@@ -11,6 +11,7 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import SourceFile
+from urmpipe_pipeline.json_values import plain
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditKind
 from urmpipe_pipeline.report.tables import (
@@ -135,4 +136,4 @@ def provenance_table(provenance: Provenance) -> Table:
 
 
 def _named(word: str, values: Mapping[str, Any]) -> list[tuple[str, str]]:
-    return [(f"{word} {name}", text.plain(value)) for name, value in values.items()]
+    return [(f"{word} {name}", plain(value)) for name, value in values.items()]

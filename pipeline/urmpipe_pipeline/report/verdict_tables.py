@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import SYMBOLS, size_of, symbol
 from urmpipe_pipeline.report.facts import alignment_value, speed_correlation
 from urmpipe_pipeline.report.tables import (
     Cell,
@@ -59,7 +60,7 @@ def _how_far(comparison: Comparison, links: Sequence[str]) -> Table:
     """Return the largest deviation of each kind and how much is out of tolerance, one line a log."""
     columns: tuple[Column, ...] = (
         *words("Log", "Verdict", "Decided by"),
-        *numbers(*(f"max |{text.SYMBOLS[axis]}| [mm]" for axis in "xyz"), "max ‖Δ‖ [mm]", "max path [mm]"),
+        *numbers(*(f"max |{SYMBOLS[axis]}| [mm]" for axis in "xyz"), "max ‖Δ‖ [mm]", "max path [mm]"),
         *numbers("max angle [deg]", "max joint [deg]", "max joint [mm]", "Share out", "Covered"),
     )
     rows = tuple(
@@ -77,7 +78,7 @@ def _how_far_row(run: Deviation, link: str, covered: float) -> tuple[Cell, ...]:
     return (
         Cell(run.name, href=link),
         judged(run.verdict),
-        Cell(text.size_of(run.decisive)),
+        Cell(size_of(run.decisive)),
         *(_largest(one) for one in found),
         Cell(text.percent(run.share_out)),
         Cell(text.percent(covered)),
@@ -133,7 +134,7 @@ def _statistics_columns(unit: str) -> tuple[Column, ...]:
 
 def _statistics_row(one: Statistics, start: float, *, most: bool) -> tuple[Cell, ...]:
     return (
-        Cell(text.symbol(one)),
+        Cell(symbol(one)),
         judged(one.verdict),
         Cell(text.limit(one.tolerance, one.unit)),
         replace(_largest(one), most=most),

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -128,6 +126,8 @@ class Run(Shown):
         """Return its name, its arm and how long it is."""
         arm = self.robot.name if self.robot else "no robot"
         rows = number_of(self.log.rows, "row")
+        if self.single_poses:
+            return line_of(self.name, arm, rows)
         grid = f"grid of {number_of(len(self.t_ns), 'sample')}"
         return line_of(self.name, arm, f"{rows} in {self.duration:g} s", grid)
 
@@ -167,18 +167,3 @@ class Run(Shown):
             "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
-
-
-def json_ready(value: Any) -> Any:
-    """Return a value as JSON can hold it: arrays as lists, NaN and infinities as null."""
-    if isinstance(value, Mapping):
-        return {str(key): json_ready(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [json_ready(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return json_ready(value.tolist())
-    if isinstance(value, np.generic):
-        return json_ready(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value

@@ -212,7 +212,7 @@ def test_urdfs_of_others_are_pinocchios(shared: Path, file: str, tip: str, other
     assert_agrees_with_peer(chain, peer_of_urdf(path, [tip]), random_poses(chain), padding=others)
 
 
-@settings(deadline=None, max_examples=40)
+@settings(deadline=None, max_examples=25)
 @given(data=st.data(), seed=st.integers(0, 2**32 - 1))
 def test_motion_and_jacobian_of_every_point_are_pinocchios(
     chains: SearchStrategy[Chain], data: st.DataObject, seed: int
@@ -364,6 +364,7 @@ def test_missing_samples_are_missing_and_touch_no_other_row() -> None:
     np.testing.assert_array_equal(got[[0, 1, 3]], clean[[0, 1, 3]])
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.lists(st.integers(-20, 20), min_size=6, max_size=6), st.integers(0, 2**32 - 1))
 def test_whole_turns_change_nothing(turns: list[int], seed: int) -> None:
     q = np.random.default_rng(seed).uniform(-math.pi, math.pi, (1, 6))
@@ -374,6 +375,7 @@ def test_whole_turns_change_nothing(turns: list[int], seed: int) -> None:
         np.testing.assert_allclose(a, b, rtol=0.0, atol=1e-12)
 
 
+@settings(max_examples=25, deadline=None)
 @given(data=st.data())
 def test_tip_pose_is_the_last_of_forward(chains: SearchStrategy[Chain], data: st.DataObject) -> None:
     chain = data.draw(chains)

@@ -314,6 +314,26 @@ def test_whole_messages(robot: Any, text: str, said: str) -> None:
     assert complaint(robot, text) == [said]
 
 
+def test_rows_that_make_no_arm_in_metres_and_radians_must_tell_their_units(robot: Any) -> None:
+    rows = 'kind = "dh"\njoints = [{ d = 118, alpha = 90 }, { a = 612 }]'
+    with pytest.raises(RobotError) as caught:
+        robot(rows)
+    assert str(caught.value).splitlines() == [
+        'arm.toml: key length_unit: found none, and links of 730 m, allowed: "mm", or "m" if so meant',
+        'arm.toml: key angle_unit: found none, and 90 rad, allowed: "deg", or "rad" if so meant',
+    ]
+    assert robot(f'length_unit = "mm"\nangle_unit = "deg"\n{rows}').joints[1].origin.translation[2] == 0.118
+    assert robot(f'length_unit = "m"\nangle_unit = "rad"\n{rows}').tip.translation[0] == 612.0
+
+
+def test_a_text_without_quotes_is_told_how_to_be_written(robot: Any) -> None:
+    with pytest.raises(RobotError) as caught:
+        robot('kind = "urm"\nname = ur5e  # mine')
+    assert str(caught.value) == (
+        'arm.toml:2: not valid TOML: Invalid value (at line 2, column 8); a text needs quotes: name = "ur5e"'
+    )
+
+
 def test_toml_that_is_none_names_its_line(robot: Any) -> None:
     (said,) = complaint(robot, 'kind = "dh"\nname = \n')
     assert said.startswith("arm.toml:2: not valid TOML: ")
@@ -345,6 +365,7 @@ def bits(chain: Chain) -> bytes:
     return np.array(numbers, dtype=float).tobytes()
 
 
+@settings(max_examples=40, deadline=None)
 @given(data=st.data())
 def test_a_dictionary_through_json_is_the_same_chain_bit_by_bit(
     chains: SearchStrategy[Chain], data: st.DataObject
@@ -356,7 +377,7 @@ def test_a_dictionary_through_json_is_the_same_chain_bit_by_bit(
     assert bits(back) == bits(chain)
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_a_toml_file_is_the_same_chain_bit_by_bit(
     chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path

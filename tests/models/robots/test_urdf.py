@@ -108,9 +108,23 @@ def test_of_several_ends_the_one_with_most_moving_joints_is_the_tip(urdf: Any) -
     branches = [link("r"), link("a"), link("b"), link("c"), joint("j1", "r", "a"), joint("j2", "a", "b")]
     assert urdf(robot(*branches, joint("camera", "a", "c", "fixed"))).coordinates == ("j1", "j2")
     assert complaint(urdf, robot(*branches, joint("j3", "a", "c"))) == [
-        "arm.urdf: found 2 ends with 2 moving joints; choose a tip link: b, c"
+        "arm.urdf: found 2 ends with 2 moving joints; choose a tip link (--tip, tip_link): b, c"
     ]
     assert urdf(robot(*branches, joint("j3", "a", "c")), tip_link="c").coordinates == ("j1", "j3")
+
+
+def test_joints_that_the_arm_carries_beside_its_tip_need_a_choice_and_wheels_below_it_do_not(
+    urdf: Any,
+) -> None:
+    arm = [link("r"), link("a"), link("b"), link("c"), link("d"), joint("j1", "r", "a")]
+    arm += [joint("j2", "a", "b"), joint("left", "b", "c")]
+    finger = joint("right", "b", "d", inside='<mimic joint="left"/>')
+    assert complaint(urdf, robot(*arm, finger)) == [
+        "arm.urdf: found right on the arm beside the way to c, as of a gripper; choose a tip link"
+        " (--tip, tip_link): b, c, d"
+    ]
+    assert urdf(robot(*arm, finger), tip_link="b").coordinates == ("j1", "j2")
+    assert urdf(robot(*arm, joint("wheel", "r", "d"))).coordinates == ("j1", "j2", "left")
 
 
 def test_several_roots_need_a_choice(urdf: Any) -> None:
@@ -190,7 +204,7 @@ def test_a_mimic_of_a_joint_outside_the_chain_is_refused(urdf: Any) -> None:
     links = [link(name) for name in "rabc"]
     follower = joint("j3", "a", "c", inside='<mimic joint="j2"/>')
     text = robot(*links, joint("j1", "r", "a"), joint("j2", "a", "b"), follower)
-    assert urdf(text).coordinates == ("j1", "j2")
+    assert urdf(text, tip_link="b").coordinates == ("j1", "j2")
     assert complaint(urdf, text, tip_link="c") == [
         "arm.urdf:8: joint j3: mimics j2, which is not on the chain r to c; allowed: j1"
     ]
@@ -264,7 +278,13 @@ def test_a_file_that_is_not_there_is_one_line(tmp_path: Path) -> None:
 
 def test_the_fingers_of_a_gripper(shared: Path) -> None:
     path = shared / "robots" / "Gepetto_example-robot-data" / "panda.urdf"
-    assert read_urdf(path).coordinates[-1] == "panda_finger_joint1"  # the end with most moving joints
+    with pytest.raises(RobotError) as caught:
+        read_urdf(path)
+    assert str(caught.value) == (
+        f"{path}: found panda_finger_joint2 on the arm beside the way to panda_leftfinger, as of a gripper;"
+        " choose a tip link (--tip, tip_link): panda_hand, panda_hand_tcp, panda_leftfinger,"
+        " panda_rightfinger"
+    )
     with pytest.raises(RobotError) as caught:
         read_urdf(path, tip_link="panda_rightfinger")
     assert "joint panda_finger_joint2: mimics panda_finger_joint1, which is not on the chain" in str(
@@ -293,7 +313,7 @@ def assert_same(chain: Chain, back: Chain) -> None:
         np.testing.assert_allclose(a.rotation, b.rotation, rtol=0.0, atol=SAME)
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_the_file_read_back_is_the_same_chain(
     chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
@@ -303,7 +323,7 @@ def test_the_file_read_back_is_the_same_chain(
     assert_same(chain, read_urdf(tmp_path / "chain.urdf"))
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_dh_arms_come_back(dh_rows: SearchStrategy[list[DHRow]], data: st.DataObject, tmp_path: Path) -> None:
     chain = dh_chain("arm", data.draw(dh_rows), tool=from_offset([0.1, 0.2, 0.3, 1.0, 2.0, 3.0]))
@@ -320,7 +340,7 @@ def test_the_catalogues_arms_come_back(name: str, tmp_path: Path) -> None:
     assert back.point_names == chain.point_names
 
 
-@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50)
+@settings(deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=25)
 @given(data=st.data())
 def test_pinocchio_reads_the_file_as_the_same_chain(
     chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path

@@ -25,7 +25,7 @@ from urmpipe_pipeline.comparison.baseline import (
 from urmpipe_pipeline.comparison.change import Absent, Difference
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.trajectory import Sync
-from urmpipe_pipeline.runs.results import json_ready
+from urmpipe_pipeline.json_values import json_ready
 
 Compared = Callable[..., Comparison]
 

@@ -37,8 +37,9 @@ def told(result: Comparison) -> list[tuple[str, str]]:
 def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArray, missing: set[int]) -> None:
     rows = [row for row in missing if row < len(values)][: len(values) - 1]
     values[rows] = np.nan
-    count, measured = np.arange(len(values)), Measured("angle", "angle", "rad", values)
-    one = describe(measured, 0.1 * count, count, {"angle": 1.0})
+    count, t = np.arange(len(values)), np.linspace(0.0, 1.0, len(values))
+    measured = Measured("angle", "angle", "rad", values)
+    one = describe(measured, t, count, {"angle": 1.0})
     assert (one.samples, one.missing) == (len(values) - len(rows), len(rows))
     above = int(np.count_nonzero(np.abs(values) > 1.0))
     assert (
@@ -47,7 +48,7 @@ def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArra
     assert one.share_out is not None
     assert round(one.share_out * len(values)) == one.out_of_tolerance
     assert one.verdict == ("fail" if above or rows else "pass")
-    free = describe(measured, 0.1 * count, count, {"axis": 1.0})
+    free = describe(measured, t, count, {"axis": 1.0})
     assert (free.verdict, free.out_of_tolerance, free.missing) == (None, None, len(rows))
 
 

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urmpipe_models.errors import OptionError
+from urmpipe_models.measure_units import DEGREE
 from urmpipe_pipeline.comparison.tolerance import (
-    DEGREE,
     UNITS,
     allowed_for,
     check_tolerance,

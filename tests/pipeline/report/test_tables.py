@@ -8,6 +8,7 @@ import pytest
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.symbols import size_of
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.report.log_tables import audit_table
 from urmpipe_pipeline.report.tables import Table
@@ -39,7 +40,7 @@ def test_the_ranking_holds_every_kind_of_deviation(everything: Comparison) -> No
     assert row_of(far, "joint-off") == {
         "Log": "joint-off",
         "Verdict": "FAIL",
-        "Decided by": text.size_of(off.decisive),
+        "Decided by": size_of(off.decisive),
         "max |Δx| [mm]": text.millimetres(found["x"].max, 0.0035),
         "max |Δy| [mm]": text.millimetres(found["y"].max, 0.0035),
         "max |Δz| [mm]": text.millimetres(found["z"].max, 0.0035),

@@ -92,7 +92,7 @@ def solve_iteratively(
 
 
 def random_starts(chain: Chain, count: int, seed: int) -> FloatArray:
-    """Return uniformly random joint values within the limits, shape (count, joints).
+    """Return uniformly random joint values in [rad] or [m] within the limits, shape (count, joints).
 
     A revolute joint that is open at an end is drawn from one turn: from its only limit, or (-pi, pi]; a
     prismatic one from as far as the arm is long: from its only limit, or to both sides. The first draws do

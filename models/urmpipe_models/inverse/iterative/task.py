@@ -66,20 +66,20 @@ class Miss:
 
     @property
     def square(self) -> FloatArray:
-        """|e|^2 in [m2]."""
+        """|e|^2 in [m2], shape (n,)."""
         return np.asarray(self.distance2 + self.turn2)
 
     def within(self, metres: float, radians: float) -> BoolArray:
-        """Return where position and orientation are as near as that, in [m] and [rad]."""
+        """Return where position and orientation are as near as that, in [m] and [rad], shape (n,)."""
         return np.asarray((self.distance2 <= metres**2) & (self.turn2 <= (self.length * radians) ** 2))
 
     def kept(self, rows: IndexArray) -> Miss:
-        """Return some of the rows."""
+        """Return some of the rows, indices of shape (m,)."""
         error, jacobian = rows_of(self.error, rows), rows_of(self.jacobian, rows)
         return Miss(error, jacobian, self.distance2[rows], self.turn2[rows], self.length)
 
     def restore(self, rows: IndexArray, before: Miss) -> None:
-        """Write another's rows over some of this one's."""
+        """Write another's rows, indices of shape (m,), over some of this one's."""
         for mine, other in (
             (self.error, before.error),
             (self.jacobian, before.jacobian),
@@ -107,7 +107,7 @@ class Task:
     columns: FloatArray | None
 
     def kept(self, rows: IndexArray) -> Task:
-        """Return some of the rows."""
+        """Return some of the rows, indices of shape (m,)."""
         columns = None if self.columns is None else rows_of(self.columns, rows)
         return replace(self, position=rows_of(self.position, rows), columns=columns)
 

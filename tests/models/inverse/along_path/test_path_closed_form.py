@@ -54,7 +54,7 @@ def line(first: FloatArray, last: FloatArray, count: int) -> FloatArray:
 amounts = st.lists(st.floats(-0.4, 0.4), min_size=6, max_size=6)
 
 
-@settings(deadline=None)  # the first case imports
+@settings(max_examples=15, deadline=None)  # the first case imports
 @given(amounts, amounts, st.sampled_from(["ur3", "ur5e", "ur10e"]))
 def test_the_motion_that_a_path_was_made_from_is_found_again(
     one: list[float], other: list[float], robot: str
@@ -113,7 +113,7 @@ def test_a_path_within_an_aligned_wrist_keeps_the_free_joints_still(robot: str) 
     assert [one.text for one in path.singular] == ["samples 0 to 200, 0.000 to 1.000 s: wrist aligned"]
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(st.integers(0, 10_000), st.sampled_from(["arm6", "ur5e"]))
 def test_a_walk_is_what_taking_the_nearest_sample_by_sample_gives(seed: int, robot: str) -> None:
     """All solutions in all allowed turns, and of them the nearest: written plainly, on coarse motions."""

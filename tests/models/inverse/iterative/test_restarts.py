@@ -48,7 +48,7 @@ def planar() -> Chain:
 @pytest.mark.parametrize("robot", ["urm6", "panda", "ur5e"])
 def test_random_reachable_poses_are_solved(robot: str) -> None:
     chain = load_robot(robot)
-    targets = random_targets(chain, 60)
+    targets = random_targets(chain, 30)
     solutions = solve_iteratively(chain, targets, start=np.zeros(len(chain.coordinates)))
     assert solutions.branches == ("1",)
     assert solutions.reached.all()
@@ -92,7 +92,7 @@ def test_a_singular_target_is_met_however_short_the_steps_towards_it() -> None:
 def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken() -> None:
     """Attempts come one, two, four, ... at a time; here each is made alone."""
     chain = load_robot("urm6")
-    targets, start = random_targets(chain, 80), np.array(chain.start)
+    targets, start = random_targets(chain, 40), np.array(chain.start)
     found = solve_iteratively(chain, targets).q[:, 0]
     restarts, others = random_starts(chain, 7, 0), 0
     for row in np.flatnonzero(~refine(chain, targets, start).converged):
