@@ -15,13 +15,14 @@ from itertools import pairwise
 from pathlib import Path
 from types import ModuleType, SimpleNamespace
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.sources import read_log
+from urmpipe_pipeline.sources import ReadOptions, read_log
 
 PAGE = (Path(__file__).parents[2] / "docs" / "recording-logs.md").read_text(encoding="utf-8")
 TIMES = 0.05 * np.arange(20)
@@ -239,3 +240,30 @@ def test_the_log_at_the_top_of_the_page_loads(tmp_path: Path) -> None:
     q: NDArray[np.float64] = log.q
     assert q.tolist() == [[0.5, -0.25], [0.5021, -0.2478]]
     assert [b - a for a, b in pairwise(log.t_ns.tolist())] == [50_000_000]
+
+
+def test_the_recipe_of_rtde_names_the_joints_and_the_tool_centre_point(tmp_path: Path) -> None:
+    (recipe,) = snippets("Universal Robots, RTDE", "xml")
+    names: list[str] = []
+    for field in ElementTree.fromstring(recipe).iter("field"):
+        name, count = field.attrib["name"], {"DOUBLE": 1, "VECTOR6D": 6}[field.attrib["type"]]
+        names += [name] if count == 1 else [f"{name}_{k}" for k in range(count)]
+    table = np.full((20, len(names)), 0.25)  # what stands still
+    table[:, names.index("timestamp")] = 1234.5 + TIMES
+    rates, joints = (names.index(f"actual_{what}_0") for what in ("qd", "q"))
+    table[:, joints : joints + 2], table[:, rates : rates + 2] = VALUES, np.gradient(VALUES, 0.05, axis=0)
+    np.savetxt(tmp_path / "monday.csv", table, "%.17g", header=" ".join(names), comments="")
+    log = read_plainly(tmp_path / "monday.csv")
+    assert log.source == "ur-rtde"
+    assert log.joints == tuple(f"actual_q_{k}" for k in range(6))
+    np.testing.assert_array_equal(log.q[:, :2], VALUES)
+    assert log.qd is not None
+    assert (log.rotation_form, log.clock_start) == ("vector", 1234.5)
+    target = read_log([tmp_path / "monday.csv"], ReadOptions(joints=_options_of_target()))
+    assert np.unique(target.q).tolist() == [0.25]
+
+
+def _options_of_target() -> tuple[str, ...]:
+    """Return the columns that the page names for the target."""
+    (said,) = re.findall(r"--joints (\S+)", PAGE)
+    return tuple(said.split(","))

@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from by_python import Q6, comma, savetxt, writer
-from by_robots import UR, krc_trace, lines, ros2_row
-from specimen import Made, Truth, degrees, made, motion, specimen
+from by_robots import UR, krc_trace, ros2_row
+from specimen import Made, Truth, degrees, lines, made, motion, specimen
 from urmpipe_models.arrays import FloatArray
 
 HEADER = ",".join(["t", *Q6])

@@ -10,13 +10,14 @@ from pathlib import Path
 
 import by_python
 import by_robots
+import by_simulators
 import damaged
 import with_clocks
 import with_tcp
 from specimen import SPECIMENS, Specimen
 
 FOLDER = Path(__file__).parent
-GROUPS = (by_python, by_robots, with_clocks, with_tcp, damaged)
+GROUPS = (by_python, by_simulators, by_robots, with_clocks, with_tcp, damaged)
 
 README = """\
 # Specimen logs

@@ -158,3 +158,8 @@ def specimen(make: Callable[[], Made]) -> Callable[[], Made]:
 def made(name: str, text: str | bytes, truth: Truth | None = None, encoding: str = "utf-8") -> Made:
     """Return a specimen of one file."""
     return Made({name: text if isinstance(text, bytes) else text.encode(encoding)}, truth)
+
+
+def lines(*rows: str, end: str = "\n") -> str:
+    """Return rows with a line end after each."""
+    return end.join([*rows, ""])

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import groupby
 from typing import NamedTuple
 
 import numpy as np
@@ -104,7 +105,7 @@ def audit_log(
     warnings = [
         *noticed,
         *_warn_unexplained(log, odd, periods),
-        *_warn_ambiguous(log, unsure, speeds, periods),
+        *_warn_ambiguous(log, unsure, speeds),
         *([] if repaired else _warn_in_between(log, between)),
     ]
     unresolved = np.concatenate((odd.steps, unsure.steps))
@@ -323,18 +324,20 @@ def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
         yield LogWarning("in-between", f"{len(between.rows) - LISTED} more samples on wraps{ALL}")
 
 
-def _warn_ambiguous(
-    log: JointLog, unsure: _Places, speeds: FloatArray, periods: FloatArray
-) -> Iterator[LogWarning]:
-    """Warn of gaps in which a joint can have turned."""
-    places = (unsure.rows, unsure.joints, unsure.before, speeds)
-    for row, j, before, speed in zip(*(part[:LISTED].tolist() for part in places), strict=True):
-        gap = float(log.t_ns[row] - log.t_ns[before]) / 1e9
+def _warn_ambiguous(log: JointLog, unsure: _Places, speeds: FloatArray) -> Iterator[LogWarning]:
+    """Warn of gaps in which joints can have turned, of each gap once."""
+    places = zip(
+        *(part.tolist() for part in (unsure.before, unsure.rows, unsure.joints, speeds)), strict=True
+    )
+    gaps = [(ends, list(found)) for ends, found in groupby(places, key=lambda place: place[:2])]
+    for (before, row), found in gaps[:LISTED]:
+        passed = float(log.t_ns[row] - log.t_ns[before]) / 1e9
+        joints = ", ".join(f"{log.joints[j]} (at {speed:.3g} rad/s)" for _, _, j, speed in found)
         said = (
-            f"{log.joints[j]} has no value for {gap:.6g} s before; at {speed:.3g} rad/s it can have turned by"
-            f" more than {np.degrees(periods[j] / 2.0):.0f} deg: the nearest turn is taken"
+            f"no value for {passed:.6g} s before this row: {joints} can have turned by more than half a"
+            " period; the nearest turn is taken"
         )
         yield LogWarning("ambiguous-turn", said, row + 1)
-    if len(unsure.rows) > LISTED:
-        left = len(unsure.rows) - LISTED
-        yield LogWarning("ambiguous-turn", f"{left} more gaps in which a joint can have turned{ALL}")
+    if len(gaps) > LISTED:
+        left = len(gaps) - LISTED
+        yield LogWarning("ambiguous-turn", f"{left} more gaps in which joints can have turned{ALL}")

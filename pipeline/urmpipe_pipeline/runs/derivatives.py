@@ -24,6 +24,17 @@ AGREEMENT = 0.1
 RESTING = 0.01
 """... or by less than this rms, in [rad/s] or [m/s]: a robot that stands still has rates of noise only."""
 
+_OTHER_UNITS = {
+    order: {
+        **{10.0 ** (-k * order): f"with the time in {unit}" for k, unit in ((3, "ms"), (6, "us"), (9, "ns"))},
+        **{10.0 ** (k * order): f"with the time in s, not in {unit}" for k, unit in ((3, "ms"), (6, "us"))},
+        np.pi / 180.0: "in deg",
+        180.0 / np.pi: "with the joints in deg",
+    }
+    for order in (1, 2)
+}
+"""By order of the derivative: the ratio of differences to what was recorded, and what makes it."""
+
 
 def derivatives(
     q: FloatArray, tsp: float, method: Method = "central", broken: IntArray | None = None
@@ -108,6 +119,25 @@ def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
     error = float(np.sqrt(np.mean((recorded[both] - computed[both]) ** 2)))
     size = float(np.sqrt(np.mean(computed[both] ** 2)))
     return error <= max(AGREEMENT * size, RESTING)
+
+
+def other_unit(recorded: FloatArray, computed: FloatArray, order: int) -> str:
+    """Return in which other unit recorded derivatives would agree with the differences; empty if in none.
+
+    Args:
+        recorded: Derivatives as the file has them, in [rad/s^order] or [m/s^order], shape (g, joints).
+        computed: From differences, same shape.
+        order: 1 for rates, 2 for accelerations.
+    """
+    both = np.isfinite(recorded) & np.isfinite(computed)
+    own, wanted = recorded[both], computed[both]
+    if not own.any() or not wanted.any():
+        return ""
+    ratio = float(own @ wanted / (own @ own))  # least squares
+    if np.linalg.norm(wanted - ratio * own) > AGREEMENT * np.linalg.norm(wanted):
+        return ""
+    near = [said for factor, said in _OTHER_UNITS[order].items() if abs(ratio / factor - 1.0) <= AGREEMENT]
+    return near[0] if near else ""
 
 
 def _window(count: int) -> int:

@@ -46,6 +46,8 @@ def otherwise(inference: Inference) -> str:
     if inference.what == "unit of the time" and other:
         return f"{other} with --unit COLUMN={other}"
     if inference.what.startswith("unit of ") and other:
-        column = inference.what.removeprefix("unit of ").split(", ")[0]
-        return f"{other} with {option('--unit', f'{column}={other}')}"
+        column, *more = inference.what.removeprefix("unit of ").split(", ")
+        if more and inference.value in ("rad", "deg"):
+            column = ""  # of all joints that turn
+        return f"{other} with {option('--unit', f'{column}={other}' if column else other)}"
     return ""

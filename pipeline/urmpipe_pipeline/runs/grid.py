@@ -207,7 +207,9 @@ def _changes(log: JointLog, wanted: float, count: int, in_gap: NDArray[np.bool_]
     """Say what the resampling did."""
     median = float(np.median(np.diff(log.t_ns)))
     said = f"{log.rows} rows with a median period of {median / 1e6:.6g} ms became {count} samples"
-    warnings = [LogWarning("resampled", f"{said} every {wanted / 1e6:.6g} ms (linear)")]
+    left = int(in_gap.sum())
+    inside = f"; {left} of them lie inside gaps and have no value" if left else ""
+    warnings = [LogWarning("resampled", f"{said} every {wanted / 1e6:.6g} ms (linear){inside}")]
     if wanted < (1.0 - REGULAR) * median:
         warnings.append(
             LogWarning(
@@ -215,9 +217,5 @@ def _changes(log: JointLog, wanted: float, count: int, in_gap: NDArray[np.bool_]
                 f"the grid of {wanted / 1e6:.6g} ms is finer than the log's {median / 1e6:.6g} ms: the"
                 " samples between its rows are interpolated, not measured",
             )
-        )
-    if in_gap.any():
-        warnings.append(
-            LogWarning("gap-left-open", f"{int(in_gap.sum())} grid samples lie inside gaps and have no value")
         )
     return warnings

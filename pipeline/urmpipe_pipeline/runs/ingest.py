@@ -17,7 +17,7 @@ from urmpipe_models.row_blocks import THREADS
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
-from urmpipe_pipeline.runs.derivatives import Method, derivatives, recorded_agree
+from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree
 from urmpipe_pipeline.runs.grid import Grid, make_grid
 from urmpipe_pipeline.runs.meshes import VISUAL_MISSING, missing_visuals
 from urmpipe_pipeline.runs.plausibility import implausible
@@ -25,6 +25,7 @@ from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
 from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources.option_text import option
 
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
@@ -175,20 +176,26 @@ def _rates(
     computed = derivatives(q, grid.tsp, method, broken)
     recorded = (log.qd, log.qdd)
     result = []
-    for values, own, word in zip(computed, recorded, ("rates", "accelerations"), strict=True):
+    for order, values, own, word in zip((1, 2), computed, recorded, ("rates", "accelerations"), strict=True):
         on_grid = None if own is None else grid.resample(own)
         if on_grid is None or len(q) < 3 or recorded_agree(on_grid, values):
             result.append(values if on_grid is None else on_grid)
             continue
         result.append(values)
-        warnings.append(
-            LogWarning(
-                f"recorded-{word}",
-                f"the recorded {word} do not agree with the differences of the joint values;"
-                " the differences are used",
-            )
-        )
+        said = f"the recorded {word} do not agree with the differences of the joint values"
+        unit = other_unit(on_grid, values, order)
+        because = f", but would {unit}{_option_of(log, unit)}" if unit else ""
+        warnings.append(LogWarning(f"recorded-{word}", f"{said}{because}; the differences are used"))
     return result[0], result[1]
+
+
+def _option_of(log: JointLog, unit: str) -> str:
+    """Return the option that reads the clock in the unit in which the recorded rates agree."""
+    name = next((column.name for column in log.columns if column.role == "time"), None)
+    wanted = unit.removeprefix("with the time in ").split(",")[0]
+    if name is None or wanted == unit:
+        return ""
+    return f" ({option('--unit', f'{name}={wanted}')})"
 
 
 def kinematics(

@@ -14,7 +14,7 @@ from urmpipe_models.orientation import RotationForm
 from urmpipe_pipeline.joint_log import ROLES, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.sources.cells.cell import is_number, plain, significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
-from urmpipe_pipeline.sources.clocks.clock import even_clock
+from urmpipe_pipeline.sources.clocks.clock import Clock, even_clock
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.content import Content
@@ -52,6 +52,11 @@ class _Measured:
     inferences: Sequence[Inference]
     warnings: Sequence[LogWarning]
 
+    @property
+    def named(self) -> Iterator[tuple[FloatArray, list[str]]]:
+        """The values of each group that is used, shape (n, columns), with the names of its columns."""
+        return ((one.values, [column.name for column in one.columns]) for one in self.groups if one.columns)
+
 
 def assemble(
     plan: Plan,
@@ -72,16 +77,15 @@ def assemble(
         files: Its files.
 
     Raises:
-        LogError: If a column has no value, or a unit cannot be told or contradicts the data.
+        LogError: If a column has no value, or its unit cannot be told.
         OptionError: If an option does not fit the log.
     """
     roles, layout, clock = content.roles, plan.tables.layouts[plan.main], plan.clock
-    t_ns, start, timed, noticed = _times(content, options)
+    t_ns, start, timed, noticed = _times(content, clock, options)
     signs, offsets = _corrections(options, len(roles.joints))
     measured = _measured(plan, content, robot, t_ns, signs, offsets)
     joints, rates, seconds, position, rotation = measured.groups
     digits = _digits(plan, roles.joints)
-    found = (plan.tables, layout, clock)
     return JointLog(
         name=name,
         source=PATH if not roles.joints and plan.tables.source == TABLE else plan.tables.source,
@@ -99,19 +103,18 @@ def assemble(
         columns=(*_time_columns(plan), *_used_columns(plan, measured.groups, signs, offsets)),
         digits=digits,
         inferences=(
-            *(inference for one in found for inference in one.inferences),
+            *(one for found in (plan.tables, layout, clock) for one in found.inferences),
             *timed,
-            *roles.inferences,
-            *content.inferences,
-            *measured.inferences,
+            *(one for found in (roles, content, measured) for one in found.inferences),
             *_about_digits(digits),
         ),
         warnings=(
             *content.warnings,
             *clock.warnings,
             *noticed,
+            *roles.warnings,
             *measured.warnings,
-            *_missing(measured.groups),
+            *missing_samples(measured.named),
             *gaps(t_ns),
         ),
     )
@@ -142,7 +145,8 @@ def _measured(
     q = _in_si(q, units)
     told = finder.rotations(roles.rotation, roles.forms)
     arm = (robot, q) if robot and roles.joints else None
-    turned = settle_rotation(roles.rotation, roles.forms, rotation, told, arm)
+    given = any(column.number in plan.units for column in roles.rotation)
+    turned = settle_rotation(roles.rotation, roles.forms, rotation, told, arm, given=given)
     return _Measured(
         groups=(
             _Group(roles.joints, q, units),
@@ -158,14 +162,15 @@ def _measured(
 
 
 def _times(
-    content: Content, options: ReadOptions
+    content: Content, clock: Clock, options: ReadOptions
 ) -> tuple[IntArray, int, tuple[Inference, ...], Sequence[LogWarning]]:
     """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say."""
     if content.clock is None:
         t_ns, said, noticed = even_clock(content.rows, options.period)
         return t_ns, 0, said, noticed
     start = int(content.clock[0])
-    return content.clock - start, start, (), ()
+    counted = Inference("start of the time", clock.shown(start), "the first row; times are counted from it")
+    return content.clock - start, start, (counted,) if start else (), ()
 
 
 def _corrections(options: ReadOptions, joints: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
@@ -228,13 +233,6 @@ def _in_si(values: FloatArray, units: Sequence[Unit]) -> FloatArray:
     if len(units) and (factors != 1.0).any():
         values *= factors
     return values
-
-
-def _missing(groups: Sequence[_Group]) -> Iterator[LogWarning]:
-    """Yield a warning for each column in which samples are missing."""
-    for group in groups:
-        if group.columns:
-            yield from missing_samples(group.values, [column.name for column in group.columns])
 
 
 def _digits(plan: Plan, joints: Sequence[Column]) -> int | None:

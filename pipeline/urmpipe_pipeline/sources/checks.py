@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
@@ -143,20 +143,24 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
     return findings
 
 
-def missing_samples(values: FloatArray, names: Sequence[str]) -> list[LogWarning]:
-    """Return one warning for each column in which samples are missing.
+def missing_samples(groups: Iterable[tuple[FloatArray, Sequence[str]]]) -> list[LogWarning]:
+    """Return a warning for the columns in which samples are missing, those that lack the same rows together.
 
     Args:
-        values: The columns, shape (n, columns).
-        names: Their names.
+        groups: Values of some columns, shape (n, columns), and their names.
     """
+    alike: dict[bytes, tuple[BoolArray, list[str]]] = {}
+    for values, names in groups:
+        for j in _unusual(values):
+            missing = np.isnan(values[:, j])
+            if missing.any():
+                alike.setdefault(missing.tobytes(), (missing, []))[1].append(names[j])
     warnings = []
-    for j in _unusual(values):
-        missing = np.flatnonzero(np.isnan(values[:, j]))
-        if len(missing):
-            first = int(missing[0]) + 1
-            said = f"{names[j]} has no value in {len(missing)} of {len(values)} rows, first in this one"
-            warnings.append(LogWarning("missing", said, first))
+    for missing, lacking in alike.values():
+        verb = "has" if len(lacking) == 1 else "have"
+        count = f"{np.count_nonzero(missing)} of {len(missing)} rows"
+        said = f"{', '.join(lacking)} {verb} no value in {count}, first in this one"
+        warnings.append(LogWarning("missing", said, int(np.argmax(missing)) + 1))
     return warnings
 
 

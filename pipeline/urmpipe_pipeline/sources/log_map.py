@@ -47,6 +47,12 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
+CORRECTIONS = (
+    "# Where the file counts a joint otherwise: sign = -1, offset = 90 (q = sign * value + offset).",
+    "# What the environment limits it to: interval = [-180, 180].",
+)
+"""What may be added to the joints of a map by hand."""
+
 TURNING = ("rad", "deg")
 """Units of joints that turn: they alone have an interval."""
 
@@ -146,6 +152,7 @@ def map_of(
         "tool": list(tool) or None,
     }
     lines = [MAP_HEADER, "", *toml_lines(top), "", "[clock]", *toml_lines(_clock(log, found))]
+    lines += ["", *CORRECTIONS] if log.joints else []
     for column, name in zip(_of(log, "joint"), log.joints, strict=True):
         said: dict[str, Any] = {"column": _called(log, column), "name": name, "unit": column.unit}
         corrected = {"sign": column.sign, "offset": column.offset}

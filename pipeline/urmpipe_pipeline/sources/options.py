@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
+from urmpipe_models.errors import OptionError
 from urmpipe_models.orientation import RotationForm
+
+COLUMNS = "columns by name or number, such as ['q1', 'q2'] or [2, 3]"
+UNITS = "a mapping, such as {'q1': 'deg'}, or {'': 'deg'} for all joints that turn"
+INTERVALS = "a mapping, such as {'q1': (-180.0, 180.0)}, or with '' for all joints that turn"
 
 
 @dataclass(frozen=True)
@@ -50,6 +55,27 @@ class ReadOptions:
     skip_bad: bool = False
     interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     repair: bool = False
+
+    def __post_init__(self) -> None:
+        """Take numbers of columns as text; refuse what is no list of names or no mapping.
+
+        Raises:
+            OptionError: With everything that is of a wrong kind.
+        """
+        wrong = []
+        for name in ("joints", "names", "position", "orientation"):
+            value = getattr(self, name)
+            if isinstance(value, str) or not isinstance(value, Iterable):
+                wrong.append(f"{name}: found {value!r}, allowed: {COLUMNS}")
+            else:
+                object.__setattr__(self, name, tuple(map(str, value)))
+        for name, allowed in (("units", UNITS), ("interval", INTERVALS)):
+            if not isinstance(getattr(self, name), Mapping):
+                wrong.append(f"{name}: found {getattr(self, name)!r}, allowed: {allowed}")
+        if wrong:
+            raise OptionError(*wrong)
+        object.__setattr__(self, "time", None if self.time is None else str(self.time))
+        object.__setattr__(self, "units", {str(column): unit for column, unit in self.units.items()})
 
 
 def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None) -> ReadOptions:

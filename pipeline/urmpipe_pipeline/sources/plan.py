@@ -6,8 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.joint_log import Inference
+from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.clocks.clock import Clock, find_clock
 from urmpipe_pipeline.sources.clocks.time_file import clock_of_file, time_file
 from urmpipe_pipeline.sources.columns.columns import (
@@ -20,7 +20,11 @@ from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_hea
 from urmpipe_pipeline.sources.columns.roles import Roles, assign
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
+from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import Unit
+
+SHOWN_LOGS = 6
+"""Files that are named where several logs stand for one."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,21 +124,50 @@ def _roles(
         return without_header(columns, main, options, robot, path=options.source == PATH)
     plots = one_plot_a_file(columns, tables.paths, robot) if several and not options.joints else None
     if plots is not None:
-        return _plots(plots, tables)
-    roles = assign(columns, tables.layouts, options, robot, path=options.source == PATH)
+        return _plots(*plots, tables)
+    try:
+        return _by_names(columns, tables.layouts, options, robot)
+    except LogError:
+        if several:
+            _refuse_several_logs(columns, tables, options, robot)
+        raise
+
+
+def _by_names(
+    columns: Sequence[Column], layouts: Sequence[Layout], options: ReadOptions, robot: Chain | None
+) -> Roles:
+    """Return the roles of columns with names, each of which is there once."""
+    roles = assign(columns, layouts, options, robot, path=options.source == PATH)
     if not options.joints:
-        refuse_twins(
-            roles.joints, columns, tables.layouts, "give the numbers of the right ones with --joints"
-        )
-    used = (*roles.position, *roles.rotation)
-    refuse_twins(used, columns, tables.layouts, "rename or remove the others")
+        refuse_twins(roles.joints, columns, layouts, "give the numbers of the right ones with --joints")
+    refuse_twins((*roles.position, *roles.rotation), columns, layouts, "rename or remove the others")
     return roles
 
 
-def _plots(plots: Sequence[Column], tables: Tables) -> Roles:
+def _refuse_several_logs(
+    columns: Sequence[Column], tables: Tables, options: ReadOptions, robot: Chain | None
+) -> None:
+    """Raise a `LogError` if two files or more are logs of their own, each with all joints."""
+    whole = []
+    for i, path in enumerate(tables.paths):
+        own = [column for column in columns if column.table == i]
+        try:
+            roles = _by_names(own, tables.layouts, options, robot)
+        except LogError:
+            continue
+        whole += [path] if len(roles.joints) > 1 else []
+    if len(whole) > 1:
+        shown = ", ".join(path.name for path in whole[:SHOWN_LOGS])
+        more = f" and {len(whole) - SHOWN_LOGS} more" if len(whole) > SHOWN_LOGS else ""
+        said = f"found {len(whole)} logs, each with joints of its own ({shown}{more})"
+        hint = "allowed: one log, or its plots with one joint a file; name the logs one by one"
+        raise LogError(Finding(f"{said}, {hint}", str(whole[0].parent))) from None
+
+
+def _plots(plots: Sequence[Column], warnings: tuple[LogWarning, ...], tables: Tables) -> Roles:
     """Return the roles of one plot a file, named by their columns or, if these repeat, by their files."""
     names = [column.header for column in plots]
     if len(set(names)) < len(names) or tables.layouts[0].header is None:
         plots = [replace(column, name=tables.titles[column.table]) for column in plots]
     said = Inference("joint columns", ", ".join(column.name for column in plots), "one plot a file")
-    return Roles(joints=tuple(plots), inferences=(said,))
+    return Roles(joints=tuple(plots), inferences=(said,), warnings=warnings)

@@ -97,8 +97,8 @@ def test_a_gap_in_which_a_joint_can_turn_half_a_period_is_ambiguous() -> None:
     (warning,) = fast.warnings
     assert warning.kind == "ambiguous-turn"
     assert warning.message == (
-        "q1 has no value for 0.505 s before; at 6.3 rad/s it can have turned by more than 180 deg: the"
-        " nearest turn is taken"
+        "no value for 0.505 s before this row: q1 (at 6.3 rad/s) can have turned by more than half a"
+        " period; the nearest turn is taken"
     )
 
 

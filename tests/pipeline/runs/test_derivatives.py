@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from urmpipe_pipeline.runs.derivatives import WINDOW, Method, derivatives, recorded_agree
+from urmpipe_pipeline.runs.derivatives import WINDOW, Method, derivatives, other_unit, recorded_agree
 
 TSP = 0.005
 T = TSP * np.arange(400, dtype=np.float64)
@@ -85,3 +85,23 @@ def test_smoothing_leaves_a_gap_around_a_missing_sample_and_nothing_else(row: in
     for got, expected in zip(derivatives(q, TSP, "savgol"), whole, strict=True):
         np.testing.assert_array_equal(np.isnan(got), np.column_stack([lost, np.zeros_like(lost)]))
         np.testing.assert_array_equal(got[~lost], expected[~lost])
+
+
+@pytest.mark.parametrize(
+    ("factor", "order", "said"),
+    [
+        (1e3, 1, "with the time in ms"),
+        (1e6, 2, "with the time in ms"),
+        (1e6, 1, "with the time in us"),
+        (1e-3, 1, "with the time in s, not in ms"),
+        (180.0 / np.pi, 1, "in deg"),
+        (np.pi / 180.0, 2, "with the joints in deg"),
+        (1.5, 1, ""),
+        (0.0, 1, ""),
+    ],
+)
+def test_the_unit_in_which_recorded_rates_agree_is_told(factor: float, order: int, said: str) -> None:
+    computed = np.column_stack((np.sin(np.arange(50.0)), np.cos(np.arange(50.0))))
+    computed[7] = np.nan
+    assert other_unit(factor * computed, computed, order) == said
+    assert other_unit(factor * computed[::-1], computed, order) == ""

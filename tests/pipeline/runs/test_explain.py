@@ -32,14 +32,14 @@ def test_every_decision_that_could_be_another_names_its_option(tmp_path: Path) -
         "unit of the time": "s with --unit COLUMN=s",
         "joint columns": "--joints A,B,C in the robot's order",
         "recorded TCP": "position in a --map",
-        "unit of q1, q2": "deg with --unit q1=deg",
+        "unit of q1, q2": "deg with --unit deg",
         "unit of x, y, z": "mm with --unit x=mm",
     }
 
 
 @pytest.mark.parametrize(
     ("what", "option"),
-    [("unit of q1", {"q1": "deg"}), ("unit of x", {"x": "mm"}), ("unit of the time", {"t": "s"})],
+    [("unit of q1", {"": "deg"}), ("unit of x", {"x": "mm"}), ("unit of the time", {"t": "s"})],
 )
 def test_the_option_named_decides_otherwise(what: str, option: dict[str, str], tmp_path: Path) -> None:
     before = next(one for name, one in inferences(tmp_path).items() if name.startswith(what))

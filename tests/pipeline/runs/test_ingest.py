@@ -106,6 +106,36 @@ def test_recorded_rates_are_used_where_they_agree(tmp_path: Path) -> None:
     assert "recorded-rates" in [w.kind for w in bad.warnings]
 
 
+@pytest.mark.parametrize(("factor", "unit", "wanted"), [(1000.0, "s", "ms"), (0.001, "ms", "s")])
+def test_rates_that_agree_in_another_unit_of_time_name_it(
+    tmp_path: Path, factor: float, unit: str, wanted: str
+) -> None:
+    t = 0.008 * np.arange(200)
+    table = np.column_stack((t * factor * (1000.0 if unit == "ms" else 1.0), np.sin(t), np.cos(t)))
+    path = tmp_path / "log.csv"
+    np.savetxt(path, table, "%.17g", ",", header=f"t 1 [{unit}],q1 [rad],dq1 [rad/s]", comments="")
+    (warning,) = [one for one in ingest_log([path]).warnings if one.kind == "recorded-rates"]
+    hint = "ms" if wanted == "ms" else "s, not in ms"
+    assert warning.message == (
+        "the recorded rates do not agree with the differences of the joint values, but would with the time in"
+        f" {hint} (--unit 't 1={wanted}'); the differences are used"
+    )
+    assert ingest_log([path], read=ReadOptions(units={"t 1": wanted})).warnings == ()
+
+
+def test_the_rates_that_export_writes_are_known_again(tmp_path: Path) -> None:
+    t = 0.005 * np.arange(50)
+    path = tmp_path / "log.csv"
+    header = "t [s],joint1 [rad],d_joint1 [rad/s],dd_joint1 [rad/s2]"
+    table = np.column_stack((t, np.sin(t), np.cos(t), -np.sin(t)))
+    np.savetxt(path, table, "%.17g", ",", header=header, comments="")
+    log = ingest_log([path]).log
+    assert log.joints == ("joint1",)
+    assert log.qd is not None
+    assert log.qdd is not None
+    np.testing.assert_array_equal(np.hstack((log.qd, log.qdd)), table[:, 2:])
+
+
 def test_the_table_has_a_row_a_grid_sample(tmp_path: Path) -> None:
     run = ingest_log([write(tmp_path / "log.csv", np.full((7, 6), 0.5))], robot=URM6, read=RAD)
     frame = run.to_frame()

@@ -119,6 +119,14 @@ def test_missing_samples(read: Read) -> None:
     ]
 
 
+def test_columns_that_lack_the_same_rows_are_one_warning(read: Read) -> None:
+    log = read("t,q1,q2,q3,x,y,z\n0,,1,,,,\n0.1,1,,2,1,1,1\n0.2,1,2,2,1,1,1\n")
+    assert [(w.row, w.message) for w in log.warnings if w.kind == "missing"] == [
+        (1, "q1, q3, x, y, z have no value in 1 of 3 rows, first in this one"),
+        (2, "q2 has no value in 1 of 3 rows, first in this one"),
+    ]
+
+
 def test_missing_samples_of_the_fast_way(read: Read) -> None:
     rows = [f"{0.005 * k:.3f},{'' if k % 1000 == 7 else k % 3},{k % 2}" for k in range(20_000)]
     log = read("\n".join(["t,q1,q2", *rows]))

@@ -295,3 +295,14 @@ def test_halves_of_a_stamp_are_joined_though_the_first_is_named_like_a_time(
 def test_a_whole_time_beside_whole_nanoseconds_is_no_half_of_it(read: Read) -> None:
     log = read("time_sec,time_nsec,q1\n1.5,1500000000,0\n1.505,1505000000,1\n")
     assert log.t_ns.tolist() == [0, 5_000_000]
+
+
+@pytest.mark.parametrize(
+    ("times", "start"),
+    [(("2.350", "2.400"), "2.35 s"), (("10:11:32.5", "10:11:32.6"), "10:11:32.5"), (("0", "0.1"), None)],
+)
+def test_where_the_clock_starts_is_told(times: tuple[str, ...], start: str | None, read: Read) -> None:
+    log = read("t,q1\n" + "".join(f"{time},1\n" for time in times))
+    assert log.t_ns[0] == 0
+    said = [(one.value, one.evidence) for one in log.inferences if one.what == "start of the time"]
+    assert said == ([(start, "the first row; times are counted from it")] if start else [])

@@ -80,7 +80,7 @@ def damaged(draw: st.DrawFn) -> bytes:
 
 
 @pytest.mark.filterwarnings("error")
-@settings(max_examples=300, deadline=None)
+@settings(max_examples=200, deadline=None)
 @given(damaged(), st.sampled_from(OPTIONS), st.sampled_from(ROBOTS))
 @example(LABELLED.replace(b"q values", b"q\r values", 1), ReadOptions(), None)
 @example(b'connected\nTime:"]" values: [1, 3] Type: 0\n', ReadOptions(), None)
@@ -230,7 +230,7 @@ def test_many_rows_left_out_are_counted(read: Read) -> None:
     assert warnings[0].row == 51
 
 
-@settings(max_examples=20, deadline=None, phases=[Phase.generate])
+@settings(max_examples=8, deadline=None, phases=[Phase.generate])
 @given(
     st.sets(st.integers(0, 79_999), min_size=1, max_size=12), st.sampled_from(["torn", "x,1,2", "1,2", "# a"])
 )

@@ -102,6 +102,15 @@ def test_what_was_inferred_reads_the_log_again(text: str, options: dict[str, obj
     assert not [w for w in again.warnings if w.kind.startswith("assumed")]
 
 
+def test_a_written_map_says_what_may_be_added(write: Write) -> None:
+    text = map_of(read_log([write("t [s],q1 [deg]\n0,1\n0.1,2\n")]))
+    assert text.split("\n\n")[-2:] == [
+        "# Where the file counts a joint otherwise: sign = -1, offset = 90 (q = sign * value + offset).\n"
+        "# What the environment limits it to: interval = [-180, 180].",
+        '[[joints]]\ncolumn = "q1 [deg]"\nname = "q1"\nunit = "deg"\n',
+    ]
+
+
 def test_robot_and_frames_come_back(write: Write) -> None:
     log = read_log([write("t [s],q1 [rad]\n0,1\n1,2\n")])
     said = read_map(write(map_of(log, "ur5e", (0.0, 0.0, 0.5), (0.1, 0.2, 0.3, 0.0, 0.5, 0.0)), "lab.toml"))

@@ -87,6 +87,23 @@ def test_the_kinematics_tell_what_rx_ry_rz_are(form: str, sequence: str, unit: s
     assert said.evidence.startswith("with it the arm's orientation agrees within ")
 
 
+def test_the_kinematics_tell_of_a_rotation_vector_in_another_unit_than_its_names_say(read: Read) -> None:
+    names = ["rotvec_x [rad]", "rotvec_y [rad]", "rotvec_z [rad]"]
+    table = text([*JOINTS_RAD, *XYZ, *names], Q, POSITION * 1e3, np.degrees(ROTATION.as_rotvec()))
+    log = read(table, UR5E)
+    assert log.tcp_rotation is not None
+    np.testing.assert_allclose(log.tcp_rotation, ROTATION.as_rotvec(), atol=PRINTED)
+    (warning,) = log.warnings
+    assert warning.kind == "unit-contradiction"
+    assert warning.message.startswith(
+        "rotvec_x, rotvec_y, rotvec_z: rad contradicts the kinematics: taken as deg: with it the arm's"
+        " orientation agrees within 0.00 deg, as vector in rad within "
+    )
+    assert warning.message.endswith(" deg; --unit rotvec_x=rad says otherwise")
+    given = read(table, UR5E, units={"rotvec_x": "rad"})
+    assert given.units["rotvec_z"] == "rad"
+
+
 def test_rx_ry_rz_without_a_robot_are_not_guessed(read: Read) -> None:
     log = read(text([*JOINTS_RAD, *XYZ, "rx", "ry", "rz"], Q, POSITION * 1e3, ROTATION.as_rotvec()))
     assert (log.tcp_rotation, log.rotation_form) == (None, None)

@@ -16,6 +16,7 @@ Wrong = Callable[..., list[str]]
 Arm = Callable[..., Chain]
 
 OPTION = "name them in the robot's order with --joints A,B,C"
+RECORD = "record every joint, or give another --robot"
 
 
 def table(names: Sequence[str]) -> str:
@@ -166,23 +167,27 @@ def test_without_a_word_for_joints_the_user_must_say(wrong: Wrong, arm: Arm) -> 
 def test_too_few_and_too_many_for_the_robot(wrong: Wrong, arm: Arm) -> None:
     text = table(["t", "q1", "q2", "q3"])
     assert wrong(text, arm(6)) == [
-        "log.csv: found 3 joint columns (q1, q2, q3), allowed: 6, as robot arm has"
+        f"log.csv: found 3 joint columns (q1, q2, q3), allowed: 6, as robot arm has; {RECORD}"
     ]
     assert wrong(text, arm(2)) == [
         f"log.csv: found 3 joint columns (q1, q2, q3), allowed: 2, as robot arm has; {OPTION}"
     ]
     assert wrong("0.1,0.2\n0.3,0.1\n", arm(6)) == [
-        "log.csv: found 2 joint columns (1, 2), allowed: 6, as robot arm has"
+        f"log.csv: found 2 joint columns (1, 2), allowed: 6, as robot arm has; {RECORD}"
     ]
 
 
-def test_a_missing_number_is_named(wrong: Wrong) -> None:
-    allowed = "allowed: numbers without a gap"
+def test_a_missing_number_is_named(wrong: Wrong, arm: Arm) -> None:
+    allowed = "allowed: numbers without a gap; record the missing one, or"
     assert wrong(table(["t", "a", "J2", "J3"])) == [
-        f"log.csv: found joint columns J2, J3 and none with number 1, {allowed}; {OPTION}"
+        f"log.csv: found joint columns J2, J3 and none with number 1, {allowed} {OPTION}"
     ]
     assert wrong(table(["t", "J1", "J2", "J4"])) == [
-        f"log.csv: found joint columns J1, J2, J4 and none with number 3, {allowed}; {OPTION}"
+        f"log.csv: found joint columns J1, J2, J4 and none with number 3, {allowed} {OPTION}"
+    ]
+    assert wrong(table(["t", "J1", "J2", "J4"]), arm(4)) == [
+        "log.csv: found joint columns J1, J2, J4 and none with number 3, allowed: the 4 joints of the robot;"
+        f" record the missing one, or {OPTION}"
     ]
 
 

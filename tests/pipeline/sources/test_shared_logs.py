@@ -102,7 +102,7 @@ def test_epoch_in_seconds(arm: Arm) -> None:
     assert log.q[0].tolist() == [0.7116998434066772, 0.006745942402631044]
     assert kinds(log.warnings) == ["assumed-unit"]
     with pytest.raises(
-        LogError, match=r"found 2 joint columns \(joint1, joint2\), allowed: 6, as robot arm has$"
+        LogError, match=r"found 2 joint columns \(joint1, joint2\), allowed: 6, as robot arm has; record"
     ):
         read_log([path], robot=arm(6))
 
@@ -113,7 +113,7 @@ def test_no_header_and_more_columns_than_joints(arm: Arm) -> None:
     assert log.q.shape == (2099, 6)
     assert log.q[0, 1] == 0.7844660375193842
     assert (log.first_line, log.period) == (1, 0.005)
-    assert kinds(log.warnings) == ["assumed-period", "assumed-unit"]
+    assert kinds(log.warnings) == ["assumed-period", "columns-not-used", "assumed-unit"]
     assert read_log([path]).q.shape == (2099, 12)
 
 

@@ -42,6 +42,46 @@ def test_plots_are_joined_in_the_order_of_their_numbers(files: list[Path], arm: 
     assert log.units["Angular Displacement2"] == "deg"
 
 
+def test_numbers_of_the_columns_come_before_those_of_the_files(write: Write) -> None:
+    files = [write(plot(VALUES[n], n=n), f"Plot{place}.csv") for place, n in ((1, 2), (2, 1))]
+    log = read_log(files)
+    assert log.joints == ("Angular Displacement1", "Angular Displacement2")
+    np.testing.assert_array_equal(log.q, np.array([VALUES[1], VALUES[2]]).T * DEG)
+    assert [(warning.kind, warning.message) for warning in log.warnings] == [
+        (
+            "plot-order",
+            "the plots are joined by the numbers of their columns, which are not those of the files: Angular"
+            " Displacement1 of Plot2.csv, Angular Displacement2 of Plot1.csv; --joints says otherwise",
+        )
+    ]
+    given = read_log(files, ReadOptions(joints=("Angular Displacement2", "Angular Displacement1")))
+    np.testing.assert_array_equal(given.q, np.array([VALUES[2], VALUES[1]]).T * DEG)
+    assert not given.warnings
+
+
+def test_a_plot_that_is_missing_between_others_is_an_error(write: Write, arm: Arm, tmp_path: Path) -> None:
+    files = [write(plot(VALUES[1], n=n), f"joint{n}.csv") for n in (1, 2, 4)]
+    with pytest.raises(LogError) as caught:
+        read_log(files)
+    assert str(caught.value) == (
+        f"{tmp_path}: found plots with the numbers 1, 2, 4 and none with 3, allowed: a plot for each joint;"
+        " add the missing one, or name them in the robot's order with --joints A,B,C"
+    )
+    assert read_log(files, robot=arm(3)).q.shape == (3, 3)
+
+
+def test_a_folder_of_several_logs_is_told_as_such(write: Write, tmp_path: Path) -> None:
+    text = "t,q1,q2\n0,1,2\n0.1,1,2\n"
+    files = [write(text, f"{day}.csv") for day in ("monday", "tuesday")]
+    files.append(write(text.replace("q", "joint"), "wednesday.csv"))
+    with pytest.raises(LogError) as caught:
+        read_log(files)
+    assert str(caught.value) == (
+        f"{tmp_path}: found 3 logs, each with joints of its own (monday.csv, tuesday.csv, wednesday.csv),"
+        " allowed: one log, or its plots with one joint a file; name the logs one by one"
+    )
+
+
 def test_german_words_and_equal_titles(write: Write) -> None:
     text = {n: plot(VALUES[n], "Winkelverschiebung (grd)").replace("Time (sec)", "Zeit (s)") for n in (1, 2)}
     files = [write(text[n], f"Gelenk {n}.csv", "latin-1") for n in (2, 1)]

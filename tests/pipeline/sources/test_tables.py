@@ -189,7 +189,12 @@ def test_without_header_the_columns_are_joints(read: Read, arm: Arm) -> None:
     assert log.q.tolist() == [[0.1, 0.2, 0.3], [0.05, 0.1, 0.5]]
     assert found(log, "columns not used") == "4"
     assert log.first_line == 1
-    assert [warning.kind for warning in log.warnings] == ["assumed-period", "assumed-unit"]
+    assert [warning.kind for warning in log.warnings] == [
+        "assumed-period", "columns-not-used", "assumed-unit",
+    ]  # fmt: skip
+    assert log.warnings[1].message == (
+        "4 columns without names, and arm has 3 joints: 4 left out; another --robot, or --joints A,B,C?"
+    )
 
 
 @pytest.mark.parametrize(

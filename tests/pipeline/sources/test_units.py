@@ -10,7 +10,9 @@ import pytest
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.sources import ReadOptions
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -229,4 +231,27 @@ def test_huge_numbers_are_read_without_a_warning_of_numpy(read: Read, wrong: Wro
     assert read(f"t,q1 [rad]\n{rows}").q[0, 0] == 1e308
     assert wrong(f"t,q1\n{rows}") == [
         "log.csv: found values up to 1e+308 in q1 and no unit, allowed: rad or deg; say which with --unit"
+    ]
+
+
+def test_a_unit_given_for_all_joints_against_their_names_is_told(read: Read) -> None:
+    log = read("t,q1 [deg],q2 [deg],q3\n0,1,2,3\n0.1,1,2,3\n", units={"": "rad"})
+    assert log.units == {"t": "s", "q1": "rad", "q2": "rad", "q3": "rad"}
+    assert [(warning.kind, warning.message) for warning in log.warnings] == [
+        ("unit-contradiction", "q1, q2: taken as rad (given as an option), though their names say deg")
+    ]
+
+
+def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None:
+    assert read("t,a,b\n0,1,2\n0.1,1,2\n", joints=[3, 2], time=1, units={2: "deg"}).joints == ("b", "a")
+    with pytest.raises(OptionError) as caught:
+        ReadOptions(joints="q1", position=3, units="deg", interval=2.0)  # type: ignore[arg-type]
+    columns = "allowed: columns by name or number, such as ['q1', 'q2'] or [2, 3]"
+    assert str(caught.value).split("\n") == [
+        f"joints: found 'q1', {columns}",
+        f"position: found 3, {columns}",
+        "units: found 'deg', allowed: a mapping, such as {'q1': 'deg'}, or {'': 'deg'} for all joints that"
+        " turn",
+        "interval: found 2.0, allowed: a mapping, such as {'q1': (-180.0, 180.0)}, or with '' for all joints"
+        " that turn",
     ]

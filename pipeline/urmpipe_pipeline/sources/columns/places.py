@@ -10,7 +10,7 @@ from pathlib import Path
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.orientation import width
-from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.pose import (
     Pose,
@@ -22,6 +22,10 @@ from urmpipe_pipeline.sources.columns.pose import (
 from urmpipe_pipeline.sources.columns.roles import OPTION, Roles, about_pose, check_count
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.vocabulary import split_unit
+
+GIVEN = "given as an option"
+"""The evidence for columns that the user named."""
 
 
 def without_header(
@@ -48,7 +52,7 @@ def without_header(
     if options.joints:
         joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
         check_count(joints, file, robot)
-        return _by_place(joints, columns, robot, "given as an option", pose)
+        return _by_place(joints, columns, robot, GIVEN, pose)
     for column in () if path else columns:  # of a path they are wrong rows
         if column.text:
             shown = layout.cells(column.index)[0]
@@ -101,29 +105,54 @@ def _trailing_pose(
 
 def one_plot_a_file(
     columns: Sequence[Column], paths: Sequence[Path], robot: Chain | None
-) -> tuple[Column, ...] | None:
+) -> tuple[tuple[Column, ...], tuple[LogWarning, ...]] | None:
     """Return the joint columns, in order, of files that hold one result each; None if one holds more.
 
-    The order is that of the numbers in the files' names, if these differ only by a number; else that of
-    the numbers in the columns' names; else the order in which the files were given.
+    The order is that of the numbers in the columns' names, if these differ only by a number; else that of
+    the numbers in the files' names; else the order in which the files were given. Where both have numbers
+    and the orders differ, a warning says so.
 
     Args:
         columns: The columns of all files, without the clocks.
         paths: The files, one a table.
         robot: The arm: a plot for each of its joints is needed.
+
+    Raises:
+        LogError: If a number is missing among those of the plots, and there is no robot.
     """
     numeric = [column for column in columns if not column.text and not column.counts_rows]
     if [column.table for column in numeric] != list(range(len(paths))):
         return None
     if robot is not None and len(numeric) != len(robot.coordinates):
         return None
-    for names in ([path.stem for path in paths], [column.name for column in numeric]):
-        numbers = _only_numbers_differ(names)
-        if numbers:
-            return tuple(
-                column for _, column in sorted(zip(numbers, numeric, strict=True), key=lambda p: p[0])
-            )
-    return tuple(numeric)
+    by_name = _only_numbers_differ([split_unit(column.header)[0] for column in numeric])
+    by_file = _only_numbers_differ([path.stem for path in paths])
+    numbers = by_name or by_file
+    if numbers is None:
+        return tuple(numeric), ()
+    if robot is None:
+        _refuse_missing_plot(numbers, paths)
+    ordered = _in_order(numbers, numeric)
+    if by_name is None or by_file is None or ordered == _in_order(by_file, numeric):
+        return ordered, ()
+    names = ", ".join(f"{column.name} of {paths[column.table].name}" for column in ordered)
+    said = f"the plots are joined by the numbers of their columns, which are not those of the files: {names}"
+    return ordered, (LogWarning("plot-order", f"{said}; --joints says otherwise"),)
+
+
+def _in_order(numbers: Sequence[int], columns: Sequence[Column]) -> tuple[Column, ...]:
+    """Return columns in the order of their numbers."""
+    return tuple(column for _, column in sorted(zip(numbers, columns, strict=True), key=lambda p: p[0]))
+
+
+def _refuse_missing_plot(numbers: Sequence[int], paths: Sequence[Path]) -> None:
+    """Raise a `LogError` if a plot is missing between others: 1, 2, 4, but not 1, 2, 10."""
+    missing = [n for n in range(min(numbers), max(numbers)) if n not in numbers]
+    if missing and len(missing) < len(numbers):
+        found = ", ".join(map(str, sorted(numbers)))
+        said = f"found plots with the numbers {found} and none with {', '.join(map(str, missing))}"
+        hint = f"allowed: a plot for each joint; add the missing one, or {OPTION}"
+        raise LogError(Finding(f"{said}, {hint}", str(paths[0].parent)))
 
 
 def _only_numbers_differ(names: Sequence[str]) -> list[int] | None:
@@ -149,6 +178,7 @@ def _by_place(
     rest = [column for column in columns if column not in (*joints, *pose.position, *pose.rotation)]
     if rest:
         said.append(Inference("columns not used", listed(rest, most=8), "no header tells what they are"))
+    warnings = (_about_rest(robot, joints, rest),) if robot and rest and evidence != GIVEN else ()
     names = robot.coordinates if robot else [f"q{k + 1}" for k in range(len(joints))]
     named = tuple(replace(column, name=name) for column, name in zip(joints, names, strict=True))
     return Roles(
@@ -157,4 +187,12 @@ def _by_place(
         rotation=pose.rotation,
         forms=pose.forms,
         inferences=tuple(said),
+        warnings=warnings,
     )
+
+
+def _about_rest(robot: Chain, joints: Sequence[Column], rest: Sequence[Column]) -> LogWarning:
+    """Say that a table has more columns than the robot has joints, and no header that tells them apart."""
+    count = f"{len(joints) + len(rest)} columns without names, and {robot.name} has {len(joints)} joints"
+    said = f"{count}: {listed(rest, most=8)} left out; another --robot, or --joints A,B,C?"
+    return LogWarning("columns-not-used", said)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.orientation import RotationForm
-from urmpipe_pipeline.joint_log import Inference
+from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import families, measured
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
@@ -31,6 +31,7 @@ class Roles:
         rotation: Recorded orientation of the tool, or none.
         forms: The forms that the orientation may have; one if it is known.
         inferences: What was found out.
+        warnings: What a person should know.
     """
 
     joints: tuple[Column, ...] = ()
@@ -40,6 +41,7 @@ class Roles:
     rotation: tuple[Column, ...] = ()
     forms: tuple[RotationForm, ...] = ()
     inferences: tuple[Inference, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
 
     @property
     def groups(self) -> tuple[tuple[Column, ...], ...]:
@@ -238,7 +240,8 @@ def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints |
     if gaps and not family.twins:  # a number that is there twice is told as such
         missing = ", ".join(map(str, gaps))
         said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
-        raise LogError(Finding(f"{said}, allowed: numbers without a gap; {OPTION}", file=file))
+        allowed = "numbers without a gap" if count is None else f"the {count} joints of the robot"
+        raise LogError(Finding(f"{said}, allowed: {allowed}; record the missing one, or {OPTION}", file=file))
     return _Joints(
         family.ordered(), "their names, in the order of their numbers", tuple(sorted(family.columns))
     )
@@ -257,7 +260,8 @@ def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> Non
     need = f"allowed: {len(robot.coordinates)}, as robot {robot.name} has"
     message = f"found {len(joints)} joint columns ({listed(joints)}), {need}"
     more = len(joints) > len(robot.coordinates)
-    raise LogError(Finding(f"{message}; {OPTION}" if more else message, file=file))
+    hint = OPTION if more else "record every joint, or give another --robot"
+    raise LogError(Finding(f"{message}; {hint}", file=file))
 
 
 def _derivative(role: str, numeric: Sequence[Column], joints: _Joints) -> tuple[Column, ...]:

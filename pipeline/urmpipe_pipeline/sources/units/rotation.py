@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import TypeAlias
 
 import numpy as np
 
@@ -13,6 +14,7 @@ from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.orientation import RotationForm, angles, quaternions
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.units.evidence import turned_apart
 from urmpipe_pipeline.sources.units.unit_evidence import peak
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
@@ -28,6 +30,9 @@ CLEARLY = 5.0
 
 UNIT_LENGTH = 0.02
 """The length of a quaternion may differ from 1 by this: they are printed with two digits or more."""
+
+Choice: TypeAlias = tuple[RotationForm, tuple[Unit, ...]]
+"""A form of an orientation, and the unit of each of its columns."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,8 +58,13 @@ def settle_rotation(
     values: FloatArray,
     told: Sequence[Unit | None],
     arm: tuple[Chain, FloatArray] | None,
+    *,
+    given: bool = False,
 ) -> Settled:
     """Return form and units of the columns of a recorded orientation.
+
+    Where the arm's kinematics agree in another unit than the one that is told, they decide, unless the user
+    gave it.
 
     Args:
         columns: The columns.
@@ -62,6 +72,7 @@ def settle_rotation(
         values: Their values as the file has them, shape (n, columns).
         told: The unit that each column tells, if it does.
         arm: The robot and the joint values in SI, shape (n, joints); None without a robot.
+        given: Whether the user told the units.
     """
     if not columns or np.isnan(values).any(axis=1).all():
         return Settled()
@@ -72,11 +83,11 @@ def settle_rotation(
         said = f"{names} hold quaternions of length {length:.4g}, allowed: 1; they are not used"
         return Settled(warnings=(LogWarning("orientation", said),))
     choices = [(form, units) for form in sound for units in _possible_units(form, values, told)]
+    found = _settled_by_kinematics(names, choices, values, arm, given=given) if arm else None
+    if found is not None:
+        return found
     if len(choices) == 1:
         return _settled(names, choices[0], "their names")
-    best = _by_kinematics(choices, values, arm) if arm else None
-    if best is not None:
-        return _settled(names, *best)
     if len(sound) == 1:
         said = (
             f"no unit is given for {names}: they are taken as {choices[0][1][0].name}; --unit says otherwise"
@@ -87,9 +98,7 @@ def settle_rotation(
     return Settled(warnings=(LogWarning("orientation", said),))
 
 
-def _settled(
-    names: str, choice: tuple[RotationForm, tuple[Unit, ...]], evidence: str, *warnings: LogWarning
-) -> Settled:
+def _settled(names: str, choice: Choice, evidence: str, *warnings: LogWarning) -> Settled:
     form, units = choice
     unit = "" if units[0] == PURE else f" in {units[0].name}"
     return Settled(form, units, (Inference(f"form of {names}", f"{form}{unit}", evidence),), warnings)
@@ -117,11 +126,41 @@ def _possible_units(
     return [(units[name],) * len(told) for name in likely]
 
 
-def _by_kinematics(
-    choices: Sequence[tuple[RotationForm, tuple[Unit, ...]]],
+def _settled_by_kinematics(
+    names: str,
+    choices: Sequence[Choice],
     values: FloatArray,
     arm: tuple[Chain, FloatArray],
-) -> tuple[tuple[RotationForm, tuple[Unit, ...]], str] | None:
+    *,
+    given: bool,
+) -> Settled | None:
+    """Return what the kinematics single out, with a warning if it is none of the choices; else None."""
+    others = [] if given else [one for one in _in_other_units(choices) if one not in choices]
+    if len(choices) + len(others) == 1:
+        return None
+    best = _by_kinematics([*choices, *others], values, arm)
+    if best is None or best[0] in choices:
+        return best and _settled(names, *best)
+    told, better = choices[0][1][0].name, best[0][1][0].name
+    said = f"{names}: {told} contradicts the kinematics: taken as {better}: {best[1]}"
+    hint = option("--unit", f"{names.split(', ', maxsplit=1)[0]}={told}")
+    return _settled(names, *best, LogWarning("unit-contradiction", f"{said}; {hint} says otherwise"))
+
+
+def _in_other_units(choices: Sequence[Choice]) -> list[Choice]:
+    """Return the same forms with their angles in the other of rad and deg."""
+    other = {"rad": "deg", "deg": "rad"}
+    units = vocabulary().units
+    return [
+        (form, (units[other[told[0].name]],) * len(told)) for form, told in choices if told[0].name in other
+    ]
+
+
+def _by_kinematics(
+    choices: Sequence[Choice],
+    values: FloatArray,
+    arm: tuple[Chain, FloatArray],
+) -> tuple[Choice, str] | None:
     """Return the choice with which the kinematics agree, and by how much; None if none stands out."""
     robot, q = arm
     known = np.isfinite(q).all(axis=1) & np.isfinite(values).all(axis=1)

@@ -46,6 +46,7 @@ class UnitFinder:
     kinematic: KinematicUnits | None = None
     _assumed: list[LogWarning] = field(default_factory=list)
     _doubted: dict[tuple[Unit, Unit, str], list[Column]] = field(default_factory=dict)
+    _overruled: dict[Unit, list[Column]] = field(default_factory=dict)
     _noted: dict[tuple[str, str], list[str]] = field(default_factory=dict)
 
     @property
@@ -58,8 +59,8 @@ class UnitFinder:
 
     @property
     def warnings(self) -> list[LogWarning]:
-        """What was assumed, and what contradicts the kinematics."""
-        return [*self._assumed, *self._contradictions()]
+        """What was assumed, and what contradicts the kinematics or the names of the columns."""
+        return [*self._assumed, *self._contradictions(), *self._against_names()]
 
     def joints(
         self, columns: Sequence[Column], values: FloatArray, t_ns: IntArray | None, robot: Chain | None
@@ -180,13 +181,23 @@ class UnitFinder:
             if evidence == GIVEN:
                 said = f"{told} {unit.name}, though as {better.name} it would fit: {by_how_much}"
             else:
-                said = f"{told} {better.name}: {by_how_much}; {option('--unit', f'{first}={unit.name}')} says otherwise"
+                hint = f"{option('--unit', f'{first}={unit.name}')} says otherwise"
+                said = f"{told} {better.name}: {by_how_much}; {hint}"
+            yield LogWarning("unit-contradiction", said)
+
+    def _against_names(self) -> Iterator[LogWarning]:
+        """Yield the columns whose names tell another unit than the one given for all joints."""
+        for unit, columns in self._overruled.items():
+            names = ", ".join(column.name for column in columns)
+            said = f"{names}: taken as {self.given[0].name} ({GIVEN}), though their names say {unit.name}"
             yield LogWarning("unit-contradiction", said)
 
     def _first_told(self, column: Column, kind: JointKind | None) -> tuple[Unit | None, str]:
         if column.number in self.given:
             return self.given[column.number], GIVEN
         if 0 in self.given and kind != "prismatic":
+            if column.unit and column.unit.quantity == "angle" and column.unit != self.given[0]:
+                self._overruled.setdefault(column.unit, []).append(column)
             return self.given[0], GIVEN
         own = self._own(column, "mm" if kind == "prismatic" else "deg")
         if own is not None and own.quantity != "time":
@@ -204,15 +215,25 @@ class UnitFinder:
             raise LogError(Finding(f"{message}; {hint}", self.file, column=column.header))
         return column.unit
 
+    def _settled(
+        self, columns: Sequence[Column], quantity: Quantity, told: set[Unit], others: str
+    ) -> Unit | None:
+        """Return the unit that the other columns agree on, or that the kinematics single out; else None."""
+        if len(told) == 1:
+            (unit,) = told
+            self._note(columns, unit.name, others)
+            return unit
+        if self.kinematic is None:
+            return None
+        unit = self.kinematic.of(quantity)
+        self._note(columns, unit.name, self.kinematic.evidence(quantity))
+        return unit
+
     def _length(self, columns: Sequence[Column], values: FloatArray, told: set[Unit]) -> Unit:
         """Return the unit of positions that say none: the others', mm if m cannot be, or m."""
-        if len(told) == 1:
-            unit = told.pop()
-            self._note(columns, unit.name, "as the other position columns")
-            return unit
-        if self.kinematic is not None:
-            self._note(columns, self.kinematic.length.name, self.kinematic.evidence("length"))
-            return self.kinematic.length
+        settled = self._settled(columns, "length", told, "as the other position columns")
+        if settled is not None:
+            return settled
         furthest = peak(values)
         if furthest > LONGEST_REACH:
             self._note(columns, "mm", f"values up to {furthest:.6g} reach further than any arm in m")
@@ -230,13 +251,9 @@ class UnitFinder:
     ) -> Unit:
         """Return the unit of joints that turn and say none: the others', what the data tell, or rad."""
         names = ", ".join(column.name for column in columns)
-        if len(told) == 1:
-            unit = told.pop()
-            self._note(columns, unit.name, "as the other joint columns")
-            return unit
-        if self.kinematic is not None:
-            self._note(columns, self.kinematic.angle.name, self.kinematic.evidence("angle"))
-            return self.kinematic.angle
+        settled = self._settled(columns, "angle", told, "as the other joint columns")
+        if settled is not None:
+            return settled
         evidence = degrees_evidence(values, t_ns, bounds)
         if evidence:
             self._note(columns, "deg", evidence)
