@@ -8,11 +8,9 @@ import os
 import subprocess
 import sys
 import xml.etree.ElementTree as ET
-from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 import pytest
 from click.shell_completion import ShellComplete
@@ -86,9 +84,7 @@ def test_json_csv_junit_and_recording_agree_bit_for_bit(capsys: Captured) -> Non
     for one, in_json in zip(stored.runs, told["runs"], strict=True):
         properties = {p.attrib["name"]: p.attrib["value"] for p in suites[one.name].iter("property")}
         for statistics in one.all_statistics:
-            kept = {
-                key: value for key, value in asdict(statistics).items() if key not in ("quantity", "kind")
-            }
+            kept = statistics.to_dict()
             assert kept == in_json_of(in_json, statistics)
             prefix = f"{'joint ' if statistics.kind == 'joint' else ''}{statistics.quantity}"
             for field, value in kept.items():
@@ -98,11 +94,8 @@ def test_json_csv_junit_and_recording_agree_bit_for_bit(capsys: Captured) -> Non
     assert [row["verdict"] for row in rows.values()].count("fail") == len(
         [case for suite in suites.values() for case in suite.findall("testcase/failure")]
     )
-    assert {
-        (case.get("classname"), case[0].get("type"))
-        for case in ET.parse("a.xml").iter("testcase")
-        if len(case)
-    } == {("bad", "out-of-tolerance")}
+    failed = [case for case in ET.parse("a.xml").iter("testcase") if len(case)]
+    assert {(one.get("classname"), one[0].get("type")) for one in failed} == {("bad", "out-of-tolerance")}
 
 
 def in_json_of(told: dict[str, Any], one: Statistics) -> dict[str, Any]:
@@ -247,9 +240,8 @@ def test_a_comparison_is_held_against_another(folder: Path, capsys: Captured) ->
     noise = ["--noise", "1mm,angle=1deg,joint=1deg"]
     assert run(["compare", "now.rrd", "--baseline", "before.rrd", "-q", *noise]) == 0
     assert run(["compare", "before.rrd", "--baseline", "now.rrd", "-q"]) == 0
-    assert (
-        run(["compare", "before.rrd", "--baseline", "before.rrd", "-q", "--noise", "0,angle=0,joint=0"]) == 0
-    )
+    none = ["--noise", "0,angle=0,joint=0"]
+    assert run(["compare", "before.rrd", "--baseline", "before.rrd", "-q", *none]) == 0
     assert compare("good.csv", "--baseline", "before.rrd", "-q") == 1
     assert recorded("good-against-wanted.rrd").baseline is None
 
@@ -312,9 +304,8 @@ def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[st
     assert compare("bad.csv", *flags) == 1
     out, err = capsys.readouterr()
     assert bool(out) == ("--json" in flags)
-    assert err.startswith(
-        "FAIL  bad out of tolerance against wanted, by the joints on both sides\n      max |"
-    )
+    said = "FAIL  bad out of tolerance against wanted, by the joints on both sides"
+    assert err.startswith(f"{said}\n      max |")
     assert err.count("\n") == 2
 
 
@@ -349,19 +340,11 @@ def test_results_are_operands_of_the_function() -> None:
     assert names() == {"v.xml", "v.csv"}
     with pytest.raises(OptionError) as error:
         urmpipe.compare(before)
-    assert str(error.value) == (
-        "found a comparison as the reference, allowed: with a baseline, and without logs"
-    )
+    wanted = "found a comparison as the reference, allowed: with a baseline, and without logs"
+    assert str(error.value) == wanted
     with pytest.raises(OptionError) as error:
         urmpipe.compare(before, baseline=before, output="a.rrd")
     assert str(error.value) == "output: found a.rrd with a comparison that stands already, allowed: without"
-
-
-def test_the_option_of_a_file_is_a_path() -> None:
-    command = cli.get_command(click.Context(cli), "compare")
-    assert command is not None
-    kinds = {param.name: type(param.type) for param in command.params}
-    assert {kinds[name] for name in ("junit", "statistics", "baseline")} == {click.Path}
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
@@ -377,7 +360,7 @@ def test_a_log_whose_name_is_no_text_is_compared_recorded_and_reported(capsys: C
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="only there may a file name hold any bytes")
-@pytest.mark.parametrize("encoding", ["utf-8:strict", "latin-1:strict", "ascii:strict"])
+@pytest.mark.parametrize("encoding", ["utf-8:strict", "ascii:strict"])
 def test_no_output_is_too_narrow_for_a_name_or_a_sign(encoding: str) -> None:
     Path("good.csv").rename("gut\udcfc.csv")
     call = [sys.executable, "-m", "urmpipe", "compare", "wanted.csv", "gut\udcfc.csv", "--robot", "ur5e"]

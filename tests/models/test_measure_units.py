@@ -20,7 +20,8 @@ def test_factors_are_those_of_the_definitions() -> None:
         ("m", "mm"): 1e3, ("mm", "um"): 1e3, ("um", "m"): 1e-6, ("us", "ms"): 1e-3,
     }  # fmt: skip
     assert (factor("rad", "deg"), factor("deg", "rad")) == (180.0 / math.pi, math.pi / 180.0)
-    assert (factor("rad/s", "rpm"), factor("rpm", "deg/s")) == (9.54929658551372, 6.0)  # 30 / pi = 9.549296585513720146, and 360 deg in 60 s
+    # 30 / pi = 9.549296585513720146, and 360 deg in 60 s
+    assert (factor("rad/s", "rpm"), factor("rpm", "deg/s")) == (9.54929658551372, 6.0)
 
 
 @given(st.sampled_from(PAIRS), st.floats(1e-6, 1e6))

@@ -97,9 +97,10 @@ def _of_comparison(result: Comparison) -> Iterator[str]:
     yield from warning_lines([*result.warnings, *told])
     yield ""
     at = text.seconds(worst.decisive.t_max)
-    yield f"`urmpipe view` opens this at {at} s, by which it was decided; other programs at the first sample."
-    yield ""
-    yield "All figures, statistics and provenance: `urmpipe report` with this file."
+    yield (
+        f"Decided at {at} s: `urmpipe view` opens this there, other programs at the first sample. All"
+        " figures, statistics and provenance: `urmpipe report` with this file."
+    )
 
 
 def _worst(one: Deviation, several: bool) -> str:

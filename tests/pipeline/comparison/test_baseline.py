@@ -227,4 +227,7 @@ def test_a_noise_is_of_all_lengths_or_of_kinds() -> None:
     assert str(error.value) == (f"--noise: found 'lots', {allowed}\n--noise: found 'angle=-1', {allowed}")
     with pytest.raises(OptionError) as error:
         complete_noise({"axis": -1.0})
-    assert str(error.value) == f"--noise: found axis=-1.0, {allowed}; 0 or positive"
+    assert str(error.value) == (
+        "--noise: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in rad"
+        " (m of a joint that slides); 0 or positive"
+    )

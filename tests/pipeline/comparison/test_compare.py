@@ -206,8 +206,8 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     with pytest.raises(OptionError) as option_error:
         CompareOptions({"axis": -1.0})
     assert str(option_error.value) == (
-        "--tolerance: found axis=-1.0, allowed: a length in m, or axis=, x=, y=, z=, norm=,"
-        " path= (m, mm, um), angle=, joint= (rad, mrad, deg; m of a joint that slides); positive"
+        "--tolerance: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in"
+        " rad (m of a joint that slides); positive"
     )
 
 

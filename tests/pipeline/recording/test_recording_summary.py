@@ -48,11 +48,11 @@ def test_the_summary_of_a_comparison_says_the_verdict_first(make_comparison: Mak
         ("| matlab", "violet", "FAIL |"),
     ]
     assert rows[2][2:6] == [f"{1e3 * worst.statistics[axis].max:.4f}" for axis in ("x", "y", "z", "norm")]
-    assert lines[-3] == (
-        f"`urmpipe view` opens this at {decisive.t_max:.3f} s, by which it was decided; other programs at the"
-        " first sample."
+    assert lines[-1] == (
+        f"Decided at {decisive.t_max:.3f} s: `urmpipe view` opens this there, other programs at the first"
+        " sample. All figures, statistics and provenance: `urmpipe report` with this file."
     )
-    assert lines[-8:-4] == [
+    assert lines[-6:-2] == [
         "- asked for: two rows lie far apart (row 7)",
         "- coppeliasim: two rows lie far apart (row 7)",
         "- solid\\*: two rows lie far apart (row 7)",
