@@ -21,7 +21,7 @@ if TYPE_CHECKING:
 @click.option(
     "--to",
     type=OneOf(["csv", "parquet", "mat", "tum"]),
-    help="The format [default: by the suffix of the output].",
+    help="The format [default: by the suffix of the output, else csv].",
 )
 @output_option("FILE", "The file [default: RUN-ROWS.FORMAT here].")
 @click.option(

@@ -15,7 +15,7 @@ from urmpipe.options.output import debug_option, version_option
 @debug_option
 @version_option
 def view(recordings: tuple[Path, ...]) -> int:
-    """Open recordings that urmpipe wrote in Rerun's viewer, each paused at its worst sample.
+    """Open recordings that urmpipe wrote in Rerun's viewer, each paused where its verdict was decided.
 
     Each opens in a window of its own; the command ends when all are closed, and Ctrl-C closes them. The
     viewer is the one that was installed with urmpipe; it needs no network and listens on 127.0.0.1 only.
