@@ -26,6 +26,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.iterative.refine import refine
 from urmpipe_models.inverse.iterative.restarts import solve_iteratively
+from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -113,7 +114,9 @@ def our_jobs(given: Problem) -> dict[str, Callable[[], FloatArray]]:
             refine(chain, targets, given.near, threads=2, metres=half, radians=half).q
         ),
         "near: urmpipe, 1 thread, to 1e-10": lambda: refine(chain, targets, given.near, threads=1).q,
-        OURS_RANDOM: lambda: solve_iteratively(chain, targets, start=given.random, restarts=RESTARTS).q[:, 0],
+        OURS_RANDOM: lambda: solve_iteratively(
+            chain, targets, start=given.random, search=Search(restarts=RESTARTS)
+        ).q[:, 0],
     }
 
 

@@ -27,8 +27,11 @@ CHROMIUM = "/usr/bin/chromium"
 VULKAN = Path("/usr/share/vulkan/icd.d")
 QUIET = ("INFO", "DEBUG", "TRACE")
 
+SETTLE = 12.0
+"""Time in [s] that the viewer has to load and to draw: no event tells when it has."""
 
-def of_recording(source: Path, target: Path, at: float | None, settle: float = 12.0) -> list[str]:
+
+def of_recording(source: Path, target: Path, at: float | None, settle: float = SETTLE) -> list[str]:
     """Picture a recording without a window, at a time in [s] or where `view` opens it; return complaints."""
     from urmpipe_pipeline.recording.viewer import open_window, opening_times
 
@@ -36,7 +39,7 @@ def of_recording(source: Path, target: Path, at: float | None, settle: float = 1
     opens_at = opening_times([source])[source]
     at_ns = opens_at if at is None else round(at * 1e9)
     with open_window(source, at_ns, headless=True) as (_, viewer):
-        time.sleep(settle)  # data load lazily, and no event tells when they are there
+        time.sleep(settle)
         viewer.save_screenshot(str(target))
         return complaints_of(viewer)
 
@@ -81,16 +84,21 @@ def of_readme() -> list[str]:
         drives = Path(folder) / "six-drives.rrd"
         subprocess.run([*urmpipe, "demo", "-q", "-o", str(demo)], check=True)
         subprocess.run([*urmpipe, "simulate", "six-drives", "-q", "-o", str(drives)], check=True)
-        target, branches = Path(folder) / "one.csv", Path(folder) / "one.rrd"
-        target.write_text("x,y,z,rz,ry,rx\n0.15,0.05,0.2,0.3,0.9,0.1\n", encoding="utf-8")
-        solved = ["ik", str(target), "--robot", "arm6", "--all", "-q", "-o", str(branches)]
-        subprocess.run([*urmpipe, *solved], check=True)
         return [
             *of_recording(demo / "demo.rrd", HERE / "recording.png", None),
             *of_page(demo / "report.html", HERE / "report.png", 1280),
             *of_recording(drives, HERE / "six-drives.png", 1.0),
-            *of_recording(branches, HERE / "ik.png", 0.0),
+            *of_branches(Path(folder), HERE / "ik.png"),
         ]
+
+
+def of_branches(folder: Path, target: Path, settle: float = SETTLE) -> list[str]:
+    """Solve one target for all branches in a folder, and picture them; return complaints."""
+    pose, branches = folder / "one.csv", folder / "one.rrd"
+    pose.write_text("x,y,z,rz,ry,rx\n0.15,0.05,0.2,0.3,0.9,0.1\n", encoding="utf-8")
+    solved = ["ik", str(pose), "--robot", "arm6", "--all", "-q", "-o", str(branches)]
+    subprocess.run([sys.executable, "-m", "urmpipe", *solved], check=True)
+    return of_recording(branches, target, 0.0, settle)
 
 
 def main() -> None:
@@ -105,6 +113,8 @@ def main() -> None:
     options = parser.parse_args()
     if options.source is None:
         complaints = of_readme()
+    elif not options.source.is_file():
+        parser.error(f"{options.source}: found no such file")
     elif options.target is None:
         parser.error("a picture needs a name: SOURCE TARGET.png")
     elif options.source.suffix == ".rrd":

@@ -13,3 +13,8 @@ def fmu_cache(tmp_path_factory: pytest.TempPathFactory) -> Iterator[None]:
     with pytest.MonkeyPatch.context() as patch:
         patch.setenv("URMPIPE_CACHE", str(tmp_path_factory.mktemp("cache")))
         yield
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    """Keep what results warn of out of pytest's summary: the tests of warnings ask for them."""
+    config.addinivalue_line("filterwarnings", "ignore::urmpipe.UrmpipeWarning")

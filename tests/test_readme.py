@@ -6,10 +6,10 @@ from pathlib import Path
 
 import pytest
 
+from pages import ROOT, indented, lay_files, text_of
 from urmpipe_models.robots.robot_file import read_robot_file
 
-ROOT = Path(__file__).resolve().parents[1]
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README = text_of("README.md")
 COMMANDS = [line.strip() for line in README.splitlines() if line.startswith("    python")]
 
 
@@ -37,9 +37,7 @@ def test_pictures_are_there(name: str) -> None:
 
 
 def test_the_robot_of_the_readme_is_one(tmp_path: Path) -> None:
-    start = README.index("    name = ")
-    lines = README[start : README.index("**In Python**")].splitlines()
-    text = "\n".join(line[4:] for line in lines)
+    text = indented("README.md", "name = ")
     tomllib.loads(text)
     path = tmp_path / "my-arm.toml"
     path.write_text(text, encoding="utf-8")
@@ -47,14 +45,8 @@ def test_the_robot_of_the_readme_is_one(tmp_path: Path) -> None:
 
 
 def test_the_python_of_the_readme_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from urmpipe_datasets import LOGS
-
-    start = README.index("    import urmpipe")
-    code = "\n".join(line[4:] for line in README[start : README.index("**Exit codes.**")].splitlines())
-    (tmp_path / "log.csv").write_bytes((LOGS / "matlab.csv").read_bytes())
-    (tmp_path / "path.csv").write_bytes((LOGS / "path.csv").read_bytes())
-    monkeypatch.chdir(tmp_path)
+    lay_files(tmp_path, monkeypatch)
     names: dict[str, object] = {}
-    exec(compile(code, "README.md", "exec"), names)
+    exec(compile(indented("README.md", "import urmpipe"), "README.md", "exec"), names)
     assert getattr(names["result"], "verdict", None) == "pass"
     assert (tmp_path / "report.html").stat().st_size > 1e6

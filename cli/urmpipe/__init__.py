@@ -2,10 +2,10 @@
 
     import urmpipe
     run = urmpipe.ingest("log.csv", robot="urm6")
-    comparison = urmpipe.compare("path.csv", ["log.csv"], robot="urm6")
-    urmpipe.report([comparison], "report.html")
+    comparison = urmpipe.compare("path.csv", "log.csv", robot="urm6")
+    urmpipe.report(comparison, "report.html")
     urmpipe.export(run, "log.parquet")
-    simulation = urmpipe.simulate("log-to-delta", arguments={"log": "log.csv"})
+    simulation = urmpipe.simulate("log-to-delta", arguments={"log": "log.csv", "reference": "path.csv"})
     urmpipe.ik("targets.csv", robot="arm6").to_frame()
     urmpipe.build_fmu("kinematic_chain", robot="urm6")
 
@@ -22,26 +22,40 @@ if TYPE_CHECKING:
     from urmpipe.api.export import export as export
     from urmpipe.api.ik import ik as ik
     from urmpipe.api.ingest import ingest as ingest
+    from urmpipe.api.read_map import read_map as read_map
+    from urmpipe.api.recordings import read_recording as read_recording
+    from urmpipe.api.recordings import write_recording as write_recording
     from urmpipe.api.report import Report as Report
     from urmpipe.api.report import report as report
     from urmpipe.api.simulate import simulate as simulate
     from urmpipe.api.view import view as view
     from urmpipe.api.write_map import write_map as write_map
+    from urmpipe.edge import UrmpipeWarning as UrmpipeWarning
     from urmpipe.inverse.result import InverseResult as InverseResult
     from urmpipe_fmus.build import BuiltFmu as BuiltFmu
     from urmpipe_models.chains.chain import Chain as Chain
+    from urmpipe_models.errors import CosimulationError as CosimulationError
+    from urmpipe_models.errors import FmuError as FmuError
+    from urmpipe_models.errors import LogError as LogError
+    from urmpipe_models.errors import OptionError as OptionError
+    from urmpipe_models.errors import OutputError as OutputError
+    from urmpipe_models.errors import RecordingError as RecordingError
+    from urmpipe_models.errors import RobotError as RobotError
+    from urmpipe_models.errors import UnitError as UnitError
     from urmpipe_models.errors import UrmpipeError as UrmpipeError
+    from urmpipe_models.errors import ViewerError as ViewerError
     from urmpipe_models.inverse.targets import Targets as Targets
     from urmpipe_models.robots.catalogue import load_robot as load_robot
     from urmpipe_models.robots.catalogue import robot_names as robot_names
+    from urmpipe_models.transform import Transform as Transform
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
+    from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
     from urmpipe_pipeline.export import Exported as Exported
-    from urmpipe_pipeline.recording import read_recording as read_recording
-    from urmpipe_pipeline.recording import write_recording as write_recording
+    from urmpipe_pipeline.joint_log import JointLog as JointLog
     from urmpipe_pipeline.runs.results import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
+    from urmpipe_pipeline.sources import LogMap as LogMap
     from urmpipe_pipeline.sources import ReadOptions as ReadOptions
-    from urmpipe_pipeline.sources import read_map as read_map
 
 __version__ = "0.1.0"
 
@@ -49,28 +63,42 @@ _HOME = {
     "BuiltFmu": "urmpipe_fmus.build",
     "Chain": "urmpipe_models.chains.chain",
     "Comparison": "urmpipe_pipeline.comparison.comparison",
-    "ReadOptions": "urmpipe_pipeline.sources",
-    "InverseResult": "urmpipe.inverse.result",
-    "Targets": "urmpipe_models.inverse.targets",
+    "CosimulationError": "urmpipe_models.errors",
+    "Deviation": "urmpipe_pipeline.comparison.deviation",
     "Exported": "urmpipe_pipeline.export",
+    "FmuError": "urmpipe_models.errors",
+    "InverseResult": "urmpipe.inverse.result",
+    "JointLog": "urmpipe_pipeline.joint_log",
+    "LogError": "urmpipe_models.errors",
+    "LogMap": "urmpipe_pipeline.sources",
+    "OptionError": "urmpipe_models.errors",
+    "OutputError": "urmpipe_models.errors",
+    "ReadOptions": "urmpipe_pipeline.sources",
+    "RecordingError": "urmpipe_models.errors",
     "Report": "urmpipe.api.report",
+    "RobotError": "urmpipe_models.errors",
     "Run": "urmpipe_pipeline.runs.results",
-    "UrmpipeError": "urmpipe_models.errors",
     "Simulation": "urmpipe_pipeline.simulations.simulation",
+    "Targets": "urmpipe_models.inverse.targets",
+    "Transform": "urmpipe_models.transform",
+    "UnitError": "urmpipe_models.errors",
+    "UrmpipeError": "urmpipe_models.errors",
+    "UrmpipeWarning": "urmpipe.edge",
+    "ViewerError": "urmpipe_models.errors",
     "build_fmu": "urmpipe.api.build_fmu",
     "compare": "urmpipe.api.compare",
     "export": "urmpipe.api.export",
     "ik": "urmpipe.api.ik",
     "ingest": "urmpipe.api.ingest",
     "load_robot": "urmpipe_models.robots.catalogue",
-    "read_map": "urmpipe_pipeline.sources",
-    "read_recording": "urmpipe_pipeline.recording",
+    "read_map": "urmpipe.api.read_map",
+    "read_recording": "urmpipe.api.recordings",
     "report": "urmpipe.api.report",
     "robot_names": "urmpipe_models.robots.catalogue",
     "simulate": "urmpipe.api.simulate",
     "view": "urmpipe.api.view",
     "write_map": "urmpipe.api.write_map",
-    "write_recording": "urmpipe_pipeline.recording",
+    "write_recording": "urmpipe.api.recordings",
 }
 
 __all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604 - the names are those of _HOME

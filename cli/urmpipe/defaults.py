@@ -12,11 +12,14 @@ above it; options on the command line come first. Files named in it are seen fro
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
+
+if TYPE_CHECKING:
+    from urmpipe_models.errors import Finding
 
 NAME = "urmpipe.toml"
 
@@ -50,26 +53,11 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
     Raises:
         OptionError: With everything that is wrong with the file.
     """
-    from difflib import get_close_matches
-
-    from urmpipe_models.errors import Finding, OptionError
+    from urmpipe_models.errors import OptionError
     from urmpipe_models.files.toml_text import parse_toml
 
     data = parse_toml(path, OptionError)
-    every = sorted({name for one in commands.values() for name in _options(one)})
-    faults = []
-    for key, value in data.items():
-        own = _options(commands[key]) if key in commands and isinstance(value, Mapping) else None
-        values = {key: value} if own is None else value
-        place, allowed = ("", every) if own is None else (f"{key}.", sorted(own))
-        for name, inner in values.items():
-            if isinstance(inner, Mapping) and name in allowed and name not in TABLES:
-                faults.append(Finding(f"key {place}{name}: found a table, allowed: a value", str(path)))
-            if name not in allowed:
-                near = get_close_matches(name, allowed, 1)
-                hint = f" (did you mean {near[0]}?)" if near else ""
-                message = f"key {place}{name}: unknown{hint}; allowed: {', '.join(allowed)}"
-                faults.append(Finding(message, str(path)))
+    faults = list(_faults(data, path, commands))
     if faults:
         raise OptionError(*faults)
     own = _options(command)
@@ -80,6 +68,37 @@ def defaults_for(command: click.Command, path: Path, commands: Mapping[str, clic
     }
     given |= data.get(command.name or "", {})
     return {own[key].name or key: _text(key, value, own[key], path.parent) for key, value in given.items()}
+
+
+def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Command]) -> Iterator[Finding]:
+    """Yield what is wrong with the keys of a file."""
+    from urmpipe_models.errors import Finding
+    from urmpipe_models.names import not_among
+
+    every = sorted({name for one in commands.values() for name in _options(one)})
+    for key, value in data.items():
+        if isinstance(value, Mapping) and key in commands:
+            own = sorted(_options(commands[key]))
+            faults = [_fault(name, inner, own) for name, inner in value.items()]
+        elif isinstance(value, Mapping) and key not in every:
+            faults = [f"{key}: {not_among(key, commands)}"]
+        else:
+            faults = [_fault(key, value, every)]
+        place = f"{key}." if key in commands else ""
+        yield from (Finding(f"key {place}{fault}", str(path)) for fault in faults if fault)
+
+
+def _fault(name: str, value: Any, allowed: Sequence[str]) -> str | None:
+    """Return what is wrong with one key and its value; None if nothing is."""
+    from urmpipe_models.names import did_you_mean, listed
+
+    if f"--{name}" in EACH_TIME:
+        return f"{name}: found what one call is to give, allowed: --{name} on the command line"
+    if name not in allowed:
+        return f"{name}: unknown{did_you_mean(name, allowed)}; allowed: {listed(name, allowed)}"
+    if isinstance(value, Mapping) and name not in TABLES:
+        return f"{name}: found a table, allowed: a value"
+    return None
 
 
 def _options(command: click.Command) -> dict[str, click.Option]:
@@ -97,10 +116,10 @@ def _text(key: str, value: Any, option: click.Option, folder: Path) -> Any:
     """Return a value as the command line would give it."""
     if key in FILES and isinstance(value, str) and Path(value).suffix:
         return str(folder / value)
+    if isinstance(value, Mapping):
+        value = ",".join(f"{name}={inner}" for name, inner in value.items())
     if option.multiple:
         return [str(one) for one in value] if isinstance(value, list) else [str(value)]
     if isinstance(value, list):
         return ",".join(map(str, value))
-    if isinstance(value, Mapping):
-        return ",".join(f"{name}={inner}" for name, inner in value.items())
     return value if option.is_flag else str(value)

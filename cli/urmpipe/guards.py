@@ -2,25 +2,37 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
+from typing import Any, cast
 
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
+from urmpipe_models.inverse.checks import ROTATION_TOLERANCE
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import Transform, rpy_of
+from urmpipe_models.transform import Transform, from_offset, rpy_of
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import OutputKind
+from urmpipe_pipeline.outputs import OutputKind, guarded_output
 from urmpipe_pipeline.recording import is_recording
 
 PathLike = str | Path
 Robot = Chain | str | Path
+Frame = Transform | Sequence[float] | FloatArray
+"""A frame: x, y, z in [m] and, if it turns, rx, ry, rz in [rad]; or a 4 by 4 matrix; or a `Transform`."""
+
+FRAME_ALLOWED = "x, y, z in m and rx, ry, rz in rad (3 or 6 numbers), a 4 x 4 matrix, or a Transform"
+
+WRITTEN_FIRST = 'arrays and tables are written first, such as table.to_csv("log.csv", index=False)'
 
 
 def place_robot(
     robot: Robot | None,
-    base: Transform | None = None,
-    tool: Transform | None = None,
+    base: Frame | None = None,
+    tool: Frame | None = None,
     *,
     base_link: str | None = None,
     tip_link: str | None = None,
@@ -29,8 +41,8 @@ def place_robot(
 
     Args:
         robot: Name, file (TOML, URDF) or chain of the arm.
-        base: Where the arm stands in the world.
-        tool: The tool centre point in the frame of the arm's tip.
+        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of the arm's tip, likewise.
         base_link: Link of a URDF where the arm begins.
         tip_link: Link of a URDF where it ends.
 
@@ -38,16 +50,97 @@ def place_robot(
         RobotError: If the robot is unknown, or with everything that is wrong with its file.
         OptionError: If the arm is placed or cut, but there is none.
     """
+    frames = (frame_of("base", base), frame_of("tool", tool))
     if robot is not None:
         chain = (
             robot if isinstance(robot, Chain) else load_robot(robot, base_link=base_link, tip_link=tip_link)
         )
-        return chain.placed(base, tool)
+        return chain.placed(*frames)
     if any(value is not None for value in (base, tool, base_link, tip_link)):
         raise OptionError(
             "found --base, --tool, --base-link or --tip without a robot; allowed: with --robot NAME|FILE"
         )
     return None
+
+
+def frame_of(name: str, given: Frame | None) -> Transform | None:
+    """Return the frame that was given; None for none.
+
+    Args:
+        name: The keyword, for messages.
+        given: x, y, z in [m] and, if it turns, rx, ry, rz in [rad]; a homogeneous matrix, shape (4, 4); or a
+            transform.
+
+    Raises:
+        OptionError: If it is anything else, or its matrix does not turn.
+    """
+    if given is None or isinstance(given, Transform):
+        return given
+    found = f"found {given!r}" if isinstance(given, str) else f"found a {type(given).__name__}"
+    try:
+        values = np.asarray(given, dtype=float)
+    except (TypeError, ValueError):
+        raise OptionError(f"{name}: {found}, allowed: {FRAME_ALLOWED}") from None
+    if values.shape not in ((3,), (6,), (4, 4)) or not np.isfinite(values).all():
+        raise OptionError(f"{name}: {found} of shape {values.shape}, allowed: {FRAME_ALLOWED}, all finite")
+    if values.ndim == 1:
+        return from_offset(values.tolist())
+    turn = values[:3, :3]
+    proper = np.abs(turn @ turn.T - np.eye(3)).max() < ROTATION_TOLERANCE and np.linalg.det(turn) > 0.0
+    if not proper or np.abs(values[3] - (0.0, 0.0, 0.0, 1.0)).max() > ROTATION_TOLERANCE:
+        raise OptionError(
+            f"{name}: found a matrix that is no rigid motion, allowed: a rotation and a translation"
+        )
+    rows, place = tuple(map(tuple, turn.tolist())), tuple(values[:3, 3].tolist())
+    return Transform(cast("Any", rows), cast("Any", place))
+
+
+def one_or_many(given: object) -> list[Any]:
+    """Return what was given as a list: a path, a run or another result alone is a list of one."""
+    alone = isinstance(given, (str, Path, Mapping)) or hasattr(given, "__array__")  # a table is no list
+    return [given] if alone or not isinstance(given, Iterable) else list(given)
+
+
+def refuse_others(name: str, given: Sequence[object], kinds: tuple[type, ...], allowed: str) -> None:
+    """Raise an `OptionError` with everything that is neither a path nor of some kinds.
+
+    Args:
+        name: The keyword, for messages.
+        given: What was given.
+        kinds: Classes that are allowed besides paths.
+        allowed: What is allowed, in words.
+    """
+    found = [
+        repr(one) if isinstance(one, str) else f"a {type(one).__name__}"
+        for one in given
+        if not isinstance(one, (str, Path, *kinds)) or one == ""
+    ]
+    if found or not given:
+        raise OptionError(f"{name}: found {', '.join(found) or 'none'}, allowed: {allowed}")
+
+
+@contextmanager
+def guarded_outputs(
+    named: Mapping[OutputKind, PathLike | None], inputs: Sequence[Path]
+) -> Iterator[dict[OutputKind, Path]]:
+    """Give the parts to write of all outputs but the recording, which `record` guards: all or none of them.
+
+    Args:
+        named: The files that are asked for, by kind; None for one that is not.
+        inputs: Files that are never replaced.
+
+    Raises:
+        OptionError: If two outputs have one name.
+        OutputError: If one may not be written there.
+    """
+    targets = {kind: Path(path) for kind, path in named.items() if path is not None}
+    refuse_shared(targets)
+    with ExitStack() as stack:
+        yield {
+            kind: stack.enter_context(guarded_output(path, inputs, kind))
+            for kind, path in targets.items()
+            if kind != "recording"
+        }
 
 
 def refuse_shared(targets: Mapping[OutputKind, Path]) -> None:
@@ -70,7 +163,13 @@ def refuse_foreign(files: Sequence[Path]) -> None:
 def refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:
     """Raise a `LogError` with all warnings if they are to be errors."""
     if strict and warnings:
-        raise LogError(*(Finding(f"{w.kind}: {w.message} (--strict)", row=w.row) for w in warnings))
+        raise LogError(*(Finding(f"{_told(one)} (--strict)", row=one.row) for one in warnings))
+
+
+def _told(warning: LogWarning) -> str:
+    """Return a warning with its kind and its row, as the terminal prints it."""
+    row = f"row {warning.row}: " if warning.row else ""
+    return f"{warning.kind}: {row}{warning.message}"
 
 
 def offset_of(frame: Transform) -> tuple[float, ...]:

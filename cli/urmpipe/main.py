@@ -8,21 +8,19 @@ from __future__ import annotations
 
 import gc
 import io
-import os
 import sys
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from urmpipe import __version__
+from urmpipe.boundary import findings_of, leave_output, print_findings
 from urmpipe.defaults import defaults_for, find_defaults
 from urmpipe.process import tune_python
-
-if TYPE_CHECKING:
-    from urmpipe_models.errors import Finding
+from urmpipe.usage import Defaults, Group
 
 COMMANDS = {
     "demo": "Run the whole way on bundled logs.",
@@ -38,11 +36,8 @@ COMMANDS = {
 }
 """Each command and its short help: --help must not import them all (a test holds both together)."""
 
-SHOWN_FINDINGS = 20
-"""Errors printed line by line; the others are counted."""
 
-
-class LazyGroup(click.Group):
+class LazyGroup(Group):
     """A group whose commands are modules, loaded when they are run."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -71,21 +66,13 @@ class LazyGroup(click.Group):
         values = defaults_for(command, path, {name: self._load(name) for name in COMMANDS})
         if values:
             options = {param.name: max(param.opts, key=len).lstrip("-") for param in command.params}
-            shown = ", ".join(f"{options[name]}={_shown(value)}" for name, value in values.items())
-            ctx.obj = f"defaults of {path}: {shown}"
+            ctx.obj = Defaults(path, {options[name]: value for name, value in values.items()})
         return values
 
     def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the commands with their short help, without loading them."""
         with formatter.section("Commands"):
             formatter.write_dl(list(COMMANDS.items()))
-
-
-def _shown(value: Any) -> str:
-    """Return a default as TOML would have it, without quotes."""
-    if isinstance(value, bool):
-        return str(value).lower()
-    return ",".join(value) if isinstance(value, list) else str(value)
 
 
 @click.group(cls=LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -103,7 +90,7 @@ def cli() -> None:
       urmpipe compare path.csv log.csv --robot urm6 --tolerance 0.0035
       urmpipe report log-against-path.rrd
       urmpipe view log-against-path.rrd
-      urmpipe ik path.csv --robot urm6 -o log.csv
+      urmpipe ik path.csv --robot urm6 -o joints.csv
 
     Exit codes: 0 within tolerance, 1 out of tolerance (ik: a target not reached, a jump, or a joint too
     fast; fmu check: a problem), 2 bad input or usage.
@@ -118,6 +105,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
         if isinstance(stream, io.TextIOWrapper):
             stream.reconfigure(errors="backslashreplace")  # names of files and signs that it cannot take
     code = run(given)
+    try:
+        sys.stdout.flush()
+    except OSError:  # a full disk, which was told; Python would tell it again
+        leave_output()
     gc.freeze()  # else Python looks for cycles among all modules before it exits
     sys.exit(code)
 
@@ -127,49 +118,13 @@ def run(arguments: Sequence[str]) -> int:
     as_json = "--json" in arguments
     try:
         return int(cli.main(list(arguments), prog_name="urmpipe", standalone_mode=False) or 0)
-    except BrokenPipeError:  # the reader of our output left, as head does
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    except BrokenPipeError:  # the reader of a help text left, as head does; results are told to the end
+        leave_output()
+        return 0
     except (Exception, KeyboardInterrupt) as error:
         if "--debug" in arguments:
             import traceback
 
             traceback.print_exception(error)
-        if isinstance(error, click.UsageError) and not as_json:
-            error.show()
-        else:
-            _print_findings(_findings(error), as_json)
+        print_findings(findings_of(error), as_json)
     return 2
-
-
-def _findings(error: BaseException) -> Sequence[Finding]:
-    """Return what to tell the user about an error, whoever raised it."""
-    from urmpipe_models.errors import Finding, UrmpipeError
-
-    match error:
-        case UrmpipeError():
-            return error.findings
-        case click.ClickException():
-            return [Finding(error.format_message())]
-        case click.Abort() | KeyboardInterrupt():
-            return [Finding("stopped before it was done; nothing was written")]
-        case OSError():
-            return [Finding(error.strerror or str(error), file=error.filename and str(error.filename))]
-        case MemoryError():
-            return [Finding("out of memory")]
-    fault = f"{type(error).__name__}: {error}"
-    return [Finding(f"{fault} (a fault of urmpipe itself; --debug shows where)")]
-
-
-def _print_findings(findings: Sequence[Finding], as_json: bool) -> None:
-    for finding in findings[:SHOWN_FINDINGS]:
-        click.echo(f"error: {finding}", err=True)
-    if len(findings) > SHOWN_FINDINGS:
-        click.echo(f"error: and {len(findings) - SHOWN_FINDINGS} more", err=True)
-    if as_json:
-        from urmpipe.printing.terminal import echo_json
-
-        errors = [
-            {name: getattr(one, name) for name in ("file", "line", "row", "column", "message")}
-            for one in findings
-        ]
-        echo_json({"schema": 1, "errors": errors})

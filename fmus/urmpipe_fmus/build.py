@@ -5,18 +5,23 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 from urmpipe_fmus.archive import content_guid, write_fmu
 from urmpipe_fmus.description import Backend, model_description
 from urmpipe_fmus.documentation import documentation
 from urmpipe_fmus.unit import Unit
+from urmpipe_models.display import Shown, line_of
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 DESCRIPTION = "modelDescription.xml"
 DOCUMENTATION = "documentation/index.html"
 
 
-@dataclass(frozen=True, slots=True)
-class BuiltFmu:
+@dataclass(frozen=True, slots=True, repr=False)
+class BuiltFmu(Shown):
     """An FMU that was built.
 
     Attributes:
@@ -34,6 +39,36 @@ class BuiltFmu:
     platforms: tuple[str, ...]
     guid: str
     note: str = ""
+
+    def _headline(self) -> str:
+        """Return the file, and what is in it."""
+        return line_of(str(self.path), self.unit.name, self.backend, *self.platforms)
+
+    def _notes(self) -> list[str]:
+        """Return why it is not native."""
+        return [self.note] if self.note else []
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a variable of the unit: name, causality, unit, start, description."""
+        import pandas as pd
+
+        fields = ("name", "causality", "unit", "start", "description")
+        return pd.DataFrame(
+            [[getattr(one, field) for field in fields] for one in self.unit.variables], columns=list(fields)
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the object that `urmpipe fmu build --json` prints."""
+        return {
+            "schema": 1,
+            "fmu": str(self.path),
+            "unit": self.unit.name,
+            "backend": self.backend,
+            "platforms": list(self.platforms),
+            "guid": self.guid,
+            "size": self.path.stat().st_size,
+            "note": self.note or None,
+        }
 
 
 def build_fmu(

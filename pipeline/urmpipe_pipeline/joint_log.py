@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Literal, get_args
+from dataclasses import asdict, dataclass, replace
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_quaternions, continuous_rotations
-from urmpipe_models.orientation import RotationForm, quaternions
+from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.orientation import NAMES, RotationForm, quaternions
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def seconds(nanoseconds: IntArray) -> FloatArray:
@@ -99,8 +103,8 @@ class LogColumn:
     number: int = 0
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class JointLog:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class JointLog(Shown):
     """A log as its file has it: the file's own rows, in SI, neither repolarized nor resampled.
 
     A path (t, x, y, z) is a log without joints.
@@ -189,3 +193,38 @@ class JointLog:
     def period(self) -> float:
         """Median time between rows in [s]; 0 for a log of one row."""
         return float(np.median(np.diff(self.t_ns))) / 1e9 if self.rows > 1 else 0.0
+
+    def _headline(self) -> str:
+        """Return its name, its source and how long it is."""
+        joints = number_of(len(self.joints), "joint") if self.joints else "a path"
+        rows = f"{number_of(self.rows, 'row')} {self.period:g} s apart"
+        return line_of(self.name, self.source, joints, rows)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a row of the file: t [s], the joints, and what else was recorded, in SI."""
+        import pandas as pd
+
+        columns: dict[str, Any] = {"t": self.t}
+        for prefix, values in (("", self.q), ("d_", self.qd), ("dd_", self.qdd)):
+            if values is not None:
+                columns |= {f"{prefix}{name}": values[:, i] for i, name in enumerate(self.joints)}
+        rotation = NAMES[self.rotation_form] if self.rotation_form else ()
+        for names, values in (("xyz", self.tcp_position), (rotation, self.tcp_rotation)):
+            if values is not None:
+                columns |= {name: values[:, i] for i, name in enumerate(names)}
+        return pd.DataFrame(columns)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return what the log is and how it was read, without its rows."""
+        return {
+            "name": self.name,
+            "source": self.source,
+            "files": [asdict(one) for one in self.files],
+            "samples": self.rows,
+            "period": self.period,
+            "clock_start": self.clock_start,
+            "joints": list(self.joints),
+            "units": self.units,
+            "inferences": [asdict(one) for one in self.inferences],
+            "warnings": [asdict(one) for one in self.warnings],
+        }

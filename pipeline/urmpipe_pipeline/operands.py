@@ -40,7 +40,7 @@ def load_runs(
 
     Args:
         operands: Recordings, logs, paths, folders; runs as they are.
-        robot: The arm; of a recording it replaces the one inside.
+        robot: The arm; of a recording or a run it replaces the one inside.
         read: How to read the CSV files; `options_of_each` tells which of it holds for which.
         tsp: Period of the grid in [s], of the CSV files.
         derivative: How the joints of CSV files are differentiated.
@@ -55,7 +55,7 @@ def load_runs(
     def run_of(operand: Path | Run) -> Run:
         """Return the run that an operand is, or is read as."""
         if isinstance(operand, Run):
-            return operand
+            return on_robot(operand, robot)
         own = None if _is_recording(operand) else next(each)
         return load_run(operand, robot=robot, read=own, tsp=tsp, derivative=derivative)
 
@@ -100,12 +100,17 @@ def load_run(
         raise RecordingError(Finding(COMPARISON, file=str(operand)))
     if isinstance(result, Simulation):
         raise RecordingError(Finding(SIMULATION, file=str(operand)))
-    if robot is not None and robot != result.robot:
-        tcp, warnings = kinematics(robot, result.q, result.qd, result.qdd)
-        others = [warning for warning in result.warnings if warning.kind not in OF_ROBOT]
-        made = replace(result.provenance, options={**result.provenance.options, "robot": robot.name})
-        return replace(result, robot=robot, tcp=tcp, warnings=(*others, *warnings), provenance=made)
-    return result
+    return on_robot(result, robot)
+
+
+def on_robot(run: Run, robot: Chain | None) -> Run:
+    """Return a run with the kinematics of an arm; as it is without one."""
+    if robot is None or robot == run.robot:
+        return run
+    tcp, warnings = kinematics(robot, run.q, run.qd, run.qdd)
+    others = [warning for warning in run.warnings if warning.kind not in OF_ROBOT]
+    made = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
+    return replace(run, robot=robot, tcp=tcp, warnings=(*others, *warnings), provenance=made)
 
 
 def load_comparison(operand: Path) -> Comparison | None:

@@ -38,6 +38,22 @@ NOUNS: dict[str, str] = {
 }
 """What people call a kind, where that is not its name."""
 
+SUFFIXES: dict[OutputKind, tuple[str, ...]] = {
+    "recording": (".rrd",),
+    "report": (".html", ".htm"),
+    "map": (".toml",),
+    "audit": (".csv",),
+    "junit": (".xml",),
+    "statistics": (".csv",),
+    "drawing": (".svg",),
+    "fmu": (".fmu",),
+    "joints": (".csv",),
+}
+"""How a file of a kind is called; exports and figures say it by their formats."""
+
+OTHERS = {".parquet", ".mat", ".tum", ".txt", ".xlsx", ".json", ".png", ".pdf", ".jpg", ".webp"}
+"""Suffixes of what urmpipe writes as exports and figures, or not at all."""
+
 AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")
 """The header of an audit, by which one of ours is known."""
 
@@ -155,16 +171,30 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     noun = NOUNS.get(kind, kind)
     if path.is_dir():
         return f"found a folder, allowed: the name of a file for the {noun}"
+    if _is_of_another_kind(path, kind):
+        return f"found a name that is none of a {noun}, allowed: {path.stem}{SUFFIXES[kind][0]}"
     if not path.parent.is_dir():
         return f"found no folder {path.parent}, allowed: a folder that exists"
     if not path.exists():
         return None
+    return _irreplaceable(path, inputs, kind)
+
+
+def _irreplaceable(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None:
+    """Return what speaks against replacing what is there, or None."""
+    noun = NOUNS.get(kind, kind)
     if any(one.exists() and path.samefile(one) for one in inputs):
         return f"found an input of this command, allowed: any other name for the {noun}"
     if not path.is_file() or not _is_ours(path, kind):
         such = f"such {'an' if kind in ('audit', 'export', 'fmu') else 'a'} {noun}"
         return f"found a file that is no {noun} of urmpipe's, allowed: a new name, or {such} to replace"
     return None
+
+
+def _is_of_another_kind(path: Path, kind: OutputKind) -> bool:
+    """Tell whether a name ends as those of other files do: what opens it would go by that."""
+    known = OTHERS.union(*SUFFIXES.values())
+    return kind in SUFFIXES and path.suffix.lower() in known.difference(SUFFIXES[kind])
 
 
 def _is_text(path: Path) -> bool:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from typing import Any
 
-from urmpipe_pipeline.comparison.comparison import AXES, Statistics
-from urmpipe_pipeline.runs.results import json_ready
+from urmpipe_models.measure_units import factor
 
 NOTHING = "–"
 """Stands where there is no value."""
@@ -19,25 +17,8 @@ DIGITS = 4
 FINEST = 1e-3
 """The least standard error of a time that is said, in [ms]: a fit may claim less, but no clock keeps it."""
 
-SHOWN = {"m": ("mm", 1e3), "rad": ("deg", 180.0 / math.pi)}
+SHOWN = {si: (unit, factor(si, unit)) for si, unit in (("m", "mm"), ("rad", "deg"))}
 """The units that people read, and how many of them one of the SI unit is."""
-
-SYMBOLS = dict(zip(AXES, ("Δx", "Δy", "Δz", "‖Δ‖"), strict=True))
-"""The quantities of a deviation as people read them."""
-
-
-def symbol(statistics: Statistics) -> str:
-    """Return what a quantity is called: Δx, ‖Δ‖, path, angle, or a joint by its name."""
-    own = statistics.kind in ("axis", "norm")
-    return SYMBOLS[statistics.quantity] if own else statistics.quantity
-
-
-def size_of(statistics: Statistics) -> str:
-    """Return what the absolute value of a quantity is called: |Δx|, ‖Δ‖, path, angle, |Δ phi1|."""
-    named = symbol(statistics)
-    if statistics.kind == "joint":
-        return f"|Δ {named}|"
-    return f"|{named}|" if statistics.kind == "axis" else named
 
 
 def number(value: float | None, unit: str, against: float | None = None) -> str:
@@ -53,11 +34,11 @@ def number(value: float | None, unit: str, against: float | None = None) -> str:
     """
     if value is None or not math.isfinite(value):
         return NOTHING
-    factor = SHOWN[unit][1]
-    scaled = value * factor
+    scale = SHOWN[unit][1]
+    scaled = value * scale
     digits, form = (3, "e") if 0.0 < abs(scaled) < 1e-3 else (DIGITS, "f")
     if against is not None and abs(value) != against:
-        while digits < 12 and f"{abs(scaled):.{digits}{form}}" == f"{against * factor:.{digits}{form}}":
+        while digits < 12 and f"{abs(scaled):.{digits}{form}}" == f"{against * scale:.{digits}{form}}":
             digits += 1
     return f"{scaled:.{digits}{form}}"
 
@@ -75,24 +56,6 @@ def millimetres(value: float | None, against: float | None = None) -> str:
 def limit(value: float | None, unit: str = "m") -> str:
     """Return a tolerance in [m] as [mm] or in [rad] as [deg], with no more digits than it has."""
     return NOTHING if value is None else f"{value * SHOWN[unit][1]:.6g}"
-
-
-def used(statistics: Statistics) -> str:
-    """Return how much of its tolerance a quantity uses up: "71.0 % of the tolerance"."""
-    share = statistics.used
-    if share is None:
-        return ""
-    return f"{percent(share)} of the tolerance" if share <= 1.0 else f"{_times(share)} times the tolerance"
-
-
-def _times(factor: float) -> str:
-    """Return a factor above 1 with three digits, or as many as tell it from 1, without an exponent."""
-    if factor >= 1000.0:
-        return f"{factor:.0f}"
-    digits = 3
-    while digits < 15 and f"{factor:.{digits}g}" == "1":
-        digits += 1
-    return f"{factor:.{digits}g}"
 
 
 def metres(value: float) -> str:
@@ -143,31 +106,6 @@ def enumerated(words: Sequence[str]) -> str:
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
 
 
-def tolerance(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",)) -> str:
-    """Return a comparison's tolerance as people read it: "±3.5 mm per axis, 0.5 deg of orientation".
-
-    Args:
-        allowed: In [m] or [rad], by kind or coordinate.
-        joint_units: The units of the joints that are held to a tolerance, rad or m.
-    """
-    words = {
-        "axis": "±{} mm per axis",
-        "norm": "{} mm norm",
-        "path": "{} mm from the path",
-        "angle": "{} deg of orientation",
-        **{axis: f"±{{}} mm {axis}" for axis in "xyz"},
-    }
-    parts = []
-    for name, value in allowed.items():
-        if name == "joint":
-            units = sorted(set(joint_units), reverse=True)
-            shown = (f"±{limit(value, unit)} {SHOWN[unit][0]}" for unit in units)
-            parts.append(f"{' or '.join(shown)} per joint")
-        else:
-            parts.append(words[name].format(limit(value, "rad" if name == "angle" else "m")))
-    return ", ".join(parts)
-
-
 def unique(names: Sequence[str]) -> list[str]:
     """Return the names, those that repeat with a number: "log", "log-2"."""
     result: list[str] = []
@@ -189,8 +127,3 @@ def exact(value: Any) -> str:
     if value is None:
         return ""
     return value if isinstance(value, str) else repr(value)
-
-
-def plain(value: Any) -> str:
-    """Return an option's value as one line: text as it is, the rest as JSON."""
-    return value if isinstance(value, str) else json.dumps(json_ready(value), ensure_ascii=False)

@@ -1,14 +1,18 @@
-"""The command line as a user runs it: in its own process, in an empty folder."""
+"""The command line as a user runs it, in an empty folder: in this process, or in one of its own."""
 
 from __future__ import annotations
 
+import io
 import subprocess
 import sys
 from collections.abc import Callable
+from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
+
+from urmpipe.main import run as run_line
 
 
 @dataclass
@@ -19,8 +23,22 @@ class Ran:
 
 
 @pytest.fixture
-def urmpipe(tmp_path: Path) -> Callable[..., Ran]:
-    """Run `urmpipe ARGUMENTS` in an empty folder."""
+def urmpipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ran]:
+    """Run `urmpipe ARGUMENTS` in an empty folder, in this process, which is quick."""
+
+    def run(*arguments: str | Path) -> Ran:
+        monkeypatch.chdir(tmp_path)
+        out, err = io.StringIO(), io.StringIO()
+        with redirect_stdout(out), redirect_stderr(err):
+            code = run_line([*map(str, arguments)])
+        return Ran(code, out.getvalue(), err.getvalue())
+
+    return run
+
+
+@pytest.fixture
+def program(tmp_path: Path) -> Callable[..., Ran]:
+    """Run `urmpipe ARGUMENTS` in an empty folder, in a process of its own."""
 
     def run(*arguments: str | Path) -> Ran:
         command = [sys.executable, "-m", "urmpipe", *map(str, arguments)]

@@ -74,8 +74,8 @@ def test_one_log_is_a_verdict_and_its_statistics(capsys: Captured) -> None:
     result = urmpipe.compare(write_path("path.csv", NOTHING_OFF), [write_path("a.csv", Y_OFF)])
     assert printed(result, capsys) == [
         "PASS  a within tolerance against path",
-        "      max |Δy|: 1.0000 mm of 3.5 mm allowed (28.6 % of the tolerance), at t = 0.000 s,"
-        " at (0.0000, -0.0010, 1.0000) m",
+        "      max |Δy|: 1.0000 mm of 3.5 mm allowed (28.6 % of the tolerance), at t = 0.000 s"
+        " (row 1), at (0.0000, -0.0010, 1.0000) m",
         "",
         "a against path",
         "Quantity   Verdict  tolerance     max  at t [s]     rms     p95    mean     std  at start",
@@ -96,8 +96,8 @@ def test_several_logs_are_one_table_from_best_to_worst(capsys: Captured) -> None
     lines = printed(urmpipe.compare(write_path("path.csv", NOTHING_OFF), logs, tolerance=tolerance), capsys)
     assert lines[:4] == [
         "FAIL  1 of 2 logs out of tolerance against path",
-        "      max |Δz| of b: 4.5000 mm of 3.5 mm allowed (1.29 times the tolerance), at t = 0.500 s,"
-        " at (0.2000, 0.0000, 0.9955) m",
+        "      max |Δz| of b: 4.5000 mm of 3.5 mm allowed (1.29 times the tolerance), at t = 0.500 s"
+        " (row 3), at (0.2000, 0.0000, 0.9955) m",
         "",
         "From best to worst",
     ]

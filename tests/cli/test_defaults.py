@@ -7,13 +7,15 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe.main import run
-from urmpipe.options import FORMS
+from urmpipe.main import COMMANDS, run
+from urmpipe.options.reading import FORMS
 from urmpipe_models import orientation
 
 LOG = "t [s],a,b,c,d,e,f\n" + "".join(f"{k * 0.005},{k},1,2,3,4,5\n" for k in range(20))
 
 INGEST = ("ingest", "log.csv", "--unit", "deg", "--joints", "a,b,c,d,e,f")
+
+NAMES = ", ".join(COMMANDS)
 
 Captured = pytest.CaptureFixture[str]
 
@@ -43,7 +45,7 @@ def test_defaults_of_a_folder_above_hold_and_are_told(lab: Path, capsys: Capture
     out, err = capsys.readouterr()
     found = json.loads(out)
     assert (found["robot"], found["units"]["a"]) == ("ur5e", "deg")
-    assert err == f"defaults of {lab}/urmpipe.toml: robot=ur5e, unit=deg, strict=true\n"
+    assert err == f"note: defaults of {lab}/urmpipe.toml: robot=ur5e, unit=deg, strict=true\n"
 
 
 def test_the_command_line_comes_before_the_defaults(lab: Path, capsys: Captured) -> None:
@@ -77,10 +79,29 @@ def test_everything_that_is_wrong_with_it(lab: Path, capsys: Captured) -> None:
     assert "key compare.tolrance: unknown (did you mean tolerance?); allowed: " in second
 
 
-def test_a_value_that_makes_no_sense_is_refused_as_on_the_command_line(lab: Path, capsys: Captured) -> None:
-    (lab / "urmpipe.toml").write_text("tsp = -1\n")
-    assert run(["ingest", "log.csv"]) == 2
-    assert "found '-1', allowed: a positive time in s, such as 0.005 or 5ms" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("tsp = -1", "key tsp: found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
+        ("[ingest]\ntsp = -1", "key tsp: found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
+        ("derivative = 'x'", "key derivative: found 'x', allowed: central, savgol"),
+        ("[ignest]\ntsp = 1", f"key ignest: found 'ignest' (did you mean ingest?), allowed: {NAMES}"),
+    ],
+)
+def test_what_is_wrong_in_it_is_told_by_file_and_key(
+    lab: Path, capsys: Captured, text: str, said: str
+) -> None:
+    (lab / "urmpipe.toml").write_text(f"{text}\n")
+    assert run(["ingest", "log.csv", "-q"]) == 2
+    assert capsys.readouterr().err == f"error: {lab}/urmpipe.toml: {said}\n"
+
+
+def test_a_wrong_tolerance_in_it_is_told_by_file_and_key(lab: Path, capsys: Captured) -> None:
+    (lab / "urmpipe.toml").write_text("[compare]\ntolerance = {axes = '2mm'}\n")
+    assert run(["compare", "log.csv", "-q"]) == 2
+    assert capsys.readouterr().err.startswith(
+        f"error: {lab}/urmpipe.toml: key tolerance: found 'axes=2mm', allowed: a length in m, or axis=, "
+    )
 
 
 def test_explain_prints_alternatives_and_writes_nothing(lab: Path, capsys: Captured) -> None:
@@ -121,7 +142,9 @@ def test_a_map_that_was_written_reads_the_next_log(lab: Path, capsys: Captured) 
 
 def test_a_map_replaces_only_a_map(lab: Path, capsys: Captured) -> None:
     assert run([*INGEST, "-q", "--write-map", "log.csv"]) == 2
-    assert capsys.readouterr().err.startswith("error: log.csv: found an input of this command, allowed: ")
+    assert (
+        capsys.readouterr().err == "error: log.csv: found a name that is none of a map, allowed: log.toml\n"
+    )
     Path("notes.toml").write_text("mine = 1\n")
     assert run([*INGEST, "-q", "--write-map", "notes.toml"]) == 2
     assert "found a file that is no map of urmpipe's" in capsys.readouterr().err
@@ -139,11 +162,14 @@ def test_a_quiet_command_tells_no_defaults(lab: Path, capsys: Captured) -> None:
     assert capsys.readouterr() == ("", "")
 
 
-@pytest.mark.parametrize("name", ["json", "audit", "write-map", "output", "explain"])
+@pytest.mark.parametrize(
+    "name", ["json", "audit", "write-map", "output", "explain", "junit", "csv", "baseline"]
+)
 def test_what_one_call_is_to_give_is_no_default(lab: Path, capsys: Captured, name: str) -> None:
     (lab / "urmpipe.toml").write_text(f"{name} = 'x'\n")
     assert run([*INGEST]) == 2
-    assert f"key {name}: unknown" in capsys.readouterr().err
+    said = f"key {name}: found what one call is to give, allowed: --{name} on the command line"
+    assert capsys.readouterr().err == f"error: {lab}/urmpipe.toml: {said}\n"
 
 
 def test_a_map_keeps_intervals_and_the_form_of_dates(lab: Path, capsys: Captured) -> None:

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from urmpipe.options.named import option_value
 from urmpipe.systems.log_tables import read_table
 from urmpipe.systems.units import unit_of
-from urmpipe.unit_options import option_value
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.units import unit_names
 from urmpipe_models.errors import UrmpipeError
@@ -134,7 +134,7 @@ def test_a_chain_is_taken_as_a_robot() -> None:
     ("arguments", "said"),
     [
         (("kinematic_chan",), "unit kinematic_chan: found (did you mean kinematic_chain?), allowed: kine"),
-        (("kinematic_chain", "--robot", "urm7"), "unknown robot 'urm7' (did you mean urm8?)"),
+        (("kinematic_chain", "--robot", "urm7"), "unknown robot 'urm7' (did you mean urm4?)"),
         (
             ("repolarizer", "-s", "joints=nan"),
             "repolarizer: option joints: found nan, allowed: an integer",

@@ -3,15 +3,21 @@
 from __future__ import annotations
 
 import json
+import subprocess
+import sys
 from collections.abc import Callable, Iterator
 from importlib.metadata import version
+from pathlib import Path
 from typing import Any
 
 import click
 import pytest
 from click.testing import CliRunner
+from hypothesis import assume, given
+from hypothesis import strategies as st
 
 from urmpipe.main import COMMANDS, cli
+from urmpipe.options.types import ROBOT, OffsetType
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
@@ -60,11 +66,51 @@ def test_version(urmpipe: RunCommand) -> None:
         assert (ran.code, ran.out) == (0, f"urmpipe, version {version('urmpipe')}\n")
 
 
-def test_an_unknown_command_is_usage_and_exits_with_2(urmpipe: RunCommand) -> None:
-    ran = urmpipe("ingset")
-    assert ran.code == 2
-    assert "No such command 'ingset'" in ran.err
-    assert ran.out == ""
+COMMAND_NAMES = ", ".join(COMMANDS)
+DURATIONS = "allowed: a positive time in s, such as 0.005 or 5ms"
+OFFSETS = "allowed: start, auto, or a time in s, such as -0.2 or 200ms"
+FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        ("igest x", f"found 'igest' (did you mean ingest?), allowed: {COMMAND_NAMES}"),
+        ("show urm6", f"found 'show' (did you mean robot show?), allowed: {COMMAND_NAMES}"),
+        ("robots list", f"found 'robots' (did you mean robot?), allowed: {COMMAND_NAMES}"),
+        ("robot lst", "found 'lst' (did you mean list?), allowed: export, list, show"),
+        ("ingest", "found no LOG..., allowed: urmpipe ingest [OPTIONS] LOG..."),
+        ("ingest x --robt a", "--robt: no such option (did you mean --robot?); see urmpipe ingest --help"),
+        ("ingest x --tsp never", f"--tsp: found 'never', {DURATIONS}"),
+        ("ingest x --tsp -1", f"--tsp: found '-1', {DURATIONS}"),
+        ("ingest x --tsp 5m", f"--tsp: found '5m', {DURATIONS}"),
+        ("ingest x --derivative magic", "--derivative: found 'magic', allowed: central, savgol"),
+        ("ingest x --interval 3", "--interval: found '3', allowed: LOW:HIGH or JOINT=LOW:HIGH"),
+        ("ingest x --base 0,0,1kg", f"--base: found '0,0,1kg', {FRAMES}"),
+        ("compare x --sync soon", f"--sync: found 'soon', {OFFSETS}"),
+    ],
+)
+def test_wrong_use_is_one_line_that_says_what_is_allowed(urmpipe: RunCommand, line: str, said: str) -> None:
+    ran = urmpipe(*line.split())
+    assert (ran.code, ran.out, ran.err) == (2, "", f"error: {said}\n")
+
+
+@given(name=st.sampled_from(sorted(COMMANDS)), at=st.integers(0, 20))
+def test_a_command_with_a_letter_missing_is_meant(name: str, at: int) -> None:
+    at %= len(name)
+    typed = name[:at] + name[at + 1 :]
+    assume(len(name) > 2 and typed != "eport")  # as much like report as like export
+    result = CliRunner().invoke(cli, [typed], standalone_mode=False)
+    assert isinstance(result.exception, click.UsageError)
+    assert f"(did you mean {name}?)" in result.exception.message
+
+
+def test_a_length_may_have_its_unit_in_a_frame() -> None:
+    typed, plain = (
+        OffsetType().convert(text, None, None)
+        for text in ("0,1cm,150 mm,0,0,90deg", "0,0.01,0.15,0,0,1.5707963267948966")
+    )
+    assert typed == plain
 
 
 def test_an_error_is_one_line_and_json_if_asked_for(urmpipe: RunCommand) -> None:
@@ -87,23 +133,15 @@ def test_debug_adds_the_traceback(urmpipe: RunCommand) -> None:
     assert "Traceback (most recent call last)" in ran.err
 
 
-@pytest.mark.parametrize(
-    ("arguments", "found"),
-    [
-        (["--tsp", "never"], "found 'never', allowed: a positive time in s, such as 0.005 or 5ms"),
-        (["--tsp", "-1"], "found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
-        (["--tsp", "5 m"], "found '5 m', allowed: a positive time in s, such as 0.005 or 5ms"),
-        (["--derivative", "magic"], "'magic' is not one of 'central', 'savgol'."),
-    ],
-)
-def test_wrong_options_say_what_is_allowed(urmpipe: RunCommand, arguments: list[str], found: str) -> None:
-    ran = urmpipe("ingest", "log.csv", *arguments)
-    assert ran.code == 2
-    assert found in ran.err
-
-
 def test_shell_completion_offers_commands_and_robots() -> None:
-    from urmpipe.options import RobotType
-
-    robots = RobotType().shell_complete(click.Context(cli), click.Option(["--robot"]), "ur5")
+    robots = ROBOT.shell_complete(click.Context(cli), click.Option(["--robot"]), "ur5")
     assert {item.value for item in robots} >= {"ur5", "ur5e"}
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
+@pytest.mark.parametrize("arguments", [(), ("--json",)])
+def test_an_output_that_is_full_is_one_line(arguments: tuple[str, ...]) -> None:
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "urmpipe", "fmu", "list", *arguments]
+        done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
+    assert (done.returncode, done.stderr) == (2, "error: No space left on device\n")

@@ -19,10 +19,13 @@ import urmpipe
 from urmpipe.api.simulate import simulate
 from urmpipe.commands.simulate import simulate as command
 from urmpipe.main import cli
-from urmpipe.unit_options import UnitType
+from urmpipe.options.types import UNIT
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.kinematics.forward import point_over_log
+from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.sources.tables.text import fingerprint
 
 RunCommand = Callable[..., Any]
 
@@ -75,7 +78,10 @@ def following(tmp_path: Path) -> Path:
 
 @pytest.mark.parametrize("log", ["coppeliasim.csv", "matlab.csv", "solidworks", "counter_rotating.csv"])
 def test_log_to_delta_is_what_compare_says(log: str) -> None:
-    result = simulate("log-to-delta", arguments={"log": str(LOGS / log), "robot": "urm6"})
+    result = simulate(
+        "log-to-delta",
+        arguments={"log": str(LOGS / log), "reference": str(LOGS / "path.csv"), "robot": "urm6"},
+    )
     compared = urmpipe.compare(LOGS / "path.csv", [LOGS / log], robot="urm6")
     (run,), (judged,) = compared.runs, result.verdicts
     np.testing.assert_array_equal(result.t_ns, run.run.t_ns[run.sample])
@@ -89,6 +95,50 @@ def test_log_to_delta_is_what_compare_says(log: str) -> None:
     assert judged.verdict == result.verdict == compared.verdict
     turns = result.signal("repolarizer.turns").values
     assert int(np.abs(np.diff(turns, axis=0)).sum()) == len(run.run.repolarizations)
+
+
+@pytest.fixture
+def slow_motion(tmp_path: Path) -> dict[str, str]:
+    """A log at 10 ms, twice the step of most systems, and the path of exactly its motion."""
+    t = np.arange(100) * 0.01
+    q = 0.8 * np.sin(3.0 * t)[:, None] * np.linspace(0.3, 1.0, 6)
+    x = point_over_log(load_robot("urm6"), q, np.zeros_like(q), np.zeros_like(q)).position
+    files = {"log": tmp_path / "log.csv", "reference": tmp_path / "path.csv"}
+    header = ",".join(f"phi{i} [rad]" for i in range(1, 7))
+    np.savetxt(files["log"], np.column_stack([t, q]), delimiter=",", header=f"t [s],{header}", comments="")
+    np.savetxt(
+        files["reference"],
+        np.column_stack([t, x]),
+        delimiter=",",
+        header="t [s],x [m],y [m],z [m]",
+        comments="",
+    )
+    return {name: str(path) for name, path in files.items()}
+
+
+def test_a_log_of_another_period_is_judged_at_its_samples(slow_motion: dict[str, str]) -> None:
+    result = simulate("log-to-delta", arguments=slow_motion)
+    assert (result.step, result.verdict, result.warnings) == (0.01, "pass", ())
+    assert result.verdicts[0].worst < 1e-12  # the path is the log's own, but for rounding
+
+
+def test_a_step_between_the_samples_of_a_log_is_told(slow_motion: dict[str, str]) -> None:
+    result = simulate("log-to-delta", arguments=slow_motion, step=0.005)
+    assert [(one.kind, one.message) for one in result.warnings] == [(
+        "held",
+        "block log: 99 of 199 communication points lie between samples of the log, where the one before is"
+        " held, 5 ms at most: a deviation there is none of the log's",
+    )]  # fmt: skip
+
+
+def test_the_bundled_logs_are_those_of_a_shipped_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "path.csv").write_text("t,x,y,z\n0,0,0,9\n1,0,0,9\n")  # of the user's, for something else
+    monkeypatch.chdir(tmp_path)
+    result = simulate("log-to-delta", duration=0.5)
+    assert result.verdict == "pass"
+    assert fingerprint(LOGS / "path.csv") in result.provenance.inputs
 
 
 def test_the_arm_of_a_kinematic_chain_is_that_of_its_joints() -> None:
@@ -177,7 +227,18 @@ def test_signals_that_stand_still_come_last(urmpipe: RunCommand, tmp_path: Path)
 
 def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> None:
     log = LOGS / "counter_rotating.csv"
-    ran = urmpipe("simulate", "log-to-delta", "--set", f"log={log}", "--duration", "10s", "--json", "-q")
+    ran = urmpipe(
+        "simulate",
+        "log-to-delta",
+        "--set",
+        f"log={log}",
+        "--set",
+        "reference=path.csv",
+        "--duration",
+        "10s",
+        "--json",
+        "-q",
+    )
     result = json.loads(ran.out)
     assert (ran.code, ran.err) == (1, "")
     assert (result["verdict"], result["verdicts"][0]["block"]) == ("fail", "delta")
@@ -210,11 +271,19 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        ((), "Error: found neither a system nor --list, allowed: one of both"),
+        ((), "error: found neither a system nor --list, allowed: one of both"),
         (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of log-to-delta"),
         (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo', allowed: log"),
         (("log-to-delta", "--set", "log"), "found 'log', allowed: NAME=VALUE, each name once"),
-        (("log-to-delta", "--set", "log=missing.csv"), "error: block log: missing.csv: found no such file"),
+        (
+            ("log-to-delta", "--set", "log=missing.csv", "--set", "reference=path.csv"),
+            "error: block log: missing.csv: found no such file",
+        ),
+        (
+            ("log-to-delta", "--set", "log=mine.csv"),
+            "error: argument reference: found nothing where log is mine.csv, allowed: a file of the same"
+            " motion (log-to-delta's own path.csv is of another one)",
+        ),
         (("log-to-delta", "--step", "nan"), "found 'nan', allowed: a positive time in s"),
         (("log-to-delta", "-o", "missing/run.rrd"), "found no folder missing, allowed: a folder that exists"),
     ],
@@ -292,7 +361,7 @@ def test_an_fmu_that_fails_at_once_leaves_an_empty_recording(following: Path, tm
 def test_names_complete_in_the_shell() -> None:
     context, argument = click.Context(command), command.params[0]
     assert argument.type.shell_complete(context, argument, "six")[0].value == "six-drives"
-    units = UnitType().shell_complete(context, argument, "dc")
+    units = UNIT.shell_complete(context, argument, "dc")
     assert [(one.value, one.type) for one in units] == [("dc_drive", "plain"), ("dc", "file")]
 
 

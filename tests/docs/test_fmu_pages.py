@@ -2,18 +2,15 @@
 
 from __future__ import annotations
 
-import os
 import re
-import shlex
 import shutil
-import subprocess
-import sys
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
+from pages import run_lines, snippets
 from urmpipe.api.simulate import simulate
 from urmpipe.printing.fmu import units_dict
 from urmpipe_datasets import LOGS
@@ -27,36 +24,11 @@ DOCS = Path(__file__).parents[2] / "docs"
 NAMED = set(re.findall(r"`(\w+)`", (DOCS / "json.md").read_text(encoding="utf-8")))
 
 
-def snippets(page: str, language: str) -> list[str]:
-    """Return the code of a language in a page."""
-    text = (DOCS / page).read_text(encoding="utf-8")
-    return [
-        "\n".join(line.removeprefix("  ") for line in one.splitlines())
-        for one in re.findall(rf"^ *```{language}\n(.*?)^ *```$", text, re.DOTALL | re.MULTILINE)
-    ]
-
-
-def run_lines(lines: str, folder: Path) -> None:
-    """Run the commands of a page in a folder: those of this Python, wherever they are installed."""
-    programs = {"urmpipe": ["-m", "urmpipe"], "fmpy": ["-m", "fmpy"]}
-    for line in lines.splitlines():
-        name, *arguments = shlex.split(line)
-        done = subprocess.run(
-            [sys.executable, *programs[name], *arguments],
-            cwd=folder,
-            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
-            capture_output=True,
-            text=True,
-            check=False,
-        )
-        assert (done.returncode, done.stderr) == (0, ""), line
-
-
 def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     missing = native_missing()
     if missing:
         pytest.skip(missing)
-    (commands,) = snippets("import/fmpy.md", "sh")
+    (commands,) = snippets("docs/import/fmpy.md", "sh")
     run_lines(commands, tmp_path)
     arm = load_robot("urm6")
     posed = np.array([[0.5, *arm.start[1:]]])
@@ -69,7 +41,7 @@ def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
     )
     monkeypatch.chdir(tmp_path)
     shown: dict[str, Any] = {}
-    for code in snippets("import/fmpy.md", "python"):
+    for code in snippets("docs/import/fmpy.md", "python"):
         exec(compile(code, "fmpy.md", "exec"), shown)
     q = np.zeros((200, 6))
     q[:, 0] = np.sin(0.005 * np.arange(200))
@@ -77,7 +49,7 @@ def test_the_page_of_fmpy_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 def test_the_system_of_the_page_runs(tmp_path: Path) -> None:
-    system = next(one for one in snippets("simulate.md", "toml") if one.startswith("[system]"))
+    system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
     (tmp_path / "my-arm.toml").write_text(system, encoding="utf-8")
     shutil.copy(LOGS / "matlab.csv", tmp_path / "log.csv")
     shutil.copy(LOGS / "path.csv", tmp_path / "path.csv")

@@ -25,56 +25,57 @@ texts = st.text(
 )
 
 
-def frames() -> SearchStrategy[Transform]:
-    offsets = st.tuples(lengths, lengths, lengths, angles, angles, angles).map(from_offset)
-    return st.just(Transform()) | offsets
+# Strategies are made once: what they are made of is checked anew for each that is made while drawing.
+frames = st.just(Transform()) | st.tuples(lengths, lengths, lengths, angles, angles, angles).map(from_offset)
 
 
-@st.composite
-def axes(draw: DrawFn) -> tuple[float, float, float]:
-    if draw(st.booleans()):
-        return draw(st.sampled_from([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)]))
-    polar, azimuth = draw(angles), draw(angles)
+def direction(polar: float, azimuth: float) -> tuple[float, float, float]:
     x, y, z = math.sin(polar) * math.cos(azimuth), math.sin(polar) * math.sin(azimuth), math.cos(polar)
     length = math.hypot(x, y, z)
     return x / length, y / length, z / length
 
 
-@st.composite
-def joints(draw: DrawFn, name: str, leaders: list[str]) -> Joint:
-    kind: JointKind = draw(st.sampled_from(["revolute", "revolute", "prismatic", "fixed"]))
+axes = st.sampled_from([(1.0, 0.0, 0.0), (0.0, -1.0, 0.0), (0.0, 0.0, 1.0)]) | st.builds(
+    direction, angles, angles
+)
+limits = st.just((-math.inf, math.inf)) | st.tuples(lengths, lengths).map(sorted)
+velocities = st.floats(0.1, 10.0) | st.just(math.inf)
+moving: SearchStrategy[JointKind] = st.sampled_from(["revolute", "revolute", "prismatic", "fixed"])
+one_in_four = st.sampled_from([True, False, False, False])
+counts = st.integers(1, 7)
+
+
+def drawn_joint(draw: DrawFn, name: str, leaders: list[str]) -> Joint:
+    kind = draw(moving)
     if kind == "fixed" and leaders:
-        return Joint(name, "fixed", draw(frames()))
+        return Joint(name, "fixed", draw(frames))
     kind = "revolute" if kind == "fixed" else kind
     mimic = None
-    if leaders and draw(st.integers(0, 3)) == 0:
+    if leaders and bool(draw(one_in_four)):
         mimic = Mimic(draw(st.sampled_from(leaders)), draw(lengths), draw(lengths))
-    lower, upper = sorted((draw(lengths), draw(lengths)))
-    if draw(st.booleans()):
-        lower, upper = -math.inf, math.inf
-    velocity = draw(st.floats(0.1, 10.0) | st.just(math.inf))
-    return Joint(name, kind, draw(frames()), draw(axes()), lower, upper, velocity, mimic)
+    lower, upper = draw(limits)
+    return Joint(name, kind, draw(frames), draw(axes), lower, upper, draw(velocities), mimic)
 
 
 @st.composite
 def random_chains(draw: DrawFn) -> Chain:
     """A chain of one to seven joints of every kind, mimics and sensor frames among them."""
     chosen: list[Joint] = []
-    for k in range(draw(st.integers(1, 7))):
-        leaders = [joint.name for joint in chosen if joint.kind != "fixed" and joint.mimic is None]
-        chosen.append(draw(joints(f"j{k}", leaders)))
-    count = sum(joint.kind != "fixed" and joint.mimic is None for joint in chosen)
-    start = tuple(draw(st.lists(lengths, min_size=count, max_size=count)))
+    leaders: list[str] = []
+    for k in range(draw(counts)):
+        joint = drawn_joint(draw, f"j{k}", leaders)
+        chosen.append(joint)
+        if joint.kind != "fixed" and joint.mimic is None:
+            leaders.append(joint.name)
+    start = tuple(draw(lengths) for _ in leaders)
     name, description, source = draw(texts), draw(texts), draw(texts)
-    base, tip, tool = draw(frames()), draw(frames()), draw(frames())
+    base, tip, tool = draw(frames), draw(frames), draw(frames)
     return Chain(name, tuple(chosen), tip, base, tool, start, description, source)
 
 
-@st.composite
-def random_dh_rows(draw: DrawFn) -> list[DHRow]:
-    """One to seven rows of DH parameters, prismatic joints among them."""
-    row = st.builds(DHRow, theta=angles, d=lengths, a=lengths, alpha=angles, kind=kinds)
-    return draw(st.lists(row, min_size=1, max_size=7))
+dh_row = st.builds(DHRow, theta=angles, d=lengths, a=lengths, alpha=angles, kind=kinds)
+random_dh_rows = st.lists(dh_row, min_size=1, max_size=7)
+"""One to seven rows of DH parameters, prismatic joints among them."""
 
 
 @pytest.fixture(scope="session")
@@ -84,7 +85,7 @@ def chains() -> SearchStrategy[Chain]:
 
 @pytest.fixture(scope="session")
 def dh_rows() -> SearchStrategy[list[DHRow]]:
-    return random_dh_rows()
+    return random_dh_rows
 
 
 @pytest.fixture(scope="session")

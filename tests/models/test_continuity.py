@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import example, given
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.arrays import FloatArray
@@ -31,6 +31,7 @@ def wrap(x: FloatArray) -> FloatArray:
     return x - 2 * np.pi * np.floor((x + np.pi) / (2 * np.pi))
 
 
+@settings(max_examples=40, deadline=None)
 @given(steps, st.lists(st.booleans(), min_size=60, max_size=60))
 def test_quaternions_of_any_sign_become_continuous(moves: list[tuple[float, ...]], flips: list[bool]) -> None:
     true = np.cumsum(np.array([[0.0, 0.0, 0.0, 5.0], *([*move, 0.0] for move in moves)]), axis=0)
@@ -70,6 +71,7 @@ def test_a_flip_at_pi_is_undone_and_a_rest_keeps_its_axis() -> None:
     np.testing.assert_allclose(continuous_vectors(v), expected, rtol=0, atol=2e-15)
 
 
+@settings(max_examples=40, deadline=None)
 @given(steps, st.lists(st.booleans(), min_size=60, max_size=60), st.integers(0, 59))
 def test_euler_angles_of_either_family_become_continuous(
     moves: list[tuple[float, ...]], swaps: list[bool], missing: int

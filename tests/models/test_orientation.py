@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from scipy.spatial.transform import Rotation, Slerp
@@ -118,6 +118,7 @@ unit_quaternions = arrays(np.float64, (3, 4), elements=st.floats(-1, 1)).filter(
 )
 
 
+@settings(max_examples=50, deadline=None)
 @given(unit_quaternions, unit_quaternions, st.floats(0, 1))
 def test_orientations_between_two_are_those_of_scipy(
     first: FloatArray, second: FloatArray, share: float

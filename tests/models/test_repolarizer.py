@@ -60,6 +60,7 @@ motions = st_np.arrays(
 )  # each step below a quarter turn, pi / 2 = 1.57
 
 
+@settings(max_examples=50, deadline=None)
 @given(motions, st.sampled_from([FULL_TURN, 360.0]))
 def test_unwrapping_a_wrapped_motion_gives_it_back(steps: FloatArray, period: float) -> None:
     x = np.cumsum(steps, axis=0) * (period / FULL_TURN)
@@ -79,7 +80,7 @@ values = st.one_of(st.floats(-7, 7), st.sampled_from([-3.14, -1.57, 0.0, 1.57, 3
     st.sampled_from([math.inf, 3.0, 300.0]),
     st.floats(0.001, 0.1),
 )
-@settings(deadline=None)
+@settings(max_examples=50, deadline=None)
 def test_the_batch_is_the_steps_bit_for_bit(
     q: FloatArray, missing: NDArray[np.bool_], max_speed: float, period_of_samples: float
 ) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
@@ -91,6 +91,7 @@ def test_constant_right_angles_are_exact(
     np.testing.assert_array_equal(matrix(turn(angle).rotation), expected)
 
 
+@settings(max_examples=40, deadline=None)
 @given(st.lists(units, min_size=12, max_size=12))
 def test_products_are_those_of_4x4_matrices(values: list[float]) -> None:
     a, b = from_offset(values[:6]), from_offset(values[6:])
@@ -212,6 +213,7 @@ def test_the_zxz_angles_are_told_apart_down_to_a_sine_of_1e_9(x: float, singular
             np.testing.assert_allclose((z1, z2), (0.4, 0.5), rtol=0.0, atol=1e-7)  # 1e-16 / 1e-8, and some
 
 
+@settings(max_examples=50, deadline=None)
 @given(angles, st.floats(-1.5, 1.5), angles)
 def test_both_conventions_tell_the_same_rotation(rz: float, ry: float, rx: float) -> None:
     rotation = from_rpy(rx, ry, rz).rotation

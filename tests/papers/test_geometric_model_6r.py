@@ -13,9 +13,10 @@ import numpy as np
 import pytest
 from numpy import cos, sin
 
+from direct_geometric_model import GeometricModel, geometric_model
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.articulated_6r import articulated_6r, articulated_6r_rows
-from urmpipe_models.chains.geometric_model import GeometricModel, GeometricRow, geometric_model
+from urmpipe_models.chains.geometric_model import GeometricRow
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.transform import euler_zxz, from_zxz
 

@@ -1,14 +1,16 @@
-"""A co-simulated system, for the tests of what is made of one."""
+"""What tests of several folders share: what is said of a wrong file, and a co-simulated system."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
@@ -25,6 +27,18 @@ SVG = (
 SYSTEM = '[system]\nname = "log-to-delta"\n\n[connections]\n"chain.phi" = "log.q"\n'
 
 MakeSimulation = Callable[..., Simulation]
+
+
+@pytest.fixture
+def wrong(read: Callable[..., object], tmp_path: Path) -> Callable[..., list[str]]:
+    """Read a file that must be refused, and return what is said, one line a finding."""
+
+    def wrong(*args: object, **options: object) -> list[str]:
+        with pytest.raises(UrmpipeError) as caught:
+            read(*args, **options)
+        return str(caught.value).replace(f"{tmp_path}/", "").split("\n")
+
+    return wrong
 
 
 def build_simulation(

@@ -86,7 +86,7 @@ def test_a_file_that_is_no_report_of_ours_is_not_replaced(tmp_path: Path, text: 
 
 
 def test_an_output_of_the_other_kind_is_not_replaced(tmp_path: Path) -> None:
-    path = tmp_path / "report.html"
+    path = tmp_path / "report"
     path.write_text(REPORT)
     wanted = (
         "found a file that is no recording of urmpipe's, allowed: a new name, or such a recording to replace"
@@ -119,6 +119,22 @@ def test_a_recording_has_a_name_that_rerun_can_open(tmp_path: Path) -> None:
     for path in (tmp_path / "bad\udcff.rrd", tmp_path / "bad\udcff" / "run.rrd"):
         path.parent.mkdir(exist_ok=True)
         assert refusal(path, kind="recording") == wanted
+
+
+@pytest.mark.parametrize(
+    ("name", "kind", "meant"),
+    [("run.csv", "recording", "run.rrd"), ("a.html", "recording", "a.rrd"), ("a.PNG", "drawing", "a.svg")],
+)
+def test_a_name_that_ends_as_those_of_another_kind_is_refused(
+    tmp_path: Path, name: str, kind: OutputKind, meant: str
+) -> None:
+    assert refusal(tmp_path / name, kind=kind) == f"found a name that is none of a {kind}, allowed: {meant}"
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("name", ["run", "run.2026", "run.RRD"])
+def test_a_name_that_no_other_kind_has_is_taken(tmp_path: Path, name: str) -> None:
+    write(tmp_path / name, kind="recording")
 
 
 def test_a_folder_is_not_replaced(tmp_path: Path) -> None:

@@ -8,6 +8,8 @@ import pytest
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Statistics
+from urmpipe_pipeline.comparison.symbols import allowed_words, used_words
+from urmpipe_pipeline.json_values import plain
 
 
 @pytest.mark.parametrize(
@@ -99,9 +101,9 @@ def test_a_share_is_never_rounded_to_none_or_all(share: float, written: str) -> 
 
 
 def test_a_tolerance_names_its_quantities() -> None:
-    assert text.tolerance({"axis": 0.0035, "norm": 0.005}) == "±3.5 mm per axis, 5 mm norm"
+    assert allowed_words({"axis": 0.0035, "norm": 0.005}) == "±3.5 mm per axis, 5 mm norm"
     every = {"x": 0.001, "path": 0.002, "angle": math.radians(0.5), "joint": 0.002}
-    assert text.tolerance(every, {"m", "rad"}) == (
+    assert allowed_words(every, {"m", "rad"}) == (
         "±1 mm x, 2 mm from the path, 0.5 deg of orientation, ±0.114592 deg or ±2 mm per joint"
     )
     assert text.limit(None) == "–"
@@ -111,8 +113,8 @@ def test_sizes_counts_and_options() -> None:
     assert text.size(1_234_567) == "1\u202f234\u202f567"
     assert text.counted(1, "log") == "1 log"
     assert text.counted(0, "log") == "0 logs"
-    assert text.plain("x") == "x"
-    assert text.plain((0.0, None, "é")) == '[0.0, null, "é"]'
+    assert plain("x") == "x"
+    assert plain((0.0, None, "é")) == '[0.0, null, "é"]'
 
 
 @pytest.mark.parametrize(
@@ -127,4 +129,4 @@ def test_sizes_counts_and_options() -> None:
 )
 def test_how_much_of_a_tolerance_is_used_is_never_rounded_to_all_of_it(largest: float, written: str) -> None:
     one = Statistics("path", "path", "m", largest, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0.01, 1, 1.0, "fail")
-    assert text.used(one) == written
+    assert used_words(one) == written

@@ -7,7 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe.guards import PathLike, Robot
+from urmpipe.edge import public
+from urmpipe.guards import PathLike, Robot, one_or_many
 from urmpipe.systems.log_tables import LogTable
 from urmpipe.systems.units import Backend, unit_of
 from urmpipe_fmus.unit import Unit
@@ -19,15 +20,16 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.sources import ReadOptions
 
 
+@public
 def build_fmu(
     unit: Unit | PathLike,
-    *,
     robot: Robot | None = None,
+    *,
     log: PathLike | LogTable | None = None,
     options: Mapping[str, Any] | None = None,
     read: ReadOptions | None = None,
     backend: Backend | None = None,
-    platforms: Sequence[str] = (),
+    platforms: str | Sequence[str] = (),
     output: PathLike = ".",
 ) -> BuiltFmu:
     """Package a unit as an FMU (FMI 2.0 co-simulation).
@@ -56,7 +58,9 @@ def build_fmu(
     target = path if path.suffix == ".fmu" else path / f"{made.name}.fmu"
     inputs = [file for one in (unit, robot, log) for file in _files(one)]
     with guarded_output(target, inputs, "fmu") as part:
-        return replace(build(made, part, backend=backend, platforms=tuple(platforms)), path=target)
+        return replace(
+            build(made, part, backend=backend, platforms=tuple(one_or_many(platforms))), path=target
+        )
 
 
 def _files(operand: Any) -> Sequence[Path]:

@@ -3,25 +3,38 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from contextlib import ExitStack
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-from urmpipe.guards import PathLike, Robot, place_robot, refuse_foreign, refuse_shared, refuse_warnings
-from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
-from urmpipe_models.transform import Transform
+from urmpipe.edge import public
+from urmpipe.guards import (
+    WRITTEN_FIRST,
+    Frame,
+    PathLike,
+    Robot,
+    guarded_outputs,
+    one_or_many,
+    place_robot,
+    refuse_foreign,
+    refuse_others,
+    refuse_warnings,
+)
+from urmpipe.words import by_command_line
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import Finding, OptionError, RecordingError
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.junit import write_junit
+from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
 from urmpipe_pipeline.comparison.statistics_table import write_statistics
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.operands import load_comparison, load_run
-from urmpipe_pipeline.outputs import OutputKind, guarded_output
-from urmpipe_pipeline.recording import read_recording, record
+from urmpipe_pipeline.operands import load_comparison, load_runs
+from urmpipe_pipeline.outputs import OutputKind
+from urmpipe_pipeline.recording import is_recording, read_recording, record
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.runs.results import Run
@@ -29,14 +42,17 @@ from urmpipe_pipeline.sources import ReadOptions
 
 Operand = PathLike | Run
 
+OPERANDS = f"a log, a path, a recording or a Run; {WRITTEN_FIRST}"
 
+
+@public
 def compare(
     reference: PathLike | Run | Comparison,
-    logs: Sequence[PathLike | Run] = (),
-    *,
+    logs: Operand | Sequence[Operand] = (),
     robot: Robot | None = None,
-    base: Transform | None = None,
-    tool: Transform | None = None,
+    *,
+    base: Frame | None = None,
+    tool: Frame | None = None,
     read: ReadOptions | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
@@ -44,98 +60,128 @@ def compare(
     tcp: Tcp = "fk",
     sync: SyncOption = "start",
     align: AlignMode = "none",
-    strict: bool = False,
     baseline: PathLike | Comparison | None = None,
     noise: float | Mapping[str, float] | None = None,
+    strict: bool = False,
     output: PathLike | None = None,
     junit: PathLike | None = None,
     statistics: PathLike | None = None,
+    inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
-    """Hold logs against a reference: deviation, statistics and verdict; write what is named: all or none.
+    """Hold logs against a reference, and write what is named: all or none. docs/python.md has the keywords.
 
     Args:
-        reference: A path (t, x, y, z), a log, or a recording. Without `logs` it is a log that recorded its
-            own tool centre point, whose forward kinematics are held against that; or, with a `baseline`, a
-            comparison that was made, which stands as it was made.
-        logs: The logs or recordings to judge.
-        robot: Name, file (TOML, URDF) or chain of the arm; a recording brings its own.
+        reference: A path, a log, a recording or a run; alone, held against the TCP that it recorded itself.
+            With a `baseline` alone: a comparison, which stands as it was made.
+        logs: What to judge: logs, recordings and runs, or one of them.
+        robot: The arm; a recording or a run that has another one is computed anew with it.
         base: Where the arm stands in the world.
         tool: The tool centre point in the frame of the arm's tip.
-        read: How to read a file where it cannot tell by itself.
-        tsp: Period of the grid in [s]; default: each log's own.
-        derivative: central or savgol; default: savgol for quantised logs, else central.
-        tolerance: Largest deviation allowed on an axis in [m], or in [m] and [rad] by kind: axis, norm, path,
-            angle, joint, or x, y, z.
-        tcp: fk or recorded: where a log was.
-        sync: How the clocks are put together: start (both start together), auto (by the motion), or the
-            offset in [s]: t_reference = t_log + offset.
-        align: How a log is moved in space before it is compared: none, start (the first poses agree), rigid
-            (the best rigid motion), tool (the best constant offset of the tool centre point).
+        read: How to read a log where it cannot tell by itself.
+        tsp: Period of a log's grid in [s].
+        derivative: How a log is differentiated: central or savgol.
+        tolerance: Largest deviation allowed of an axis in [m], or in [m] and [rad] by kind.
+        tcp: Where a log was: fk or recorded.
+        sync: How the clocks are put together: start, auto, or t_reference - t_log in [s].
+        align: How a log is moved in space first: none, start, rigid or tool.
+        baseline: An earlier comparison, to tell what changed since.
+        noise: Changes since then that mean nothing, as `tolerance`; default: 1 um and 1 urad.
         strict: Whether a warning is an error.
-        baseline: An earlier comparison, or its recording: the result tells what changed since (`baseline`).
-        noise: Changes since the baseline that mean nothing: of all lengths in [m], or in [m] and [rad] by
-            kind; default: 1 um and 1 urad.
         output: The recording (.rrd) to write.
         junit: A JUnit file (XML) to write.
         statistics: A table (CSV) to write, one row a log and quantity.
+        inputs: Files besides the operands that are never replaced.
         progress: Told the share of the recording that is written, 0..1.
-
-    Returns:
-        The comparison: its verdict, `to_frame()`, `to_dict()`.
 
     Raises:
         UrmpipeError: With everything that is wrong with the input or the output.
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
-    allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
-    options = CompareOptions(allowed, tcp, sync, align)
-    level = complete_noise(noise)
-    if noise is not None and baseline is None:
-        raise OptionError("--noise: found without --baseline, allowed: with an earlier comparison")
-    named: dict[OutputKind, PathLike | None] = {
+    operands = [reference, *one_or_many(logs)]
+    refuse_others("operands", operands, (Run, Comparison), OPERANDS)
+    kept = [*_files([*operands, baseline]), *map(Path, inputs)]
+    outputs: dict[OutputKind, PathLike | None] = {
         "recording": output, "junit": junit, "statistics": statistics,
     }  # fmt: skip
-    targets = {kind: Path(path) for kind, path in named.items() if path is not None}
-    refuse_shared(targets)
-    earlier = None if baseline is None else _earlier(baseline)
-    arm = place_robot(robot, base, tool)
-
-    def run_of(operand: Operand) -> Run:
-        """Return the run that an operand is, or is read as."""
-        if isinstance(operand, Run):
-            return operand
-        return load_run(Path(operand), robot=arm, read=read, tsp=tsp, derivative=derivative)
-
-    with ExitStack() as stack:
-        inputs = _files([reference, *logs, baseline])
-        parts = {
-            kind: stack.enter_context(guarded_output(path, inputs, kind))
-            for kind, path in targets.items()
-            if kind != "recording"
-        }
-        made = None if logs or earlier is None else _made_before(reference, output)
-        made = made or _compared(reference, logs, run_of, options)
-        _refuse_doubts(strict, made)
-        result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
-        if "junit" in parts:
-            write_junit(result, parts["junit"], targets["junit"])
-        if "statistics" in parts:
-            write_statistics(result, parts["statistics"], targets["statistics"])
-        return result if output is None else record(lambda early: result, Path(output), inputs, progress)
+    told = None if junit is None else Path(junit)
+    with guarded_outputs(outputs, kept) as parts:
+        with told_in_junit(told, kept):
+            allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
+            options = CompareOptions(allowed, tcp, sync, align)
+            level = _noise_level(noise, baseline)
+            given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
+            given.refuse_unused(operands)
+            earlier = None if baseline is None else _earlier(baseline)
+            made = None if operands[1:] or earlier is None else _made_before(reference, output)
+            made = made or _compared(operands, given, options)
+            _refuse_doubts(strict, made)
+            result = (
+                made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
+            )
+        if told is not None:
+            write_junit(result, parts["junit"], told)
+        if statistics is not None:
+            write_statistics(result, parts["statistics"], Path(statistics))
+        return result if output is None else record(lambda early: result, Path(output), kept, progress)
 
 
-def _compared(
-    reference: Operand | Comparison,
-    logs: Sequence[Operand],
-    run_of: Callable[[Operand], Run],
-    options: CompareOptions,
-) -> Comparison:
+@dataclass(frozen=True)
+class _Given:
+    """What is said of the operands: the arm of all of them, and how the logs among them are read."""
+
+    robot: Chain | None
+    read: ReadOptions | None
+    tsp: float | None
+    derivative: Method | None
+
+    def runs(self, operands: Sequence[Operand]) -> list[Run]:
+        """Return the runs that operands are, or are read as."""
+        return load_runs(
+            [one if isinstance(one, Run) else Path(one) for one in operands],
+            robot=self.robot, read=self.read, tsp=self.tsp, derivative=self.derivative,
+        )  # fmt: skip
+
+    def refuse_unused(self, operands: Sequence[Operand | Comparison]) -> None:
+        """Raise an `OptionError` if it is said how logs are read, and every operand was ingested before.
+
+        The command line tells so itself, since there a file of defaults may say how logs are read.
+        """
+        said = {"read": self.read, "--tsp": self.tsp, "--derivative": self.derivative}
+        names = [name for name, value in said.items() if value is not None]
+        if not names or by_command_line() or any(_is_log(one) for one in operands):
+            return
+        found = f"{', '.join(names)}: found with what was ingested before"
+        raise OptionError(f"{found}, allowed: with a log; a run or a recording stands as `ingest` made it")
+
+
+def _is_log(operand: Operand | Comparison) -> bool:
+    """Return whether an operand is a log that is yet to be read."""
+    if isinstance(operand, (Run, Comparison)):
+        return False
+    path = Path(operand)
+    return not (path.suffix == ".rrd" or (path.is_file() and is_recording(path)))
+
+
+def _noise_level(
+    noise: float | Mapping[str, float] | None, baseline: PathLike | Comparison | None
+) -> Mapping[str, float]:
+    """Return what changes mean nothing, by kind.
+
+    Raises:
+        OptionError: If it is no such mapping, or there is no baseline.
+    """
+    if noise is not None and baseline is None:
+        raise OptionError("--noise: found without --baseline, allowed: with an earlier comparison")
+    return complete_noise(noise)
+
+
+def _compared(operands: Sequence[Operand | Comparison], given: _Given, options: CompareOptions) -> Comparison:
     """Return the comparison of some logs with a reference, or of one log with what it recorded itself."""
-    if isinstance(reference, Comparison):
+    if any(isinstance(one, Comparison) for one in operands):
         raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
-    first, *others = for_each(run_of, (reference, *logs))
+    first, *others = given.runs([one for one in operands if not isinstance(one, Comparison)])
     return compare_runs(first, others, options) if others else compare_recorded(first, options)
 
 

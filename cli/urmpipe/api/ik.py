@@ -9,16 +9,18 @@ from typing import Any
 
 from numpy.typing import ArrayLike
 
-from urmpipe.guards import PathLike, Robot, refuse_warnings
+from urmpipe.edge import public
+from urmpipe.guards import Frame, PathLike, Robot, refuse_warnings
 from urmpipe.inverse.asked import Asked, arm_of, refuse_unsolvable, start_of
 from urmpipe.inverse.output import output_kind, run_of_solutions, write_joints
 from urmpipe.inverse.result import InverseResult
 from urmpipe.inverse.solving import solutions_of, solved
 from urmpipe.inverse.targets import TargetsLike, given_targets
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import for_each
+from urmpipe_models.inverse.search import USUAL_SEARCH, Search
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.solve import Method
-from urmpipe_models.transform import Transform
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import refuse_output
 from urmpipe_pipeline.recording import write_recording
@@ -27,20 +29,21 @@ from urmpipe_pipeline.sources import ReadOptions
 SOLVING = 0.7
 """Share of the work that solving is where something is written, too."""
 
-RESTARTS = 20
+RESTARTS = USUAL_SEARCH.restarts
 """Random starts of the iterative solver for a target that it does not reach from the start."""
 
 
+@public
 def ik(
     targets: TargetsLike,
     robot: Robot | None = None,
     *,
-    base: Transform | None = None,
-    tool: Transform | None = None,
+    base: Frame | None = None,
+    tool: Frame | None = None,
+    read: ReadOptions | None = None,
     t: ArrayLike | None = None,
     tsp: float | None = None,
-    read: ReadOptions | None = None,
-    start: Sequence[float] | None = None,
+    start: Sequence[float] | FloatArray | None = None,
     every: bool = False,
     tolerance: float | None = None,
     within_pi: bool = False,
@@ -52,42 +55,34 @@ def ik(
     inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
 ) -> InverseResult:
-    """Find the joint values that bring the tool centre point of an arm to targets, limits of the joints kept.
+    """Find the joint values that bring an arm's tool to targets, limits kept. docs/ik.md tells how.
 
-    Targets without times stand for themselves: of each the solution nearest to the start is chosen. Targets
-    with times are a path: the solutions follow each other without a jump where the arm can.
-
-    An arm with a spherical wrist or with three parallel axes has a closed form, by which the result holds
-    all solutions of a pose; any other arm, and positions with any orientation, are solved iteratively.
+    Targets without times stand for themselves; with times they are a path, followed without a jump where
+    the arm can.
 
     Args:
-        targets: A file (x, y, z, and an orientation in any form that a log may have; with a time a path);
-            positions in [m], shape (n, 3); poses as matrices, shape (n, 4, 4); or `Targets`.
-        robot: Name, file (TOML, URDF) or chain of the arm.
+        targets: A file; positions in [m], shape (n, 3); poses as matrices, shape (n, 4, 4); or `Targets`.
+        robot: The arm.
         base: Where the arm stands in the world.
         tool: The tool centre point in the frame of the arm's tip.
-        t: Times of arrays in [s], shape (n,): they are a path then.
-        tsp: Time from target to target in [s] where none is told: they are a path then.
         read: How to read the file where it cannot tell by itself.
-        start: Joint values in [rad] or [m] that solutions are to be near to; default: the robot's own.
-        every: Collect all solutions of an arm without closed form by restarts, too; show all of them, and
-            record every branch as a ghost arm.
+        t: Times of arrays in [s], shape (n,).
+        tsp: Time from target to target in [s] where none is told.
+        start: Joint values in [rad] or [m] to be near to, shape (joints,); default: the robot's own.
+        every: Collect all solutions of any arm, and record every branch as a ghost arm.
         tolerance: A target out of reach takes the nearest point within this on each axis, in [m].
-        within_pi: Write the joints of a path within -pi to pi, with jumps, as CoppeliaSim does.
+        within_pi: Write the joints of a path within -pi to pi, with jumps.
         method: closed or iterative to allow only one; default: closed where there is one.
-        restarts: Random starts of the iterative solver for a target that it does not reach from the start.
+        restarts: Random starts of the iterative solver.
         seed: Of the random starts: the same seed, the same solutions.
         strict: Whether a warning is an error.
         output: A joint log (.csv) or a recording (.rrd) to write.
         inputs: Files besides the targets that are never replaced.
         progress: Told the share that is done, 0..1.
 
-    Returns:
-        The solutions: `q`, `branch`, `reasons`, `to_frame()`, `to_dict()`.
-
     Raises:
-        UrmpipeError: With everything that is wrong with the input or the output. A target that is none, or
-            out of reach, is no error: it has a reason in the result.
+        UrmpipeError: With everything that is wrong with the input or the output. A target that is out of
+            reach, or none, is no error: it has a reason in the result.
 
     Source: [Serial6dof2019]_ section 4, [UrmArm2021]_ section 5.
     """
@@ -99,9 +94,8 @@ def ik(
     )
     arm, kind, given = for_each(lambda make: make(), parts)
     solving, writing = _parts(progress, path is not None)
-    asked = Asked(
-        arm, given, start_of(arm, start), every, tolerance, within_pi, method, restarts, seed, solving
-    )
+    search = Search(tolerance, restarts, seed)
+    asked = Asked(arm, given, start_of(arm, start), every, within_pi, method, search, solving)
     refuse_unsolvable(asked, kind)
 
     kept = [Path(one) for one in (*([targets] if isinstance(targets, (str, Path)) else []), *inputs)]

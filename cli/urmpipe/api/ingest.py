@@ -3,16 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from contextlib import ExitStack
 from pathlib import Path
+from typing import Any
 
 from urmpipe.api.write_map import write_map_part
-from urmpipe.guards import PathLike, Robot, place_robot, refuse_shared, refuse_warnings
-from urmpipe_models.errors import Finding, LogError
-from urmpipe_models.transform import Transform
+from urmpipe.edge import public
+from urmpipe.guards import (
+    WRITTEN_FIRST,
+    Frame,
+    PathLike,
+    Robot,
+    guarded_outputs,
+    one_or_many,
+    place_robot,
+    refuse_others,
+    refuse_warnings,
+)
+from urmpipe_models.errors import Finding, LogError, for_each
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.operands import log_files
-from urmpipe_pipeline.outputs import OutputKind, guarded_output
+from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.recording import is_recording, record
 from urmpipe_pipeline.runs.audit_file import write_audit
 from urmpipe_pipeline.runs.derivatives import Method
@@ -20,60 +30,56 @@ from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
 
+LOG_ALLOWED = f"a file, several of one log, or a folder of them; {WRITTEN_FIRST}"
 
+
+@public
 def ingest(
     log: PathLike | Sequence[PathLike],
-    *,
     robot: Robot | None = None,
-    base: Transform | None = None,
-    tool: Transform | None = None,
+    *,
+    base: Frame | None = None,
+    tool: Frame | None = None,
     read: ReadOptions | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
     strict: bool = False,
     output: PathLike | None = None,
     audit: PathLike | None = None,
-    log_map: PathLike | None = None,
+    write_map: PathLike | None = None,
     map_robot: str | None = None,
     inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Run:
-    """Turn one log into a run, and write its recording, audit and map if they are named: all or none.
+    """Turn one log into a run, and write what is named: all or none. docs/python.md has the keywords.
 
     Args:
         log: The log's file; several files, or a folder of them, if its source writes one a plot.
-        robot: Name, file (TOML, URDF) or chain of the arm; without it there are no kinematics.
-        base: Where the arm stands in the world.
-        tool: The tool centre point in the frame of the arm's tip.
-        read: How to read the file where it cannot tell by itself.
+        robot: The arm; without it there are no kinematics.
+        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of the arm's tip, likewise.
+        read: How to read the log where it cannot tell by itself.
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for quantised logs, else central.
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write.
         audit: A CSV file to write the repolarizer's audit to.
-        log_map: A TOML file to write the map to, by which further logs read as this one was read.
+        write_map: A TOML file to write the map to, by which further logs read as this one was read.
         map_robot: Name or file of the arm in that map; default: its name, if it is one of the catalogue.
         inputs: Files besides the log that are never replaced, such as the map it was read by.
         progress: Told the share of the recording that is written, 0..1.
 
-    Returns:
-        The run: arrays in SI, `to_frame()`, `to_dict()`.
-
     Raises:
         UrmpipeError: With everything that is wrong with the input or the output.
     """
-    files, name = _files_and_name(log)
-    arm = place_robot(robot, base, tool)
-    named: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": log_map}
-    targets = {kind: Path(path) for kind, path in named.items() if path is not None}
-    refuse_shared(targets)
+    parts: tuple[Callable[[], Any], ...] = (
+        lambda: place_robot(robot, base, tool),
+        lambda: _files_and_name(log),
+    )
+    arm, (files, name) = for_each(lambda make: make(), parts)
+    outputs: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": write_map}
     kept = [*files, *map(Path, inputs)]
-    with ExitStack() as stack:
-        parts = {
-            kind: stack.enter_context(guarded_output(path, kept, kind))
-            for kind, path in targets.items()
-            if kind != "recording"
-        }
+    with guarded_outputs(outputs, kept) as written:
 
         def make(early: Callable[[JointLog | Run], None] | None) -> Run:
             """Return the run; write its audit and its map."""
@@ -81,10 +87,10 @@ def ingest(
                 files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name, early=early
             )
             refuse_warnings(strict, run.warnings)
-            if "audit" in parts:
-                write_audit(run, parts["audit"], targets["audit"])
-            if "map" in parts:
-                write_map_part(run, parts["map"], targets["map"], map_robot)
+            if audit is not None:
+                write_audit(run, written["audit"], Path(audit))
+            if write_map is not None:
+                write_map_part(run, written["map"], Path(write_map), map_robot)
             return run
 
         return make(None) if output is None else record(make, Path(output), kept, progress)
@@ -92,7 +98,9 @@ def ingest(
 
 def _files_and_name(log: PathLike | Sequence[PathLike]) -> tuple[list[Path], str | None]:
     """Return the files of one log, and its name where that is a folder's."""
-    given = [Path(log)] if isinstance(log, (str, Path)) else [Path(one) for one in log]
+    operands = one_or_many(log)
+    refuse_others("log", operands, (), LOG_ALLOWED)
+    given = [Path(one) for one in operands]
     recordings = [str(path) for path in given if path.is_file() and is_recording(path)]
     if recordings:
         raise LogError(*(Finding("found a recording, allowed: a log (CSV)", file) for file in recordings))

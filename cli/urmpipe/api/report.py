@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe.guards import PathLike, refuse_foreign
+from urmpipe.edge import public
+from urmpipe.guards import PathLike, one_or_many, refuse_foreign, refuse_others
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import read_recording
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.simulations.simulation import Result
+from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -21,8 +23,8 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.report.headless import FigureFormat
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Report:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Report(Shown):
     """A report that was written.
 
     Attributes:
@@ -34,6 +36,11 @@ class Report:
     path: Path
     results: tuple[Result, ...]
     figures: tuple[FigureFile, ...] = ()
+
+    def _headline(self) -> str:
+        """Return the file, and what it shows."""
+        figures = number_of(len(self.figures), "figure file") if self.figures else ""
+        return line_of(str(self.path), number_of(len(self.results), "result"), figures)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a compared log and quantity, as `Comparison.to_frame`, for all comparisons in it."""
@@ -56,21 +63,27 @@ class Report:
         }
 
 
+SHOWN = "a recording, a Run, a Comparison or a Simulation; ik(..., output=FILE.rrd) writes a recording"
+
+
+@public
 def report(
-    results: Sequence[PathLike | Result],
+    results: PathLike | Result | Sequence[PathLike | Result],
     output: PathLike,
     *,
     figures: PathLike | None = None,
-    formats: Sequence[FigureFormat] = ("svg", "png"),
+    formats: FigureFormat | Sequence[FigureFormat] = ("svg", "png"),
+    inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
 ) -> Report:
     """Write one self-contained HTML file about recordings or results, and its figures as files: all or none.
 
     Args:
-        results: Recordings (.rrd), or what `ingest`, `compare` and `simulate` returned.
+        results: Recordings (.rrd), what `ingest`, `compare` and `simulate` returned, or one of them.
         output: The HTML file to write.
         figures: A folder to write every figure to as a file; needs the extra `figures` and Chromium.
         formats: svg, png or both.
+        inputs: Files besides the recordings that are never replaced.
         progress: Told the share that is done, 0..1.
 
     Raises:
@@ -78,8 +91,10 @@ def report(
     """
     from urmpipe_pipeline.report import FigureOptions, write_report
 
-    wanted = None if figures is None else FigureOptions(Path(figures), tuple(formats))
-    files = [Path(one) for one in results if isinstance(one, (str, Path))]
+    wanted = None if figures is None else FigureOptions(Path(figures), tuple(one_or_many(formats)))
+    given = one_or_many(results)
+    refuse_others("results", given, (Run, Comparison, Simulation), SHOWN)
+    files = [Path(one) for one in given if isinstance(one, (str, Path))]
     refuse_foreign(files)
     reading, writing = _halves(progress)
 
@@ -87,11 +102,11 @@ def report(
         """Return a result, read if it is a recording, and tell how far it is."""
         number, one = numbered
         found = read_recording(Path(one)) if isinstance(one, (str, Path)) else one
-        reading(number / len(results))
+        reading(number / len(given))
         return found
 
-    shown = for_each(read, enumerate(results, start=1))
-    written = write_report(shown, Path(output), files, wanted, writing)
+    shown = for_each(read, enumerate(given, start=1))
+    written = write_report(shown, Path(output), [*files, *map(Path, inputs)], wanted, writing)
     return Report(written.path, tuple(shown), written.figures)
 
 

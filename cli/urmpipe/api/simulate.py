@@ -12,10 +12,12 @@ from typing import TYPE_CHECKING
 import fmpy  # noqa: F401 - Rerun is imported beside: what both import must be there before
 
 from urmpipe import __version__
+from urmpipe.edge import public
 from urmpipe.guards import PathLike, refuse_shared
 from urmpipe.systems.blocks import Blocks
 from urmpipe.systems.result import check_meters, simulation_of
 from urmpipe.systems.units import Backend
+from urmpipe_datasets import LOGS
 from urmpipe_fmus.cosim import load_system, prepare, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
 from urmpipe_fmus.cosim.process import Worker
@@ -29,6 +31,7 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.sources import ReadOptions
 
 
+@public
 def simulate(
     system: PathLike,
     *,
@@ -47,7 +50,7 @@ def simulate(
     Args:
         system: Name of a shipped system, or a system file (TOML).
         arguments: Values for the `$name`s of the system, such as {"log": "log.csv"}.
-        step: Communication step in [s]; default: that of the system.
+        step: Communication step in [s]; default: that of the system, else of the joint log that it plays.
         duration: In [s]; default: that of the system, else of the longest log that it reads.
         backend: native or python, for the FMUs of units; default: native if it can be built here.
         read: How to read the logs where they cannot tell by themselves.
@@ -64,7 +67,7 @@ def simulate(
         UrmpipeError: With everything that is wrong with the system, before the first step, or with an output.
     """
     loaded = _changed(load_system(system, arguments), step, duration)
-    shipped = str(system) in system_names()
+    bundled = _bundled(system, arguments or {})
     kept = [loaded.path, *_files(loaded)]
     named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
     refuse_shared({kind: Path(path) for kind, path in named.items() if path is not None})
@@ -75,8 +78,10 @@ def simulate(
 
         def make() -> Simulation:
             """Return the simulation; draw it before it is run."""
-            blocks = Blocks(loaded, shipped=shipped, backend=backend, read=read, told=told)
-            plan = prepare(loaded, blocks.make, column=blocks.column, duration=blocks.end)
+            blocks = Blocks(loaded, bundled=bundled, backend=backend, read=read, told=told)
+            plan = prepare(
+                loaded, blocks.make, column=blocks.column, duration=blocks.end, period=blocks.period
+            )
             check_meters(plan)
             svg = system_svg(plan)
             if drawing is not None:
@@ -84,6 +89,34 @@ def simulate(
             return simulation_of(plan, run_plan(plan, progress=running, worker=worker), blocks, svg)
 
         return make() if output is None else record(lambda early: make(), Path(output), kept, writing)
+
+
+def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:
+    """Return the logs of a shipped system that came with it: all where none is given, else none.
+
+    Raises:
+        OptionError: If some of its logs are given and others are not: they would be of two motions.
+    """
+    if str(system) not in system_names():
+        return set()
+    own = {
+        name: value
+        for name, value in load_system(system).arguments.items()
+        if isinstance(value, str) and value and (LOGS / value).is_file()
+    }
+    given = {name: value for name, value in arguments.items() if name in own}
+    if not given:
+        return set(own.values())
+    others = " and ".join(f"{name} is {value}" for name, value in given.items())
+    missing = [
+        f"argument {name}: found nothing where {others}, allowed: a file of the same motion"
+        f" ({system}'s own {value} is of another one)"
+        for name, value in own.items()
+        if name not in given
+    ]
+    if missing:
+        raise OptionError(*missing)
+    return {value for value in given.values() if value in own.values() and not Path(value).exists()}
 
 
 def _changed(system: System, step: float | None, duration: float | None) -> System:

@@ -5,9 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from urmpipe.guards import PathLike
+from urmpipe.edge import public
+from urmpipe.guards import PathLike, one_or_many, refuse_others
 
 
+@public
 def view(recordings: PathLike | Sequence[PathLike]) -> None:
     """Open recordings in the viewer, each in a window paused at its worst sample; return when all are closed.
 
@@ -19,5 +21,6 @@ def view(recordings: PathLike | Sequence[PathLike]) -> None:
     """
     from urmpipe_pipeline.recording.viewer import view_recordings
 
-    given = [recordings] if isinstance(recordings, (str, Path)) else recordings
+    given = one_or_many(recordings)
+    refuse_others("recordings", given, (), "recordings (.rrd): the `recording` of a result is its file")
     view_recordings([Path(one) for one in given])

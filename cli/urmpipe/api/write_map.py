@@ -6,6 +6,7 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
+from urmpipe.edge import public
 from urmpipe.guards import PathLike, offset_of
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.outputs import guarded_output
@@ -13,14 +14,17 @@ from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import map_of, read_map
 
 
-def write_map(run: Run, output: PathLike, inputs: Sequence[PathLike] = (), robot: str | None = None) -> Path:
+@public
+def write_map(
+    run: Run, output: PathLike, *, robot: str | None = None, inputs: Sequence[PathLike] = ()
+) -> Path:
     """Write the map (TOML) by which further logs read as this one was read.
 
     Args:
         run: An ingested log.
         output: The file to write; only another map of ours is replaced.
-        inputs: Files that may not be overwritten.
         robot: Name or file of the arm; default: its name, if it is one of the catalogue.
+        inputs: Files that are never replaced.
 
     Raises:
         UrmpipeError: If it may not be written there.

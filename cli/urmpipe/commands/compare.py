@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
-from click.core import ParameterSource
 
 import urmpipe
-from urmpipe.options import Command, about_recordings, log_options, output_options, take_log_options
+from urmpipe.options.given import about_recordings, options_given
+from urmpipe.options.grouped import Command
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.reading import LogOptions, log_options
+from urmpipe.options.types import TIMES, OneOf, ParsedType, parsed, quantity
 from urmpipe.process import tune_pyarrow
 from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE
 
@@ -21,48 +25,52 @@ OF_RESULTS = {"baseline", "noise", "junit", "statistics", "strict", "as_json", "
 """Parameters that a comparison takes that was made before; the others say how one is made."""
 
 
-def _sync(ctx: click.Context, param: click.Parameter, value: str) -> str | float:
-    """Return how the clocks are put together: start, auto, or an offset in [s]."""
-    if value in ("start", "auto"):
-        return value
-    try:
-        return float(value)
-    except ValueError:
-        raise click.BadParameter(f"found {value!r}, allowed: start, auto, or a time in s") from None
+def _sync(text: str) -> str | float:
+    """Return how the clocks are put together: start, auto, or an offset in [s].
+
+    Raises:
+        OptionError: If it is none of them.
+    """
+    from urmpipe_models.errors import OptionError
+
+    offset = quantity(text, TIMES)
+    if text not in ("start", "auto") and not math.isfinite(offset):
+        raise OptionError(f"found {text!r}, allowed: start, auto, or a time in s, such as -0.2 or 200ms")
+    return text if text in ("start", "auto") else offset
 
 
-def _tolerance(ctx: click.Context, param: click.Parameter, value: str) -> dict[str, float]:
-    """Return what is allowed, by kind."""
+def _tolerance(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
+    """Return what is allowed, by kind; given several times, it is all of it."""
     from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
-    return parse_tolerance(value)
+    kinds: dict[str, float] = parsed(parse_tolerance, ",".join(values), ctx, param)
+    return kinds
 
 
-def _noise(ctx: click.Context, param: click.Parameter, value: str | None) -> dict[str, float] | None:
+def _noise(text: str) -> dict[str, float]:
     """Return what of a change means nothing, by kind."""
     from urmpipe_pipeline.comparison.baseline import parse_noise
 
-    return None if value is None else parse_noise(value)
+    return parse_noise(text)
 
 
-def _file(name: str, *names: str, help: str) -> Callable[[Command], Command]:
+SYNC = ParsedType("sync", _sync)
+
+
+def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command], Command]:
     """Return an option that names a file to write or to read."""
-    return click.option(name, *names, metavar="FILE", type=click.Path(path_type=Path), help=help)
+    return click.option(name, *names, metavar=metavar, type=click.Path(path_type=Path), help=help)
 
 
 @click.command(short_help="Hold logs against a reference and give a verdict.")
 @click.argument("reference", type=click.Path(path_type=Path))
 @click.argument("logs", metavar="[LOG...]", nargs=-1, type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    type=click.Path(path_type=Path),
-    help="The recording [default: LOG-against-REFERENCE.rrd here].",
-)
+@output_option("RUN.rrd", "The recording [default: LOG-against-REFERENCE.rrd here].")
 @click.option(
     "--tolerance",
-    default=str(DEFAULT_TOLERANCE),
+    default=[str(DEFAULT_TOLERANCE)],
     show_default=True,
+    multiple=True,
     callback=_tolerance,
     metavar="M|KIND=VALUE,...",
     help="Largest deviation allowed: on an axis in m, or of kinds: axis, x, y, z, norm, path (m, mm, um),"
@@ -71,7 +79,7 @@ def _file(name: str, *names: str, help: str) -> Callable[[Command], Command]:
 )
 @click.option(
     "--tcp",
-    type=click.Choice(["fk", "recorded"]),
+    type=OneOf(["fk", "recorded"]),
     default="fk",
     show_default=True,
     help="Where a log was: by its joints, or as it recorded itself.",
@@ -80,24 +88,32 @@ def _file(name: str, *names: str, help: str) -> Callable[[Command], Command]:
     "--sync",
     default="start",
     show_default=True,
-    callback=_sync,
+    type=SYNC,
     metavar="start|auto|SECONDS",
     help="Start both together, find the offset by the motion, or t_reference = t_log + SECONDS.",
 )
 @click.option(
     "--align",
-    type=click.Choice(["none", "start", "rigid", "tool"]),
+    type=OneOf(["none", "start", "rigid", "tool"]),
     default="none",
     show_default=True,
     help="Move the log first: to the same start pose, by the best rigid motion, by the best tool offset.",
 )
-@_file("--junit", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
-@_file("--csv", "statistics", help="Write the statistics as a table, one line a log and quantity.")
-@_file("--baseline", help="Tell what changed since an earlier comparison (its .rrd); worse is exit code 1.")
+@_file("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
+@_file(
+    "--csv",
+    "statistics",
+    metavar="FILE.csv",
+    help="Write the statistics as a table, one line a log and quantity.",
+)
+@_file(
+    "--baseline",
+    metavar="RUN.rrd",
+    help="Tell what changed since an earlier comparison (its .rrd); worse is exit code 1.",
+)
 @click.option(
     "--noise",
-    callback=_noise,
-    metavar="M|KIND=VALUE,...",
+    type=ParsedType("M|KIND=VALUE,...", _noise),
     help="Changes since the baseline that mean nothing, as --tolerance [default: 1um, 1e-6 rad].",
 )
 @log_options
@@ -109,8 +125,8 @@ def compare(
     reference: Path,
     logs: tuple[Path, ...],
     output: Path | None,
-    as_json: bool,
-    quiet: bool,
+    log: LogOptions,
+    terminal: Terminal,
     **options: Any,
 ) -> int:
     """Hold logs against a reference: deviation, statistics, verdict.
@@ -131,45 +147,52 @@ def compare(
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
     """
     tune_pyarrow()
-    from urmpipe.printing.comparison import print_comparison
-    from urmpipe.printing.terminal import print_json, print_recording, print_warnings, progress_bar, say
-
     said = about_recordings(ctx, (reference, *logs))
-    if said and not quiet:
-        say(f"note: {said}", err=True)
+    if said:
+        terminal.note(said)
     made = None if logs or not options["baseline"] else _made_before(ctx, reference)
-    if not options["baseline"] and ctx.get_parameter_source("noise") != ParameterSource.COMMANDLINE:
+    if not options["baseline"] and not options_given(ctx, "noise".__eq__):
         options["noise"] = None  # what a lab says for the calls that have a baseline
-    robot, read = take_log_options(options)
-    names = (
-        "tsp", "derivative", "strict", "tolerance", "tcp", "sync", "align", "baseline", "noise", "junit",
-        "statistics",
-    )  # fmt: skip
-    shared = {name: options.pop(name) for name in names}
+    reading = log.reading()
     target = None if made else output or Path(default_name(reference, logs))
-    with progress_bar(f"Writing {target}", quiet=quiet or made is not None) as progress:
+    replaces = target is not None and target.exists()
+    with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
         result = urmpipe.compare(
             made or reference,
             logs,
-            robot=robot,
-            read=read,
+            robot=reading.arm,
+            read=reading.options,
             output=target,
             progress=progress,
-            **shared,
+            **options,
         )
-    if not quiet:
-        for one in result.runs:
-            print_warnings(one.run.warnings, one.name)
-        print_warnings(result.warnings)
-    if as_json:
-        print_json(result.to_dict())
-    elif not quiet:
-        print_comparison(result)
-        for title, path in (("JUnit", shared["junit"]), ("Statistics", shared["statistics"])):
-            if path:
-                say(f"{title}: {path}")
-        print_recording(result.recording)
-    return 0 if result.accepted else 1
+    for one in result.runs:
+        terminal.warn(one.run.warnings, one.name)
+    terminal.warn(result.warnings)
+    written = {"JUnit": options["junit"], "Statistics": options["statistics"]}
+    terminal.answer(result.to_dict, lambda: _print(result, replaces, written))
+    if terminal.quiet and result.verdict == "fail":
+        _tell_failure(result)
+    return 0 if result.verdict == "pass" else 1
+
+
+def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:
+    """Print a comparison, and what was written."""
+    from urmpipe.printing.comparison import print_comparison
+    from urmpipe.printing.terminal import print_recording, say
+
+    print_comparison(result)
+    for title, path in written.items():
+        if path:
+            say(f"{title}: {path}")
+    print_recording(result.recording, replaced=replaces)
+
+
+def _tell_failure(result: Comparison) -> None:
+    """Print the verdict alone on standard error: a job that fails says why, however quiet it is."""
+    from urmpipe.printing.comparison import print_verdict
+
+    print_verdict(result, err=True)
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:
@@ -181,13 +204,7 @@ def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:
     from urmpipe_pipeline.operands import load_comparison
 
     made = load_comparison(reference)
-    given = [
-        max(param.opts, key=len)
-        for param in ctx.command.params
-        if isinstance(param, click.Option)
-        and param.name not in OF_RESULTS
-        and ctx.get_parameter_source(param.name or "") == ParameterSource.COMMANDLINE
-    ]
+    given = options_given(ctx, lambda name: name not in OF_RESULTS)
     if made is not None and given:
         raise click.UsageError(
             f"{', '.join(given)}: found with the recording of a comparison ({reference}), which stands as it"

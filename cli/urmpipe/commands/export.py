@@ -3,37 +3,39 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import urmpipe
-from urmpipe.options import output_options
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.types import OneOf
 from urmpipe.process import tune_pyarrow
+
+if TYPE_CHECKING:
+    from urmpipe_pipeline.export import Exported
 
 
 @click.command(short_help="Write a recording as CSV, Parquet, MAT or TUM.")
 @click.argument("recording", metavar="RUN.rrd", type=click.Path(path_type=Path))
 @click.option(
     "--to",
-    type=click.Choice(["csv", "parquet", "mat", "tum"]),
-    help="The format [default: by the suffix of the output].",
+    type=OneOf(["csv", "parquet", "mat", "tum"]),
+    help="The format [default: by the suffix of the output, else csv].",
 )
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The file [default: RUN-ROWS.FORMAT here]."
-)
+@output_option("FILE", "The file [default: RUN-ROWS.FORMAT here].")
 @click.option(
     "--rows",
-    type=click.Choice(["grid", "file"]),
+    type=OneOf(["grid", "file"]),
     help="The run on its grid in SI, or the file's own rows, names and units [default: grid].",
 )
 @click.option(
     "--tcp",
-    type=click.Choice(["fk", "recorded"]),
+    type=OneOf(["fk", "recorded"]),
     help="Poses for --to tum: by the joints, or as the log recorded them [default: fk].",
 )
 @output_options
-def export(recording: Path, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> int:
+def export(recording: Path, output: Path | None, terminal: Terminal, **options: Any) -> int:
     """Write what a recording holds, for other tools.
 
     --rows grid is what urmpipe made of a log: t, the repolarized joints, their rates, and the motion of the
@@ -55,15 +57,15 @@ def export(recording: Path, output: Path | None, as_json: bool, quiet: bool, **o
       urmpipe export one-drive.rrd -o one-drive.csv
     """
     tune_pyarrow()
-    from urmpipe.printing.terminal import print_json, print_warnings, say
-
     result = urmpipe.export(recording, output, **options)
-    if not quiet:
-        print_warnings(result.warnings)
-    if as_json:
-        print_json(result.to_dict())
-    elif not quiet:
-        columns = len(result.columns)
-        for one in result.files:
-            say(f"Export: {one.path}  ({one.rows} rows, {columns} columns)")
+    terminal.warn(result.warnings)
+    terminal.answer(result.to_dict, lambda: _print(result))
     return 0
+
+
+def _print(result: Exported) -> None:
+    """Print what was written."""
+    from urmpipe.printing.terminal import say
+
+    for one in result.files:
+        say(f"Export: {one.path}  ({one.rows} rows, {len(result.columns)} columns)")

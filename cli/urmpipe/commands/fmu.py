@@ -8,8 +8,11 @@ from typing import Literal
 import click
 
 import urmpipe
-from urmpipe.options import NamesType, RobotType, output_options
-from urmpipe.unit_options import NamedType, UnitType, named_values, option_names, option_value
+from urmpipe.options.named import NamedType, named_values, option_names, option_value
+from urmpipe.options.output import Terminal, output_options
+from urmpipe.options.reading import MAP_OPTION
+from urmpipe.options.types import ROBOT, UNIT, NamesType, OneOf
+from urmpipe.usage import Group
 
 PLATFORMS = ("linux64", "win64")
 
@@ -25,7 +28,7 @@ def _platforms(
     return named
 
 
-@click.group(short_help="List units, build and check FMUs.")
+@click.group(cls=Group, short_help="List units, build and check FMUs.")
 def fmu() -> None:
     """List the units that urmpipe brings along, package them or your own as FMUs, and check any FMU.
 
@@ -36,7 +39,7 @@ def fmu() -> None:
 
 @fmu.command("list", short_help="List the units that urmpipe brings along.")
 @output_options
-def list_(as_json: bool, quiet: bool) -> int:
+def list_(terminal: Terminal) -> int:
     """List the units that urmpipe brings along, and the options that each takes.
 
     \b
@@ -45,27 +48,21 @@ def list_(as_json: bool, quiet: bool) -> int:
       urmpipe fmu list --json
     """
     from urmpipe.printing.fmu import print_units, units_dict
-    from urmpipe.printing.terminal import print_json
 
-    if as_json:
-        print_json(units_dict())
-    elif not quiet:
-        print_units()
+    terminal.answer(units_dict, print_units)
     return 0
 
 
 @fmu.command(short_help="Package a unit as an FMU.")
-@click.argument("unit", type=UnitType())
-@click.option("--robot", type=RobotType(), help="The arm of a unit that has one.")
+@click.argument("unit", metavar="UNIT|FILE.py", type=UNIT)
+@click.option("--robot", type=ROBOT, help="The arm of a unit that has one.")
 @click.option(
-    "--log", type=click.Path(path_type=Path), help="The log of a unit that plays one: CSV, or a folder."
+    "--log",
+    metavar="LOG",
+    type=click.Path(path_type=Path),
+    help="The log of a unit that plays one.",
 )
-@click.option(
-    "--map",
-    "log_map",
-    type=click.Path(dir_okay=False, path_type=Path),
-    help="How to read the log (TOML), as ingest --write-map wrote it.",
-)
+@MAP_OPTION
 @click.option(
     "-s",
     "--option",
@@ -74,11 +71,11 @@ def list_(as_json: bool, quiet: bool) -> int:
     multiple=True,
     callback=named_values,
     metavar="NAME=VALUE",
-    help="A further option of the unit, such as joints=6 or rates=true.",
+    help="A further option of the unit, such as joints=6 or rates=true; `urmpipe fmu list` shows them.",
 )
 @click.option(
     "--backend",
-    type=click.Choice(["native", "python"]),
+    type=OneOf(["native", "python"]),
     help="native: C inside, needs nothing on the target. python: needs Python with NumPy there"
     " [default: native if it can be built here].",
 )
@@ -88,7 +85,7 @@ def list_(as_json: bool, quiet: bool) -> int:
     multiple=True,
     callback=_platforms,
     metavar="A,B",
-    help="linux64, win64, or both, with the extra `cross` [default: this one].",
+    help="linux64, win64, or both, with the extra `cross` [default: this one; python: all].",
 )
 @click.option(
     "-o",
@@ -108,8 +105,7 @@ def build(
     backend: Literal["native", "python"] | None,
     platforms: tuple[str, ...],
     output: Path,
-    as_json: bool,
-    quiet: bool,
+    terminal: Terminal,
 ) -> int:
     """Package a unit as an FMU: one of `urmpipe fmu list`, or a Python file of your own with a unit in it.
 
@@ -124,8 +120,8 @@ def build(
       urmpipe fmu build my_unit.py
     """
     from urmpipe.guards import place_robot
-    from urmpipe.printing.fmu import built_dict, print_built
-    from urmpipe.printing.terminal import print_json, print_warnings, prints_apart, say
+    from urmpipe.printing.fmu import print_built
+    from urmpipe.printing.terminal import prints_apart
     from urmpipe.systems.log_tables import read_table
     from urmpipe.systems.units import column_names
     from urmpipe_fmus.native import this_platform
@@ -137,26 +133,22 @@ def build(
     arm = place_robot(robot)
     read = read_map(log_map).read if log_map else None
     table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm, read=read)
-    if table and not quiet:
-        print_warnings(table.warnings)
-    if backend != "python" and not quiet and {*platforms} - {this_platform()}:
-        said = f"compiling for {', '.join(platforms)}; the first time on this computer takes minutes"
-        say(f"note: {said}", err=True)
+    if table:
+        terminal.warn(table.warnings)
+    if backend != "python" and {*platforms} - {this_platform()}:
+        terminal.note(f"compiling for {', '.join(platforms)}; the first time on this computer takes minutes")
     with prints_apart():
         made = urmpipe.build_fmu(
             unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
         )
-    if as_json:
-        print_json(built_dict(made))
-    elif not quiet:
-        print_built(made)
+    terminal.answer(made.to_dict, lambda: print_built(made))
     return 0
 
 
 @fmu.command(short_help="Validate an FMU, run it and list its variables.")
 @click.argument("file", metavar="FILE.fmu", type=click.Path(path_type=Path))
 @output_options
-def check(file: Path, as_json: bool, quiet: bool) -> int:
+def check(file: Path, terminal: Terminal) -> int:
     """Validate an FMU of any tool, run it, and list its variables.
 
     \b
@@ -167,12 +159,8 @@ def check(file: Path, as_json: bool, quiet: bool) -> int:
     Exit codes: 0 nothing found, 1 problems found, 2 no FMU.
     """
     from urmpipe.printing.fmu import checked_dict, print_checked
-    from urmpipe.printing.terminal import print_json
     from urmpipe_fmus.check import check_fmu
 
     checked = check_fmu(file)
-    if as_json:
-        print_json(checked_dict(checked))
-    elif not quiet:
-        print_checked(checked)
+    terminal.answer(lambda: checked_dict(checked), lambda: print_checked(checked))
     return 1 if checked.problems else 0

@@ -3,22 +3,19 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 from click.core import ParameterSource
 
 import urmpipe
-from urmpipe.options import (
-    DURATION,
-    JointValuesType,
-    output_options,
-    robot_options,
-    strict_option,
-    table_options,
-    take_log_options,
-)
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.reading import TableOptions, table_options
+from urmpipe.options.types import DURATION, JointValuesType, OneOf
 from urmpipe.process import tune_pyarrow
+
+if TYPE_CHECKING:
+    from urmpipe.inverse.result import InverseResult
 
 
 def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
@@ -43,13 +40,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 
 @click.command(short_help="Find joint values for poses of the tool.")
 @click.argument("targets", metavar="TARGETS|PATH", type=click.Path(path_type=Path))
-@click.option(
-    "-o",
-    "--output",
-    metavar="LOG.csv|RUN.rrd",
-    type=click.Path(path_type=Path),
-    help="Write a joint log that ingest reads, or a recording.",
-)
+@output_option("LOG.csv|RUN.rrd", "Write a joint log that ingest reads, or a recording.")
 @click.option(
     "--all",
     "every",
@@ -73,7 +64,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 )
 @click.option(
     "--method",
-    type=click.Choice(["auto", "closed", "iterative"]),
+    type=OneOf(["auto", "closed", "iterative"]),
     default="auto",
     show_default=True,
     help="How it is solved; auto: by the closed form of the arm if it has one.",
@@ -88,16 +79,14 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 @click.option(
     "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random starts."
 )
-@strict_option
 @table_options
-@robot_options
 @output_options
 def ik(
     targets: Path,
-    as_json: bool,
-    quiet: bool,
     every: bool,
     output: Path | None,
+    table: TableOptions,
+    terminal: Terminal,
     **options: Any,
 ) -> int:
     """Find joint values that bring the tool centre point of an arm to targets.
@@ -111,39 +100,38 @@ def ik(
       urmpipe ik targets.csv --robot arm6
       urmpipe ik targets.csv --robot ur5e --all --json
       urmpipe ik targets.csv --robot panda --start 0,-0.8,0,-2.4,0,1.6,0.8 -o targets.rrd --all
-      urmpipe ik path.csv --robot urm6 -o log.csv
+      urmpipe ik path.csv --robot urm6 -o joints.csv
       urmpipe ik path.csv --robot ur5e --tolerance 3.5mm -o run.rrd
 
     Exit codes: 0 every target reached, 1 not so (rows that hold no target count, and along a path jumps and
     joints that are too fast), 2 bad input or usage.
     """
     tune_pyarrow()
-    from urmpipe.printing.inverse import print_inverse
-    from urmpipe.printing.terminal import print_json, print_recording, print_warnings, progress_bar, say
-
-    log_map = options["log_map"]
-    robot, read = take_log_options(options)
-    del options["robot_named"]
-    names = ("start", "tolerance", "tsp", "within_pi", "method", "restarts", "seed", "strict")
-    with progress_bar(f"Solving {targets}", quiet=quiet) as progress:
+    reading = table.reading()
+    with terminal.progress(f"Solving {targets}") as progress:
         result = urmpipe.ik(
             targets,
-            robot,
-            read=read,
+            reading.arm,
+            read=reading.options,
             every=every,
             output=output,
-            inputs=[log_map] if log_map else [],
+            inputs=reading.files,
             progress=progress,
-            **{name: options[name] for name in names},
+            **options,
         )
-    if not quiet:
-        print_warnings(result.warnings)
-    if as_json:
-        print_json(result.to_dict())
-    elif not quiet:
-        print_inverse(result, every=every)
-        if output is not None and output.suffix == ".rrd":
-            print_recording(output)
-        elif output is not None:
-            say(f"Joints: {output}  (read it: urmpipe ingest {output} --robot {result.robot.name})")
+    terminal.warn(result.warnings)
+    terminal.answer(result.to_dict, lambda: _print(result, every))
     return 0 if result.verdict == "pass" else 1
+
+
+def _print(result: InverseResult, every: bool) -> None:
+    """Print what was found, and what was written."""
+    from urmpipe.printing.inverse import print_inverse
+    from urmpipe.printing.terminal import print_recording, say
+
+    print_inverse(result, every=every)
+    written = result.output
+    if written is not None and written.suffix == ".rrd":
+        print_recording(written)
+    elif written is not None:
+        say(f"Joints: {written}  (read it: urmpipe ingest {written} --robot {result.robot.name})")

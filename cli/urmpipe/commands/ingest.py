@@ -3,20 +3,22 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import urmpipe
-from urmpipe.options import log_options, output_options, take_log_options
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.reading import LogOptions, log_options
 from urmpipe.process import tune_pyarrow
+
+if TYPE_CHECKING:
+    from urmpipe_pipeline.runs.results import Run
 
 
 @click.command(short_help="Turn one log into a recording.")
 @click.argument("logs", metavar="LOG...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: LOG.rrd here]."
-)
+@output_option("RUN.rrd", "The recording [default: LOG.rrd here].")
 @click.option(
     "--explain",
     is_flag=True,
@@ -43,8 +45,8 @@ def ingest(
     explain: bool,
     map_output: Path | None,
     audit: Path | None,
-    as_json: bool,
-    quiet: bool,
+    log: LogOptions,
+    terminal: Terminal,
     **options: Any,
 ) -> int:
     """Turn one log into a recording: checked, repolarized, with the arm's kinematics.
@@ -61,51 +63,44 @@ def ingest(
       urmpipe ingest log.csv --robot ur5e --write-map lab.toml
       urmpipe ingest next.csv --map lab.toml
     """
-    tune_pyarrow()
-    from urmpipe.printing.terminal import (
-        print_json,
-        print_recording,
-        print_run,
-        print_warnings,
-        progress_bar,
-        say,
-    )
-
     if explain and output:
         raise click.UsageError(
             f"-o: found {output} with --explain, which writes no recording, allowed: one of both"
         )
+    tune_pyarrow()
     target = None if explain else output or Path(default_name(logs))
-    map_input = options["log_map"]
-    robot, read = take_log_options(options)
-    shared = {name: options[name] for name in ("tsp", "derivative", "strict")}
-    with progress_bar(f"Writing {target}", quiet=quiet or explain) as progress:
+    replaces = target is not None and target.exists()
+    reading = log.reading()
+    with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
         run = urmpipe.ingest(
             logs,
-            robot=robot,
-            read=read,
+            robot=reading.arm,
+            read=reading.options,
             output=target,
             audit=audit,
-            log_map=map_output,
-            map_robot=options["robot_named"],
-            inputs=[map_input] if map_input else [],
+            write_map=map_output,
+            map_robot=reading.robot,
+            inputs=reading.files,
             progress=progress,
-            **shared,
+            **options,
         )
-    print_warnings(() if quiet else run.warnings)
-    if as_json:
-        print_json(run.to_dict())
-    elif not quiet:
-        print_run(run, alternatives=explain)
-        if run.recording:
-            print_recording(run.recording)
-        if audit:
-            from urmpipe_pipeline.text import counted
-
-            say(f"Audit: {audit}  ({counted(len(run.audit), 'line')})")
-        if map_output:
-            say(f"Map: {map_output}  (use it: urmpipe ingest LOG --map {map_output})")
+    terminal.warn(run.warnings)
+    terminal.answer(run.to_dict, lambda: _print(run, explain, replaces, audit, map_output))
     return 0
+
+
+def _print(run: Run, explain: bool, replaces: bool, audit: Path | None, map_output: Path | None) -> None:
+    """Print what was found in a log, and what was written."""
+    from urmpipe.printing.terminal import print_recording, print_run, say
+    from urmpipe_pipeline.text import counted
+
+    print_run(run, alternatives=explain)
+    if run.recording:
+        print_recording(run.recording, replaced=replaces)
+    if audit:
+        say(f"Audit: {audit}  ({counted(len(run.audit), 'line')})")
+    if map_output:
+        say(f"Map: {map_output}  (use it: urmpipe ingest LOG --map {map_output})")
 
 
 def default_name(logs: tuple[Path, ...]) -> str:

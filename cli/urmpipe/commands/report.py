@@ -6,13 +6,15 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
-from click.core import ParameterSource
 
 import urmpipe
-from urmpipe.options import output_options
+from urmpipe.options.given import options_given
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.types import OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
+    from urmpipe.api.report import Report
     from urmpipe_pipeline.report.headless import FigureFormat
 
 FORMATS: dict[str, tuple[FigureFormat, ...]] = {
@@ -24,7 +26,7 @@ FORMATS: dict[str, tuple[FigureFormat, ...]] = {
 
 @click.command(short_help="Write the HTML report of recordings.")
 @click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="The report [default: RUN.html here].")
+@output_option("FILE.html", "The report [default: RUN.html here].")
 @click.option(
     "--figures",
     metavar="DIR",
@@ -34,7 +36,7 @@ FORMATS: dict[str, tuple[FigureFormat, ...]] = {
 @click.option(
     "--format",
     "figure_format",
-    type=click.Choice(list(FORMATS)),
+    type=OneOf(list(FORMATS)),
     default="both",
     show_default=True,
     help="What the files of figures are.",
@@ -48,8 +50,7 @@ def report(
     output: Path | None,
     figures: Path | None,
     figure_format: str,
-    as_json: bool,
-    quiet: bool,
+    terminal: Terminal,
 ) -> int:
     """Write one self-contained HTML file about recordings that ingest, compare or simulate wrote.
 
@@ -63,21 +64,22 @@ def report(
       urmpipe report monday.rrd tuesday.rrd -o week.html
       urmpipe report log-against-path.rrd --figures figures --format svg
     """
-    source = ctx.get_parameter_source("figure_format")
-    if figures is None and source == ParameterSource.COMMANDLINE:
+    if figures is None and options_given(ctx, "figure_format".__eq__):
         raise click.UsageError("--format: found without --figures, allowed: with --figures DIR")
     tune_pyarrow()
-    from urmpipe.printing.terminal import print_json, progress_bar, say
-
     target = output or Path(f"{recordings[0].stem}.html")
-    with progress_bar(f"Writing {target}", quiet=quiet) as progress:
+    with terminal.progress(f"Writing {target}") as progress:
         result = urmpipe.report(
             recordings, target, figures=figures, formats=FORMATS[figure_format], progress=progress
         )
-    if as_json:
-        print_json(result.to_dict())
-    elif not quiet:
-        say(f"Report: {result.path}  (open it in any browser)")
-        if figures:
-            say(f"Figures: {len(result.figures)} files in {figures}")
+    terminal.answer(result.to_dict, lambda: _print(result, figures))
     return 0
+
+
+def _print(result: Report, figures: Path | None) -> None:
+    """Print what was written."""
+    from urmpipe.printing.terminal import say
+
+    say(f"Report: {result.path}  (open it in any browser)")
+    if figures:
+        say(f"Figures: {len(result.figures)} files in {figures}")

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import click
 
-from urmpipe.options import JointValuesType, RobotType, output_options, placing_options
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.reading import PlacingOptions, placing_options
+from urmpipe.options.types import ROBOT, JointValuesType
+from urmpipe.usage import Group
 
 if TYPE_CHECKING:
     from urmpipe_models.chains.chain import Chain
-    from urmpipe_models.transform import Transform
 
 
-@click.group(short_help="List, show and export robots.")
+@click.group(cls=Group, short_help="List, show and export robots.")
 def robot() -> None:
     """List, show and export robots: those that urmpipe brings along, and your own files.
 
@@ -24,7 +26,7 @@ def robot() -> None:
 
 @robot.command("list", short_help="List the robots that urmpipe brings along.")
 @output_options
-def list_(as_json: bool, quiet: bool) -> int:
+def list_(terminal: Terminal) -> int:
     """List the robots that urmpipe brings along.
 
     \b
@@ -32,29 +34,16 @@ def list_(as_json: bool, quiet: bool) -> int:
       urmpipe robot list
       urmpipe robot list --json
     """
-    from urmpipe.printing.robot import print_robots
-    from urmpipe.printing.terminal import print_json
+    from urmpipe.printing.robot import print_robots, robots_dict
     from urmpipe_models.robots.catalogue import load_robot, robot_names
 
     robots = [load_robot(name) for name in robot_names()]
-    if as_json:
-        listed = [
-            {
-                "name": chain.name,
-                "joints": list(chain.coordinates),
-                "description": chain.description,
-                "source": chain.source,
-            }
-            for chain in robots
-        ]
-        print_json({"schema": 1, "robots": listed})
-    elif not quiet:
-        print_robots(robots)
+    terminal.answer(lambda: robots_dict(robots), lambda: print_robots(robots))
     return 0
 
 
 @robot.command(short_help="Print the parameters of a robot and draw it.")
-@click.argument("name", metavar="NAME|FILE", type=RobotType())
+@click.argument("name", metavar="NAME|FILE", type=ROBOT)
 @click.option(
     "--q",
     type=JointValuesType(),
@@ -67,9 +56,8 @@ def show(
     name: str,
     q: tuple[float, ...] | None,
     picture: Path | None,
-    as_json: bool,
-    quiet: bool,
-    **options: Any,
+    placing: PlacingOptions,
+    terminal: Terminal,
 ) -> int:
     """Print the parameters of a robot, where its points are, and draw it from two sides.
 
@@ -83,11 +71,10 @@ def show(
     """
     from urmpipe.printing.chain_drawing import chain_svg
     from urmpipe.printing.robot import chain_at, print_chain
-    from urmpipe.printing.terminal import print_json
     from urmpipe_models.errors import OptionError
     from urmpipe_models.robots.written import write_export
 
-    chain = _load(name, **options)
+    chain = _placed(name, placing)
     q = chain.start if q is None else q
     if len(q) != len(chain.coordinates):
         allowed = f"{len(chain.coordinates)}, one for each of {', '.join(chain.coordinates)}"
@@ -95,21 +82,16 @@ def show(
     posed = chain_at(chain, q)
     if picture is not None:
         write_export(picture, chain_svg(posed.skeleton, posed.title), Path(name))
-    if as_json:
-        print_json(posed.to_dict())
-    elif not quiet:
-        print_chain(posed)
+    terminal.answer(posed.to_dict, lambda: print_chain(posed))
     return 0
 
 
 @robot.command(short_help="Write a robot as URDF or TOML.")
-@click.argument("name", metavar="NAME|FILE", type=RobotType())
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="A .urdf or .toml file [default: NAME.urdf here]."
-)
+@click.argument("name", metavar="NAME|FILE", type=ROBOT)
+@output_option("FILE", "A .urdf or .toml file [default: NAME.urdf here].")
 @placing_options
 @output_options
-def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options: Any) -> int:
+def export(name: str, output: Path | None, placing: PlacingOptions, terminal: Terminal) -> int:
     """Write a robot as URDF (its visuals, else cylinders for its links) or as a TOML robot file.
 
     Read back, the file is the same arm: of a TOML bit by bit, of a URDF to rounding. It replaces only
@@ -121,7 +103,7 @@ def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options
       urmpipe robot export ur5e --tool 0,0,0.15 -o ur5e-gripper.urdf
       urmpipe robot export urm8 -o urm8.toml
     """
-    from urmpipe.printing.terminal import print_json, say
+    from urmpipe.printing.terminal import say
     from urmpipe_models.errors import OptionError
     from urmpipe_models.robots.robot_file import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
@@ -131,18 +113,17 @@ def export(name: str, output: Path | None, as_json: bool, quiet: bool, **options
     writers = {".urdf": urdf_text, ".toml": robot_toml}
     if target.suffix.lower() not in writers:
         raise OptionError(f"--output: found {str(target)!r}, allowed: a name that ends in .urdf or .toml")
-    chain = _load(name, **options)
+    chain = _placed(name, placing)
     write_export(target, writers[target.suffix.lower()](chain), Path(name))
-    if as_json:
-        print_json({"schema": 1, "robot": chain.name, "file": target})
-    elif not quiet:
-        say(f"Robot: {target}")
+    made = {"schema": 1, "robot": chain.name, "file": target}
+    terminal.answer(lambda: made, lambda: say(f"Robot: {target}"))
     return 0
 
 
-def _load(
-    name: str, *, base: Transform | None, tool: Transform | None, base_link: str | None, tip: str | None
-) -> Chain:
+def _placed(name: str, placing: PlacingOptions) -> Chain:
+    """Return a robot on its base, with its tool, and cut."""
     from urmpipe_models.robots.catalogue import load_robot
 
-    return load_robot(name, base_link=base_link, tip_link=tip).placed(base, tool)
+    return load_robot(name, base_link=placing.base_link, tip_link=placing.tip).placed(
+        placing.base, placing.tool
+    )

@@ -8,20 +8,19 @@ from typing import TYPE_CHECKING, Literal
 import click
 
 import urmpipe
-from urmpipe.options import DURATION, output_options
+from urmpipe.options.named import NamedType, argument_names, named_values
+from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.types import DURATION, SYSTEM, OneOf
 from urmpipe.process import tune_pyarrow
-from urmpipe.unit_options import NamedType, SystemType, argument_names, named_values
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.simulations.simulation import Simulation
 
 
 @click.command(short_help="Run a system of blocks.")
-@click.argument("system", type=SystemType(), required=False)
+@click.argument("system", metavar="[SYSTEM|FILE.toml]", type=SYSTEM, required=False)
 @click.option("--list", "listed", is_flag=True, help="List the systems that urmpipe brings along.")
-@click.option(
-    "-o", "--output", type=click.Path(path_type=Path), help="The recording [default: SYSTEM.rrd here]."
-)
+@output_option("RUN.rrd", "The recording [default: SYSTEM.rrd, of a file FILE.rrd, here].")
 @click.option(
     "--set",
     "arguments",
@@ -42,7 +41,7 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--backend",
-    type=click.Choice(["native", "python"]),
+    type=OneOf(["native", "python"]),
     help="What the units run as [default: native if it can be built here].",
 )
 @output_options
@@ -55,8 +54,7 @@ def simulate(
     duration: float | None,
     draw: Path | None,
     backend: Literal["native", "python"] | None,
-    as_json: bool,
-    quiet: bool,
+    terminal: Terminal,
 ) -> int:
     """Run a system of blocks: units of urmpipe, your own, and FMUs of any tool, connected to each other.
 
@@ -77,21 +75,16 @@ def simulate(
         found = f"{system} and --list" if listed else "neither a system nor --list"
         raise click.UsageError(f"found {found}, allowed: one of both")
     if listed or system is None:
-        return _list(as_json, quiet)
+        return _list(terminal)
     tune_pyarrow()
     from time import perf_counter
 
-    from urmpipe.printing.terminal import prints_apart, progress_bar, say
+    from urmpipe.printing.terminal import prints_apart, say
 
     started = perf_counter()
     target = output or Path(default_name(system))
-
-    def told(line: str) -> None:
-        """Tell what takes its time."""
-        if not quiet:
-            say(f"note: {line}", err=True)
-
-    with prints_apart(), progress_bar(f"Simulating {system}", quiet=quiet) as progress:
+    replaces = target.exists()
+    with prints_apart(), terminal.progress(f"Simulating {system}") as progress:
         result = urmpipe.simulate(
             system,
             arguments=arguments,
@@ -100,46 +93,39 @@ def simulate(
             backend=backend,
             output=target,
             draw=draw,
-            told=told,
+            told=terminal.note,
             progress=progress,
         )
-    _print(result, perf_counter() - started, draw, as_json, quiet)
+    wall = perf_counter() - started
+    terminal.warn(result.warnings)
+    terminal.answer(result.to_dict, lambda: _print(result, wall, replaces, draw))
+    if result.failed is not None:
+        say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
     return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0
 
 
-def _print(result: Simulation, wall: float, draw: Path | None, as_json: bool, quiet: bool) -> None:
+def _print(result: Simulation, wall: float, replaces: bool, draw: Path | None) -> None:
     """Print what a simulation, which took `wall` seconds, came to."""
     from urmpipe.printing.simulation import print_simulation
-    from urmpipe.printing.terminal import print_json, print_recording, print_warnings, say
+    from urmpipe.printing.terminal import print_recording, say
 
-    if not quiet:
-        print_warnings(result.warnings)
-    if as_json:
-        print_json(result.to_dict())
-    elif not quiet:
-        print_simulation(result, wall)
-        if draw:
-            say(f"Drawing: {draw}")
-        print_recording(result.recording)
-    if result.failed is not None:
-        say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
+    print_simulation(result, wall)
+    if draw:
+        say(f"Drawing: {draw}")
+    print_recording(result.recording, replaced=replaces)
 
 
-def _list(as_json: bool, quiet: bool) -> int:
+def _list(terminal: Terminal) -> int:
     """List the shipped systems."""
     from urmpipe.printing.simulation import print_systems
-    from urmpipe.printing.terminal import print_json
     from urmpipe_fmus.cosim import load_system, system_names
 
     systems = [load_system(name, {}) for name in system_names()]
-    if as_json:
-        rows = [
-            {"name": one.name, "description": one.description, "arguments": dict(one.arguments)}
-            for one in systems
-        ]
-        print_json({"schema": 1, "systems": rows})
-    elif not quiet:
-        print_systems(systems)
+    rows = [
+        {"name": one.name, "description": one.description, "arguments": dict(one.arguments)}
+        for one in systems
+    ]
+    terminal.answer(lambda: {"schema": 1, "systems": rows}, lambda: print_systems(systems))
     return 0
 
 

@@ -7,15 +7,15 @@ from pathlib import Path
 import click
 
 import urmpipe
-from urmpipe import __version__
+from urmpipe.options.output import debug_option, version_option
 
 
 @click.command(short_help="Open recordings in the viewer.")
 @click.argument("recordings", metavar="RUN.rrd...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--debug", is_flag=True, expose_value=False, help="Show the traceback of an error.")
-@click.version_option(__version__, prog_name="urmpipe")
+@debug_option
+@version_option
 def view(recordings: tuple[Path, ...]) -> int:
-    """Open recordings that urmpipe wrote in Rerun's viewer, each paused at its worst sample.
+    """Open recordings that urmpipe wrote in Rerun's viewer, each paused where its verdict was decided.
 
     Each opens in a window of its own; the command ends when all are closed, and Ctrl-C closes them. The
     viewer is the one that was installed with urmpipe; it needs no network and listens on 127.0.0.1 only.

@@ -4,21 +4,24 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from urmpipe.guards import Robot, place_robot
+from urmpipe.guards import Frame, Robot, place_robot
 from urmpipe.inverse.output import Written
 from urmpipe.inverse.targets import GivenTargets
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
+from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import METHODS, Method
 from urmpipe_models.robots.catalogue import robot_names
-from urmpipe_models.transform import Transform
+
+TYPED = 1e-3
+"""A start beyond a limit by this, in [rad] or [m], is on it: people type limits with few digits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -31,11 +34,9 @@ class Asked:
         start: Joint values in [rad] or [m], shape (joints,), that solutions are to be near to; None for the
             robot's own.
         every: Whether all solutions are asked for.
-        tolerance: What a target out of reach may be missed by on each axis, in [m]; None for not at all.
         within_pi: Whether joints that turn without end are written within -pi to pi.
         method: Which methods are allowed.
-        restarts: Random starts of the iterative solver.
-        seed: Of the random starts.
+        search: How far to search for what does not follow from the start.
         progress: Told the share of solving that is done, 0..1.
     """
 
@@ -43,11 +44,9 @@ class Asked:
     given: GivenTargets
     start: FloatArray | None
     every: bool
-    tolerance: float | None
     within_pi: bool
     method: Method
-    restarts: int
-    seed: int
+    search: Search
     progress: Callable[[float], None] | None
 
     @property
@@ -59,14 +58,14 @@ class Asked:
 
     @property
     def begin(self) -> FloatArray:
-        """Joint values that solutions are to be near to, shape (joints,)."""
+        """Joint values in [rad] and [m] that solutions are to be near to, shape (joints,)."""
         return np.array(self.arm.start, dtype=float) if self.start is None else self.start
 
     @property
     def options(self) -> dict[str, Any]:
         """The options as a recording keeps them."""
-        names = ("every", "tolerance", "within_pi", "method", "restarts", "seed")
-        options = {name: getattr(self, name) for name in names}
+        options = {name: getattr(self, name) for name in ("every", "within_pi", "method")}
+        options |= asdict(self.search)
         return options | ({} if self.start is None else {"start": self.start.tolist()})
 
 
@@ -88,12 +87,7 @@ def _bad_values(asked: Asked) -> Iterator[str]:
     """Yield which values make no sense."""
     if asked.method not in METHODS:
         yield f"--method: found {asked.method!r}, allowed: {', '.join(METHODS)}"
-    for name, value in (("restarts", asked.restarts), ("seed", asked.seed)):
-        if not isinstance(value, (int, np.integer)) or value < 0:
-            yield f"--{name}: found {value!r}, allowed: a whole number, 0 or more"
-    tolerance = asked.tolerance
-    if tolerance is not None and not 0.0 < tolerance < math.inf:
-        yield f"--tolerance: found {tolerance:g} m, allowed: more than 0, finite"
+    yield from (f"--{fault}" for fault in asked.search.faults())
 
 
 def _what_no_path_has(asked: Asked, kind: Written | None) -> Iterator[str]:
@@ -118,11 +112,11 @@ def _what_no_path_has(asked: Asked, kind: Written | None) -> Iterator[str]:
         )
 
 
-def start_of(arm: Chain, start: Sequence[float] | None) -> FloatArray | None:
-    """Return the start as an array, shape (joints,).
+def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
+    """Return the start as an array in [rad] and [m], shape (joints,).
 
     Raises:
-        OptionError: If it has not one finite value for each joint.
+        OptionError: If it has not one finite value for each joint, within the joint's limits.
     """
     if start is None:
         return None
@@ -135,11 +129,24 @@ def start_of(arm: Chain, start: Sequence[float] | None) -> FloatArray | None:
         raise OptionError(f"--start: found {values.size} values, {allowed}")
     if not np.isfinite(values).all():
         raise OptionError(f"--start: found a value that is not finite, {allowed}, in rad and m")
+    beyond = list(_beyond_limits(arm, values))
+    if beyond:
+        raise OptionError(*beyond)
     return values
 
 
-def arm_of(robot: Robot | None, base: Transform | None, tool: Transform | None) -> Chain:
-    """Return the arm on its base and with its tool.
+def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[str]:
+    """Yield which values of a start the limits of their joints do not allow."""
+    for joint, value in zip(arm.moving, start.tolist(), strict=True):
+        if not joint.lower - TYPED <= value <= joint.upper + TYPED:
+            unit = "rad" if joint.kind == "revolute" else "m"
+            degrees = "; in deg?" if unit == "rad" and abs(value) > 2.0 * math.pi else ""
+            limits = f"{joint.lower:.6g} to {joint.upper:.6g} {unit}"
+            yield f"--start: found {joint.name} = {value:g}, allowed: {limits}{degrees}"
+
+
+def arm_of(robot: Robot | None, base: Frame | None, tool: Frame | None) -> Chain:
+    """Return the arm on its base and with its tool, frames in [m] and [rad] as 6 numbers or of shape (4, 4).
 
     Raises:
         OptionError: If there is none.

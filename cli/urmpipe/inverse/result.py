@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray, IntArray, TextArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets, misses
 from urmpipe_pipeline.joint_log import LogWarning, seconds
@@ -22,8 +23,8 @@ if TYPE_CHECKING:
     from urmpipe_models.inverse.along_path.joint_path import JointPath
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class InverseResult:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class InverseResult(Shown):
     """The joint values that bring the tool centre point of an arm to n targets.
 
     Attributes:
@@ -91,6 +92,11 @@ class InverseResult:
         """Pass if the arm reaches every target, along a path without a jump or a joint that is too fast."""
         smooth = self.path is None or not (self.path.jumps or self.path.too_fast)
         return "pass" if smooth and bool(self.reached.all()) else "fail"
+
+    def _headline(self) -> str:
+        """Return its verdict, the arm, and how many targets it reaches."""
+        reached = f"{int(self.reached.sum())} of {number_of(len(self), 'target')} reached"
+        return line_of(self.name, self.verdict, self.robot.name, reached, self.method)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a solution, and one a target that has none.
@@ -199,10 +205,6 @@ class InverseResult:
             "miss": float(self.miss[index, column]),
             "angle": None if self.angle is None else float(self.angle[index, column]),
         }
-
-    def _repr_html_(self) -> str:
-        """Return the solutions as a table, for a notebook."""
-        return str(self.to_frame().to_html(max_rows=30, index=False))
 
     def _listed(self) -> tuple[IndexArray, IndexArray]:
         """Return target and column of each solution; of a target that has none the first column."""

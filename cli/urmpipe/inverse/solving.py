@@ -42,9 +42,8 @@ def solutions_of(asked: Asked, *, every: bool) -> Solutions:
     def found(targets: Targets) -> Solutions:
         """Return the solutions of some of them."""
         return solve(
-            asked.arm, targets, start=asked.start, every=every, tolerance=asked.tolerance,
-            restarts=asked.restarts, seed=asked.seed, method=asked.method,
-        )  # fmt: skip
+            asked.arm, targets, start=asked.start, every=every, method=asked.method, search=asked.search
+        )
 
     return solve_in_blocks(found, asked.given.targets, asked.progress)
 
@@ -66,7 +65,7 @@ def _of_path(asked: Asked, t_ns: IntArray) -> InverseResult:
     """Return the solutions of a path, which follow each other."""
     path = follow(
         asked.arm, asked.given.targets, t_ns, start=asked.start, within_pi=asked.within_pi,
-        tolerance=asked.tolerance, restarts=asked.restarts, seed=asked.seed, progress=asked.progress,
+        search=asked.search, progress=asked.progress,
     )  # fmt: skip
     solutions = Solutions(
         path.q[:, None], ("path",), path.reasons[:, None], tuple(_families(path)), path.shortfall[:, None],

@@ -8,14 +8,16 @@ from typing import TYPE_CHECKING
 from urmpipe.printing.columns import Column, print_columns
 from urmpipe.printing.terminal import LISTED, judged_line
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.baseline import Absent, BaselineComparison, Change, Worse
+from urmpipe_pipeline.comparison.change import Absent, BaselineComparison, Change, Worse
+from urmpipe_pipeline.comparison.symbols import symbol
+from urmpipe_pipeline.json_values import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 ARROW = " → "
 
-WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out"}
+WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out", "samples": "samples"}
 """What people call what may be worse."""
 
 
@@ -41,11 +43,13 @@ def _columns(changes: Sequence[Change]) -> Iterator[Column]:
     """Yield the columns of the table of changes."""
     yield Column("Log", [one.run for one in changes], key=True)
     yield Column(
-        "Quantity", [f"{text.symbol(one.now)} [{text.SHOWN[one.now.unit][0]}]" for one in changes], key=True
+        "Quantity", [f"{symbol(one.now)} [{text.SHOWN[one.now.unit][0]}]" for one in changes], key=True
     )
     yield Column("worse", [", ".join(WORDS[name] for name in one.worse) or None for one in changes])
     for name in ("max", "rms"):
         yield Column(name, [_both(one, name) for one in changes])
+    if any("samples" in (*one.worse, *one.better) for one in changes):
+        yield Column("samples", [f"{one.before.samples}{ARROW}{one.now.samples}" for one in changes])
     if any(one.before.share_out or one.now.share_out for one in changes):
         yield Column("out", [_shares(one) for one in changes])
     yield Column("most at\none sample", [text.number(one.largest, one.now.unit) for one in changes])
@@ -85,7 +89,7 @@ def _lines(found: BaselineComparison) -> Iterator[str]:
         if absent:
             yield f"{word}: {_listed(absent)}"
     for one in found.differences:
-        yield f"made otherwise: {one.what}: {text.plain(one.before)}{ARROW}{text.plain(one.now)}"
+        yield f"made otherwise: {one.what}: {plain(one.before)}{ARROW}{plain(one.now)}"
 
 
 def _unit(kind: str) -> str:

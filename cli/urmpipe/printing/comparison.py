@@ -9,8 +9,10 @@ from urmpipe.printing.columns import Column, print_columns
 from urmpipe.printing.comparison_facts import facts
 from urmpipe.printing.terminal import judged, judged_line, new_console
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation, Statistics
-from urmpipe_pipeline.comparison.wording import correlation, of_allowed
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import SYMBOLS, size_of, symbol, used_words
+from urmpipe_pipeline.comparison.wording import correlation, lacking_words, of_allowed
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -30,7 +32,7 @@ def print_comparison(result: Comparison) -> None:
     _print_verdict(console, result)
     ranked = result.ranking
     if len(ranked) > 1:
-        print_columns(console, "From best to worst", list(_ranking(ranked)))
+        print_columns(console, "From best to worst", list(_ranking(result)))
     detailed = ranked if len(ranked) <= MANY else tuple(one for one in ranked if one.verdict == "fail")
     for run in detailed[-SHOWN:]:
         title = f"{run.name} against {result.reference.name}"
@@ -43,40 +45,60 @@ def print_comparison(result: Comparison) -> None:
         print_baseline(console, result.baseline)
 
 
+def print_verdict(result: Comparison, *, err: bool = False) -> None:
+    """Print the verdict alone, on standard error if asked to: why a quiet command fails."""
+    console = new_console()
+    console.stderr = err
+    _print_verdict(console, result)
+
+
 def _print_verdict(console: Console, result: Comparison) -> None:
     """Print pass or fail, and which quantity uses up most of its tolerance: how much, when and where."""
-    failed = [run.name for run in result.ranking if run.verdict == "fail"]
+    console.print(judged_line(result.verdict, verdict_words(result)), soft_wrap=True)
+    worst = result.ranking[-1]
+    console.print(f"      {_decisive(worst, named=len(result.runs) > 1)}", soft_wrap=True)
+
+
+def verdict_words(result: Comparison) -> str:
+    """Say what was held against what, by which tool centre points, and how it came out."""
+    failed = [run.name for run in result.runs if run.verdict == "fail"]
     total = len(result.runs)
     number = f"{len(failed)} of {total} logs" if failed else f"all {total} logs"
     who = result.runs[0].name if total == 1 else number
     said = f"{who} {'out of' if failed else 'within'} tolerance against {result.reference.name}"
-    console.print(judged_line(result.verdict, said), soft_wrap=True)
-    worst = result.ranking[-1]
-    console.print(f"      {_decisive(worst, named=total > 1)}", soft_wrap=True)
+    if result.reference.joints:
+        recorded = result.provenance.options.get("tcp") == "recorded"
+        said += f", {'as recorded' if recorded else 'by the joints'} on both sides"
+    if result.baseline is not None and result.within_tolerance and result.baseline.verdict == "fail":
+        said += f", but worse than the baseline {result.baseline.name}"
+    return said
 
 
 def _decisive(run: Deviation, *, named: bool) -> str:
     """Say which quantity uses up most of its tolerance: how much of how much, when and where."""
     one = run.decisive
+    if one.tolerance is not None and one.missing:
+        return f"{size_of(one)}{f' of {run.name}' if named else ''}: {lacking_words(one)}"
     place = text.point(run.place(one))
     of = f" of {run.name}" if named else ""
-    used = f" ({text.used(one)})" if one.tolerance is not None else ""
+    used = f" ({used_words(one)})" if one.tolerance is not None else ""
     return (
-        f"max {text.size_of(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
-        f"{used}, at t = {text.seconds(one.t_max)} s, at ({place}) m"
+        f"max {size_of(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
+        f"{used}, at t = {text.seconds(one.t_max)} s (row {run.row(one)}), at ({place}) m"
     )
 
 
-def _ranking(runs: Sequence[Deviation]) -> Iterator[Column]:
+def _ranking(result: Comparison) -> Iterator[Column]:
     """Yield the columns of the table of logs; those that no log has are left out."""
+    runs = result.ranking
     yield Column("Log", [run.name for run in runs], key=True)
     yield Column("Verdict", [judged(run.verdict) for run in runs])
     quantities: dict[str, Callable[[Deviation], Statistics | None]] = {
-        f"max |{text.SYMBOLS[axis]}|": lambda run, axis=axis: run.statistics[axis]  # type: ignore[misc]
+        f"max |{SYMBOLS[axis]}|": lambda run, axis=axis: run.statistics[axis]  # type: ignore[misc]
         for axis in "xyz"
     }
     quantities |= {
-        f"max {text.SYMBOLS['norm']}": lambda run: run.statistics["norm"],
+        f"max {SYMBOLS['norm']}": lambda run: run.statistics["norm"],
         "max path": lambda run: run.statistics["path"],
         "max angle": lambda run: run.statistics.get("angle"),
         "max joint": lambda run: run.furthest_joint("rad"),
@@ -87,6 +109,9 @@ def _ranking(runs: Sequence[Deviation]) -> Iterator[Column]:
         unit = next((text.SHOWN[one.unit][0] for one in found if one), None)
         if unit:
             yield Column(f"{head}\n[{unit}]", [_cell(one) for one in found])
+    covered = [result.covered(run) for run in runs]
+    if min(covered) < WHOLE:
+        yield Column("covered", [text.percent(share) for share in covered])
     yield from _when(runs)
 
 
@@ -118,7 +143,7 @@ def _statistics(run: Deviation) -> Iterator[Column]:
     """Yield the columns of the statistics of one log, a row a quantity."""
     every = run.all_statistics
     start = dict(zip(AXES, run.start, strict=True))
-    yield Column("Quantity", [f"{text.symbol(one)} [{text.SHOWN[one.unit][0]}]" for one in every], key=True)
+    yield Column("Quantity", [f"{symbol(one)} [{text.SHOWN[one.unit][0]}]" for one in every], key=True)
     yield Column("Verdict", [judged(one.verdict) for one in every])
     yield Column("tolerance", [text.limit(one.tolerance, one.unit) for one in every])
     yield Column("max", [_cell(one) for one in every])
@@ -127,5 +152,7 @@ def _statistics(run: Deviation) -> Iterator[Column]:
         yield Column(name, [text.number(getattr(one, name), one.unit) for one in every])
     known = [start.get(one.quantity) if one.kind in ("axis", "norm") else None for one in every]
     yield Column("at start", [value if value is None else text.number(value, "m") for value in known])
+    if any(one.missing for one in every):
+        yield Column("judged", [None if one.samples is None else str(one.samples) for one in every])
     if any(one.share_out for one in every):
         yield Column("out", [None if one.share_out is None else text.percent(one.share_out) for one in every])

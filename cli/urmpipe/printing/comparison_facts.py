@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.wording import alignment_words, correlation, sync_words, tool_option
 
 

@@ -52,20 +52,6 @@ def print_units() -> None:
     say("Build one: urmpipe fmu build UNIT [--robot R] [--log LOG] [-s NAME=VALUE]")
 
 
-def built_dict(made: BuiltFmu) -> dict[str, Any]:
-    """Return the object that `urmpipe fmu build --json` prints."""
-    return {
-        "schema": 1,
-        "fmu": str(made.path),
-        "unit": made.unit.name,
-        "backend": made.backend,
-        "platforms": list(made.platforms),
-        "guid": made.guid,
-        "size": made.path.stat().st_size,
-        "note": made.note or None,
-    }
-
-
 def print_built(made: BuiltFmu) -> None:
     """Print where an FMU is and what is inside."""
     inside = f"{made.backend}, {', '.join(made.platforms)}"

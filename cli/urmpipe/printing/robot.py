@@ -27,6 +27,20 @@ WIDEST = 120
 """Columns that a drawing takes at most."""
 
 
+def robots_dict(robots: Sequence[Chain]) -> dict[str, Any]:
+    """Return the object that `urmpipe robot list --json` prints."""
+    listed = [
+        {
+            "name": chain.name,
+            "joints": list(chain.coordinates),
+            "description": chain.description,
+            "source": chain.source,
+        }
+        for chain in robots
+    ]
+    return {"schema": 1, "robots": listed}
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class PosedChain:
     """An arm in one pose.

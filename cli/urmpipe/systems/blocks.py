@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Iterator
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+import numpy as np
 
 from urmpipe.guards import place_robot
 from urmpipe.systems.log_tables import LogTable, read_table
@@ -15,13 +17,17 @@ from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.cosim.plan import LogColumn
 from urmpipe_fmus.native import native_missing
 from urmpipe_models.errors import OptionError, UrmpipeError
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources import ReadOptions, read_map
 
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
+    from urmpipe_fmus.table import Table
     from urmpipe_fmus.unit import Unit
     from urmpipe_models.chains.chain import Chain
-    from urmpipe_pipeline.joint_log import LogWarning
+
+ON_TIME = 1e-6
+"""So far from a sample in [s] a communication point counts as on it: no clock of a log is finer."""
 
 CHAIN, METER = "kinematic_chain", "delta_meter"
 """The units that are shown as an arm, and judged."""
@@ -34,7 +40,7 @@ class Blocks:
 
     Args:
         system: The system.
-        shipped: Whether it came with urmpipe: its logs are the bundled ones then, by name.
+        bundled: Names of logs that came with urmpipe, and are those whatever else is called so.
         backend: What the FMUs of units are built with.
         read: How to read a log where it cannot tell by itself.
         told: Told what takes its time: an FMU that is built.
@@ -45,18 +51,19 @@ class Blocks:
         files: The files that were read.
         warnings: What a person should know of the logs.
         end: Where the longest log ends in [s]; None without one.
+        period: The finest period in [s] of the joint logs that are held between samples; None without one.
     """
 
     def __init__(
         self,
         system: System,
         *,
-        shipped: bool,
+        bundled: Collection[str] = (),
         backend: Backend | None = None,
         read: ReadOptions | None = None,
         told: Callable[[str], None] | None = None,
     ) -> None:
-        self._shipped, self._backend, self._read = shipped, backend, read
+        self._bundled, self._backend, self._read = bundled, backend, read
         self._told = told or (lambda line: None)
         self._why = ""
         self.units: dict[str, Unit] = {}
@@ -64,6 +71,8 @@ class Blocks:
         self.files: list[Path] = []
         self.warnings: list[LogWarning] = []
         self.end: float | None = None
+        self.period: float | None = None
+        self._held: dict[str, Table] = {}
         self._faults: dict[str, UrmpipeError] = {}
         self._columns: dict[Port, LogTable] = {}
         for block in system.blocks:
@@ -126,8 +135,38 @@ class Blocks:
             raise OptionError(f"map: found {log_map} without a log, allowed: with log = ...")
         if log is None:
             return unit_of(block.unit, robot=arm, options=options)
-        table = self._table(log, column_names(options.pop("columns", None)), arm, log_map)
+        names = column_names(options.pop("columns", None))
+        table = self._table(log, names, arm, log_map)
+        if names is None and "q" in (one.name for one in table.columns) and not options.get("interpolate"):
+            self._hold(block.name, table.table)
         return unit_of(block.unit, robot=arm, log=table, options=options)
+
+    def _hold(self, block: str, table: Table) -> None:
+        """Remember joint values that are held between samples: they may wrap, so nothing is in between."""
+        self._held[block] = table
+        if len(table.t_ns) > 1:
+            period = float(np.median(np.diff(table.t_ns))) / 1e9
+            self.period = min(self.period or period, period)
+
+    def between_samples(self, step: float, count: int) -> Iterator[LogWarning]:
+        """Yield which joint logs are held at communication points that lie between two of their samples.
+
+        A deviation there is that of a sample before, held against a reference that has moved on.
+
+        Args:
+            step: Communication step in [s].
+            count: Number of steps.
+        """
+        for block, table in self._held.items():
+            times = np.arange(count + 1) * step
+            times = times[times * 1e9 <= table.t_ns[-1]]
+            rows = np.searchsorted(table.t_ns / 1e9, times + ON_TIME, side="right") - 1
+            late = times - table.t_ns[np.maximum(rows, 0)] / 1e9
+            if np.any(off := late > ON_TIME):
+                points = f"{off.sum()} of {len(times)} communication points lie between samples of the log"
+                held = f"where the one before is held, {1e3 * late.max():.4g} ms at most"
+                said = f"block {block}: {points}, {held}: a deviation there is none of the log's"
+                yield LogWarning("held", said)
 
     def _fmu(self, block: str) -> Path:
         """Return the FMU of a block from the cache; tell if it is built, and if Python runs it and why."""
@@ -146,9 +185,7 @@ class Blocks:
         self, name: str, columns: list[str] | None, robot: Chain | None = None, log_map: str | None = None
     ) -> LogTable:
         """Return a log by the name that the system gives it, and remember what there is to know of it."""
-        path = Path(name)
-        if self._shipped and not path.exists() and (LOGS / path.name).exists():
-            path = LOGS / path.name
+        path = LOGS / name if name in self._bundled else Path(name)
         read = self._read if log_map is None else read_map(Path(log_map)).read
         found = read_table(path, columns, robot=robot, read=read)
         self.files += found.files

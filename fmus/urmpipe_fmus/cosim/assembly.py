@@ -48,7 +48,7 @@ class Assembly:
         """
         plan = self._plan
         return Job(
-            step=plan.system.step,
+            step=plan.step,
             count=plan.count,
             record_every=plan.system.record_every,
             tolerance=plan.system.tolerance,

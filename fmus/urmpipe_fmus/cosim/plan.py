@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from urmpipe_fmus.cosim.checks import Link, Start, Wiring
 from urmpipe_fmus.cosim.interface import Interface, Variable, read_interface
 from urmpipe_fmus.cosim.order import Exchange, Loop, Order
-from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
+from urmpipe_fmus.cosim.system import STEP, Block, LogInput, Port, System
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.errors import CosimulationError, Finding, UrmpipeError
@@ -82,6 +82,11 @@ class Plan:
         return {one: source for link in self.links for one, source in link.scalars}
 
     @property
+    def step(self) -> float:
+        """Communication step in [s]."""
+        return self.system.step or STEP
+
+    @property
     def loops(self) -> tuple[Loop, ...]:
         """Its algebraic loops."""
         return tuple(one for one in self.order if isinstance(one, Loop))
@@ -97,6 +102,7 @@ def prepare(
     *,
     column: Callable[[LogInput], LogColumn] | None = None,
     duration: float | None = None,
+    period: float | None = None,
 ) -> Plan:
     """Make a system ready to run: everything that can be wrong with it is found here.
 
@@ -105,6 +111,7 @@ def prepare(
         make: Gives a block's unit, whose FMU is taken from the cache or built, or an FMU.
         column: Gives the column of a log that an input follows.
         duration: In [s], of a system that names none and reads no log by which to tell.
+        period: Communication step in [s], of a system that names none: that of the logs that it plays.
 
     Raises:
         CosimulationError: With all that is wrong: FMUs that cannot be read, unknown variables, a destination
@@ -112,6 +119,8 @@ def prepare(
             without a source, start values that are refused, algebraic loops that may not be iterated.
     """
     faults: list[Finding | str] = []
+    step = system.step or period or STEP
+    system = replace(system, step=step)
     columns: dict[Port, LogColumn] = {}
     interfaces, ends = _interfaces(system, make, faults)
     for one in system.inputs:
@@ -124,9 +133,10 @@ def prepare(
     wiring = Wiring(system, interfaces, {port: one.unit for port, one in columns.items()})
     ends += [float(one.t_ns[-1]) * 1e-9 for one in columns.values() if len(one.t_ns)]
     faults += wiring.faults
-    count = _count(system, duration, ends, faults)
-    wiring.notes += _cut_short(system, count)
-    logged = tuple(_logged(system, one, columns, wiring, count, faults) for one in wiring.logged)
+    count = _count(step, system.duration or duration or max(ends, default=0.0), faults)
+    wiring.notes += _cut_short(system.duration, step, count)
+    times = np.arange(count + 1) * step
+    logged = tuple(_logged(system, one, columns, wiring, times, faults) for one in wiring.logged)
     order = _order(system, interfaces, wiring, faults)
     if faults:
         raise CosimulationError(*dict.fromkeys(faults))
@@ -179,31 +189,28 @@ def _column(one: LogInput, column: Callable[[LogInput], LogColumn] | None) -> Lo
     return column(one)
 
 
-def _count(system: System, duration: float | None, ends: Iterable[float], faults: list[Finding | str]) -> int:
-    """Return the number of communication steps."""
-    length = system.duration or duration or max(ends, default=0.0)
+def _count(step: float, length: float, faults: list[Finding | str]) -> int:
+    """Return the number of communication steps of a length in [s]."""
     if not (length > 0.0 and math.isfinite(length)):
         faults.append(
             "system.duration: not found, and no log tells it; allowed: a number above 0, in s, or --duration"
         )
         return 0
-    if system.step < NANOSECOND:
-        faults.append(f"system.step: found {system.step:g} s, allowed: from 1e-09 s, as times are in ns")
+    if step < NANOSECOND:
+        faults.append(f"system.step: found {step:g} s, allowed: from 1e-09 s, as times are in ns")
         return 0
-    count = math.floor((length + NANOSECOND) / system.step)
+    count = math.floor((length + NANOSECOND) / step)
     if count < 1:
-        faults.append(
-            f"system.step: found {system.step:g} s, allowed: no more than the duration, {length:g} s"
-        )
+        faults.append(f"system.step: found {step:g} s, allowed: no more than the duration, {length:g} s")
     return count
 
 
-def _cut_short(system: System, count: int) -> Iterator[str]:
+def _cut_short(duration: float | None, step: float, count: int) -> Iterator[str]:
     """Yield what should be seen of a duration that is no whole number of steps."""
-    end = count * system.step
-    if system.duration and system.duration - end > NANOSECOND:
+    end = count * step
+    if duration and duration - end > NANOSECOND:
         yield (
-            f"system.duration: found {system.duration:.9g} s, no multiple of the step, {system.step:.9g} s:"
+            f"system.duration: found {duration:.9g} s, no multiple of the step, {step:.9g} s:"
             f" it ends at {end:.9g} s"
         )
 
@@ -213,10 +220,10 @@ def _logged(
     port: Port,
     columns: Mapping[Port, LogColumn],
     wiring: Wiring,
-    count: int,
+    times: NDArray[np.float64],
     faults: list[Finding | str],
 ) -> Logged:
-    """Return the values of a log at the communication points."""
+    """Return the values of a log at the communication points, at times in [s]."""
     variable = wiring.interfaces[port.block].variables[port.variable]
     asked = next(one for one in system.inputs if one.destination == port)
     if asked.interpolate and variable.type != "Real":
@@ -225,11 +232,11 @@ def _logged(
         table = Table(columns[port].t_ns, np.asarray(columns[port].values)[:, None])
     except UrmpipeError as error:
         faults += [f"inputs.{port}: {finding}" for finding in error.findings]
-        return Logged(port, np.zeros(count + 1))
+        return Logged(port, np.zeros(len(times)))
     refused = map(variable.refusal, np.unique(table.values).tolist())
     if fault := next(filter(None, refused), ""):
         faults.append(f"inputs.{port}: {asked.log}, column {asked.column}: {fault}")
-    before, after, fraction = table.rows_at(np.arange(count + 1) * system.step)
+    before, after, fraction = table.rows_at(times)
     values = before[0] + fraction * (after[0] - before[0]) if asked.interpolate else before[0]
     return Logged(port, np.ascontiguousarray(values))
 

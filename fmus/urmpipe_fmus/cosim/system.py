@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 STEP = 0.005
-"""Communication step in [s] of a system that names none."""
+"""Communication step in [s] of a system that names none and plays no log."""
 
 TOLERANCE = 1e-9
 """What is left of an algebraic loop, relative to nominal + |value|, unless the system says otherwise."""
@@ -90,7 +90,7 @@ class System:
         name: Its name.
         path: The file that describes it.
         description: One line for people.
-        step: Communication step in [s].
+        step: Communication step in [s]; None: the period of the logs that it plays, else `STEP`.
         duration: In [s]; None: as long as the longest log that it reads.
         record_every: Every so many communication points are recorded.
         arguments: The values that `$name` stood for.
@@ -104,7 +104,7 @@ class System:
     name: str
     path: Path
     description: str = ""
-    step: float = STEP
+    step: float | None = None
     duration: float | None = None
     record_every: int = 1
     arguments: Mapping[str, Any] = field(default_factory=dict)

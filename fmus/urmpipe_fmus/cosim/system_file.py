@@ -11,7 +11,7 @@ from typing import Any
 
 from urmpipe_fmus.cosim.arguments import beside, given, replaced, unknown
 from urmpipe_fmus.cosim.names import not_among
-from urmpipe_fmus.cosim.system import STEP, TOLERANCE, Block, Connection, LogInput, Port, System
+from urmpipe_fmus.cosim.system import TOLERANCE, Block, Connection, LogInput, Port, System
 from urmpipe_models.errors import CosimulationError, Finding
 
 SYSTEMS = Path(__file__).parents[1] / "systems"
@@ -113,7 +113,7 @@ class _System:
             path=self.path,
             name=self._text(head, "system", "name", self.path.stem),
             description=self._text(head, "system", "description", ""),
-            step=self._positive(head, "system", "step", STEP),
+            step=self._positive(head, "system", "step", 0.0) if "step" in head else None,
             duration=self._positive(head, "system", "duration", 0.0) if "duration" in head else None,
             record_every=self._count(head, "record_every"),
             arguments=self.arguments,

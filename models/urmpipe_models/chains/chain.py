@@ -6,9 +6,11 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Literal
+from html import escape
+from typing import Any, Literal
 
 from urmpipe_models.chains.visual import Visual
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import RobotError
 from urmpipe_models.transform import Transform
 
@@ -52,8 +54,8 @@ class Joint:
     mimic: Mimic | None = None
 
 
-@dataclass(frozen=True)
-class Chain:
+@dataclass(frozen=True, repr=False)
+class Chain(Shown):
     """A serial chain from its base to its tip.
 
     The points p1..pn are the ends of its segments: p_k is the origin of the frame that follows
@@ -135,3 +137,22 @@ class Chain:
     def placed(self, base: Transform | None = None, tool: Transform | None = None) -> Chain:
         """Return the same arm on another base or with another tool."""
         return replace(self, base=base or self.base, tool=tool or self.tool)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the arm as a robot file of kind `joints` has it."""
+        from urmpipe_models.robots.robot_file import chain_to_dict
+
+        return chain_to_dict(self)
+
+    def _headline(self) -> str:
+        """Return its name, what it is, and its coordinates."""
+        moving = number_of(len(self.coordinates), "coordinate")
+        return line_of(self.name, self.description, f"{moving} ({', '.join(self.coordinates)})")
+
+    def _table(self) -> str:
+        """Return a row a joint: its name, kind and limits; a model knows no pandas."""
+        rows = "".join(
+            f"<tr><td>{escape(one.name)}</td><td>{one.kind}</td><td>{one.lower:.6g}</td><td>{one.upper:.6g}</td></tr>"
+            for one in self.joints
+        )
+        return f"<table><tr><th>joint</th><th>kind</th><th>lower</th><th>upper</th></tr>{rows}</table>"

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from difflib import get_close_matches
 from typing import Any, TypeAlias
 
 from urmpipe_models.errors import Finding
+from urmpipe_models.names import did_you_mean
 
 Rows3: TypeAlias = tuple[tuple[float, ...], ...]
 
@@ -55,9 +55,7 @@ class Table:
         value = self._get(key, _one_of(allowed), default)
         if value in allowed:
             return str(value)
-        near = get_close_matches(str(value), allowed, 1)
-        hint = f" (did you mean {near[0]}?)" if near else ""
-        self._refuse(key, value, _one_of(allowed) + hint)
+        self._refuse(key, value, _one_of(allowed) + did_you_mean(str(value), allowed))
         return allowed[0]
 
     def number(self, key: str, default: float | None = None, *, infinite: bool = False) -> float:
@@ -145,8 +143,7 @@ class Table:
         """Note every key that was not asked for, with the nearest one that was."""
         for key in self._data:
             if key not in self._known:
-                near = get_close_matches(key, self._known, 1)
-                hint = f" (did you mean {near[0]}?)" if near else ""
+                hint = did_you_mean(key, self._known)
                 allowed = ", ".join(dict.fromkeys(self._known))
                 self.fault(key, f"unknown{hint}; allowed: {allowed}")
 

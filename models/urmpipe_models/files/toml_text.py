@@ -22,8 +22,10 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
     Raises:
         UrmpipeError: `error`, if it cannot be read, is no UTF-8 or no TOML, with the line.
     """
+    text = ""
     try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
+        text = path.read_text(encoding="utf-8-sig")
+        return tomllib.loads(text)
     except UnicodeDecodeError as fault:
         raise error(Finding(f"byte {fault.start} is no UTF-8; allowed: TOML in UTF-8", str(path))) from fault
     except OSError as fault:
@@ -31,7 +33,16 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as fault:
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(fault))
         line = int(place[1]) if place else None
-        raise error(Finding(f"not valid TOML: {fault}", str(path), line=line)) from fault
+        hint = _unquoted(text, line)
+        raise error(Finding(f"not valid TOML: {fault}{hint}", str(path), line=line)) from fault
+
+
+def _unquoted(text: str, line: int | None) -> str:
+    """Return what to write where a line has a text without quotes; nothing where that is not its fault."""
+    lines = text.splitlines()
+    written = lines[line - 1] if line and line <= len(lines) else ""
+    bare = re.fullmatch(r"\s*([\w.-]+)\s*=\s*([^\s\"'\[{#][^\"'\[{#]*?)\s*(#.*)?", written)
+    return f"; a text needs quotes: {bare[1]} = {toml_text(bare[2])}" if bare else ""
 
 
 def toml_lines(table: Mapping[str, Any]) -> list[str]:

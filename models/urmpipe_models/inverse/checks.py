@@ -1,9 +1,6 @@
-"""Targets that are none (not finite, farther than any tool gets, no rotation), and options that are none."""
+"""Targets that are none: not finite, farther than any tool gets, no rotation."""
 
 from __future__ import annotations
-
-import math
-from collections.abc import Iterator
 
 import numpy as np
 
@@ -75,13 +72,3 @@ def _of_rotations(rotation: FloatArray) -> list[str]:
         else:
             reasons[row] = "the orientation is no rotation: its determinant is -1, a mirror, allowed: 1"
     return reasons
-
-
-def search_faults(tolerance: float | None, restarts: int, seed: int) -> Iterator[str]:
-    """Yield which options of the search for solutions make no sense; `solve` says what they are."""
-    if tolerance is not None and not (math.isfinite(tolerance) and tolerance > 0.0):
-        yield f"tolerance: found {tolerance:g} m, allowed: more than 0, finite"
-    if restarts < 0:
-        yield f"restarts: found {restarts}, allowed: 0 or more"
-    if seed < 0:
-        yield f"seed: found {seed}, allowed: 0 or more"

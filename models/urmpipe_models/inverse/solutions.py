@@ -103,7 +103,7 @@ class Solutions:
         return list(dict.fromkeys(one.family for one in self.singular if one.where[target].any()))
 
     def nearest(self, start: FloatArray, period: FloatArray) -> FloatArray:
-        """Return of each target the solution nearest to a start, shape (n, joints); NaN where there is none.
+        """Return of each target the solution nearest to a start, in [rad] or [m], shape (n, joints), or NaN.
 
         It is returned in the turn nearest to the start; see `nearest_column` for what near means.
         """

@@ -11,10 +11,11 @@ import numpy as np
 from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
-from urmpipe_models.inverse.checks import checked, search_faults
+from urmpipe_models.inverse.checks import checked
 from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.free_joints import within_limits_by_choice
 from urmpipe_models.inverse.limits import periods
+from urmpipe_models.inverse.search import USUAL_SEARCH, Search
 from urmpipe_models.inverse.solutions import NEAREST_POINT, NO_BRANCH, Singular, Solutions, no_solutions
 from urmpipe_models.inverse.targets import Targets
 
@@ -31,10 +32,8 @@ def solve(
     *,
     start: FloatArray | None = None,
     every: bool = False,
-    tolerance: float | None = None,
-    restarts: int = 20,
-    seed: int = 0,
     method: Method = "auto",
+    search: Search = USUAL_SEARCH,
 ) -> Solutions:
     """Return joint values, limits kept, that bring the tool centre point to its targets.
 
@@ -51,12 +50,8 @@ def solve(
         every: Return all solutions, one column a branch, each joint in the turn nearest to `start` that its
             limits allow: what differs from it by whole turns is not listed. Otherwise the one nearest to
             `start`, whose branch stands in `labels`.
-        tolerance: In [m] along each axis: a target out of reach takes the nearest point that the tool can get
-            to if it is no farther away than this, and turned by no more than tolerance / l with l of
-            `turn_length`; `shortfall` says how far it is.
-        restarts: Random starts of the iterative solver for what it does not reach from `start`.
-        seed: Of the random starts: the same seed, the same solutions.
         method: "closed" or "iterative" to allow only one of them.
+        search: How far to search for what does not follow from `start`.
 
     Raises:
         OptionError: With all that is wrong with the options.
@@ -64,32 +59,32 @@ def solve(
     position_only = targets.rotation is None
     targets, reasons = checked(targets)
     form = None if position_only or method == "iterative" else closed_form(chain)
-    faults = list(_faults(chain, len(targets), start, tolerance, restarts, seed, method))
+    faults = [*_start_faults(chain, len(targets), start), *search.faults()]
+    if method not in METHODS:
+        faults.append(f"method: found {method!r}, allowed: {', '.join(METHODS)}")
     if method == "closed" and form is None:
         faults.append(_no_closed_form(chain, position_only))
     if faults:
         raise OptionError(*faults)
     begin = _starts(chain, len(targets), start)
     good = np.array([not reason for reason in reasons], dtype=bool)
-    rest = tolerance is not None or (method == "auto" and form is not None and form != exact_form(chain))
-    search = _Search(chain, every, tolerance, restarts, seed, rest)
+    nearly = method == "auto" and form is not None and form != exact_form(chain)
+    asked = _Asked(chain, every, search, nearly or search.tolerance is not None)
     if form is None:
-        found = search.iteratively(targets.rows(good), begin[good])
+        found = asked.iteratively(targets.rows(good), begin[good])
     else:
         near = begin[good] if start is not None or not every else None
-        found = search.by_closed_form(form, targets.rows(good), begin[good], near)
+        found = asked.by_closed_form(form, targets.rows(good), begin[good], near)
     return found if good.all() else _spread(found, good, reasons)
 
 
 @dataclass(frozen=True, slots=True)
-class _Search:
+class _Asked:
     """What was asked of the solvers."""
 
     chain: Chain
     every: bool
-    tolerance: float | None
-    restarts: int
-    seed: int
+    search: Search
     rest: bool
     """Whether what a closed form does not reach is searched for: the nearest points, or what one that holds
     nearly may have lost."""
@@ -112,15 +107,7 @@ class _Search:
 
         if not len(targets):
             return no_solutions([], ("1",), len(self.chain.coordinates))
-        return solve_iteratively(
-            self.chain,
-            targets,
-            start=start,
-            every=self.every,
-            restarts=self.restarts,
-            seed=self.seed,
-            tolerance=self.tolerance,
-        )
+        return solve_iteratively(self.chain, targets, start=start, every=self.every, search=self.search)
 
 
 def _approached(found: Solutions, out: BoolArray, nearest: Solutions) -> Solutions:
@@ -163,29 +150,18 @@ def _starts(chain: Chain, count: int, start: FloatArray | None) -> FloatArray:
     return np.broadcast_to(begin, (count, begin.shape[1]))
 
 
-def _faults(
-    chain: Chain,
-    count: int,
-    start: FloatArray | None,
-    tolerance: float | None,
-    restarts: int,
-    seed: int,
-    method: Method,
-) -> Iterator[str]:
-    """Yield what is wrong with the options."""
-    joints = len(chain.coordinates)
-    if start is not None:
-        begin = np.asarray(start, dtype=float)
-        if begin.shape not in {(joints,), (count, joints)}:
-            yield (
-                f"start: found values of shape {begin.shape}, allowed: ({joints},), one each of"
-                f" {', '.join(chain.coordinates)}, or ({count}, {joints}), as many for each target"
-            )
-        elif not np.isfinite(begin).all():
-            yield "start: found a value that is not finite, allowed: finite numbers in rad and m"
-    yield from search_faults(tolerance, restarts, seed)
-    if method not in METHODS:
-        yield f"method: found {method!r}, allowed: {', '.join(METHODS)}"
+def _start_faults(chain: Chain, count: int, start: FloatArray | None) -> Iterator[str]:
+    """Yield what is wrong with a start."""
+    if start is None:
+        return
+    joints, begin = len(chain.coordinates), np.asarray(start, dtype=float)
+    if begin.shape not in {(joints,), (count, joints)}:
+        yield (
+            f"start: found values of shape {begin.shape}, allowed: ({joints},), one each of"
+            f" {', '.join(chain.coordinates)}, or ({count}, {joints}), as many for each target"
+        )
+    elif not np.isfinite(begin).all():
+        yield "start: found a value that is not finite, allowed: finite numbers in rad and m"
 
 
 def _no_closed_form(chain: Chain, position_only: bool) -> str:

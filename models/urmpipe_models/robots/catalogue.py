@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import math
 import re
-from difflib import get_close_matches
 from pathlib import Path
 
 from urmpipe_datasets import ROBOTS
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError, RobotError
 from urmpipe_models.files.tables import shown
+from urmpipe_models.names import did_you_mean
 from urmpipe_models.robots.robot_file import read_robot_file
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.transform import Transform, from_offset
@@ -46,8 +46,7 @@ def load_robot(
     names = robot_names()
     if str(name_or_path) in names:
         return read_robot_file(ROBOTS / f"{name_or_path}.toml")
-    near = get_close_matches(str(name_or_path), names, 1)
-    hint = f" (did you mean {near[0]}?)" if near else ""
+    hint = did_you_mean(str(name_or_path), names)
     raise RobotError(
         f"unknown robot {str(name_or_path)!r}{hint}; allowed: {', '.join(names)}, or a .toml or .urdf file"
     )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -20,6 +20,9 @@ from urmpipe_models.robots.robot_frames import Units, frame_to_dict, read_frame
 from urmpipe_models.robots.robot_visuals import read_visual, visual_to_dict
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.robots.written import EXPORT_MARK
+
+LONGEST = 100.0
+"""An arm whose links add up to more than this, in [m], was meant in mm, unless its file says m."""
 
 Build: TypeAlias = Callable[[str], Chain]
 """Makes the chain of a given name, once all keys are read and found right."""
@@ -58,9 +61,10 @@ def read_robot_file(path: str | Path) -> Chain:
         RobotError: With everything that is wrong: the key, what was found and what is allowed.
     """
     path = Path(path)
-    chain = _read(
-        parse_toml(path, RobotError), tuple(_READERS), file=str(path), stem=path.stem, folder=path.parent
-    )
+    data = parse_toml(path, RobotError)
+    chain = _read(data, tuple(_READERS), file=str(path), stem=path.stem, folder=path.parent)
+    if faults := [*_unsaid_units(data, chain)]:
+        raise RobotError(*(Finding(fault, str(path)) for fault in faults))
     return replace(chain, visuals=tuple(visual.located(path.parent) for visual in chain.visuals))
 
 
@@ -148,6 +152,20 @@ def _read(
         )
     except RobotError as error:
         raise RobotError(*(replace(fault, file=fault.file or file) for fault in error.findings)) from error
+
+
+def _unsaid_units(data: Mapping[str, Any], chain: Chain) -> Iterator[str]:
+    """Yield which units rows of numbers should tell: as they stand they make no arm in m and rad."""
+    if data["kind"] in {"joints", "urdf"}:
+        return
+    frames = [*(joint.origin for joint in chain.joints), chain.tip]
+    length = sum(math.hypot(*frame.translation) for frame in frames)
+    if "length_unit" not in data and length > LONGEST:
+        yield f'key length_unit: found none, and links of {length:.4g} m, allowed: "mm", or "m" if so meant'
+    twists = [row.get(key, 0.0) for row in data.get("joints", ()) for key in ("theta", "alpha")]
+    angle = max(map(abs, (*data.get("tilts", ()), *twists)), default=0.0)
+    if "angle_unit" not in data and angle > 2.0 * math.pi:
+        yield f'key angle_unit: found none, and {angle:.4g} rad, allowed: "deg", or "rad" if so meant'
 
 
 def _read_urm(table: Table, units: Units, folder: Path) -> Build:

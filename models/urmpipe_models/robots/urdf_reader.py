@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
-from difflib import get_close_matches
 from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.visual import Visual
 from urmpipe_models.errors import RobotError
+from urmpipe_models.names import did_you_mean
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
     KINDS,
@@ -35,7 +35,7 @@ def read_urdf(path: str | Path, *, base_link: str | None = None, tip_link: str |
         path: The file.
         base_link: Where the chain begins; the root by default.
         tip_link: Where it ends. By default the only leaf; of several, the one with the most moving
-            joints on its way, if there is a single one.
+            joints on its way, if there is a single one and the arm carries no other moving joints.
 
     Raises:
         RobotError: With everything that is wrong with the file or the choice of links.
@@ -77,8 +77,7 @@ def _choose(tree: UrdfTree, base: str | None, tip: str | None) -> list[Edge]:
 def _is_link(tree: UrdfTree, role: str, link: str) -> bool:
     if link in tree.links:
         return True
-    near = get_close_matches(link, tree.links, 1)
-    hint = f" (did you mean {near[0]}?)" if near else ""
+    hint = did_you_mean(link, tree.links)
     tree.fault(f"{role} link {link!r} is not in the file{hint}; allowed: {_listed(tree.links)}")
     return False
 
@@ -109,15 +108,32 @@ def _ways(tree: UrdfTree, root: str) -> dict[str, list[Edge]]:
 
 
 def _default_tip(tree: UrdfTree, ways: dict[str, list[Edge]]) -> str | None:
+    """Return the end with the most moving joints before it; nothing, and a fault noted, if in doubt."""
     parents = {edge.parent for edge in tree.edges.values()}
     moving = {link: sum(map(_moves, way)) for link, way in ways.items() if link not in parents}
     most = [link for link, count in moving.items() if count == max(moving.values())]
-    if len(most) == 1:
-        return most[0]
-    tree.fault(
-        f"found {len(most)} ends with {moving[most[0]]} moving joints; choose a tip link: {_listed(moving)}"
-    )
-    return None
+    choose = "choose a tip link (--tip, tip_link)"
+    if len(most) > 1:
+        found = f"{len(most)} ends with {moving[most[0]]} moving joints"
+        tree.fault(f"found {found}; {choose}: {_listed(moving)}")
+        return None
+    carried = {edge.joint.name: fork for edge, fork in _carried(ways, most[0])}
+    if carried:
+        found = f"{_listed(carried)} on the arm beside the way to {most[0]}, as of a gripper"
+        tree.fault(f"found {found}; {choose}: {_listed(dict.fromkeys((*carried.values(), *moving)))}")
+        return None
+    return most[0]
+
+
+def _carried(ways: dict[str, list[Edge]], tip: str) -> Iterator[tuple[Edge, str]]:
+    """Yield the joints beside the way to a tip that its moving joints carry, and the link they part at."""
+    own = ways[tip]
+    for way in ways.values():
+        if not way or way[-1] in own or way[-1].joint.kind == "fixed":
+            continue
+        common = [edge for edge, other in zip(own, way, strict=False) if edge is other]
+        if any(map(_moves, common)):
+            yield way[-1], common[-1].child
 
 
 def _moves(edge: Edge) -> bool:

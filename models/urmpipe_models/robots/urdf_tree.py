@@ -5,13 +5,13 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from difflib import get_close_matches
 from pathlib import Path
 from typing import Literal
 
 from urmpipe_models.chains.chain import Joint, JointKind, Mimic
 from urmpipe_models.errors import Finding, RobotError
 from urmpipe_models.files.xml_tree import Node, read_xml
+from urmpipe_models.names import did_you_mean
 from urmpipe_models.transform import Transform, from_rpy
 
 KINDS: dict[str, JointKind] = {
@@ -151,8 +151,7 @@ def _link_of(tree: UrdfTree, node: Node, joint: str, end: Literal["parent", "chi
         tree.sound = False
         return ""
     if link not in tree.links:
-        near = get_close_matches(link, tree.links, 1)
-        hint = f" (did you mean {near[0]}?)" if near else ""
+        hint = did_you_mean(link, tree.links)
         tree.fault(f"joint {joint}: {end} {link!r}; allowed: a link of the file{hint}", node.line)
         tree.sound = False
     return link

@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.orientation import best_rotation, conjugate, matrices, product, quaternions
+from urmpipe_models.orientation import angle_between, best_rotation, conjugate, matrices, product, quaternions
 from urmpipe_models.transform import rpy_of, translation
 from urmpipe_pipeline.comparison.matching import Matched, lacking
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
@@ -21,6 +21,10 @@ ALIGN_MODES: tuple[AlignMode, ...] = get_args(AlignMode)
 RESOLVED = 1e-4
 """Positions that leave a line by less than this, root mean square in [m], leave the rotation about it open: a
 joint angle of four digits puts a point as far off."""
+
+TURNED = np.radians(1.0)
+"""A tool that turns by less in [rad] is not told from a base: 1 mm of the base is 0.02 mm off as one of the
+tool, as much as the best arms repeat to."""
 
 IN_COMMON = 1e-9
 """Two motions across a line have nothing in common if their covariance is below this share of their sizes:
@@ -33,8 +37,8 @@ def check_align(mode: str) -> None:
         raise OptionError(f"--align: found {mode}, allowed: {', '.join(ALIGN_MODES)}")
 
 
-def align(matched: Matched, mode: AlignMode, run: Run) -> tuple[Alignment, Matched]:
-    """Return how the log is moved in space, and both sides with the log so moved.
+def align(matched: Matched, mode: AlignMode, run: Run) -> Matched:
+    """Return both sides with the log moved in space, and how it was moved (`alignment`).
 
     Args:
         matched: Both sides at the same times, at least one.
@@ -44,13 +48,13 @@ def align(matched: Matched, mode: AlignMode, run: Run) -> tuple[Alignment, Match
         run: The log, for messages.
 
     Raises:
-        LogError: If the positions leave the rotation open, or the log has no orientation for a tool.
+        LogError: If the positions leave the rotation open, or a tool, by orientations that hardly turn.
     """
     if mode == "start":
         return _moved(matched, _start(matched))
     if mode == "rigid":
         return _moved(matched, _rigid(matched, run))
-    return _with_tool(matched, run) if mode == "tool" else (Alignment(), matched)
+    return _with_tool(matched, run) if mode == "tool" else matched
 
 
 def tool_with(robot: Chain, alignment: Alignment) -> tuple[float, ...]:
@@ -72,13 +76,13 @@ def tool_with(robot: Chain, alignment: Alignment) -> tuple[float, ...]:
 def _start(matched: Matched) -> Alignment:
     """Return the motion that joins the first poses: R = R_reference R_log^T, t = p_reference - R p_log."""
     first, turn = 0, np.array([[0.0, 0.0, 0.0, 1.0]])
-    if matched.wanted_quat is not None and matched.done_quat is not None:
-        there = np.isfinite(matched.wanted_quat).all(axis=1) & np.isfinite(matched.done_quat).all(axis=1)
+    if matched.reference_quat is not None and matched.actual_quat is not None:
+        there = np.isfinite(matched.reference_quat).all(axis=1) & np.isfinite(matched.actual_quat).all(axis=1)
         if there.any():
             first = int(np.argmax(there))
-            turn = product(matched.wanted_quat[[first]], conjugate(matched.done_quat[[first]]))
+            turn = product(matched.reference_quat[[first]], conjugate(matched.actual_quat[[first]]))
     rotation = matrices(turn)[0]
-    return _alignment("start", rotation, matched.wanted[first] - rotation @ matched.done[first])
+    return _alignment("start", rotation, matched.reference[first] - rotation @ matched.actual[first])
 
 
 def _rigid(matched: Matched, run: Run) -> Alignment:
@@ -86,12 +90,12 @@ def _rigid(matched: Matched, run: Run) -> Alignment:
 
     Source: Umeyama 1991, eq. 38-42, without scale.
     """
-    wanted, done = matched.wanted - matched.wanted.mean(axis=0), matched.done - matched.done.mean(axis=0)
+    wanted, done = (side - side.mean(axis=0) for side in (matched.reference, matched.actual))
     rotation, common = best_rotation(wanted.T @ done / len(done))
     size, breadth = zip(*map(_extent, (wanted, done)), strict=True)
     if min(breadth) < RESOLVED or common[1] + common[2] <= IN_COMMON * breadth[0] * breadth[1]:
         raise LogError(lacking(run, _open_rotation(min(size), min(breadth))))
-    shift = matched.wanted.mean(axis=0) - rotation @ matched.done.mean(axis=0)
+    shift = matched.reference.mean(axis=0) - rotation @ matched.actual.mean(axis=0)
     return _alignment("rigid", rotation, shift)
 
 
@@ -119,24 +123,30 @@ def _alignment(mode: AlignMode, rotation: FloatArray, shift: FloatArray) -> Alig
     return Alignment(mode, tuple(tuple(row) for row in rotation.tolist()), (x, y, z))
 
 
-def _moved(matched: Matched, alignment: Alignment) -> tuple[Alignment, Matched]:
-    """Return the alignment, and both sides with the log moved by its rotation and translation."""
+def _moved(matched: Matched, alignment: Alignment) -> Matched:
+    """Return both sides with the log moved by the rotation and translation of an alignment."""
     rotation = np.array(alignment.rotation)
-    done = matched.done @ rotation.T + np.array(alignment.translation)
-    quat = matched.done_quat
+    done = matched.actual @ rotation.T + np.array(alignment.translation)
+    quat = matched.actual_quat
     if quat is not None:
         quat = product(quaternions(rotation.reshape(1, 9), "matrix"), quat)
-    return alignment, replace(matched, done=done, done_quat=quat)
+    return replace(matched, actual=done, actual_quat=quat, alignment=alignment)
 
 
-def _with_tool(matched: Matched, run: Run) -> tuple[Alignment, Matched]:
-    """Return the offset d of the least squared |p_reference - p - R d|, the mean of R^T (p_reference - p)."""
-    quat = matched.done_quat
+def _with_tool(matched: Matched, run: Run) -> Matched:
+    """Move the log by the d of the least |p_reference - p - R d|^2, the mean of R^T (p_reference - p)."""
+    quat = matched.actual_quat
     known = np.zeros(0, np.intp) if quat is None else np.flatnonzero(np.isfinite(quat).all(axis=1))
     if quat is None or not len(known):
         found = "--align tool: found no orientation of the log"
         raise LogError(lacking(run, f"{found}, allowed: joints with a --robot, or a recorded orientation"))
+    turned = float(angle_between(quat[known], np.broadcast_to(quat[known[0]], (len(known), 4))).max())
+    if turned < TURNED:
+        found = f"--align tool: found a tool that turns by {np.degrees(turned):.4f} deg in all"
+        said = "which any offset of the base explains as well, allowed: a log that turns it; start, none"
+        raise LogError(lacking(run, f"{found}, {said}"))
     posed = matched if len(known) == len(quat) else matched.at(known)
     rotation = matrices(quat[known])
-    x, y, z = np.einsum("nji,nj->ni", rotation, posed.wanted - posed.done).mean(axis=0).tolist()
-    return Alignment("tool", tool=(x, y, z)), replace(posed, done=posed.done + rotation @ np.array((x, y, z)))
+    x, y, z = np.einsum("nji,nj->ni", rotation, posed.reference - posed.actual).mean(axis=0).tolist()
+    moved = posed.actual + rotation @ np.array((x, y, z))
+    return replace(posed, actual=moved, alignment=Alignment("tool", tool=(x, y, z)))

@@ -1,254 +1,28 @@
-"""What `compare` returns: deviations with their statistics and verdicts, as arrays, tables and JSON."""
+"""What `compare` returns: the deviations of some logs and the verdict on all, as tables and JSON."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
-from urmpipe_pipeline.joint_log import LogWarning, seconds
+from urmpipe_models.display import Shown, line_of
+from urmpipe_pipeline.comparison.change import BaselineComparison
+from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation, Kind, Statistics, Stretch, Verdict
+from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.results import SCHEMA, Run
+from urmpipe_pipeline.runs.results import SCHEMA
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from urmpipe_pipeline.comparison.baseline import BaselineComparison
-
-Verdict = Literal["pass", "fail"]
-
-Kind = Literal["axis", "norm", "path", "angle", "joint"]
-"""What a deviation is measured of: a coordinate, the distance at one time, the distance from the path,
-the orientation, a joint."""
-
-AXES = ("x", "y", "z", "norm")
-"""The columns of `Deviation.delta`."""
+__all__ = ["AXES", "Comparison", "Deviation", "Kind", "Statistics", "Stretch", "Verdict"]
 
 
-@dataclass(frozen=True, slots=True)
-class Statistics:
-    """How one quantity deviates; max, rms and p95 are of absolute values, mean and std signed.
-
-    Attributes:
-        quantity: x, y, z, norm, path, angle, or a joint's name.
-        kind: What it is measured of; a tolerance of that name holds for it.
-        unit: m or rad, that of all lengths and angles here.
-        max: Largest absolute value.
-        rms: Root mean square.
-        mean: Mean.
-        std: Standard deviation about the mean, of the samples themselves (n, not n - 1).
-        p95: 95th percentile of the absolute values.
-        t_max: When the largest stands, in [s] of the log.
-        sample_max: Grid sample of the largest, from 0.
-        tolerance: Largest absolute value allowed, or None.
-        out_of_tolerance: Samples above it; None without a tolerance.
-        share_out: Their share of the compared samples, 0..1; None without a tolerance.
-        verdict: pass or fail, None without a tolerance.
-    """
-
-    quantity: str
-    kind: Kind
-    unit: str
-    max: float
-    rms: float
-    mean: float
-    std: float
-    p95: float
-    t_max: float
-    sample_max: int
-    tolerance: float | None
-    out_of_tolerance: int | None
-    share_out: float | None
-    verdict: Verdict | None
-
-    @property
-    def used(self) -> float | None:
-        """Share of the tolerance that the largest value uses up; None without one."""
-        return None if not self.tolerance else self.max / self.tolerance
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object."""
-        return {key: value for key, value in asdict(self).items() if key not in ("quantity", "kind")}
-
-
-@dataclass(frozen=True, slots=True)
-class Stretch:
-    """Samples in a row that are out of tolerance.
-
-    Attributes:
-        samples: How many.
-        sample: The first of them, by its grid sample.
-        t: When it begins, in [s] of the log.
-        duration: From its first to its last sample in [s].
-    """
-
-    samples: int
-    sample: int
-    t: float
-    duration: float
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Deviation:
-    """The deviation of one log from the reference.
-
-    Attributes:
-        name: The log's name, unique in the comparison.
-        run: The ingested log.
-        sample: Grid samples that were compared, shape (m,).
-        t_ns: Their times on the log's clock in integer [ns], shape (m,).
-        reference: Where the reference was, in [m], shape (m, 3).
-        actual: Where the log was, aligned, in [m], shape (m, 3).
-        delta: x, y, z and norm of reference - actual, in [m], shape (m, 4).
-        path: Distance of `actual` from the nearest point of the reference's path, in [m], shape (m,).
-        speed: Speed of the log's tool centre point in [m/s], shape (m,); NaN where it is not known.
-        angle: Angle between the orientations in [rad], shape (m,); None where a side has none.
-        joint_delta: reference - log of each joint, turns included, in [rad] or [m], shape (m, joints); None
-            where a side has none.
-        joint_turns: Whole turns that the two logs count apart for the pose they start in, one a joint; they
-            are taken out of `joint_delta`.
-        outside: Where any quantity with a tolerance is out of it, shape (m,).
-        sync: How the clocks were put together.
-        alignment: How the log was moved in space.
-        left_out: Samples of the log without a reference or without a value.
-        reference_left_out: Samples of the reference outside the log's time.
-        statistics: One for each of x, y, z, norm and path, and for angle where there is one.
-        joint_statistics: One a joint, by its name in the log; none where a side has no joints.
-        start: delta at the first compared sample in [m]: x, y, z, norm (the paper's mutual calibration).
-        speed_correlation: Pearson's r of the norm and the speed; None where one of them does not change.
-        verdict: pass or fail.
-    """
-
-    name: str
-    run: Run
-    sample: IntArray
-    t_ns: IntArray
-    reference: FloatArray
-    actual: FloatArray
-    delta: FloatArray
-    path: FloatArray
-    speed: FloatArray
-    angle: FloatArray | None
-    joint_delta: FloatArray | None
-    joint_turns: tuple[int, ...]
-    outside: NDArray[np.bool_]
-    sync: Sync
-    alignment: Alignment
-    left_out: int
-    reference_left_out: int
-    statistics: dict[str, Statistics]
-    joint_statistics: dict[str, Statistics]
-    start: tuple[float, float, float, float]
-    speed_correlation: float | None
-    verdict: Verdict
-
-    @property
-    def t(self) -> FloatArray:
-        """Times of the compared samples in [s], shape (m,)."""
-        return seconds(self.t_ns)
-
-    @property
-    def duration(self) -> float:
-        """From the first to the last compared sample in [s]."""
-        return float(self.t_ns[-1] - self.t_ns[0]) / 1e9
-
-    @property
-    def worst(self) -> int:
-        """Index into the compared samples of the largest norm."""
-        return int(np.argmax(self.delta[:, 3]))
-
-    @property
-    def share_out(self) -> float:
-        """Share of the compared samples out of tolerance, 0..1."""
-        return float(np.count_nonzero(self.outside)) / len(self.sample)
-
-    @property
-    def longest_out(self) -> Stretch | None:
-        """The longest stretch out of tolerance, the first of equally long ones; None without any."""
-        edges = np.flatnonzero(np.diff(self.sample) > 1) + 1  # a stretch ends where samples are left out
-        changes = np.flatnonzero(np.diff(self.outside)) + 1
-        starts = np.unique(np.concatenate(([0], edges, changes)))
-        ends = np.append(starts[1:], len(self.sample))
-        lengths = np.where(self.outside[starts], ends - starts, 0)
-        longest = int(np.argmax(lengths))
-        if not lengths[longest]:
-            return None
-        first, last = int(starts[longest]), int(ends[longest]) - 1
-        return Stretch(
-            int(lengths[longest]),
-            int(self.sample[first]),
-            float(self.t[first]),
-            float(self.t_ns[last] - self.t_ns[first]) / 1e9,
-        )
-
-    @property
-    def all_statistics(self) -> tuple[Statistics, ...]:
-        """Of every quantity: x, y, z, norm, path, angle and the joints."""
-        return (*self.statistics.values(), *self.joint_statistics.values())
-
-    @property
-    def values(self) -> tuple[FloatArray, ...]:
-        """Every quantity at the compared samples in [m] or [rad], shape (m,) each; as `all_statistics`."""
-        angle = () if self.angle is None else (self.angle,)
-        joints = () if self.joint_delta is None else tuple(self.joint_delta.T)
-        return (*self.delta.T, self.path, *angle, *joints)
-
-    def furthest_joint(self, unit: str) -> Statistics | None:
-        """Return the joint in rad or m that is furthest off; None without one."""
-        joints = [one for one in self.joint_statistics.values() if one.unit == unit]
-        return max(joints, key=lambda one: one.max, default=None)
-
-    def place(self, one: Statistics) -> FloatArray:
-        """Return where the log was when one of its quantities was largest, in [m], shape (3,)."""
-        return np.asarray(self.actual[np.searchsorted(self.sample, one.sample_max)])
-
-    @property
-    def decisive(self) -> Statistics:
-        """The quantity that uses up most of its tolerance; the norm where nothing has one."""
-        held = [one for one in self.all_statistics if one.used is not None]
-        return max(held, key=lambda one: one.used or 0.0, default=self.statistics["norm"])
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of one run."""
-        worst, longest = self.worst, self.longest_out
-        angle = self.statistics.get("angle")
-        return {
-            "name": self.name,
-            "samples": len(self.sample),
-            "left_out": self.left_out,
-            "reference_left_out": self.reference_left_out,
-            "duration": self.duration,
-            "sync_offset": self.sync.offset,
-            "sync": self.sync.to_dict(),
-            "alignment": self.alignment.to_dict(),
-            "delta": {axis: self.statistics[axis].to_dict() for axis in AXES},
-            "path": self.statistics["path"].to_dict(),
-            "angle": None if angle is None else angle.to_dict(),
-            "joints": {name: one.to_dict() for name, one in self.joint_statistics.items()},
-            "joint_turns": dict(zip(self.joint_statistics, self.joint_turns, strict=True)),
-            "start": dict(zip(AXES, self.start, strict=True)),
-            "worst": {
-                "t": float(self.t[worst]),
-                "sample": int(self.sample[worst]),
-                "norm": float(self.delta[worst, 3]),
-            },
-            "out_of_tolerance": int(np.count_nonzero(self.outside)),
-            "share_out": self.share_out,
-            "longest_out": None if longest is None else asdict(longest),
-            "speed_correlation": self.speed_correlation,
-            "verdict": self.verdict,
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.run.warnings],
-        }
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Comparison:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Comparison(Shown):
     """Some logs held against one reference.
 
     Attributes:
@@ -272,27 +46,49 @@ class Comparison:
     baseline: BaselineComparison | None = None
 
     @property
-    def verdict(self) -> Verdict:
-        """Pass if every log passes."""
-        return "pass" if all(run.verdict == "pass" for run in self.runs) else "fail"
+    def within_tolerance(self) -> bool:
+        """Whether every log passes, whatever a baseline says."""
+        return all(run.verdict == "pass" for run in self.runs)
 
     @property
-    def accepted(self) -> bool:
-        """Whether every log passes and, where there is a baseline, nothing is worse than there."""
-        return self.verdict == "pass" and (self.baseline is None or self.baseline.verdict == "pass")
+    def verdict(self) -> Verdict:
+        """Pass if every log passes and, where there is a baseline, nothing is worse than there."""
+        kept = self.baseline is None or self.baseline.verdict == "pass"
+        return "pass" if self.within_tolerance and kept else "fail"
+
+    def covered(self, run: Deviation) -> float:
+        """Return the share of the reference's samples, 0..1, that lie within the time of a log."""
+        return 1.0 - run.reference_left_out / len(self.reference.t_ns)
 
     @property
     def ranking(self) -> tuple[Deviation, ...]:
-        """The logs from best to worst: by the share of a tolerance that is used up, then by the rms norm."""
-        return tuple(
-            sorted(self.runs, key=lambda run: (run.decisive.used or 0.0, run.statistics["norm"].rms))
-        )
+        """The logs from best to worst.
+
+        Those that pass come first, and among them (as among the others) those that cover the reference; then
+        the share of a tolerance that is used up decides, then the rms norm.
+        """
+
+        def place(run: Deviation) -> tuple[bool, bool, float, float]:
+            partly = self.covered(run) < WHOLE
+            return run.verdict == "fail", partly, run.decisive.used or 0.0, run.statistics["norm"].rms
+
+        return tuple(sorted(self.runs, key=place))
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield one row a log and quantity: the offset of the clocks, the statistics and the verdict."""
         for run in self.runs:
             for one in run.all_statistics:
                 yield {"run": run.name, "sync_offset": run.sync.offset, **asdict(one)}
+
+    def _headline(self) -> str:
+        """Return its verdict, and that of each log."""
+        logs = (f"{one.name} {one.verdict} ({one.decisive.max:.4g} {one.decisive.unit})" for one in self.runs)
+        return line_of(f"{self.name}: {self.verdict}", *logs)
+
+    def _notes(self) -> list[str]:
+        """Return what is to be known of it, and of its logs."""
+        of_logs = [w.of(one.name).message for one in self.runs for w in one.run.warnings]
+        return [*(warning.message for warning in self.warnings), *of_logs]
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a log and quantity, as `rows`."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.comparison.comparison import AXES, Verdict
+from urmpipe_pipeline.comparison.deviation import AXES, Verdict
 from urmpipe_pipeline.comparison.tolerance import allowed_for
 
 

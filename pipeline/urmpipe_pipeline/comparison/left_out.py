@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.grid import ROUNDING_NS
@@ -29,11 +30,20 @@ def left_out_warnings(one: Deviation, reference: Trajectory) -> list[LogWarning]
     if one.left_out > beyond:
         said = f"{one.name}: {one.left_out - beyond} of {samples} samples have no reference or no value"
         warnings.append(LogWarning("left-out", said))
+    if not one.sync.offset and one.reference_left_out > (1.0 - WHOLE) * len(reference.t_ns):
+        warnings.append(LogWarning("not-covered", f"{one.name}: {_covered(one, reference)}"))
     if one.sync.offset and (beyond or one.reference_left_out):
         theirs = f"{one.reference_left_out} of {len(reference.t_ns)} samples of {reference.name}"
         said = f"the offset of {one.sync.offset:.6g} s leaves {beyond} of {samples} samples and {theirs}"
         warnings.append(LogWarning(BEYOND, f"{one.name}: {said} without the other side"))
     return warnings
+
+
+def _covered(one: Deviation, reference: Trajectory) -> str:
+    """Say how much of the time of the reference a log lasts."""
+    kept = len(reference.t_ns) - one.reference_left_out
+    lasts = f"{text.seconds(one.run.t[-1])} s of the {text.seconds(reference.t[-1])} s of {reference.name}"
+    return f"it covers {lasts} ({text.percent(kept / len(reference.t_ns))}): the rest was not judged"
 
 
 def _beyond(one: Deviation, reference: Trajectory) -> int:

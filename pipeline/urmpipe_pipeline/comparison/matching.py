@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.orientation import quaternions, slerp
-from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.runs.grid import ROUNDING_NS, interpolate
 from urmpipe_pipeline.runs.results import Run
 
@@ -23,41 +23,49 @@ class Matched:
     Attributes:
         sample: Samples of the log, shape (m,).
         t_ns: Their times on the log's clock in integer [ns], shape (m,).
-        wanted: Where the reference was, in [m], shape (m, 3).
-        done: Where the log was, in [m], shape (m, 3).
-        wanted_quat: Orientation of the reference x, y, z, w [-], shape (m, 4); None without one.
-        done_quat: The same of the log.
-        wanted_q: Joints of the reference, in the log's order, in [rad] or [m], shape (m, joints); None where
-            `joints_apart` tells why not.
-        done_q: The same of the log.
+        reference: Where the reference was, in [m], shape (m, 3).
+        actual: Where the log was, aligned, in [m], shape (m, 3).
+        reference_quat: Orientation of the reference x, y, z, w [-], shape (m, 4); None without one.
+        actual_quat: Orientation of the log x, y, z, w [-], shape (m, 4); None without one.
+        reference_q: Joints of the reference, in the log's order, in [rad] or [m], shape (m, joints); None
+            where `joints_apart` tells why not.
+        actual_q: Joints of the log in [rad] or [m], shape (m, joints); None where the reference's are.
         left_out: Samples of the log that were not compared.
         reference_left_out: Samples of the reference outside the log's time.
+        sync: How the clocks were put together.
+        alignment: How the log was moved in space.
     """
 
     sample: IntArray
     t_ns: IntArray
-    wanted: FloatArray
-    done: FloatArray
-    wanted_quat: FloatArray | None
-    done_quat: FloatArray | None
-    wanted_q: FloatArray | None
-    done_q: FloatArray | None
+    reference: FloatArray
+    actual: FloatArray
+    reference_quat: FloatArray | None
+    actual_quat: FloatArray | None
+    reference_q: FloatArray | None
+    actual_q: FloatArray | None
     left_out: int
     reference_left_out: int
+    sync: Sync
+    alignment: Alignment
 
     def at(self, kept: NDArray[np.intp]) -> Matched:
-        """Return both sides at some of these samples alone, by index; the others are left out."""
-        return Matched(
+        """Return both sides at some of these samples alone; the others are left out.
+
+        Args:
+            kept: Indices of the samples [-], shape (k,).
+        """
+        return replace(
+            self,
             sample=self.sample[kept],
             t_ns=self.t_ns[kept],
-            wanted=self.wanted[kept],
-            done=self.done[kept],
-            wanted_quat=None if self.wanted_quat is None else self.wanted_quat[kept],
-            done_quat=None if self.done_quat is None else self.done_quat[kept],
-            wanted_q=None if self.wanted_q is None else self.wanted_q[kept],
-            done_q=None if self.done_q is None else self.done_q[kept],
+            reference=self.reference[kept],
+            actual=self.actual[kept],
+            reference_quat=None if self.reference_quat is None else self.reference_quat[kept],
+            actual_quat=None if self.actual_quat is None else self.actual_quat[kept],
+            reference_q=None if self.reference_q is None else self.reference_q[kept],
+            actual_q=None if self.actual_q is None else self.actual_q[kept],
             left_out=self.left_out + len(self.sample) - len(kept),
-            reference_left_out=self.reference_left_out,
         )
 
 
@@ -104,7 +112,7 @@ def as_recorded(run: Run) -> Trajectory:
     )
 
 
-def match(reference: Trajectory, log: Trajectory, offset: float) -> Matched:
+def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
     """Return both sides at the log's samples; the reference is interpolated there.
 
     Positions and joints are interpolated linearly, orientations on the great arc. Samples outside the time of
@@ -113,27 +121,29 @@ def match(reference: Trajectory, log: Trajectory, offset: float) -> Matched:
     Args:
         reference: What was asked for.
         log: What was done.
-        offset: t_reference = t_log + offset in [s].
+        sync: How their clocks are put together.
     """
-    shift = round(offset * 1e9)
+    shift = round(sync.offset * 1e9)
     at_ns = log.t_ns + shift
     wanted = interpolate(at_ns, reference.t_ns, reference.position)
     sample = np.flatnonzero(np.isfinite(wanted).all(axis=1) & np.isfinite(log.position).all(axis=1))
     at_ns = at_ns[sample]
-    wanted_q, done_q = _joints(reference, log, sample, at_ns)
+    reference_q, actual_q = _joints(reference, log, sample, at_ns)
     before = reference.t_ns < log.t_ns[0] + shift - ROUNDING_NS
     after = reference.t_ns > log.t_ns[-1] + shift + ROUNDING_NS
     return Matched(
         sample=sample,
         t_ns=log.t_ns[sample],
-        wanted=wanted[sample],
-        done=log.position[sample],
-        wanted_quat=_between(at_ns, reference),
-        done_quat=None if log.quat_xyzw is None else log.quat_xyzw[sample],
-        wanted_q=wanted_q,
-        done_q=done_q,
+        reference=wanted[sample],
+        actual=log.position[sample],
+        reference_quat=_between(at_ns, reference),
+        actual_quat=None if log.quat_xyzw is None else log.quat_xyzw[sample],
+        reference_q=reference_q,
+        actual_q=actual_q,
         left_out=len(log.t_ns) - len(sample),
         reference_left_out=int(np.count_nonzero(before | after)),
+        sync=sync,
+        alignment=Alignment(),
     )
 
 

@@ -11,11 +11,11 @@ from urmpipe_models.delta import delta
 from urmpipe_models.errors import LogError
 from urmpipe_models.orientation import angle_between
 from urmpipe_models.repolarizer import FULL_TURN
-from urmpipe_pipeline.comparison.comparison import AXES, Deviation, Kind
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Kind
 from urmpipe_pipeline.comparison.matching import Matched, joints_apart, lacking
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.statistics import Measured, correlation, describe, overall
-from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
+from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.runs.grid import apart, interpolate
 from urmpipe_pipeline.runs.results import Run
@@ -28,13 +28,7 @@ START_SAMPLES = 11
 
 
 def measure(
-    name: str,
-    run: Run,
-    reference: Trajectory,
-    matched: Matched,
-    sync: Sync,
-    alignment: Alignment,
-    tolerance: Mapping[str, float],
+    name: str, run: Run, reference: Trajectory, matched: Matched, tolerance: Mapping[str, float]
 ) -> Deviation:
     """Return the deviation of a log: delta, distance from the path, angle, joints, and the verdict.
 
@@ -43,8 +37,6 @@ def measure(
         run: The log.
         reference: What was asked for, whole.
         matched: Both sides at the same times, the log aligned.
-        sync: How the clocks were put together.
-        alignment: How the log was moved in space.
         tolerance: In [m] or [rad], by kind or by coordinate.
 
     Raises:
@@ -52,19 +44,14 @@ def measure(
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
-    t, sample = seconds(matched.t_ns), matched.sample
-    values = np.column_stack(delta(_columns(matched.wanted), _columns(matched.done)))
-    path = distance_from_path(matched.done, reference.position, ~apart(reference.t_ns))
+    values = np.column_stack(delta(_columns(matched.reference), _columns(matched.actual)))
+    path = distance_from_path(matched.actual, reference.position, ~apart(reference.t_ns))
     path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
     angle = _angle(matched)
     joint_delta, turns = _joint_delta(run, matched)
     _refuse_unheld(run, reference, tolerance, angle, joint_delta)
-    in_space = [
-        *(Measured(axis, KINDS[i], "m", values[:, i]) for i, axis in enumerate(AXES)),
-        Measured("path", "path", "m", path),
-        *([] if angle is None else [Measured("angle", "angle", "rad", angle)]),
-    ]
-    of_joints = _of_joints(run, joint_delta)
+    in_space, of_joints = _in_space(values, path, angle), _of_joints(run, joint_delta)
+    t, sample = seconds(matched.t_ns), matched.sample
     statistics, joint_statistics = (
         {one.quantity: describe(one, t, sample, tolerance) for one in measured}
         for measured in (in_space, of_joints)
@@ -76,8 +63,8 @@ def measure(
         run=run,
         sample=sample,
         t_ns=matched.t_ns,
-        reference=matched.wanted,
-        actual=matched.done,
+        reference=matched.reference,
+        actual=matched.actual,
         delta=values,
         path=path,
         speed=speed,
@@ -85,8 +72,8 @@ def measure(
         joint_delta=joint_delta,
         joint_turns=turns,
         outside=np.any([one.outside(tolerance) for one in (*in_space, *of_joints)], axis=0),
-        sync=sync,
-        alignment=alignment,
+        sync=matched.sync,
+        alignment=matched.alignment,
         left_out=matched.left_out,
         reference_left_out=matched.reference_left_out,
         statistics=statistics,
@@ -97,11 +84,18 @@ def measure(
     )
 
 
+def _in_space(values: FloatArray, path: FloatArray, angle: FloatArray | None) -> list[Measured]:
+    """Return what is measured of the pose: x, y, z, norm, path, and the angle where there is one."""
+    found = [Measured(axis, KINDS[i], "m", values[:, i]) for i, axis in enumerate(AXES)]
+    found.append(Measured("path", "path", "m", path))
+    return found if angle is None else [*found, Measured("angle", "angle", "rad", angle)]
+
+
 def _angle(matched: Matched) -> FloatArray | None:
     """Return the angle between the orientations in [rad], shape (m,); None if a side has none anywhere."""
-    if matched.wanted_quat is None or matched.done_quat is None:
+    if matched.reference_quat is None or matched.actual_quat is None:
         return None
-    angle = angle_between(matched.wanted_quat, matched.done_quat)
+    angle = angle_between(matched.reference_quat, matched.actual_quat)
     return angle if np.isfinite(angle).any() else None
 
 
@@ -110,9 +104,9 @@ def _joint_delta(run: Run, matched: Matched) -> tuple[FloatArray | None, tuple[i
 
     None if a joint has no value on a side: it could not be judged.
     """
-    if matched.wanted_q is None or matched.done_q is None:
+    if matched.reference_q is None or matched.actual_q is None:
         return None, ()
-    difference = matched.wanted_q - matched.done_q
+    difference = matched.reference_q - matched.actual_q
     if not np.isfinite(difference).any(axis=0).all():
         return None, ()
     turning = zip(difference.T, run.joint_units, strict=True)
@@ -179,7 +173,7 @@ def _speed_by_positions(matched: Matched) -> FloatArray:
     """
     step = np.diff(seconds(matched.t_ns))[:, np.newaxis]
     joined = (np.diff(matched.sample) == 1) & ~apart(matched.t_ns)
-    slope = np.where(joined[:, np.newaxis], np.diff(matched.done, axis=0) / step, 0.0)
+    slope = np.where(joined[:, np.newaxis], np.diff(matched.actual, axis=0) / step, 0.0)
     weight = np.where(joined[:, np.newaxis], 1.0 / step, 0.0)  # of the nearer neighbour the more
     none = np.zeros((1, 1))
     before, after = np.vstack((none, weight)), np.vstack((weight, none))

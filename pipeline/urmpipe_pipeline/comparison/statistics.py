@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.comparison.comparison import Kind, Statistics, Verdict
+from urmpipe_pipeline.comparison.deviation import Kind, Statistics, Verdict
 from urmpipe_pipeline.comparison.tolerance import allowed_for
 
 UNCHANGING = 1e-9
@@ -25,7 +25,7 @@ class Measured:
         quantity: x, y, z, norm, path, angle, or a joint's name.
         kind: What it is measured of.
         unit: m or rad.
-        values: In that unit, shape (m,); NaN where a side has no value.
+        values: In [m] or [rad], as the unit says, shape (m,); NaN where a side has no value.
     """
 
     quantity: str
@@ -34,15 +34,20 @@ class Measured:
     values: FloatArray
 
     def outside(self, tolerance: Mapping[str, float]) -> NDArray[np.bool_]:
-        """Return where it is out of tolerance, shape (m,): nowhere without one."""
+        """Return where it is out of tolerance, shape (m,): nowhere without one.
+
+        What has no value cannot be shown to be within its tolerance: it is out of it.
+        """
         allowed = allowed_for(self.quantity, self.kind, tolerance)
-        return np.asarray(np.abs(self.values) > (np.inf if allowed is None else allowed))
+        if allowed is None:
+            return np.zeros(len(self.values), bool)
+        return ~np.asarray(np.abs(self.values) <= allowed)
 
 
 def describe(
     measured: Measured, t: FloatArray, sample: IntArray, tolerance: Mapping[str, float]
 ) -> Statistics:
-    """Return the statistics of one quantity over the samples that have a value.
+    """Return the statistics of one quantity over the samples that have a value, and the verdict on all.
 
     Args:
         measured: The quantity, with at least one value.
@@ -56,7 +61,7 @@ def describe(
     worst = int(np.argmax(size))
     largest = float(size[worst])
     allowed = allowed_for(measured.quantity, measured.kind, tolerance)
-    out = None if allowed is None else int(np.count_nonzero(size > allowed))
+    out = None if allowed is None else int(np.count_nonzero(measured.outside(tolerance)))
     return Statistics(
         quantity=measured.quantity,
         kind=measured.kind,
@@ -70,8 +75,10 @@ def describe(
         sample_max=int(sample[known[worst]]),
         tolerance=allowed,
         out_of_tolerance=out,
-        share_out=None if out is None else out / len(values),
+        share_out=None if out is None else out / len(measured.values),
         verdict=None if out is None else "fail" if out else "pass",
+        samples=len(known),
+        missing=len(measured.values) - len(known),
     )
 
 
@@ -85,7 +92,7 @@ def correlation(first: FloatArray, second: FloatArray) -> float | None:
 
     Args:
         first: Shape (m,), in [m] or [m/s]; NaN where there is no value.
-        second: The same.
+        second: Shape (m,), in [m] or [m/s]; NaN where there is no value.
     """
     both = np.isfinite(first) & np.isfinite(second)
     if not both.any():

@@ -48,7 +48,7 @@ class Rates:
         reference_ns: The ends of the reference's periods in integer [ns], shape (n + 1,).
         reference: Rates in [rad/s] or [m/s], shape (n, k); NaN where a sample is missing.
         log_ns: The ends of the log's periods in integer [ns], shape (m + 1,).
-        log: Rates, shape (m, k).
+        log: Rates in [rad/s] or [m/s], shape (m, k); NaN where a sample is missing.
     """
 
     period_ns: int
@@ -101,7 +101,12 @@ def mean_rates(view: View) -> Rates | None:
 
 
 def rates(values: FloatArray, period_ns: int) -> FloatArray:
-    """Return the mean rate between each value and the next, shape (n - 1, k)."""
+    """Return the mean rate between each value and the next, in [rad/s] or [m/s], shape (n - 1, k).
+
+    Args:
+        values: In [rad] or [m], shape (n, k).
+        period_ns: Between two of them, in integer [ns].
+    """
     return np.diff(values, axis=0) / (period_ns / 1e9)
 
 
@@ -119,8 +124,8 @@ def similarity(reference: FloatArray, log: FloatArray, turned: bool) -> float:
     for the same motion done with another amplitude.
 
     Args:
-        reference: Rates a, shape (n, k).
-        log: Rates b, shape (n, k).
+        reference: Rates a in [rad/s] or [m/s], shape (n, k).
+        log: Rates b in the same, shape (n, k).
         turned: Whether b is turned first, as is best for the similarity.
 
     Returns:

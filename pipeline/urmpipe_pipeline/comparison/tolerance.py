@@ -9,16 +9,12 @@ from decimal import Decimal
 from numbers import Real
 
 from urmpipe_models.errors import OptionError
+from urmpipe_models.measure_units import units_of
 
 DEFAULT_TOLERANCE = 0.0035
 """Largest deviation allowed on an axis in [m]. Source: [UrmArm2021]_ section 2.4."""
 
-SI, MILLI, MICRO = Decimal(1), Decimal("1e-3"), Decimal("1e-6")
-DEGREE = Decimal("0.01745329251994329576923690768")
-"""pi / 180."""
-
-LENGTHS = {"": SI, "m": SI, "mm": MILLI, "um": MICRO}
-ANGLES = {"": SI, "rad": SI, "mrad": MILLI, "deg": DEGREE}
+LENGTHS, ANGLES = ({"": Decimal(1), **units_of(si)} for si in ("m", "rad"))
 UNITS: dict[str, dict[str, Decimal]] = {
     **dict.fromkeys(("axis", "x", "y", "z", "norm", "path"), LENGTHS),
     **dict.fromkeys(("angle", "joint"), ANGLES),
@@ -34,8 +30,16 @@ ALLOWED = (
     " m of a joint that slides)"
 )
 
-QUANTITY = re.compile(r"\s*([0-9]+\.?[0-9]*(?:[eE][-+]?[0-9]+)?|\.[0-9]+(?:[eE][-+]?[0-9]+)?)\s*([a-z]*)\s*")
-"""A number in plain digits and its unit."""
+ALLOWED_NUMBERS = (
+    "numbers of axis, x, y, z, norm, path in m, of angle, joint in rad (m of a joint that slides)"
+)
+
+NUMBER = r"(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?"
+QUANTITY = re.compile(rf"\s*(?:±|\+-)?\s*({NUMBER})\s*([a-z]*)\s*")
+"""A number in plain digits and its unit, ± before it or not."""
+
+DECIMAL_COMMA = re.compile(r"\s*[0-9]+,[0-9]+\s*[a-z]*\s*")
+"""A length alone with a decimal comma: a comma parts two kinds."""
 
 
 def parse_tolerance(
@@ -52,6 +56,9 @@ def parse_tolerance(
     Raises:
         OptionError: With everything that is wrong.
     """
+    if DECIMAL_COMMA.fullmatch(text):
+        point = text.strip().replace(",", ".")
+        raise OptionError(f"{option}: found {text!r}, allowed: a point before the decimals, {point}")
     found: dict[str, float] = {}
     named: set[str] = set()
     faults = []
@@ -61,7 +68,9 @@ def parse_tolerance(
         number = _number(value, UNITS.get(kinds[0], {}), zero)
         twice = " twice" if number is not None and not named.isdisjoint(kinds) else ""
         if number is None or twice:
-            faults.append(f"{option}: found {part.strip()!r}{twice}, allowed: {ALLOWED}")
+            angle = not sign and _number(value, ANGLES, zero) is not None and not twice
+            hint = f"; here angle={part.strip()} or joint={part.strip()}" if angle else ""
+            faults.append(f"{option}: found {part.strip()!r}{twice}, allowed: {ALLOWED}{hint}")
             continue
         named.update(kinds)
         found |= dict.fromkeys(kinds, number)
@@ -82,12 +91,12 @@ def check_tolerance(
     """
     sign = "0 or positive" if zero else "positive"
     faults = [
-        f"{option}: found {kind}={value}, allowed: {ALLOWED}; {sign}"
+        f"{option}: found {kind}={value}, allowed: {ALLOWED_NUMBERS}; {sign}"
         for kind, value in tolerance.items()
         if kind not in UNITS or not isinstance(value, Real) or not _fits(float(value), zero)
     ]
     if not tolerance:
-        faults = [f"{option}: found nothing, allowed: {ALLOWED}"]
+        faults = [f"{option}: found nothing, allowed: {ALLOWED_NUMBERS}"]
     if faults:
         raise OptionError(*faults)
 

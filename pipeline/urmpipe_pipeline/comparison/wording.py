@@ -5,14 +5,26 @@ from __future__ import annotations
 from urmpipe_models.chains.chain import Chain
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import tool_with
-from urmpipe_pipeline.comparison.comparison import Comparison, Statistics
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.deviation import Statistics
+from urmpipe_pipeline.comparison.symbols import allowed_words
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 
 
 def excess(one: Statistics) -> str:
-    """Return how far a quantity goes, and of how much: "x reaches 4.2000 mm of 3.5 mm allowed"."""
+    """Return how far a quantity goes, and of how much: "x reaches 4.2000 mm of 3.5 mm allowed".
+
+    Where a quantity with a tolerance lacks values, that: "angle has no value at 3 of 40 samples".
+    """
+    if one.tolerance is not None and one.missing:
+        return f"{one.quantity} has {lacking_words(one)}"
     return f"{one.quantity} reaches {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
+
+
+def lacking_words(one: Statistics) -> str:
+    """Return at how many of the compared samples a quantity has no value."""
+    return f"no value at {one.missing} of {(one.samples or 0) + one.missing} samples"
 
 
 def of_allowed(one: Statistics) -> str:
@@ -25,7 +37,7 @@ def of_allowed(one: Statistics) -> str:
 def tolerance_words(comparison: Comparison) -> str:
     """Return what a comparison allows, that of joints in the units of those that were compared."""
     units = {one.unit for run in comparison.runs for one in run.joint_statistics.values()}
-    return text.tolerance(comparison.tolerance, units or {"rad"})
+    return allowed_words(comparison.tolerance, units or {"rad"})
 
 
 def meter_words(one: DeltaVerdict) -> str:

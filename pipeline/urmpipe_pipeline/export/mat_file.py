@@ -49,21 +49,25 @@ def write_mat(name: str, fields: Mapping[str, Any], path: Path, target: Path) ->
 
 
 def run_fields(run: Run, about: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the fields of a run on its grid, in SI: t, q, qd, qdd, p, v, a, euler_zyx, p_recorded."""
+    """Return the fields of a run on its grid, in SI: t, q, qd, qdd, p, v, a, euler_zyx, p_recorded.
+
+    What a run does not have is empty: the point without kinematics, times and derivatives of single poses.
+    """
     units = run.joint_units
     tcp = run.tcp
     nothing = np.empty((0, 0))
+    moves = not run.single_poses
     return {
         "name": printable(run.name),
         "rows": "grid",
-        "t": run.t,
-        "clock_ns": run.log.clock_start_ns + run.t_ns,
+        "t": run.t if moves else nothing,
+        "clock_ns": run.log.clock_start_ns + run.t_ns if moves else nothing,
         "q": run.q,
-        "qd": run.qd,
-        "qdd": run.qdd,
+        "qd": run.qd if moves else nothing,
+        "qdd": run.qdd if moves else nothing,
         "p": nothing if tcp is None else tcp.position,
-        "v": nothing if tcp is None else tcp.velocity,
-        "a": nothing if tcp is None else tcp.acceleration,
+        "v": tcp.velocity if tcp is not None and moves else nothing,
+        "a": tcp.acceleration if tcp is not None and moves else nothing,
         "euler_zyx": nothing if tcp is None else tcp.euler_zyx,
         "p_recorded": nothing if run.tcp_recorded is None else run.tcp_recorded,
         "joints": cells([printable(name) for name in run.log.joints]),
@@ -139,7 +143,11 @@ def _deviation(run: Deviation) -> dict[str, Any]:
 
 
 def cells(items: Sequence[Any]) -> np.ndarray[tuple[int, int], np.dtype[np.object_]]:
-    """Return items as a row of MATLAB's cells."""
+    """Return items as a row of MATLAB's cells.
+
+    Args:
+        items: n texts, numbers or structs; [-]; the cells have the shape (1, n).
+    """
     row = np.empty((1, len(items)), dtype=object)
     for k, item in enumerate(items):
         row[0, k] = item

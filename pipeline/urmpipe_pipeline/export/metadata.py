@@ -7,7 +7,7 @@ from dataclasses import asdict
 from typing import Any
 
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.runs.results import json_ready
+from urmpipe_pipeline.json_values import json_ready
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 MARK = "urmpipe export"

@@ -64,16 +64,16 @@ class ExportOptions:
 
 
 def format_of(to: Format | None, output: Path | None) -> Format:
-    """Return the format that is asked for, or else that of the output's suffix.
+    """Return the format that is asked for, or else that of the output's suffix; CSV without both.
 
     Raises:
-        OptionError: If neither tells.
+        OptionError: If the output's suffix tells none.
     """
-    if to is not None:
-        return to
-    suffix = output.suffix.lower().lstrip(".") if output else ""
+    if to is not None or output is None:
+        return to or "csv"
+    suffix = output.suffix.lower().lstrip(".")
     for known in FORMATS:
         if suffix == known:
             return known
-    found = f"the output {output}" if output else "neither a format nor an output"
-    raise OptionError(f"--to: found {found}, allowed: --to {'|'.join(FORMATS)}, or an output that ends so")
+    allowed = f"allowed: --to {'|'.join(FORMATS)}, or an output that ends so"
+    raise OptionError(f"--to: found the output {output}, {allowed}")

@@ -40,7 +40,7 @@ class Column:
     Attributes:
         name: Its name, unique in the table.
         unit: Its unit; empty for counts and names.
-        values: Shape (n,); NaN where a sample is missing.
+        values: In [`unit`], shape (n,); NaN where a sample is missing.
     """
 
     name: str
@@ -105,17 +105,25 @@ def _as_told(log: JointLog, clock_ns: IntArray, timed: Sequence[str]) -> IntArra
 
 
 def grid_table(run: Run) -> Table:
-    """Return the run on its grid in SI, each name with its unit: t, q, q', q'', and the tool centre point."""
+    """Return the run on its grid in SI, each name with its unit: t, q, q', q'', and the tool centre point.
+
+    Of single poses the row stands for t, and there is nothing per second: no motion joins them.
+    """
+    moves = not run.single_poses
     columns = [Column("t [s]", "s", Times(run.t_ns, "s"))]
+    if not moves:
+        columns = [Column("row", "", np.arange(1, len(run.t_ns) + 1))]
     units = run.joint_units
     joints = [printable(name) for name in run.log.joints]
-    for prefix, order, values in (("", "", run.q), ("d_", "/s", run.qd), ("dd_", "/s2", run.qdd)):
+    orders = (("", "", run.q), ("d_", "/s", run.qd), ("dd_", "/s2", run.qdd))
+    for prefix, order, values in orders[: 3 if moves else 1]:
         names = [prefix + name for name in joints]
         columns += _group(names, [unit + order for unit in units], values)
     if run.tcp is not None:
-        for name, unit, values in (
+        points = (
             ("p", "m", run.tcp.position), ("v", "m/s", run.tcp.velocity), ("a", "m/s2", run.tcp.acceleration),
-        ):  # fmt: skip
+        )  # fmt: skip
+        for name, unit, values in points[: 3 if moves else 1]:
             columns += _group([name + axis for axis in AXES[:3]], [unit] * 3, values)
         columns += _group(["rz", "ry", "rx"], ["rad"] * 3, run.tcp.euler_zyx)
     if run.tcp_recorded is not None:
@@ -124,7 +132,7 @@ def grid_table(run: Run) -> Table:
         unit = "rad" if len(run.rotation_names) == 3 else "1"
         names = [f"recorded_{name}" for name in run.rotation_names]
         columns += _group(names, [unit] * len(names), run.rotation_recorded)
-    return Table(tuple(columns), run.log.clock_start_ns + run.t_ns)
+    return Table(tuple(columns), run.log.clock_start_ns + run.t_ns if moves else None)
 
 
 def delta_table(comparison: Comparison) -> Table:

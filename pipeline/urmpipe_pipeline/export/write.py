@@ -8,8 +8,9 @@ from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.export.csv_file import write_csv
@@ -31,6 +32,9 @@ from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 POSE_COLUMNS = (
     ("t", "s"), ("x", "m"), ("y", "m"), ("z", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""),
 )  # fmt: skip
@@ -49,8 +53,8 @@ class ExportedFile:
     rows: int
 
 
-@dataclass(frozen=True, slots=True)
-class Exported:
+@dataclass(frozen=True, slots=True, repr=False)
+class Exported(Shown):
     """What left.
 
     Attributes:
@@ -68,6 +72,23 @@ class Exported:
     columns: tuple[tuple[str, str], ...]
     left_out: int = 0
     warnings: tuple[LogWarning, ...] = ()
+
+    @property
+    def path(self) -> Path:
+        """The file; of several trajectories the first."""
+        return self.files[0].path
+
+    def _headline(self) -> str:
+        """Return the file, and what it holds."""
+        more = f"and {number_of(len(self.files) - 1, 'other file')}" if len(self.files) > 1 else ""
+        rows = number_of(sum(one.rows for one in self.files), "row")
+        return line_of(str(self.path), more, self.to, rows, number_of(len(self.columns), "column"))
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a file: its path and its rows."""
+        import pandas as pd
+
+        return pd.DataFrame([(str(one.path), one.rows) for one in self.files], columns=["file", "rows"])
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe export --json` prints."""

@@ -34,7 +34,8 @@ def draw_log_events(stream: RecordingStream, place: Place, run: Run) -> None:
         for one in run.warnings
     ]
     rows = np.clip([(one.row or 1) - 1 for one in run.warnings], 0, run.log.rows - 1).astype(np.int64)
-    _draw(stream, f"{place.prefix}events/warning", run.log.t_ns[rows], said, ["WARN"] * len(said))
+    entity, levels = f"{place.prefix}events/warning", ["WARN"] * len(said)
+    _draw(stream, entity, run.log.t_ns[rows], said, levels, timed=not run.single_poses)
 
 
 def draw_comparison_events(stream: RecordingStream, place: Place, one: Deviation) -> None:
@@ -85,13 +86,20 @@ def _told(one: AuditEntry) -> str:
 
 
 def _draw(
-    stream: RecordingStream, entity: str, t_ns: IntArray, texts: Sequence[str], levels: Sequence[str]
+    stream: RecordingStream,
+    entity: str,
+    t_ns: IntArray,
+    texts: Sequence[str],
+    levels: Sequence[str],
+    *,
+    timed: bool = True,
 ) -> None:
     """Send lines of the list of events, each beginning with its time: the list's own column is too narrow."""
     import rerun as rr
 
     if not texts:
         return
-    lines = [f"{at / 1e9:.4f} s  {text}" for at, text in zip(t_ns.tolist(), texts, strict=True)]
+    heads = [f"{at / 1e9:.4f} s  " if timed else "" for at in t_ns.tolist()]
+    lines = [head + said for head, said in zip(heads, texts, strict=True)]
     columns = rr.TextLog.columns(text=lines, level=list(levels))
     stream.send_columns(entity, time_columns(t_ns), columns)

@@ -1,7 +1,8 @@
 """What the viewer opens with: verdict, arm and paths at the left; the plots and the events at the right.
 
 No blueprint says at which time the viewer opens: a `time_selection` moves the cursor only while it plays, and
-keeps it there. So `urmpipe view` sets the time, and a line through the worst sample stands in every plot.
+keeps it there. So `urmpipe view` sets the time, and in every plot stands a line through the sample by which
+the verdict was decided. Opened otherwise the viewer stands at the first sample: the summary says where to go.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
 from urmpipe_pipeline.recording.eye import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.ghost_arms import fullest_time
@@ -28,7 +30,14 @@ if TYPE_CHECKING:
 
     Row: TypeAlias = tuple[View | Container, float]
 
-HEIGHTS = {"delta": 4, "joints in the file": 3.5, "joints repolarized": 3, "speed": 2, "events": 2.2}
+HEIGHTS = {
+    "delta": 4,
+    "joints apart": 3,
+    "joints in the file": 3.5,
+    "joints repolarized": 3,
+    "speed": 2,
+    "events": 2.2,
+}
 """Shares of the height that the plots have."""
 
 HEAD_SHARE, LINE_SHARE, MOST_TEXT = 0.12, 0.022, 0.45
@@ -88,7 +97,7 @@ def _blueprint_of(root: Container) -> Blueprint:
 
 
 def opening_time(result: Result) -> int:
-    """Return where the viewer should stand in [ns]: at the worst sample of what is open, else the first.
+    """Return where the viewer should stand in [ns]: where the verdict was decided, else at the first sample.
 
     A simulation that failed opens where it ended, solved joint values where most branches are.
     """
@@ -99,7 +108,7 @@ def opening_time(result: Result) -> int:
     if isinstance(result, Run):
         return fullest_time(result) if result.ghosts else int(result.t_ns[0])
     open_first = result.ranking[-1]
-    return int(open_first.t_ns[open_first.worst])
+    return int(open_first.t_ns[decided_row(open_first)])
 
 
 def eye_and_target(scene: Scene) -> tuple[FloatArray, FloatArray]:
@@ -116,8 +125,15 @@ def _scene_view(scene: Scene) -> Spatial3DView:
     entities = ["/robot/**", "/path/**", "/point/**"]
     entities += ["/branches/**"] if scene.ghosts else []
     entities += ["/targets/**"] if scene.goals else []
-    name = f"Arm of {scene.whose} and paths [m]" if scene.whose else "Arm and paths [m]"
-    return rrb.Spatial3DView(origin="/", contents=entities, name=name, eye_controls=eye)
+    return rrb.Spatial3DView(origin="/", contents=entities, name=_scene_name(scene), eye_controls=eye)
+
+
+def _scene_name(scene: Scene) -> str:
+    """Return whose arm is drawn, and what the crimson line is."""
+    arm = f"Arm of {scene.whose}" if scene.whose else "Arm"
+    if scene.enlarged is None:
+        return f"{arm} and paths [m]"
+    return f"{arm} and paths [m], in crimson the deviation x{scene.enlarged.factor}"
 
 
 def _of_run(run: Run) -> Container:
@@ -138,19 +154,29 @@ def _of_comparison(result: Comparison) -> Container:
     import rerun.blueprint as rrb
 
     plots, standing = Plots(result), places_of(result)
-    name = result.reference.name
-    columns = [_of_log(plots, one, place, name) for one, place in zip(result.runs, standing, strict=True)]
+    columns = [_of_log(plots, one, place, result) for one, place in zip(result.runs, standing, strict=True)]
     if len(columns) == 1:
         return columns[0]
     return rrb.Tabs(*columns, active_tab=result.runs.index(result.ranking[-1]))
 
 
-def _of_log(plots: Plots, one: Deviation, place: Place, reference: str) -> Container:
-    """Return the plots of a compared log from top to bottom, what decides on it open in the first."""
-    deviations = plots.deviations(one, place, reference)
-    before = sum(len(views) for views in deviations[: decisive_plot(one)])
-    rows: list[Row] = [(_tabs([view for views in deviations for view in views], before), HEIGHTS["delta"])]
-    rows += _joint_rows(plots, one.run, place)
+def _of_log(plots: Plots, one: Deviation, place: Place, result: Comparison) -> Container:
+    """Return the plots of a compared log from top to bottom, what decides on it open in the first.
+
+    Where the joints were compared their deviation stands below, and those of the file behind a tab.
+    """
+    deviations = plots.deviations(one, place, result.reference.name, result.tolerance)
+    apart = deviations.pop("joints", [])
+    kinds = [plot for plot, views in deviations.items() for _ in views]
+    decisive = decisive_plot(one)
+    first = [view for views in deviations.values() for view in views]
+    rows: list[Row] = [(_tabs(first, kinds.index(decisive) if decisive in kinds else 0), HEIGHTS["delta"])]
+    if apart:
+        rows.append((_tabs(apart), HEIGHTS["joints apart"]))
+        joints = [view for views in reversed(list(plots.joints(one.run, place))) for view in views]
+        rows += [(_tabs(joints), HEIGHTS["joints repolarized"])] if joints else []
+    else:
+        rows += _joint_rows(plots, one.run, place)
     rows.append((_tabs(plots.compared_speed(one, place)), HEIGHTS["speed"]))
     rows.append((_tabs([_events(place), *plots.motion(one.run, place)]), HEIGHTS["events"]))
     return _stacked(rows, f"{one.verdict.upper()} {printable(one.name)}")

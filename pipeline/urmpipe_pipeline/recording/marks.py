@@ -9,10 +9,11 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.recording.columns import scalar_column, time_columns
 from urmpipe_pipeline.recording.entities import Place, printable
-from urmpipe_pipeline.recording.overview import COMPARED
+from urmpipe_pipeline.recording.shown_units import plotted_deviations
 from urmpipe_pipeline.recording.signal_entities import verdict_entities
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run
@@ -62,11 +63,11 @@ def draw_repolarizations(stream: RecordingStream, place: Place, run: Run) -> Non
 
 
 def draw_worst(stream: RecordingStream, place: Place, one: Deviation) -> None:
-    """Draw a line through the worst sample in every plot, as high as what is plotted there."""
+    """Draw a line through the sample that decides in every plot, as high as what is plotted there."""
     if len(one.run.t_ns) < 2:
         return  # the line's nanosecond would be the whole axis
     for plot, values in _plots(one):
-        _draw_instant(stream, worst_entity(place, plot), int(one.t_ns[one.worst]), values)
+        _draw_instant(stream, worst_entity(place, plot), int(one.t_ns[decided_row(one)]), values)
 
 
 def draw_meter_worst(stream: RecordingStream, result: Simulation) -> None:
@@ -94,7 +95,7 @@ def _draw_instant(stream: RecordingStream, entity: str, at_ns: int, values: Floa
         return
     style = rr.SeriesLines(
         colors=[rgb(NEUTRAL_COLOUR)],
-        names=["worst"],
+        names=["decides"],
         widths=[WORST_WIDTH],
         aggregation_policy=rr.components.AggregationPolicy.MinMax,
     )
@@ -106,12 +107,10 @@ def _draw_instant(stream: RecordingStream, entity: str, at_ns: int, values: Floa
 
 def _plots(one: Deviation) -> Iterator[tuple[str, FloatArray]]:
     """Yield what is plotted of a compared run, by the names of the plots."""
-    yield "delta", one.delta
+    yield from plotted_deviations(one)
     yield "raw", one.run.log.q
     yield "repolarized", one.run.q
-    for plot, values in zip(COMPARED, (one.speed, one.path, one.angle, one.joint_delta), strict=True):
-        if values is not None:
-            yield plot, values
+    yield "speed", one.speed
 
 
 def _kinds(audit: Sequence[AuditEntry]) -> dict[Mark, list[AuditEntry]]:

@@ -1,6 +1,7 @@
 """Few rows of what is long, so that the viewer shows it whole and at once: every peak stays.
 
-They stand beside the arrays that they are of, below overview/, and are there to be looked at only.
+They stand beside the arrays that they are of, below overview/, and are there to be looked at only: those of a
+deviation in the units that people read, of a short log with all its rows.
 """
 
 from __future__ import annotations
@@ -10,8 +11,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.recording.entities import Block, Place, places_of
+from urmpipe_pipeline.recording.shown_units import deviation_entity, plotted_deviations
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
@@ -26,9 +29,6 @@ SLICE = 65_536
 
 SPEED_ROWS = 2_000
 """Rows of the speed of a log that is not long: it is drawn only, so its recording hardly grows by it."""
-
-COMPARED = ("speed", "path", "angle", "joints")
-"""What is plotted of a deviation besides delta: entities below matched/<key>."""
 
 
 def overview_entity(entity: str) -> str:
@@ -52,11 +52,27 @@ def overviews(result: Result, every: Sequence[Block]) -> Iterator[Block]:
     for block in every:
         if block.entity in plotted and _long(block):
             yield _overview(block, ROWS)
+    if isinstance(result, Comparison):
+        yield from _deviations(result, every)
     if isinstance(result, Run) and result.tcp is not None:
         velocity = result.tcp.velocity
         speed = np.sqrt(np.einsum("ij,ij->i", velocity, velocity))[:, np.newaxis]
         whole = Block(speed_entity(places_of(result)[0]), result.t_ns, speed, "number", ("speed",))
         yield _overview(whole, ROWS if len(speed) > LONG else SPEED_ROWS)
+
+
+def _deviations(result: Comparison, every: Sequence[Block]) -> Iterator[Block]:
+    """Yield what is plotted of each deviation, in the units that people read."""
+    arrays = {block.entity: block for block in every}
+    for one, place in zip(result.runs, places_of(result), strict=True):
+        for plot, values in plotted_deviations(one):
+            shown = replace(arrays[deviation_entity(place, plot)], values=values)
+            yield _overview(shown, ROWS) if _long(shown) else _beside(shown)
+
+
+def _beside(block: Block) -> Block:
+    """Return an array with all its rows, as it stands among the overviews."""
+    return replace(block, entity=overview_entity(block.entity), worst=None)
 
 
 def _long(block: Block) -> bool:
@@ -75,8 +91,7 @@ def _plotted(run: Run, place: Place) -> Iterator[str]:
         yield f"{place.prefix}tcp/recorded"
     yield f"{place.prefix}joints/raw"
     yield f"{place.prefix}joints/repolarized"
-    yield place.named("delta")
-    yield from (place.named("matched", leaf) for leaf in COMPARED)
+    yield place.named("matched", "speed")
 
 
 def _overview(block: Block, most: int) -> Block:
@@ -86,11 +101,4 @@ def _overview(block: Block, most: int) -> Block:
     parts = [start + decimate(block.values[start : start + SLICE], each) for start in starts]
     rows = np.concatenate(parts)
     numbers = None if block.numbers is None else (block.numbers[0], block.numbers[1][rows])
-    return replace(
-        block,
-        entity=overview_entity(block.entity),
-        t_ns=block.t_ns[rows],
-        values=block.values[rows],
-        numbers=numbers,
-        worst=None,
-    )
+    return replace(_beside(block), t_ns=block.t_ns[rows], values=block.values[rows], numbers=numbers)

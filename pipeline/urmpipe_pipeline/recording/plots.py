@@ -6,12 +6,21 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import TYPE_CHECKING
 from uuid import UUID
 
-from urmpipe_models.arrays import IntArray
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.comparison.comparison import Deviation
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.recording.marks import mark_entity, worst_entity
 from urmpipe_pipeline.recording.overview import LONG, overview_entity, speed_entity
-from urmpipe_pipeline.recording.tolerances import tolerance_entities
+from urmpipe_pipeline.recording.shown_units import (
+    deviation_entity,
+    factors,
+    plotted_deviations,
+    shown_unit,
+    span_with_numbers,
+)
+from urmpipe_pipeline.recording.tolerances import PLOTS, UNSIGNED, tolerance_entities
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.signal_groups import Group
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
@@ -24,8 +33,12 @@ SHARED_AXIS = UUID("5c0dca6a-e63f-9cf7-f657-2602590474cc")
 """The view of which the viewer keeps the time axis that linked plots share. Without a range there, it opens a
 log of more than some minutes on a minute of it."""
 
-BEFORE, AFTER = 0.01, 0.17
+BEFORE, AFTER = 0.01, 0.24
 """Time shown before the first sample and after the last, as shares of all: there stands the legend."""
+
+
+TALL, LOW = 8, 4
+"""Multiples of a power of ten that the axis of a high and of a low plot has room for."""
 
 
 class Plots:
@@ -35,8 +48,10 @@ class Plots:
         self._range = _whole_time(result)
         self._shares_axis = True
 
-    def series(self, name: str, *entities: str, legend: bool = True) -> TimeSeriesView:
-        """Return a plot of some entities."""
+    def series(
+        self, name: str, *entities: str, legend: bool = True, span: tuple[float, float] | None = None
+    ) -> TimeSeriesView:
+        """Return a plot of some entities; its vertical axis spans all of them, or what is given."""
         import rerun.blueprint as rrb
 
         view = rrb.TimeSeriesView(
@@ -44,6 +59,7 @@ class Plots:
             contents=list(entities),
             name=name,
             axis_x=rrb.TimeAxis(link="LinkToGlobal", view_range=self._range),
+            axis_y=None if span is None else rrb.ScalarAxis(range=span),
             plot_legend=rrb.PlotLegend("RightTop", visible=legend),
         )
         if self._shares_axis:
@@ -74,27 +90,43 @@ class Plots:
         return self._arrays(name, printable(group.bracket), own, rows, *beside)
 
     def _arrays(
-        self, name: str, unit: str, entities: Sequence[str], rows: int, *beside: str, legend: bool = True
+        self,
+        name: str,
+        unit: str,
+        entities: Sequence[str],
+        rows: int,
+        *beside: str,
+        legend: bool = True,
+        span: tuple[float, float] | None = None,
     ) -> list[TimeSeriesView]:
+        """Return the plot of some arrays of equally many rows, as `array` does it of one."""
         if rows <= LONG:
-            return [self.series(f"{name} [{unit}]", *entities, *beside, legend=legend)]
+            return [self.series(f"{name} [{unit}]", *entities, *beside, legend=legend, span=span)]
         said = f"{name} [{unit}], every peak of {rows:,} rows"
         return [
-            self.series(said, *map(overview_entity, entities), *beside, legend=legend),
-            self.series(f"all {rows:,} rows [{unit}]", *entities, *beside, legend=legend),
+            self.series(said, *map(overview_entity, entities), *beside, legend=legend, span=span),
+            self.series(f"all {rows:,} rows [{unit}]", *entities, *beside, legend=legend, span=span),
         ]
 
     def joints(self, run: Run, place: Place) -> Iterator[list[TimeSeriesView]]:
-        """Yield the joints before and after, which share the legend of the first; nothing for a path."""
+        """Yield the joints before and after, which share the legend of the first; nothing for a path.
+
+        Where nothing was repolarized both are one plot: they would show the same.
+        """
         if not run.log.joints:
             return
         unit, raw, after = run.joint_unit(), f"{place.prefix}joints/raw", f"{place.prefix}joints/repolarized"
-        yield self.array("Joints in the file", unit, raw, run.log.rows, worst_entity(place, "raw"))
+        before = self.array("Joints in the file", unit, raw, run.log.rows, worst_entity(place, "raw"))
         marks = mark_entity(place, "**"), worst_entity(place, "repolarized")
+        if not run.audit:
+            name = "Joints, no repolarization needed" if run.goals is None else "Joints, solved"
+            same = self.array(name, unit, after, len(run.t_ns), *marks)
+            yield [*same, *before] if run.goals is None else same
+            return
         wraps, doubts = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
         found = f"{wraps} marked, {doubts} doubtful" if doubts else f"{wraps} marked"
-        name = f"Joints repolarized ({found if run.audit else 'none was needed'})"
-        yield self.array(name, unit, after, len(run.t_ns), *marks, legend=False)
+        yield before
+        yield self.array(f"Joints repolarized ({found})", unit, after, len(run.t_ns), *marks, legend=False)
 
     def speed(self, run: Run, place: Place) -> list[TimeSeriesView]:
         """Return the speed of an ingested log's tool centre point; nothing if it has none."""
@@ -105,23 +137,36 @@ class Plots:
     def compared_speed(self, one: Deviation, place: Place) -> list[TimeSeriesView]:
         """Return the speed of a compared log's tool centre point."""
         entity, worst = place.named("matched", "speed"), worst_entity(place, "speed")
-        return self.array("Speed of the TCP", "m/s", entity, len(one.sample), worst, legend=False)
+        span = _span([one.speed], LOW)
+        return self._arrays(
+            "Speed of the TCP", "m/s", [entity], len(one.sample), worst, legend=False, span=span
+        )
 
-    def deviations(self, one: Deviation, place: Place, reference: str) -> list[list[TimeSeriesView]]:
-        """Return what was held against a tolerance or can be: delta, path, angle and joints."""
-        found = [("delta", f"delta = {printable(reference)} - {printable(one.name)}", "m")]
-        found.append(("path", "Distance from the path", "m"))
-        if one.angle is not None:
-            found.append(("angle", "Angle between the orientations", "rad"))
-        if one.joint_delta is not None:
-            found.append(("joints", "Joints, reference - log", one.run.joint_unit()))
-        return [
-            self.array(
-                name, unit, place.named("delta") if plot == "delta" else place.named("matched", plot),
-                len(one.sample), tolerance_entities(plot), worst_entity(place, plot),
-            )
-            for plot, name, unit in found
-        ]  # fmt: skip
+    def deviations(
+        self, one: Deviation, place: Place, reference: str, tolerance: Mapping[str, float]
+    ) -> dict[str, list[TimeSeriesView]]:
+        """Return what was held against a tolerance or can be, by its plot: delta, path, angle and joints.
+
+        In the units that people read; of a long log there is a second view of all its rows, in SI.
+        """
+        names = {
+            "delta": f"delta = {printable(reference)} - {printable(one.name)}",
+            "path": "Distance from the path",
+            "angle": "Angle between the orientations",
+            "joints": "Joints, reference - log",
+        }
+        si = {"delta": "m", "path": "m", "angle": "rad", "joints": one.run.joint_unit()}
+        rows, views = len(one.sample), {}
+        for plot, values in plotted_deviations(one):
+            said = f"{names[plot]} [{shown_unit(one, plot)}]"
+            entity, long = deviation_entity(place, plot), rows > LONG
+            beside = tolerance_entities(plot), worst_entity(place, plot)
+            span = _span([values, *_allowed(one, plot, tolerance)], TALL)
+            said += f", every peak of {rows:,} rows" if long else ""
+            views[plot] = [self.series(said, overview_entity(entity), *beside, span=span)]
+            if long:
+                views[plot].append(self.series(f"all {rows:,} rows [{si[plot]}]", entity))
+        return views
 
     def motion(self, run: Run, place: Place) -> list[TimeSeriesView]:
         """Return the derivatives and the tool centre point, as far as the run has them."""
@@ -142,11 +187,25 @@ class Plots:
         return [self.series(name, place.prefix + entity) for name, entity in found]
 
 
-def decisive_plot(one: Deviation) -> int:
-    """Return which of the deviations decides: its place among `Plots.deviations`."""
-    kind = one.decisive.kind
-    plots = ["delta", "path", *(["angle"] if one.angle is not None else []), "joint"]
-    return plots.index("delta" if kind in ("axis", "norm") else kind)
+def decisive_plot(one: Deviation) -> str:
+    """Return in which of the plots of `Plots.deviations` stands what decides."""
+    return PLOTS[one.decisive.kind]
+
+
+def _allowed(one: Deviation, plot: str, tolerance: Mapping[str, float]) -> list[FloatArray]:
+    """Return what is allowed in a plot, in its unit: both signs of what has one."""
+    scale = float(factors(one, plot).max())
+    found = [(kind, allowed * scale) for kind, allowed in tolerance.items() if PLOTS[kind] == plot]
+    return [np.array([0.0 if kind in UNSIGNED else -allowed, allowed]) for kind, allowed in found]
+
+
+def _span(arrays: Sequence[FloatArray], most: int) -> tuple[float, float] | None:
+    """Return the range of an axis that shows some values and more numbers than 0; None without a value."""
+    known = [values[np.isfinite(values)] for values in arrays]
+    every = [values for values in known if len(values)]
+    if not every:
+        return None
+    return span_with_numbers(min(map(np.min, every)), max(map(np.max, every)), most)
 
 
 def _times(result: Result) -> list[IntArray]:

@@ -15,7 +15,9 @@ from urmpipe_models.kinematics.forward import points_over_log, positions_over_lo
 from urmpipe_models.transform import Transform, translation
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.comparison.wording import excess
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
 from urmpipe_pipeline.recording.bodies import Body, bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import enlarged
@@ -77,7 +79,7 @@ class Scene:
         arm: The arm of a run, of several the worst that has kinematics; None without a robot.
         ways: The paths.
         enlarged: The deviation as a path whose distance from the reference is a multiple of the true one.
-        worst: Where the largest deviation of all runs stands.
+        worst: Where the verdict on the log was decided whose arm it is.
         whose: Name of the log whose arm it is, where there are several; else empty.
         ghosts: The further branches of solved joint values.
         chosen: The name of the branch that the arm itself is in, where there are others.
@@ -150,10 +152,11 @@ def scene_of(result: Result) -> Scene:
         for i, (place, one) in enumerate(zip(standing, result.runs, strict=True))
     ]
     colour = run_colour(result.runs.index(shown))
-    arm = _arm(_aligned(shown), int(shown.t_ns[shown.worst]), colour)
+    arm = _arm(_aligned(shown), int(shown.t_ns[decided_row(shown)]), colour)
     whose = printable(shown.name) if arm is not None and len(result.runs) > 1 else ""
     scene = Scene(arm, (_asked(result.reference, shown), *ways), whose=whose)
-    return replace(scene, enlarged=enlarged(result, scene.ball()[1]), worst=_worst(result))
+    larger = enlarged(shown, scene.ball()[1])
+    return replace(scene, enlarged=larger, worst=_worst(shown, several=len(result.runs) > 1))
 
 
 def _of_run(run: Run, place: Place) -> Scene:
@@ -174,13 +177,11 @@ def arm_of(result: Comparison) -> Deviation:
     return next((one for one in worst_first if one.run.tcp is not None), worst_first[0])
 
 
-def _worst(result: Comparison) -> Mark:
-    """Return where the largest deviation of all runs stands, with its size and its time."""
-    one = max(result.runs, key=lambda run: run.statistics["norm"].max)
-    norm = one.statistics["norm"]
-    x, y, z = one.actual[one.worst].tolist()
-    whose = f", {printable(one.name)}" if len(result.runs) > 1 else ""
-    said = f"worst {text.quantity(norm.max, 'm')} at {text.seconds(norm.t_max)} s{whose}"
+def _worst(one: Deviation, *, several: bool) -> Mark:
+    """Return where the verdict on a log was decided: by what, how much and when."""
+    x, y, z = one.actual[decided_row(one)].tolist()
+    whose = f", {printable(one.name)}" if several else ""
+    said = f"{printable(excess(one.decisive))} at {text.seconds(one.decisive.t_max)} s{whose}"
     return Mark((x, y, z), said)
 
 
@@ -203,20 +204,21 @@ def _run_ways(run: Run, place: Place) -> Iterator[Way]:
 def _asked(reference: Trajectory, shown: Deviation) -> Way:
     """Return the reference: its lines whole, its point where it is at the samples of a run."""
     entities = entity_path("path", "reference"), entity_path("point", "reference")
-    strips = dashed(lines_of(reference.position))
-    track = track_of(shown.t_ns, shown.reference, shown.sample, shown.worst)
+    strips = () if shown.run.single_poses else dashed(lines_of(reference.position))
+    track = track_of(shown.t_ns, shown.reference, shown.sample, decided_row(shown))
     return Way(*entities, REFERENCE_COLOUR, True, strips, track)
 
 
 def _done(one: Deviation, place: Place, colour: str) -> Way:
     """Return where a compared run was."""
-    track = track_of(one.t_ns, one.actual, one.sample, one.worst)
+    row = decided_row(one)
+    track = track_of(one.t_ns, one.actual, one.sample, row)
     return Way(
         place.named("path"),
         place.named("point"),
         colour,
         False,
-        lines_of(one.actual, one.sample, one.worst),
+        () if one.run.single_poses else lines_of(one.actual, one.sample, row),
         track,
     )
 

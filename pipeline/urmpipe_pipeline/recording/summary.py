@@ -11,6 +11,7 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation
+from urmpipe_pipeline.comparison.symbols import used_words
 from urmpipe_pipeline.comparison.wording import alignment_words, excess, sync_words, tolerance_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import ghost_colour_word, run_colour_word
@@ -40,12 +41,15 @@ def _of_run(run: Run) -> Iterator[str]:
     marked = ", marked by triangles in the joint's colour" if wraps else ""
     doubts = f"; other findings: {others}, marked by crosses" if others else ""
     yield f"### {shown(run.name)}"
-    rows = f"{text.counted(run.log.rows, 'row')}, {run.duration:.6g} s"
+    rows = text.counted(run.log.rows, "row") + ("" if run.single_poses else f", {run.duration:.6g} s")
     yield f"{files}, {done} {shown(run.log.source)}: {rows}. {robot}"
     yield ""
-    every = f", one in {1e3 * run.tsp:.6g} ms" if len(run.t_ns) > 1 else ""
-    grid = f"Grid: {text.counted(len(run.t_ns), 'sample')}{every}."
-    yield f"{grid} Repolarizations: {wraps}{marked}{doubts}." if run.log.joints else grid
+    if run.single_poses:
+        yield f"Without times: the timeline counts rows, t = 0 s is row 1. Solved: {_reached(run)}."
+    else:
+        every = f", one in {1e3 * run.tsp:.6g} ms" if len(run.t_ns) > 1 else ""
+        grid = f"Grid: {text.counted(len(run.t_ns), 'sample')}{every}."
+        yield f"{grid} Repolarizations: {wraps}{marked}{doubts}." if run.log.joints else grid
     yield from _branches(run)
     yield from warning_lines(run.warnings)
 
@@ -54,7 +58,7 @@ def _branches(run: Run) -> Iterator[str]:
     """Yield which ghost is which branch, and at how many rows it is another solution: two in a line."""
     if not run.ghosts:
         return
-    rows = int(np.isfinite(run.log.q).all(axis=1).sum())
+    rows = _reached(run)
     names = {name for name in run.goals.branches if name} if run.goals else set()
     chosen = f"chosen: {shown(names.pop())}" if len(names) == 1 else "chosen"
     cells = [(chosen, f"solid, its tip {run_colour_word(0)}", str(rows))]
@@ -69,6 +73,11 @@ def _branches(run: Run) -> Iterator[str]:
     if len(run.ghosts) > BRANCHES:
         yield ""
         yield f"and {len(run.ghosts) - BRANCHES} more branches"
+
+
+def _reached(run: Run) -> int:
+    """Return how many rows have every joint."""
+    return int(np.isfinite(run.log.q).all(axis=1).sum())
 
 
 def _of_comparison(result: Comparison) -> Iterator[str]:
@@ -87,13 +96,17 @@ def _of_comparison(result: Comparison) -> Iterator[str]:
     told = [warning.of(one.name) for one in result.runs for warning in one.run.warnings]
     yield from warning_lines([*result.warnings, *told])
     yield ""
-    yield "All figures, statistics and provenance: `urmpipe report` with this file."
+    at = text.seconds(worst.decisive.t_max)
+    yield (
+        f"Decided at {at} s: `urmpipe view` opens this there, other programs at the first sample. All"
+        " figures, statistics and provenance: `urmpipe report` with this file."
+    )
 
 
 def _worst(one: Deviation, several: bool) -> str:
     """Return how much, where and when of the log that comes out worst."""
     decisive = one.decisive
-    used = "" if decisive.used is None else f" ({text.used(decisive)})"
+    used = "" if decisive.used is None else f" ({used_words(decisive)})"
     said = f"**{shown(one.name)}**: " if several else ""
     said += f"{shown(excess(decisive))}{used}, at {text.seconds(decisive.t_max)} s."
     if one.verdict == "fail":
@@ -107,7 +120,7 @@ def _worst(one: Deviation, several: bool) -> str:
 
 def _table(result: Comparison) -> Iterator[str]:
     """Yield the logs from best to worst."""
-    heads = ("log", "drawn", *(f"{axis} [mm]" for axis in AXES), "worst at [s]", "out", "verdict")
+    heads = ("log", "drawn", *(f"{axis} [mm]" for axis in AXES), "decides at [s]", "out", "verdict")
     yield table_row(heads)
     yield table_row("---" for _ in heads)
     for one in result.ranking:
@@ -119,7 +132,7 @@ def _cells(index: int, one: Deviation) -> Iterable[str]:
     yield run_colour_word(index)
     for axis in AXES:
         yield text.millimetres(one.statistics[axis].max, one.statistics[axis].tolerance)
-    yield text.seconds(float(one.t[one.worst]))
+    yield text.seconds(one.decisive.t_max)
     yield text.percent(one.share_out)
     yield one.verdict.upper()
 

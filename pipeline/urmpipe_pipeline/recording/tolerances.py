@@ -14,6 +14,7 @@ from urmpipe_pipeline.recording.columns import scalar_column, time_columns
 from urmpipe_pipeline.recording.entities import entity_path
 from urmpipe_pipeline.recording.signal_entities import verdict_entities
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.text import SHOWN
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -38,7 +39,17 @@ def draw_tolerances(stream: RecordingStream, result: Comparison) -> None:
     ends = _ends([one.t_ns for one in result.runs])
     numbers = _ends([one.sample for one in result.runs])
     for kind, allowed in result.tolerance.items():
-        _draw(stream, entity_path("tolerance", PLOTS[kind], kind), kind, allowed, ends, numbers)
+        unit, factor = SHOWN[_unit(result, kind)]
+        entity = entity_path("tolerance", PLOTS[kind], kind)
+        _draw(stream, entity, kind, allowed * factor, unit, ends, numbers)
+
+
+def _unit(result: Comparison, kind: str) -> str:
+    """Return the SI unit of what is allowed: that of joints is of those that were held against it."""
+    if kind != "joint":
+        return "rad" if kind == "angle" else "m"
+    joints = (joint for one in result.runs for joint in one.joint_statistics.values())
+    return next((joint.unit for joint in joints if joint.tolerance is not None), "rad")
 
 
 def draw_meter_tolerances(stream: RecordingStream, result: Simulation) -> None:
@@ -48,20 +59,25 @@ def draw_meter_tolerances(stream: RecordingStream, result: Simulation) -> None:
     ends, numbers = result.t_ns[[0, -1]], np.array([0, len(result.t_ns) - 1])
     for one, root in zip(result.verdicts, verdict_entities(result, "tolerance"), strict=True):
         for kind, allowed in one.tolerance.items():
-            _draw(stream, f"{root}/{kind}", kind, allowed, ends, numbers)
+            _draw(stream, f"{root}/{kind}", kind, allowed, "m", ends, numbers)
 
 
 def _draw(
-    stream: RecordingStream, entity: str, kind: str, allowed: float, ends: IntArray, numbers: IntArray
+    stream: RecordingStream,
+    entity: str,
+    kind: str,
+    allowed: float,
+    unit: str,
+    ends: IntArray,
+    numbers: IntArray,
 ) -> None:
-    """Draw one tolerance as lines: both signs of what has a sign."""
+    """Draw one tolerance, in the unit of its plot, as lines: both signs of what has a sign."""
     import rerun as rr
 
     signs = (1,) if kind in UNSIGNED else (1, -1)
     colour = rgb(AXIS_COLOURS.get(kind, REFERENCE_COLOUR))
     what = "tolerance" if kind not in AXIS_COLOURS else f"tolerance of {kind}"
-    # The axis of a plot may show no number but 0: what is allowed says how large the rest is.
-    said = f"{what} {allowed:.6g}"
+    said = f"{what} {allowed:.4g} {unit}"
     names = [f"{'+' if sign > 0 else '-'}{said}" if len(signs) > 1 else said for sign in signs]
     style = rr.SeriesLines(colors=[colour] * len(signs), names=names, widths=[LIMIT_WIDTH] * len(signs))
     stream.log(entity, style, static=True)

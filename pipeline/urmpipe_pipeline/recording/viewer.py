@@ -1,4 +1,4 @@
-"""Open recordings in the viewer that was installed with Rerun, each paused at its worst sample.
+"""Open recordings in the viewer that was installed with Rerun, each paused where its verdict was decided.
 
 One window a recording: within one, the viewer shows all recordings of a program in the layout of the first.
 """
@@ -11,7 +11,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Mapping, Sequence
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -35,8 +35,12 @@ GRACE = 5.0
 DISPLAYS = ("DISPLAY", "WAYLAND_DISPLAY")
 
 
+class _ClosedError(ViewerError):
+    """The window was closed before it showed the recording."""
+
+
 def view_recordings(paths: Sequence[Path]) -> None:
-    """Open a window for each recording, and return when all of them are closed.
+    """Open a window for each recording, and return when all of them are closed, however early.
 
     Ctrl-C (KeyboardInterrupt) closes them.
 
@@ -50,8 +54,11 @@ def view_recordings(paths: Sequence[Path]) -> None:
     times = opening_times(paths)
     refuse_without_display(paths, os.environ)
     with ExitStack() as windows:
-        processes = [windows.enter_context(open_window(path, at)) for path, at in times.items()]
-        for process, _ in processes:
+        processes = []
+        for path, at in times.items():
+            with suppress(_ClosedError):
+                processes.append(windows.enter_context(open_window(path, at))[0])
+        for process in processes:
             process.wait()
 
 
@@ -167,6 +174,8 @@ def _shown(process: subprocess.Popen[bytes], url: str, path: Path, at_ns: int) -
         except OSError:  # it does not listen yet, or has just ended
             time.sleep(0.1)
     code = process.poll()
+    if code == 0:
+        raise _ClosedError(f"the window was closed before it showed {path}")
     how = f"did not answer within {PATIENCE:.0f} s" if code is None else f"ended with exit code {code}"
     raise ViewerError(
         f"the viewer {how}, allowed: a display and a graphics driver that it can use; what is wrong it says"

@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.symbols import size_of
 from urmpipe_pipeline.comparison.wording import of_allowed, tolerance_words
 from urmpipe_pipeline.report.facts import Fact
 from urmpipe_pipeline.runs.results import Run
@@ -22,7 +23,7 @@ class Banner:
     """The verdict.
 
     Attributes:
-        state: pass, fail, or ingested where nothing was compared.
+        state: pass, fail, or ingested where nothing was judged.
         word: The same in capitals.
         headline: One sentence.
         facts: How much, when, where, against what.
@@ -58,7 +59,9 @@ def banner(comparisons: Sequence[Comparison], runs: Sequence[Run], links: Sequen
         headline = f"{_who(failed, total)} out of tolerance{_named(failed, total)}"
     else:
         headline = f"{_who([one for one, _ in places], total)} within tolerance"
-    state = "fail" if failed else "pass"
+    state = "fail" if any(one.verdict == "fail" for one in comparisons) else "pass"
+    if state == "fail" and not failed:
+        headline += ", but worse than the baseline"
     return Banner(state, state.upper(), headline, (*_decisive(run, href), *_against(comparisons)))
 
 
@@ -79,13 +82,22 @@ def _named(runs: Sequence[Deviation], total: int) -> str:
 def _decisive(run: Deviation, href: str) -> tuple[Fact, ...]:
     """Return which quantity uses up the largest share of its tolerance, how much, when and where."""
     one = run.decisive
-    amount = f"{text.size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
+    amount = f"{size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
     return (
         Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", run.name, href=href),
         Fact("How much", amount),
+        *_joint_furthest_off(run),
         Fact("When", f"t = {text.seconds(one.t_max)} s"),
-        Fact("Where (x, y, z)", f"{text.point(run.place(one))} m"),
+        Fact("Where the log was (x, y, z)", f"{text.point(run.place(one))} m"),
     )
+
+
+def _joint_furthest_off(run: Deviation) -> tuple[Fact, ...]:
+    """Return the joint that deviates most, of a log that is out of tolerance by something else."""
+    joint = run.furthest_joint("rad") or run.furthest_joint("m")
+    if run.verdict == "pass" or joint is None or run.decisive.kind == "joint" or not joint.max:
+        return ()
+    return (Fact("Joint furthest off", f"{joint.quantity}: {text.quantity(joint.max, joint.unit)}"),)
 
 
 def _against(comparisons: Sequence[Comparison]) -> tuple[Fact, ...]:
@@ -100,18 +112,28 @@ def _against(comparisons: Sequence[Comparison]) -> tuple[Fact, ...]:
 
 def _ingested(runs: Sequence[Run]) -> Banner:
     """Say what was ingested, or solved if nothing else was."""
+    warnings = text.counted(sum(len(run.warnings) for run in runs), "warning")
+    solved = [run for run in runs if run.goals is not None]
+    missed = any(_reached(run) < run.log.rows for run in solved)
+    if solved and (missed or len(solved) == len(runs)):
+        return _solved(solved, warnings, missed=missed)
     rows = sum(run.log.rows for run in runs)
     wraps = sum(len(run.repolarizations) for run in runs)
-    warnings = sum(len(run.warnings) for run in runs)
     subject = runs[0].name if len(runs) == 1 else text.counted(len(runs), "log")
     headline = f"{subject}: {text.counted(rows, 'row')}, {text.counted(wraps, 'repolarization')}"
-    solved = all(run.goals is not None for run in runs)
-    if solved:
-        reached = sum(int(np.isfinite(run.log.q).all(axis=1).sum()) for run in runs)
-        headline = f"{subject}: {reached} of {text.counted(rows, 'target')} with a solution"
-    return Banner(
-        "ingested",
-        "SOLVED" if solved else "INGESTED",
-        headline,
-        detail=f"{text.counted(warnings, 'warning')}. Nothing was compared: there is no verdict.",
-    )
+    detail = f"{warnings}. Nothing was compared: there is no verdict."
+    return Banner("ingested", "INGESTED", headline, detail=detail)
+
+
+def _solved(runs: Sequence[Run], warnings: str, *, missed: bool) -> Banner:
+    """Say how many targets have a solution: the verdict is that of `urmpipe ik`, fail if one has none."""
+    reached, wanted = sum(map(_reached, runs)), sum(run.log.rows for run in runs)
+    subject = runs[0].name if len(runs) == 1 else text.counted(len(runs), "file")
+    headline = f"{subject}: {reached} of {text.counted(wanted, 'target')} with a solution"
+    state = "fail" if missed else "pass"
+    return Banner(state, "FAIL" if missed else "SOLVED", headline, detail=f"{warnings}.")
+
+
+def _reached(run: Run) -> int:
+    """Return how many rows of a log have every joint."""
+    return int(np.isfinite(run.log.q).all(axis=1).sum())

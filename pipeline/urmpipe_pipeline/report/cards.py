@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import size_of, used_words
 from urmpipe_pipeline.report.facts import (
     Fact,
     alignment_value,
@@ -42,8 +43,14 @@ class Card:
     facts: tuple[Fact, ...]
 
 
-def card(deviation: Deviation, href: str) -> Card:
-    """Return the card of a compared log."""
+def card(deviation: Deviation, href: str, covered: float) -> Card:
+    """Return the card of a compared log.
+
+    Args:
+        deviation: The log.
+        href: Where its part of the page is.
+        covered: Share of the reference's samples within its time, 0..1.
+    """
     decisive = deviation.decisive
     tolerance = decisive.tolerance
     shown = text.SHOWN[decisive.unit][0]
@@ -51,22 +58,23 @@ def card(deviation: Deviation, href: str) -> Card:
         name=deviation.name,
         href=href,
         state=deviation.verdict,
-        size=text.size_of(decisive),
+        size=size_of(decisive),
         amount=text.quantity(decisive.max, decisive.unit, tolerance),
         allowed="" if tolerance is None else f"{text.limit(tolerance, decisive.unit)} {shown}",
         share=None if decisive.used is None else min(decisive.used, 1.0),
-        used=text.used(decisive),
-        facts=tuple(fact for fact in _facts(deviation) if fact.value),
+        used=used_words(decisive),
+        facts=tuple(fact for fact in _facts(deviation, covered) if fact.value),
     )
 
 
-def _facts(deviation: Deviation) -> list[Fact]:
+def _facts(deviation: Deviation, covered: float) -> list[Fact]:
     decisive = deviation.decisive
     found = deviation.statistics
     angle = found.get("angle")
     return [
         Fact("When", f"t = {text.seconds(decisive.t_max)} s"),
         Fact("Where (x, y, z)", f"{text.point(deviation.place(decisive))} m"),
+        Fact("Covered", f"{text.percent(covered)} of the reference"),
         Fact("Largest ‖Δ‖", _largest(found["norm"])),
         Fact("Off the path", _largest(found["path"])),
         Fact("Largest angle", _largest(angle) if angle else ""),

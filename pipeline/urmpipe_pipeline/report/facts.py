@@ -36,12 +36,20 @@ def run_facts(run: Run) -> tuple[Fact, ...]:
     return _told(
         Fact("Robot", run.robot.name if run.robot else "none: no kinematics"),
         Fact("Source", run.log.source),
-        Fact("Rows", f"{run.log.rows} every {text.seconds(run.log.period)} s"),
-        Fact("Grid", f"{len(run.t_ns)} samples every {text.seconds(run.tsp)} s"),
-        Fact("Duration", f"{text.seconds(run.duration)} s"),
+        *_time_facts(run),
         *_solved_facts(run),
         Fact("Recording", str(run.recording) if run.recording else ""),
     )
+
+
+def _time_facts(run: Run) -> Iterator[Fact]:
+    """Yield how many rows a log has and how far apart; single poses have no times."""
+    if run.single_poses:
+        yield Fact("Rows", f"{run.log.rows}, without times")
+        return
+    yield Fact("Rows", f"{run.log.rows} every {text.seconds(run.log.period)} s")
+    yield Fact("Grid", f"{len(run.t_ns)} samples every {text.seconds(run.tsp)} s")
+    yield Fact("Duration", f"{text.seconds(run.duration)} s")
 
 
 def _solved_facts(run: Run) -> Iterator[Fact]:

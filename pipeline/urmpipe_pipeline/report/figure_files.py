@@ -6,8 +6,8 @@ import re
 import struct
 import unicodedata
 import zlib
-from collections.abc import Callable, Sequence
-from contextlib import ExitStack
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from html import escape
 from importlib.metadata import version
@@ -96,7 +96,6 @@ def write_figures(
     Raises:
         OutputError: If they may not be written there, or there is nothing to draw them with.
     """
-    _make_folder(options.folder)
     stems = unique([figure_stem(figure.title, part) for part, figure in figures])
     wanted = [
         (figure, suffix, FigureFile(options.folder / f"{stem}.{suffix}", figure.title, part))
@@ -104,6 +103,7 @@ def write_figures(
         for suffix in options.formats
     ]
     with ExitStack() as stack:
+        stack.enter_context(_made_folder(options.folder))
         places = [stack.enter_context(guarded_output(file.path, inputs, "figure")) for _, _, file in wanted]
 
         def write(number: int, drawn: bytes) -> None:
@@ -119,12 +119,22 @@ def write_figures(
     return tuple(file for _, _, file in wanted)
 
 
-def _make_folder(folder: Path) -> None:
+@contextmanager
+def _made_folder(folder: Path) -> Iterator[None]:
+    """Make a folder with those above it, which stay only if the body succeeds."""
+    new = [one for one in (folder, *folder.parents) if not one.exists()]
     try:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         said = "found a file, allowed: a folder" if folder.is_file() else error.strerror or str(error)
         raise OutputError(Finding(f"--figures: {said}", str(folder))) from error
+    try:
+        yield
+    except BaseException:
+        for one in new:
+            with suppress(OSError):  # somebody else put a file there meanwhile
+                one.rmdir()
+        raise
 
 
 def _plain_name(text: str) -> str:

@@ -9,6 +9,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import AXES, Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import SYMBOLS
 from urmpipe_pipeline.comparison.wording import correlation
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, joint_colour
 from urmpipe_pipeline.report.spec import MUTED, Figure, Panel, Spec, axis, base_layout, stacked, typed
@@ -47,7 +48,7 @@ STRENGTHS = ((0.7, "strongly"), (0.4, "moderately"), (0.2, "weakly"))
 
 def deviation_figure(deviation: Deviation) -> Figure:
     """Return delta, its norm and the distance from the path with tolerances, and the tool's speed."""
-    named = [(name, text.SYMBOLS[name], AXIS_COLOURS[name]) for name in AXES]
+    named = [(name, SYMBOLS[name], AXIS_COLOURS[name]) for name in AXES]
     columns = [*zip(named, deviation.delta.T, strict=True), (("path", "path", MUTED), deviation.path)]
     panels = [
         _panel(deviation, deviation.statistics[name], symbol, colour, values)
@@ -57,7 +58,7 @@ def deviation_figure(deviation: Deviation) -> Figure:
     if speed:
         drawn = line(deviation.t, deviation.speed, "speed", MUTED, "m/s")
         panels.append(Panel("‖v‖ [m/s]", [drawn], from_zero=True))
-    t_worst, duration = float(deviation.t[deviation.worst]), deviation.run.duration
+    at, duration = deviation.decisive.t_max, deviation.run.duration
     largest = ", ".join(
         f"{symbol} {_most(deviation.statistics[name])} at {text.seconds(deviation.statistics[name].t_max)} s"
         for (name, symbol, _), _ in columns
@@ -66,10 +67,10 @@ def deviation_figure(deviation: Deviation) -> Figure:
         "Deviation" + (" and speed" if speed else "") + " over time",
         "Δ is reference minus actual at the same time; path is the distance from the reference's path, time"
         " left out. Dashed: the tolerance; tinted: out of it. Diamonds: the largest value of each. Dotted:"
-        " the worst moment.",
+        " when the verdict was decided.",
         f"Deviation of {deviation.name} from the reference over time. Largest absolute values: {largest}."
         f" {_out_of_tolerance(deviation)}",
-        stacked(panels, duration, [instant(t_worst, f"worst {text.seconds(t_worst)} s", duration)]),
+        stacked(panels, duration, [instant(at, f"decides at {text.seconds(at)} s", duration)]),
         PANEL_PX * len(panels) + AROUND_PX,
     )
 

@@ -11,9 +11,18 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import SourceFile
+from urmpipe_pipeline.json_values import plain
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditKind
-from urmpipe_pipeline.report.tables import Cell, Column, Table, listing, numbers, words
+from urmpipe_pipeline.report.tables import (
+    Cell,
+    Column,
+    Table,
+    listing,
+    numbers,
+    without_empty_columns,
+    words,
+)
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result
 
@@ -40,14 +49,14 @@ def ingest_table(runs: Sequence[Run], links: Sequence[str]) -> Table:
             Cell(run.robot.name if run.robot else "none"),
             Cell(run.log.source),
             Cell(str(run.log.rows)),
-            Cell(text.seconds(run.duration)),
+            Cell(text.NOTHING if run.single_poses else text.seconds(run.duration)),
             Cell(str(len(run.log.joints))),
             Cell(str(len(run.repolarizations))),
             Cell(str(len(run.warnings))),
         )
         for run, link in zip(runs, links, strict=True)
     )
-    return Table("What was read", columns, rows)
+    return without_empty_columns(Table("What was read", columns, rows))
 
 
 def audit_table(run: Run) -> Table:
@@ -82,11 +91,17 @@ def missed_table(run: Run) -> Table | None:
     if goals is None or not goals.missed.any():
         return None
     rows = [
-        (str(k + 1), text.seconds(goals.t_ns[k] / 1e9), text.point(goals.position[k]), goals.reasons[k])
+        (
+            str(k + 1),
+            text.NOTHING if run.single_poses else text.seconds(goals.t_ns[k] / 1e9),
+            text.point(goals.position[k]),
+            goals.reasons[k],
+        )
         for k in np.flatnonzero(goals.missed).tolist()
     ]
     columns = (*numbers("Row", "t [s]"), *words("x, y, z [m]", "Why"))
-    return listing(f"Targets without a solution ({len(rows)})", columns, rows)
+    table = listing(f"Targets without a solution ({len(rows)})", columns, rows)
+    return without_empty_columns(table)
 
 
 def warnings_table(found: Result) -> Table:
@@ -121,4 +136,4 @@ def provenance_table(provenance: Provenance) -> Table:
 
 
 def _named(word: str, values: Mapping[str, Any]) -> list[tuple[str, str]]:
-    return [(f"{word} {name}", text.plain(value)) for name, value in values.items()]
+    return [(f"{word} {name}", plain(value)) for name, value in values.items()]

@@ -203,7 +203,10 @@ def _summary(comparison: Comparison, links: Sequence[str]) -> Summary:
     return Summary(
         f"Verdict{'s' if several else ''} against {comparison.reference.name}"
         f"{', best to worst' if several else ''}",
-        tuple(card(run, link) for run, link in zip(comparison.ranking, links, strict=True)),
+        tuple(
+            card(run, link, comparison.covered(run))
+            for run, link in zip(comparison.ranking, links, strict=True)
+        ),
         verdict_tables.ranking_tables(comparison, links) if several else (),
         f"Tolerance: {tolerance_words(comparison)}. The bars show how much of it is used up.",
     )
@@ -254,7 +257,8 @@ def _run_part(run: Run, ident: str) -> Part:
     """Return the part of one log that was only ingested."""
     missed = log_tables.missed_table(run)
     blocks = (*((missed,) if missed else ()), *gallery.run_figures(run), *_run_tables(run))
-    return Part(f"Log {run.name}", blocks, (), ident, "", run_facts(run))
+    title = f"Log {run.name}" if run.goals is None else f"Targets {run.name}"
+    return Part(title, blocks, (), ident, "", run_facts(run))
 
 
 def _run_tables(run: Run) -> tuple[Block, ...]:

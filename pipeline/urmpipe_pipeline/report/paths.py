@@ -8,6 +8,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.wording import excess
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.report.figures_motion import point_name
@@ -26,7 +27,11 @@ CAMERA = {"eye": {"x": 1.5, "y": -1.5, "z": 0.86}, "center": {"x": 0.0, "y": 0.0
 HANDLING = "Drag to turn; pinch to zoom, with a mouse by the bar at the top right."
 
 AROUND, CLOSEST = 0.05, 1e-3
-"""Space around the path of an arm as a share of its extent, and half of the shortest axis in [m]."""
+"""Space around a slim path as a share of its extent, and half of the shortest axis in [m]."""
+
+SLIM = 1.7
+"""Largest extent over the geometric mean of the three: from there on plotly.js, which keeps the volume of the
+scene, draws the longest axis out of view."""
 
 SCENE_PX = 540
 """Height of a scene."""
@@ -40,16 +45,15 @@ def path_figure(deviation: Deviation) -> Figure:
         "actual", deviation.actual[kept], deviation.t[kept], norm[kept], line=_by_deviation(norm, kept)
     )
     reference = _way("reference", deviation.reference, deviation.t, REFERENCE_COLOUR, 2)
-    worst = deviation.worst
-    where = text.point(deviation.actual[worst])
-    spots = [*_ends(deviation.actual), _spot("worst", deviation.actual[worst], FAULT, "diamond")]
+    place = deviation.place(deviation.decisive)
+    spots = [*_ends(deviation.actual), _spot("decides", place, FAULT, "diamond")]
     return Figure(
         "Path in space",
         "Equal scale on all axes. The colour is the distance from the reference at the same time. "
         f"{HANDLING}",
-        f"Paths of the reference and of {deviation.name} in three dimensions. The worst point is at"
-        f" x, y, z = {where} m, {text.millimetres(deviation.statistics['norm'].max)} mm off.",
-        _scene([reference, actual, *spots]),
+        f"Paths of the reference and of {deviation.name} in three dimensions. The verdict was decided at"
+        f" x, y, z = {text.point(place)} m: {excess(deviation.decisive)}.",
+        _scene([reference, actual, *spots], deviation.actual, deviation.reference),
         SCENE_PX,
         space=True,
     )
@@ -70,7 +74,7 @@ def run_path_figure(run: Run) -> Figure | None:
         "Path in space",
         f"The tool centre point, equal scale on all axes. {HANDLING}",
         f"Path of {run.name} in three dimensions, within ({text.point(low)}) m and ({text.point(high)}) m.",
-        _scene([*traces, *_ends(known)]),
+        _scene([*traces, *_ends(known)], known),
         SCENE_PX,
         space=True,
     )
@@ -87,8 +91,7 @@ def arms_path_figure(simulation: Simulation) -> Figure | None:
         _way(block, position, simulation.t, run_colour(i), 4) for i, (block, position) in enumerate(found)
     ]
     low, high = every.min(axis=0), every.max(axis=0)
-    spec = _scene([*ways, *_ends(known[0] if len(known[0]) else every)])
-    _frame(spec, low, high)
+    spec = _scene([*ways, *_ends(known[0] if len(known[0]) else every)], every)
     return Figure(
         "Path in space",
         f"The tip of each arm, equal scale on all axes. {HANDLING}",
@@ -121,7 +124,9 @@ def repolarized_path_figure(run: Run, played: Playback) -> Figure | None:
                 _way("before", played.position, played.t, FAULT, 2, BEFORE_POINTS),
                 _way("after", after, run.t, AXIS_COLOURS["norm"], 5),
                 *spots,
-            ]
+            ],
+            after,
+            played.position,
         ),
         SCENE_PX,
         space=True,
@@ -195,17 +200,27 @@ def _in_space(position: FloatArray) -> Spec:
     return {"type": "scatter3d", "x": x, "y": y, "z": z}
 
 
-def _frame(spec: Spec, low: FloatArray, high: FloatArray) -> None:
-    """Give a scene axes of one length around what lies between two corners: a slim path stays in view."""
-    spec["layout"]["scene"]["aspectmode"] = "cube"
-    half = max(float((high - low).max()) / 2.0 * (1.0 + AROUND), CLOSEST)
-    for name, middle in zip("xyz", ((low + high) / 2.0).tolist(), strict=True):
-        spec["layout"]["scene"][f"{name}axis"]["range"] = [middle - half, middle + half]
+def _scene(traces: list[Spec], *positions: FloatArray) -> Spec:
+    """Return a scene with equal scale on all axes, the z axis up.
 
-
-def _scene(traces: list[Spec]) -> Spec:
-    """Return a scene with equal scale on all axes, the z axis up."""
+    Args:
+        traces: What is in it.
+        positions: Where that is, in [m], shape (any, 3) each: around a slim path all axes are equally long.
+    """
     axes = {f"{name}axis": space_axis(f"{name} [m]") for name in "xyz"}
     scene = axes | {"aspectmode": "data", "camera": CAMERA}
+    every = np.concatenate(positions)
+    known = every[np.isfinite(every).all(axis=1)]
+    if len(known) and _slim(low := known.min(axis=0), high := known.max(axis=0)):
+        half = max(float((high - low).max()) / 2.0 * (1.0 + AROUND), CLOSEST)
+        for name, middle in zip("xyz", ((low + high) / 2.0).tolist(), strict=True):
+            axes[f"{name}axis"]["range"] = [middle - half, middle + half]
+        scene["aspectmode"] = "cube"
     layout = base_layout() | {"scene": scene, "margin": {"l": 0, "r": 0, "t": 0, "b": 56}}
     return {"data": traces, "layout": layout}
+
+
+def _slim(low: FloatArray, high: FloatArray) -> bool:
+    """Tell whether what lies between two corners is much longer than wide or high."""
+    extent = np.maximum(high - low, CLOSEST)
+    return bool(extent.max() > SLIM * np.prod(extent) ** (1.0 / 3.0))

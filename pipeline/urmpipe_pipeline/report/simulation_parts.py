@@ -7,6 +7,7 @@ from dataclasses import replace
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.symbols import SYMBOLS
 from urmpipe_pipeline.comparison.wording import meter_words
 from urmpipe_pipeline.report.banner import Banner
 from urmpipe_pipeline.report.cards import Card
@@ -120,7 +121,7 @@ def _size(worst: DeltaVerdict | None) -> str:
     """Return what is worst, such as |Δx|; nothing where nothing is judged."""
     if worst is None:
         return "Simulated"
-    return text.SYMBOLS["norm"] if worst.quantity == "norm" else f"|{text.SYMBOLS[worst.quantity]}|"
+    return SYMBOLS["norm"] if worst.quantity == "norm" else f"|{SYMBOLS[worst.quantity]}|"
 
 
 def _worst(worst: DeltaVerdict) -> str:

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.symbols import SYMBOLS
 from urmpipe_pipeline.report.tables import Cell, Column, Table, judged, listing, numbers, words
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation, extremes
 
@@ -46,7 +47,7 @@ def meters_table(verdicts: Sequence[DeltaVerdict]) -> Table:
             Cell(one.block),
             Cell(text.millimetres(one.worst, one.allowed)),
             Cell(text.limit(one.allowed)),
-            Cell(text.SYMBOLS[one.quantity]),
+            Cell(SYMBOLS[one.quantity]),
             Cell(text.seconds(one.t)),
             Cell(str(one.sample)),
             Cell(f"{one.out_of_tolerance} ({text.percent(one.share_out)})"),

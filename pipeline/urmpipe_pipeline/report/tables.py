@@ -24,12 +24,14 @@ class Cell:
         state: pass or fail, shown as a sign and a word; empty where it is no judgement.
         href: Where it leads, such as "#r1".
         used: Share of the tolerance that is used up, 0..1, shown as a bar under the number.
+        most: True for what stands out of its column: shown bold.
     """
 
     text: str
     state: str = ""
     href: str = ""
     used: float | None = None
+    most: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import SYMBOLS, size_of, symbol
 from urmpipe_pipeline.report.facts import alignment_value, speed_correlation
 from urmpipe_pipeline.report.tables import (
     Cell,
@@ -40,7 +42,12 @@ def statistics_tables(deviation: Deviation) -> tuple[Table, ...]:
     tables = []
     for unit, (shown, _) in text.SHOWN.items():
         pairs = zip(deviation.all_statistics, starts, strict=True)
-        rows = tuple(_statistics_row(one, start) for one, start in pairs if one.unit == unit)
+        joint = deviation.furthest_joint(unit)
+        rows = tuple(
+            _statistics_row(one, start, most=one is joint and one.max > 0.0)
+            for one, start in pairs
+            if one.unit == unit
+        )
         if rows:
             about = dict.fromkeys(ABOUT[one.kind] for one in deviation.all_statistics if one.unit == unit)
             title = f"Statistics of {text.enumerated(tuple(about))}"
@@ -53,23 +60,28 @@ def _how_far(comparison: Comparison, links: Sequence[str]) -> Table:
     """Return the largest deviation of each kind and how much is out of tolerance, one line a log."""
     columns: tuple[Column, ...] = (
         *words("Log", "Verdict", "Decided by"),
-        *numbers(*(f"max |{text.SYMBOLS[axis]}| [mm]" for axis in "xyz"), "max ‖Δ‖ [mm]", "max path [mm]"),
-        *numbers("max angle [deg]", "max joint [deg]", "max joint [mm]", "Share out"),
+        *numbers(*(f"max |{SYMBOLS[axis]}| [mm]" for axis in "xyz"), "max ‖Δ‖ [mm]", "max path [mm]"),
+        *numbers("max angle [deg]", "max joint [deg]", "max joint [mm]", "Share out", "Covered"),
     )
-    rows = tuple(_how_far_row(run, link) for run, link in zip(comparison.ranking, links, strict=True))
+    rows = tuple(
+        _how_far_row(run, link, comparison.covered(run))
+        for run, link in zip(comparison.ranking, links, strict=True)
+    )
     note = "The bars show how much of a tolerance is used up; the logs are ranked by the fullest of theirs."
+    note += " Covered: share of the reference within the log's time."
     return without_empty_columns(Table("Largest deviations, best to worst", columns, rows, note=note))
 
 
-def _how_far_row(run: Deviation, link: str) -> tuple[Cell, ...]:
+def _how_far_row(run: Deviation, link: str, covered: float) -> tuple[Cell, ...]:
     found = [*(run.statistics[axis] for axis in AXES), run.statistics["path"], run.statistics.get("angle")]
     found += map(run.furthest_joint, ("rad", "m"))
     return (
         Cell(run.name, href=link),
         judged(run.verdict),
-        Cell(text.size_of(run.decisive)),
+        Cell(size_of(run.decisive)),
         *(_largest(one) for one in found),
         Cell(text.percent(run.share_out)),
+        Cell(text.percent(covered)),
     )
 
 
@@ -77,7 +89,7 @@ def _when_and_where(comparison: Comparison, links: Sequence[str]) -> Table:
     """Return when and where each log is worst, and how it was put together with the reference."""
     columns = (
         *words("Log"),
-        *numbers("Worst ‖Δ‖ at t [s]", "Worst at x, y, z [m]", "Longest out [s]", "Longest out from t [s]"),
+        *numbers("Decided at t [s]", "Log there at x, y, z [m]", "Longest out [s]", "Longest out from t [s]"),
         *numbers("Sync offset [s]", "r(‖Δ‖, speed)", "Left out", "Warnings"),
         *words("Alignment"),
     )
@@ -87,14 +99,14 @@ def _when_and_where(comparison: Comparison, links: Sequence[str]) -> Table:
 
 
 def _when_and_where_row(run: Deviation, link: str) -> tuple[Cell, ...]:
-    worst, longest = run.worst, run.longest_out
+    longest = run.longest_out
     stretch = (text.NOTHING,) * 2
     if longest is not None:
         stretch = (text.seconds(longest.duration), text.seconds(longest.t))
     return (
         Cell(run.name, href=link),
-        Cell(text.seconds(float(run.t[worst]))),
-        Cell(text.point(run.actual[worst])),
+        Cell(text.seconds(run.decisive.t_max)),
+        Cell(text.point(run.place(run.decisive))),
         *(Cell(value) for value in stretch),
         Cell(text.seconds(run.sync.offset)),
         Cell(speed_correlation(run) or text.NOTHING),
@@ -115,20 +127,22 @@ def _statistics_columns(unit: str) -> tuple[Column, ...]:
             f"at start [{unit}]",
             "samples out",
             "share out",
+            "no value",
         ),
     )
 
 
-def _statistics_row(one: Statistics, start: float) -> tuple[Cell, ...]:
+def _statistics_row(one: Statistics, start: float, *, most: bool) -> tuple[Cell, ...]:
     return (
-        Cell(text.symbol(one)),
+        Cell(symbol(one)),
         judged(one.verdict),
         Cell(text.limit(one.tolerance, one.unit)),
-        _largest(one),
+        replace(_largest(one), most=most),
         Cell(text.seconds(one.t_max)),
         *(Cell(text.number(value, one.unit)) for value in (one.rms, one.p95, one.mean, one.std, start)),
         Cell(text.NOTHING if one.out_of_tolerance is None else str(one.out_of_tolerance)),
         Cell(text.NOTHING if one.share_out is None else text.percent(one.share_out)),
+        Cell(str(one.missing) if one.missing else text.NOTHING),
     )
 
 

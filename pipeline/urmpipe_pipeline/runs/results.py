@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +10,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.orientation import NAMES, angles
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, seconds
@@ -26,8 +25,8 @@ if TYPE_CHECKING:
 SCHEMA = 1
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Run:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Run(Shown):
     """One ingested log: repolarized, on a uniform grid, with the arm's kinematics.
 
     Attributes:
@@ -123,6 +122,15 @@ class Run:
         """
         return " or ".join(f"{unit}{per}" for unit in sorted(set(self.joint_units) or {"rad"}, reverse=True))
 
+    def _headline(self) -> str:
+        """Return its name, its arm and how long it is."""
+        arm = self.robot.name if self.robot else "no robot"
+        rows = number_of(self.log.rows, "row")
+        if self.single_poses:
+            return line_of(self.name, arm, rows)
+        grid = f"grid of {number_of(len(self.t_ns), 'sample')}"
+        return line_of(self.name, arm, f"{rows} in {self.duration:g} s", grid)
+
     def to_frame(self) -> pd.DataFrame:
         """Return one row a grid sample: t [s], the joints, their rates, and the TCP where there is one."""
         import pandas as pd
@@ -159,18 +167,3 @@ class Run:
             "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
-
-
-def json_ready(value: Any) -> Any:
-    """Return a value as JSON can hold it: arrays as lists, NaN and infinities as null."""
-    if isinstance(value, Mapping):
-        return {str(key): json_ready(item) for key, item in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [json_ready(item) for item in value]
-    if isinstance(value, np.ndarray):
-        return json_ready(value.tolist())
-    if isinstance(value, np.generic):
-        return json_ready(value.item())
-    if isinstance(value, float) and not math.isfinite(value):
-        return None
-    return str(value) if isinstance(value, Path) else value

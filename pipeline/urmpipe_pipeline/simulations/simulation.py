@@ -13,6 +13,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import CosimulationError
 from urmpipe_pipeline.comparison.comparison import Comparison, Verdict
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
@@ -64,7 +65,7 @@ class Signal:
 
     @property
     def columns(self) -> FloatArray:
-        """The values with a column a scalar, shape (n, size); of a scalar (n, 1)."""
+        """The values in [`unit`] with a column a scalar, shape (n, size); of a scalar (n, 1)."""
         return self.values if self.values.ndim > 1 else self.values[:, np.newaxis]
 
     @property
@@ -138,8 +139,8 @@ class Arm:
         object.__setattr__(self, "q", np.asarray(self.q, dtype=np.float64))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Simulation:
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Simulation(Shown):
     """A co-simulated system: its blocks and connections, and every signal until its end or its failure.
 
     Attributes:
@@ -235,6 +236,12 @@ class Simulation:
         if name not in found:
             raise CosimulationError(f"{name}: found as a signal, allowed: {', '.join(found) or 'none'}")
         return found[name]
+
+    def _headline(self) -> str:
+        """Return its verdict, why it failed, and how much it recorded."""
+        end = f"failed ({self.failed})" if self.failed is not None else self.verdict
+        samples = f"{number_of(len(self.t_ns), 'sample')} in {self.duration:g} s"
+        return line_of(self.name, end, number_of(len(self.signals), "signal"), samples)
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a sample: t [s], then a column a scalar signal, such as `chain.phi[1]`."""

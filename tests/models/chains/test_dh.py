@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
@@ -54,6 +54,7 @@ def homogeneous(frame: Transform) -> FloatArray:
     return result
 
 
+@settings(max_examples=50, deadline=None)
 @pytest.mark.parametrize(("build", "matrix"), [(dh_chain, standard), (modified_dh_chain, modified)])
 @given(data=st.data())
 def test_the_tip_is_the_product_of_the_matrices(

@@ -12,8 +12,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from direct_geometric_model import geometric_model
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain, geometric_model
+from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.forward import forward
 

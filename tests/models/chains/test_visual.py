@@ -167,7 +167,7 @@ def shown(draw: DrawFn, chains: SearchStrategy[Chain]) -> Chain:
     return replace(chain, visuals=tuple(draw(visuals)))
 
 
-@settings(deadline=None, max_examples=50)
+@settings(deadline=None, max_examples=25)
 @given(data=st.data())
 def test_visuals_come_back_from_the_metadata_of_a_recording(
     chains: SearchStrategy[Chain], data: st.DataObject
@@ -176,7 +176,7 @@ def test_visuals_come_back_from_the_metadata_of_a_recording(
     assert chain_from_dict(json.loads(json.dumps(chain_to_dict(chain)))) == chain
 
 
-@settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_visuals_come_back_from_robot_files(
     chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path
@@ -187,7 +187,7 @@ def test_visuals_come_back_from_robot_files(
     assert read_robot_file(path) == chain
 
 
-@settings(deadline=None, max_examples=50, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@settings(deadline=None, max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(data=st.data())
 def test_visuals_come_back_from_urdf(
     chains: SearchStrategy[Chain], data: st.DataObject, tmp_path: Path

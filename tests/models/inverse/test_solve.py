@@ -9,6 +9,7 @@ import pytest
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
+from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.solve import Method, solve
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
@@ -171,9 +172,9 @@ REASONS = [
 def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) -> None:
     chain = load_robot(name)
     targets = bad_targets(chain)
-    found = solve(chain, targets, every=every, restarts=40 if name == "urm6" else 0)
+    found = solve(chain, targets, every=every, search=Search(restarts=40 if name == "urm6" else 0))
     good = targets.rows(np.array([0, 6]))
-    alone = solve(chain, good, every=every, restarts=40 if name == "urm6" else 0)
+    alone = solve(chain, good, every=every, search=Search(restarts=40 if name == "urm6" else 0))
     np.testing.assert_allclose(found.q[[0, 6]], alone.q, atol=1e-9)
     assert alone.reached.any(axis=1).all()
     x, y, z = (f"{value:g}" for value in (targets.position[1, 0], targets.position[1, 1], 0.0))
@@ -243,7 +244,7 @@ def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() ->
     out = Targets(above, np.repeat(targets.rotation, 2, axis=0))
     refused = solve(chain, out, start=q)
     assert not refused.reached.any()
-    found = solve(chain, out, start=q, tolerance=0.0035)
+    found = solve(chain, out, start=q, search=Search(tolerance=0.0035))
     assert found.reached[:, 0].tolist() == [True, False]
     assert found.labels[0, 0] == "nearest point"
     position, _ = misses(chain, found.q[:1, 0], out.rows(slice(0, 1)))
@@ -251,7 +252,7 @@ def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() ->
     np.testing.assert_allclose(found.shortfall[0, 0], np.linalg.norm(position), rtol=1e-6)
     assert found.shortfall[0, 0] > 1e-4 and found.shortfall[1, 0] == 0.0
     assert found.reason(1) is not None and "from axis" in str(found.reason(1))
-    every = solve(chain, out, start=q, tolerance=0.0035, every=True)
+    every = solve(chain, out, start=q, every=True, search=Search(tolerance=0.0035))
     assert every.reached.sum(axis=1).tolist() == [1, 0]
     assert every.labels[0, 0] == "nearest point"
 
@@ -259,7 +260,9 @@ def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() ->
 def test_a_tolerance_changes_nothing_where_the_target_is_met() -> None:
     chain = load_robot("ur5e")
     _, targets = poses(chain, 20)
-    np.testing.assert_array_equal(solve(chain, targets).q, solve(chain, targets, tolerance=0.01).q)
+    np.testing.assert_array_equal(
+        solve(chain, targets).q, solve(chain, targets, search=Search(tolerance=0.01)).q
+    )
 
 
 @pytest.mark.parametrize("name", ["ur5e", "arm6"])
@@ -285,7 +288,7 @@ def test_positions_alone_are_solved_iteratively() -> None:
 def test_redundant_arms_are_solved_iteratively() -> None:
     chain = load_robot("panda")
     _, targets = poses(chain, 5)
-    found = solve(chain, targets, restarts=40)
+    found = solve(chain, targets, search=Search(restarts=40))
     assert found.reached.all() and found.q.shape == (5, 1, 7)
     assert_met(chain, targets, found)
 
@@ -302,21 +305,19 @@ def test_everything_wrong_with_the_options_is_told_at_once() -> None:
     chain = load_robot("urm6")
     _, targets = poses(chain, 2)
     odd: Method = "exact"  # type: ignore[assignment]
+    search = Search(tolerance=-1.0, restarts=-2, seed=-1)
     with pytest.raises(OptionError) as caught:
-        solve(chain, targets, start=np.zeros(5), tolerance=-1.0, restarts=-2, seed=-1, method=odd)
+        solve(chain, targets, start=np.zeros(5), method=odd, search=search)
     assert [str(one) for one in caught.value.findings] == [
         f"start: found values of shape (5,), allowed: (6,), one each of {', '.join(chain.coordinates)},"
         " or (2, 6), as many for each target",
-        "tolerance: found -1 m, allowed: more than 0, finite",
-        "restarts: found -2, allowed: 0 or more",
-        "seed: found -1, allowed: 0 or more",
+        *search.faults(),
         "method: found 'exact', allowed: auto, closed, iterative",
     ]
     with pytest.raises(OptionError) as caught:
-        solve(chain, targets, start=np.array([0, 0, 0, 0, 0, math.nan]), tolerance=math.inf, method="closed")
+        solve(chain, targets, start=np.array([0, 0, 0, 0, 0, math.nan]), method="closed")
     assert [str(one) for one in caught.value.findings] == [
         "start: found a value that is not finite, allowed: finite numbers in rad and m",
-        "tolerance: found inf m, allowed: more than 0, finite",
         "method closed: robot urm6 has no closed form, allowed: six joints whose last three axes meet in a"
         " point or whose axes 2, 3 and 4 are parallel, exactly or nearly; use method iterative",
     ]

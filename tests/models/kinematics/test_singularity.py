@@ -11,14 +11,13 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from arm6 import Arm6Lengths, arm6_determinant
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.dh import DHRow, dh_chain
 from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.kinematics.singularity import (
-    Arm6Lengths,
-    arm6_determinant,
     characteristic_length,
     singularity_over_log,
 )

@@ -231,6 +231,17 @@ def test_a_tool_without_an_orientation_is_refused(quat: FloatArray | None) -> No
     )
 
 
+def test_a_tool_that_hardly_turns_is_refused_since_a_base_explains_as_much() -> None:
+    position, _ = motion()
+    turned = Rotation.from_rotvec(np.linspace([0.0, 0.0, 0.0], [0.0, np.radians(0.9), 0.0], len(position)))
+    with pytest.raises(LogError) as error:
+        aligned(pose_run(position + SHIFT), pose_run(position, turned.as_quat(), "log"), "tool")
+    assert str(error.value) == (
+        "log.csv: --align tool: found a tool that turns by 0.9000 deg in all, which any offset of the base"
+        " explains as well, allowed: a log that turns it; start, none"
+    )
+
+
 def arm_run(recorded_with: Transform, tool: Transform | None = None) -> Run:
     """A log of a UR5e that recorded its pose with one tool, and whose kinematics have another."""
     bare = load_robot("ur5e")

@@ -15,17 +15,17 @@ from hypothesis.extra import numpy as hnp
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import OptionError
+from urmpipe_models.transform import translation
 from urmpipe_pipeline.comparison.baseline import (
     DEFAULT_NOISE,
-    Absent,
-    Difference,
     against_baseline,
     complete_noise,
     parse_noise,
 )
+from urmpipe_pipeline.comparison.change import Absent, Difference
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.trajectory import Sync
-from urmpipe_pipeline.runs.results import json_ready
+from urmpipe_pipeline.json_values import json_ready
 
 Compared = Callable[..., Comparison]
 
@@ -142,6 +142,35 @@ def test_logs_and_quantities_that_only_one_has_are_told(paths: Compared, arms: C
     assert against_baseline(with_joints, paths({"a": off(0.0)})).gone == ()
 
 
+def test_the_only_logs_of_both_are_a_pair_whatever_they_are_called(paths: Compared) -> None:
+    found = against_baseline(paths({"today": off(0.001)}), paths({"released": off(0.001)}))
+    assert (found.verdict, found.new, found.gone) == ("pass", (), ())
+    assert found.differences == (Difference("log of today", "released", "today"),)
+    several = against_baseline(paths({"a": off(0.0), "b": off(0.0)}), paths({"c": off(0.0)}))
+    assert (several.verdict, several.gone) == ("fail", (Absent("c"),))
+
+
+@pytest.mark.parametrize(("samples", "verdict"), [(90, "pass"), (89, "fail")])
+def test_a_log_that_lost_a_tenth_of_its_samples_is_worse(paths: Compared, samples: int, verdict: str) -> None:
+    found = against_baseline(paths({"a": off(0.0, samples)}), paths({"a": off(0.0)}))
+    assert found.verdict == verdict
+    assert {change.worse for change in found.changes} == {() if verdict == "pass" else ("samples",)}
+    unknown = replace(found.changes[0], before=replace(found.changes[0].before, samples=None))
+    assert unknown.worse == ()
+
+
+def test_another_base_and_another_tool_are_told(arms: Compared) -> None:
+    before = arms({"a": np.zeros((20, 6))})
+    run = before.runs[0]
+    assert run.run.robot is not None
+    robot = run.run.robot.placed(base=translation(0.0, 0.0, 1.0), tool=translation(0.0, 0.0, 0.12))
+    now = replace(before, runs=(replace(run, run=replace(run.run, robot=robot)),))
+    assert against_baseline(now, before).differences == (
+        Difference("base of a", [0.0] * 6, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),
+        Difference("robot tool of a", [0.0] * 6, [0.0, 0.0, 0.12, 0.0, 0.0, 0.0]),
+    )
+
+
 def test_what_was_made_otherwise_is_told(paths: Compared) -> None:
     before = paths({"a": off(0.0)})
     run = replace(before.runs[0], sync=Sync("given", 0.25))
@@ -163,12 +192,8 @@ def test_the_result_is_json_in_the_comparison(paths: Compared) -> None:
     before = replace(paths({"a": off(0.001), "old": off(0.0)}), recording=Path("old.rrd"))
     now = paths({"a": off(0.002)})
     held = replace(now, baseline=against_baseline(now, before))
-    assert (held.verdict, held.accepted, now.accepted, now.to_dict()["baseline"]) == (
-        "pass",
-        False,
-        True,
-        None,
-    )
+    assert (held.verdict, held.within_tolerance, now.verdict) == ("fail", True, "pass")
+    assert (held.to_dict()["verdict"], now.to_dict()["baseline"]) == ("fail", None)
     told = json.loads(json.dumps(json_ready(held.to_dict())))["baseline"]
     assert (told["name"], told["recording"], told["verdict"]) == ("against-path", "old.rrd", "fail")
     assert told["noise"] == DEFAULT_NOISE
@@ -202,4 +227,7 @@ def test_a_noise_is_of_all_lengths_or_of_kinds() -> None:
     assert str(error.value) == (f"--noise: found 'lots', {allowed}\n--noise: found 'angle=-1', {allowed}")
     with pytest.raises(OptionError) as error:
         complete_noise({"axis": -1.0})
-    assert str(error.value) == f"--noise: found axis=-1.0, {allowed}; 0 or positive"
+    assert str(error.value) == (
+        "--noise: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in rad"
+        " (m of a joint that slides); 0 or positive"
+    )

@@ -206,8 +206,8 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     with pytest.raises(OptionError) as option_error:
         CompareOptions({"axis": -1.0})
     assert str(option_error.value) == (
-        "--tolerance: found axis=-1.0, allowed: a length in m, or axis=, x=, y=, z=, norm=,"
-        " path= (m, mm, um), angle=, joint= (rad, mrad, deg; m of a joint that slides); positive"
+        "--tolerance: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in"
+        " rad (m of a joint that slides); positive"
     )
 
 
@@ -224,7 +224,7 @@ def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
                         "out_of_tolerance", "share_out", "verdict", "warnings"}  # fmt: skip
     assert set(one["delta"]["x"]) == {
         "unit", "max", "rms", "mean", "std", "p95", "t_max", "sample_max", "tolerance", "out_of_tolerance",
-        "share_out", "verdict",
+        "share_out", "verdict", "samples", "missing",
     }  # fmt: skip
     assert one["share_out"] == 1.0
 

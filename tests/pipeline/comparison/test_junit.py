@@ -14,10 +14,11 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.errors import OutputError
+from urmpipe_models.errors import Finding, LogError, OutputError
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.junit import write_junit
+from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.outputs import guarded_output
 
 Compared = Callable[..., Comparison]
@@ -47,17 +48,18 @@ def assert_consumers_take_it(root: ET.Element) -> None:
         cases = suite.findall("testcase")
         assert int(suite.attrib["tests"]) == len(cases)
         assert int(suite.attrib["failures"]) == len(suite.findall("testcase/failure"))
-        assert suite.attrib["errors"] == suite.attrib["skipped"] == "0"
-        assert re.fullmatch(r"\d+\.\d+", suite.attrib["time"])  # no exponent
+        assert int(suite.attrib["errors"]) == len(suite.findall("testcase/error"))
+        assert suite.attrib["time"] == suite.attrib["skipped"] == "0"
         assert re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d", suite.get("timestamp", "2026-01-01T00:00:00"))
         order = [child.tag for child in suite]
-        assert order == [*["properties"] * order.count("properties"), *["testcase"] * len(cases)]
+        before, behind = order.count("properties"), order.count("system-out")
+        assert order == [*["properties"] * before, *["testcase"] * len(cases), *["system-out"] * behind]
         for properties in suite.findall("properties"):
             assert len(properties) > 0
             assert all(one.tag == "property" and set(one.attrib) == {"name", "value"} for one in properties)
         for case in cases:
             assert case.get("classname") and case.get("name") and float(case.attrib["time"]) >= 0.0
-            assert [child.tag for child in case] in ([], ["failure"])
+            assert [child.tag for child in case] in ([], ["failure"], ["error"])
             for failure in case:
                 assert failure.get("type") and failure.get("message") == failure.text
         for name in counted:
@@ -71,17 +73,16 @@ def test_a_log_is_a_suite_and_a_judged_quantity_a_case(paths: Compared, tmp_path
     result = paths({"good": off(0.001), "bad": off(0.004)}, tolerance={"axis": 0.0035, "norm": 0.01})
     root = written(result, tmp_path / "verdict.xml")
     assert {name: root.get(name) for name in ("name", "tests", "failures", "errors", "time")} == {
-        "name": "against-path", "tests": "8", "failures": "1", "errors": "0", "time": "0.990000000",
+        "name": "against-path", "tests": "8", "failures": "1", "errors": "0", "time": "0",
     }  # fmt: skip
     assert [suite.get("name") for suite in root] == ["good", "bad"]
     assert [(case.get("classname"), case.get("name"), len(case)) for case in root[1].findall("testcase")] == [
         ("bad", "x", 1), ("bad", "y", 0), ("bad", "z", 0), ("bad", "norm", 0),
     ]  # fmt: skip
     failure = root[1].findall("testcase/failure")[0]
-    x = result.runs[1].statistics["x"]
     assert (failure.get("type"), failure.text) == (
         "out-of-tolerance",
-        f"x: max {x.max!r} m, allowed 0.0035 m, at t = 0.495 s (sample 99); 13 samples out, share 0.13",
+        "x reaches 4.0000 mm of 3.5 mm allowed at t = 0.495 s (row 100); 13 samples out (13.0 %)",
     )
     assert root[0].get("timestamp") == result.provenance.created[:19]
 
@@ -136,6 +137,45 @@ def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, 
     result = replace(now, baseline=against_baseline(now, with_joints))
     lost = written(result, tmp_path / "verdict.xml").findall(".//testcase[@name='angle is there']/failure")
     assert [one.text for one in lost] == ["angle: in the baseline, not compared any more"]
+
+
+def test_the_warnings_of_a_log_stand_behind_its_cases(paths: Compared, tmp_path: Path) -> None:
+    result = paths({"short": off(0.001, 50), "long": off(0.001)})
+    told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
+    covered = "it covers 0.245 s of the 0.495 s of path (50.0 %)"
+    assert told == [f"not-covered: short: {covered}: the rest was not judged", None]
+
+
+def test_what_could_not_be_compared_takes_the_place_of_a_verdict_from_before(
+    paths: Compared, tmp_path: Path
+) -> None:
+    path = tmp_path / "verdict.xml"
+    written(paths({"a": off(0.0, 5)}), path)
+    wrong = LogError(Finding("found 'x', allowed: a number", "a.csv", line=7, column="q1"), Finding("no arm"))
+    with pytest.raises(LogError), told_in_junit(path, []):
+        raise wrong
+    root = ET.parse(path).getroot()
+    assert_consumers_take_it(root)
+    assert (root.get("tests"), root.get("failures"), root.get("errors")) == ("2", "0", "2")
+    cases = root[0].findall("testcase")
+    assert [(case.get("classname"), case.get("name"), case[0].text) for case in cases] == [
+        ("a.csv", "can be compared (1)", "a.csv:7, column q1: found 'x', allowed: a number"),
+        ("urmpipe compare", "can be compared (2)", "no arm"),
+    ]
+    assert {case[0].get("type") for case in cases} == {"bad-input"}
+
+
+def test_an_error_replaces_no_file_of_another_and_no_input(paths: Compared, tmp_path: Path) -> None:
+    mine, other = tmp_path / "mine.xml", tmp_path / "other.xml"
+    written(paths({"a": off(0.0, 5)}), mine)
+    other.write_text("<testsuites/>")
+    for path, inputs in ((mine, [mine]), (other, []), (tmp_path / "nowhere" / "v.xml", [])):
+        before = path.read_bytes() if path.exists() else None
+        with pytest.raises(LogError, match=r"^broken$"), told_in_junit(path, inputs):
+            raise LogError("broken")
+        assert (path.read_bytes() if path.exists() else None) == before
+    with pytest.raises(LogError, match=r"^broken$"), told_in_junit(None, []):
+        raise LogError("broken")
 
 
 @settings(max_examples=50, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])

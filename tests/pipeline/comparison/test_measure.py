@@ -248,7 +248,9 @@ def test_missing_orientations_leave_the_angle_open_between_their_neighbours() ->
     assert found.angle is not None
     assert np.flatnonzero(np.isnan(found.angle)).tolist() == [9, 10, 11]  # 4.5, 5 and 5.5
     assert len(found.sample) == 39
-    assert found.statistics["angle"].verdict == "pass"
+    angle = found.statistics["angle"]
+    assert (angle.verdict, angle.samples, angle.missing, angle.out_of_tolerance) == ("fail", 36, 3, 3)
+    assert found.outside[[9, 10, 11]].all()
     assert np.isfinite(found.statistics["angle"].rms)
 
 

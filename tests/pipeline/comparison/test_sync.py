@@ -119,7 +119,7 @@ def test_any_offset_between_two_logs_of_the_joints_is_found_or_too_little_is_in_
     assert sync.similarity > 0.999  # lines between samples leave less than 1e-3 unlike
 
 
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 @given(SEEDS, STARTS, STARTS, RATES, st.sampled_from([smooth, moves]), st.booleans())
 def test_any_offset_between_two_paths_is_found_wherever_they_stand(
     seed: int, first: float, second: float, rate: tuple[float, float], make: Callable[[int, int], Motion],
@@ -272,7 +272,7 @@ def test_two_motions_without_likeness_are_told() -> None:
 
 def test_random_motions_are_not_taken_for_each_other() -> None:
     t = times(0.0, 20.0, 0.01)
-    for seed in range(40):
+    for seed in range(20):
         make = (smooth, moves)[seed % 2]
         for side, channels in ((joints, 6), (path, 3)):
             one, other = (side(make(1000 + 2 * seed + k, channels)(t), t) for k in (0, 1))

@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urmpipe_models.errors import OptionError
+from urmpipe_models.measure_units import DEGREE
 from urmpipe_pipeline.comparison.tolerance import (
-    DEGREE,
     UNITS,
     allowed_for,
     check_tolerance,
@@ -20,6 +20,11 @@ from urmpipe_pipeline.comparison.tolerance import (
 ALLOWED = (
     "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
     " m of a joint that slides)"
+)
+
+
+NUMBERS = (
+    "allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in rad (m of a joint that slides)"
 )
 
 
@@ -40,6 +45,7 @@ ALLOWED = (
         ),
         ("path=0.1mm,angle=10mrad,joint=2mrad", {"path": 1e-4, "angle": 0.01, "joint": 0.002}),
         ("angle=0.5deg", {"angle": math.pi / 360}),
+        ("±3.5mm,norm=+-5mm", {"axis": 0.0035, "norm": 0.005}),
     ],
 )
 def test_what_is_written_is_found_in_si(text: str, found: dict[str, float]) -> None:
@@ -77,6 +83,7 @@ def test_a_degree_is_that_of_pi() -> None:
         ("axis=", "'axis='"),
         ("angle=3mm", "'angle=3mm'"),
         ("norm=1deg", "'norm=1deg'"),
+        ("±±1mm", "'±±1mm'"),
         ("joint=2mm", "'joint=2mm'"),  # of joints that turn it would be 2 mrad
         ("a=b=1", "'a=b=1'"),
     ],
@@ -85,6 +92,15 @@ def test_what_is_no_tolerance_is_one_line(part: str, said: str) -> None:
     with pytest.raises(OptionError) as error:
         parse_tolerance(part)
     assert str(error.value) == f"--tolerance: found {said}, {ALLOWED}"
+
+
+def test_an_angle_alone_and_a_decimal_comma_are_told_how_to_be_written() -> None:
+    with pytest.raises(OptionError) as error:
+        parse_tolerance("0.5deg")
+    assert str(error.value) == (f"--tolerance: found '0.5deg', {ALLOWED}; here angle=0.5deg or joint=0.5deg")
+    with pytest.raises(OptionError) as error:
+        parse_tolerance("3,5mm")
+    assert str(error.value) == ("--tolerance: found '3,5mm', allowed: a point before the decimals, 3.5mm")
 
 
 def test_everything_that_is_wrong_is_told_at_once() -> None:
@@ -109,12 +125,12 @@ def test_a_tolerance_in_numbers_is_checked_whole() -> None:
     with pytest.raises(OptionError) as error:
         check_tolerance({"foo": 1.0, "axis": 0.0, "norm": math.nan, "path": "1mm"})  # type: ignore[dict-item]
     assert [str(one) for one in error.value.findings] == [
-        f"--tolerance: found {found}, {ALLOWED}; positive"
+        f"--tolerance: found {found}, {NUMBERS}; positive"
         for found in ("foo=1.0", "axis=0.0", "norm=nan", "path=1mm")
     ]
     with pytest.raises(OptionError) as error:
         check_tolerance({})
-    assert str(error.value) == f"--tolerance: found nothing, {ALLOWED}"
+    assert str(error.value) == f"--tolerance: found nothing, {NUMBERS}"
 
 
 def test_a_coordinate_goes_before_the_axes_and_a_joint_of_that_name_does_not() -> None:

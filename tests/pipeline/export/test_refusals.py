@@ -60,10 +60,7 @@ def test_the_suffix_tells_the_format_unless_it_is_given() -> None:
     assert said(OptionError, lambda: format_of(None, Path("a.txt"))) == (
         "--to: found the output a.txt, allowed: --to csv|parquet|mat|tum, or an output that ends so"
     )
-    assert said(OptionError, lambda: format_of(None, None)) == (
-        "--to: found neither a format nor an output, allowed: --to csv|parquet|mat|tum,"
-        " or an output that ends so"
-    )
+    assert format_of(None, None) == "csv"
 
 
 def test_a_comparison_has_the_samples_that_it_compared(comparison: Comparison, tmp_path: Path) -> None:

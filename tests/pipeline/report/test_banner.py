@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import replace
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.report.banner import banner
@@ -25,7 +26,7 @@ def test_a_banner_of_a_log_that_passes_says_how_close_when_and_where(comparison:
         ("Closest to the limit", "shifted", "#a"),
         ("How much", "|Δz| = 2.5000 mm of 3.5 mm allowed", ""),
         ("When", f"t = {text.seconds(z.t_max)} s", ""),
-        ("Where (x, y, z)", f"{x:.4f}, {y:.4f}, {height:.4f} m", ""),
+        ("Where the log was (x, y, z)", f"{x:.4f}, {y:.4f}, {height:.4f} m", ""),
         ("Reference", "path", ""),
         ("Tolerance", "±3.5 mm per axis", ""),
     ]
@@ -47,6 +48,24 @@ def test_a_banner_of_logs_that_fail_names_the_worst(comparison: Comparison) -> N
     assert banner([many], [], ("abcd",)).headline == "all 4 logs are out of tolerance"
 
 
+def test_a_banner_names_the_joint_that_is_furthest_off(comparison: Comparison) -> None:
+    off = comparison.runs[1]
+    joint = off.furthest_joint("rad")
+    assert joint is not None and off.decisive.kind == "axis"
+    told = {fact.name: fact.value for fact in banner([comparison], [], LINKS).facts}
+    assert told["Joint furthest off"] == f"phi2: {text.quantity(joint.max, 'rad')}"
+
+
+def test_a_banner_of_logs_within_tolerance_says_that_they_are_worse_than_the_baseline(
+    comparison: Comparison,
+) -> None:
+    gone = BaselineComparison("before", None, {}, (), (), (Absent("old"),), ())
+    held = replace(comparison, runs=comparison.runs[:1], baseline=gone)
+    said = banner([held], [], [["#a"]])
+    assert (said.state, said.word) == ("fail", "FAIL")
+    assert said.headline == "shifted is within tolerance, but worse than the baseline"
+
+
 def test_a_banner_of_some_comparisons_counts_their_logs(
     comparison: Comparison, everything: Comparison
 ) -> None:
@@ -66,7 +85,7 @@ def test_a_banner_without_a_comparison(bare_run: Run) -> None:
 
 def test_a_card_holds_what_decides_and_the_rest(everything: Comparison) -> None:
     deviation = next(run for run in everything.runs if run.name == "joint-off")
-    decisive, found = deviation.decisive, card(deviation, "#x")
+    decisive, found = deviation.decisive, card(deviation, "#x", 0.25)
     assert (found.name, found.href, found.state) == ("joint-off", "#x", "fail")
     assert decisive.used is not None
     assert found.share == 1.0
@@ -81,6 +100,7 @@ def test_a_card_holds_what_decides_and_the_rest(everything: Comparison) -> None:
     assert facts["Largest angle"] == text.quantity(deviation.statistics["angle"].max, "rad", 0.01)
     assert facts["Largest joint"] == f"{text.quantity(deviation.joint_statistics['phi2'].max, 'rad')} (phi2)"
     assert facts["Out of tolerance"] == text.percent(deviation.share_out)
+    assert facts["Covered"] == "25.0 % of the reference"
     assert facts["Warnings"] == "0"
 
 
@@ -93,10 +113,11 @@ def test_a_card_leaves_out_what_there_is_not(comparison: Comparison) -> None:
         joint_statistics={},
         speed_correlation=None,
     )  # fmt: skip
-    found = card(deviation, "#x")
+    found = card(deviation, "#x", 0.25)
     assert [fact.name for fact in found.facts] == [
         "When",
         "Where (x, y, z)",
+        "Covered",
         "Largest ‖Δ‖",
         "Off the path",
         "Out of tolerance",
@@ -110,4 +131,4 @@ def test_a_card_leaves_out_what_there_is_not(comparison: Comparison) -> None:
 def test_a_card_counts_the_warnings_of_its_log(comparison: Comparison) -> None:
     deviation = comparison.runs[0]
     run = replace(deviation.run, warnings=(LogWarning("gap", "a gap", 7),) * 3)
-    assert card(replace(deviation, run=run), "#x").facts[-1].value == "3"
+    assert card(replace(deviation, run=run), "#x", 1.0).facts[-1].value == "3"

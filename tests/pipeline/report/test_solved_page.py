@@ -15,6 +15,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.report import gallery
 from urmpipe_pipeline.report.banner import banner
+from urmpipe_pipeline.report.facts import run_facts
 from urmpipe_pipeline.report.log_tables import missed_table
 from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.report.spec import Figure
@@ -41,11 +42,27 @@ def run() -> Run:
 
 def test_the_banner_counts_the_targets_with_a_solution(run: Run) -> None:
     said = banner([], [run], [])
-    assert (said.word, said.headline) == ("SOLVED", "poses: 2 of 3 targets with a solution")
-    assert said.detail == "1 warning. Nothing was compared: there is no verdict."
+    assert (said.state, said.word, said.headline) == ("fail", "FAIL", "poses: 2 of 3 targets with a solution")
+    assert said.detail == "1 warning."
     log = replace(run, goals=None)
-    assert banner([], [run, log], []).word == "INGESTED"
-    assert banner([], [run, run], []).headline == "2 logs: 4 of 6 targets with a solution"
+    assert banner([], [run, log], []).headline == said.headline
+    assert banner([], [run, run], []).headline == "2 files: 4 of 6 targets with a solution"
+    solved = replace(run, log=replace(run.log, q=np.zeros((3, 6))))
+    said = banner([], [solved], [])
+    assert (said.state, said.word, said.headline) == (
+        "pass",
+        "SOLVED",
+        "poses: 3 of 3 targets with a solution",
+    )
+    assert banner([], [solved, log], []).word == "INGESTED"
+
+
+def test_poses_without_times_have_no_duration(run: Run) -> None:
+    (table,) = lay_out([run]).summaries[0].tables
+    assert "Duration [s]" not in [column.title for column in table.columns]
+    facts = {fact.name: fact.value for fact in run_facts(run)}
+    assert facts["Rows"] == "3, without times"
+    assert {"Grid", "Duration"} & set(facts) == set()
 
 
 def test_each_target_that_was_missed_has_a_row(run: Run) -> None:
@@ -55,7 +72,7 @@ def test_each_target_that_was_missed_has_a_row(run: Run) -> None:
     assert run.goals is not None
     x, y, z = run.goals.position[1]
     assert [[cell.text for cell in row] for row in table.rows] == [
-        ["2", "1.000", f"{x:.4f}, {y:.4f}, {z:.4f}", f"{FAR}; axis 4 is 2 m from axis 2"]
+        ["2", f"{x:.4f}, {y:.4f}, {z:.4f}", f"{FAR}; axis 4 is 2 m from axis 2"]
     ]
     assert missed_table(replace(run, goals=replace(run.goals, reasons=("",) * 3))) is None
     assert missed_table(replace(run, goals=None)) is None
@@ -76,7 +93,7 @@ def test_single_poses_are_points_that_nothing_joins(run: Run) -> None:
 
 
 def test_the_targets_missed_stand_before_the_figures(run: Run) -> None:
-    (part,) = [part for part in lay_out([run]).parts if part.title == "Log poses"]
+    (part,) = [part for part in lay_out([run]).parts if part.title == "Targets poses"]
     assert [block.title for block in part.blocks[:2]] == ["Targets without a solution (1)", "Joints"]
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.symbols import size_of
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.report.log_tables import audit_table
 from urmpipe_pipeline.report.tables import Table
@@ -39,7 +40,7 @@ def test_the_ranking_holds_every_kind_of_deviation(everything: Comparison) -> No
     assert row_of(far, "joint-off") == {
         "Log": "joint-off",
         "Verdict": "FAIL",
-        "Decided by": text.size_of(off.decisive),
+        "Decided by": size_of(off.decisive),
         "max |Δx| [mm]": text.millimetres(found["x"].max, 0.0035),
         "max |Δy| [mm]": text.millimetres(found["y"].max, 0.0035),
         "max |Δz| [mm]": text.millimetres(found["z"].max, 0.0035),
@@ -48,6 +49,7 @@ def test_the_ranking_holds_every_kind_of_deviation(everything: Comparison) -> No
         "max angle [deg]": text.number(found["angle"].max, "rad", 0.01),
         "max joint [deg]": text.number(joint.max, "rad", 0.002),
         "Share out": text.percent(off.share_out),
+        "Covered": text.percent(everything.covered(off)),
     }
     failed = {cell.text for cell in far.rows[0] if cell.used == 1.0}
     assert failed == {cell.text for cell in far.rows[0][3:] if cell.state == "fail"}
@@ -61,8 +63,8 @@ def test_the_ranking_says_when_where_and_how(everything: Comparison) -> None:
     assert longest is not None
     assert row_of(where, "joint-off") == {
         "Log": "joint-off",
-        "Worst ‖Δ‖ at t [s]": text.seconds(float(off.t[off.worst])),
-        "Worst at x, y, z [m]": text.point(off.actual[off.worst]),
+        "Decided at t [s]": text.seconds(off.decisive.t_max),
+        "Log there at x, y, z [m]": text.point(off.place(off.decisive)),
         "Longest out [s]": text.seconds(longest.duration),
         "Longest out from t [s]": text.seconds(longest.t),
         "Sync offset [s]": "0.500",
@@ -168,3 +170,12 @@ def test_a_bar_is_as_long_as_what_is_used_up(comparison: Comparison, share: floa
     lengths, _ = statistics_tables(replace(shifted, statistics=found))
     (cell,) = [row[3] for row in lengths.rows if row[0].text == "Δz"]
     assert cell.used == pytest.approx(share)
+
+
+def test_the_joint_that_is_furthest_off_stands_out(everything: Comparison) -> None:
+    off = everything.ranking[0]
+    (table,) = [one for one in statistics_tables(off) if "joints" in one.title]
+    marked = [row[0].text for row in table.rows if any(cell.most for cell in row)]
+    joint = off.furthest_joint("rad")
+    assert joint is not None
+    assert marked == [joint.quantity]

@@ -106,7 +106,7 @@ def test_blocks_that_differ_or_are_judged_are_plotted_by_themselves(
     ("unit", "wanted", "shown", "of_one"),
     [
         ("rad", "deg", "deg", 57.29577951308232), ("m", "mm", "mm", 1000.0),
-        ("rad/s", "rpm", "rpm", 9.549296585513721),
+        ("rad/s", "rpm", "rpm", 9.54929658551372),
         ("rad", "", "rad", 1.0), ("N.m", "lbf.ft", "N.m", 1.0), ("m", "deg", "m", 1.0),
     ],
 )  # fmt: skip

@@ -8,7 +8,6 @@ from pathlib import Path
 import pytest
 
 from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log
 
@@ -43,18 +42,6 @@ def read(write: Callable[..., Path]) -> Read:
         return read_log([write(text, name, encoding)], ReadOptions(**options), robot)  # type: ignore[arg-type]
 
     return read
-
-
-@pytest.fixture
-def wrong(read: Read, tmp_path: Path) -> Wrong:
-    """Read a specimen that must be refused, and return what is said, one line a finding."""
-
-    def wrong(*args: object, **options: object) -> list[str]:
-        with pytest.raises(UrmpipeError) as caught:
-            read(*args, **options)
-        return str(caught.value).replace(f"{tmp_path}/", "").split("\n")
-
-    return wrong
 
 
 @pytest.fixture

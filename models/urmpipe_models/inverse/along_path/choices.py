@@ -52,7 +52,7 @@ class Choices:
 
         Args:
             sample: Its index.
-            last: Joint values before, shape (joints,).
+            last: Joint values before in [rad] or [m], shape (joints,).
             column: Taken whatever its distance, if it has a solution; None to take the nearest.
         """
         turns = np.rint((last - self.q[sample]) / TURN)
@@ -63,7 +63,7 @@ class Choices:
         return column, near[column]
 
     def going_on(self, rows: slice, column: int, last: FloatArray) -> FloatArray:
-        """Return the joint values of a column while it is the nearest and within limits, shape (m, joints).
+        """Return joint values in [rad] or [m] while a column is the nearest and allowed, shape (m, joints).
 
         Another solution can only be farther than the shorter way to it, so limits of its turns are not asked.
 

@@ -11,6 +11,7 @@ from urmpipe_models.arrays import BoolArray, FloatArray, TextArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.along_path.nearest_turns import in_nearest_turns
 from urmpipe_models.inverse.along_path.sliding_window import SlidingWindow
+from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.targets import Targets
 
@@ -33,9 +34,7 @@ class LeastMotionPath:
         chain: The arm.
         targets: Poses or positions, one a sample.
         start: Joint values in [rad] or [m] that the first sample moves least from, shape (joints,).
-        tolerance: In [m] along each axis, of targets out of reach; see `solve`.
-        restarts: Random starts for what does not follow from the sample before.
-        seed: Of the random starts.
+        search: How far to search for what does not follow from the sample before.
         progress: Told the share of the samples that is done, 0 to 1.
         q: Joint values found in [rad] or [m], shape (n, joints); NaN where there are none.
         reasons: Why there are none, shape (n,); empty where there are.
@@ -45,9 +44,7 @@ class LeastMotionPath:
     chain: Chain
     targets: Targets
     start: FloatArray
-    tolerance: float | None
-    restarts: int
-    seed: int
+    search: Search
     progress: Callable[[float], None]
     q: FloatArray = field(init=False)
     reasons: TextArray = field(init=False)
@@ -64,15 +61,8 @@ class LeastMotionPath:
     def _look_for(self, sample: int, last: FloatArray) -> FloatArray:
         """Return the joint values of a sample, or of it and those after it that are as much out of reach."""
         rows = slice(sample, sample + self._at_once)
-        found = solve(
-            self.chain,
-            self.targets.rows(rows),
-            start=last,
-            tolerance=self.tolerance,
-            restarts=self.restarts,
-            seed=self.seed,
-            method="iterative",
-        )
+        targets = self.targets.rows(rows)
+        found = solve(self.chain, targets, start=last, method="iterative", search=self.search)
         met = found.reached[:, 0] & (found.shortfall[:, 0] == 0.0)
         alike = 1 if met[0] else _alike(met, found.reached[:, 0])
         self._at_once = min(MOST_AT_ONCE, MORE * self._at_once) if alike == len(met) and not met[0] else 1

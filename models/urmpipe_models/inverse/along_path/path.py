@@ -19,11 +19,12 @@ from urmpipe_models.inverse.along_path.jumps import jump_samples, jumps_at
 from urmpipe_models.inverse.along_path.least_motion_path import LeastMotionPath
 from urmpipe_models.inverse.along_path.nearest_turns import in_nearest_turns
 from urmpipe_models.inverse.along_path.stretches import stretches
-from urmpipe_models.inverse.checks import checked, search_faults
+from urmpipe_models.inverse.checks import checked
 from urmpipe_models.inverse.closed.closed_form import ClosedForm, exact_form
 from urmpipe_models.inverse.farthest import too_far
 from urmpipe_models.inverse.limits import TURN, periods
 from urmpipe_models.inverse.limits import within_pi as within_pi_of
+from urmpipe_models.inverse.search import USUAL_SEARCH, Search
 from urmpipe_models.inverse.solutions import SingularFamily
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.targets import Targets
@@ -49,9 +50,7 @@ def follow(
     *,
     start: FloatArray | None = None,
     within_pi: bool = False,
-    tolerance: float | None = None,
-    restarts: int = 20,
-    seed: int = 0,
+    search: Search = USUAL_SEARCH,
     progress: Callable[[float], None] | None = None,
 ) -> JointPath:
     """Return joint values that lead the tool along a path, limits kept.
@@ -76,10 +75,7 @@ def follow(
         start: Joint values in [rad] or [m], shape (joints,); of the chain by default.
         within_pi: Write joints that turn without end within (-pi, pi], as CoppeliaSim does. Jumps and
             speeds are those of the motion before that.
-        tolerance: In [m] along each axis: a target out of reach takes the nearest point that the tool can get
-            to if it is no farther away than this.
-        restarts: Random starts of the iterative solver where the motion does not lead on by itself.
-        seed: Of the random starts: the same seed, the same motion.
+        search: How far to search where the motion does not lead on by itself.
         progress: Told the share of the samples that is done, 0 to 1.
 
     Raises:
@@ -87,15 +83,15 @@ def follow(
     """
     targets, reasons = checked(targets)
     begin = np.array(chain.start if start is None else start, dtype=float)
-    faults = [*_time_faults(t_ns, len(targets)), *_option_faults(chain, begin, tolerance, restarts, seed)]
+    faults = [*_time_faults(t_ns, len(targets)), *_start_faults(chain, begin), *search.faults()]
     if faults:
         raise OptionError(*faults)
     form = None if targets.rotation is None else exact_form(chain)
     if form is None:
-        far = too_far(chain, targets, tolerance)
+        far = too_far(chain, targets, search.tolerance)
         reasons = [fault or reason for fault, reason in zip(reasons, far, strict=True)]
     good = np.array([not reason for reason in reasons], dtype=bool)
-    asked = _Asked(chain, targets.rows(good), begin, tolerance, restarts, seed, progress or _untold)
+    asked = _Asked(chain, targets.rows(good), begin, search, progress or _untold)
     found = _spread(asked.by_least_motion() if form is None else asked.by_closed_form(form), good, reasons)
     asked.progress(1.0)
     return _told(chain, targets, np.asarray(t_ns), found, form, within_pi)
@@ -112,16 +108,12 @@ class _Asked:
     chain: Chain
     targets: Targets
     start: FloatArray
-    tolerance: float | None
-    restarts: int
-    seed: int
+    search: Search
     progress: Callable[[float], None]
 
     def by_least_motion(self) -> _Found:
         """Return what least motion finds; its branches have no names of their own."""
-        path = LeastMotionPath(
-            self.chain, self.targets, self.start, self.tolerance, self.restarts, self.seed, self.progress
-        )
+        path = LeastMotionPath(self.chain, self.targets, self.start, self.search, self.progress)
         return _Found(path.q, None, path.reasons, path.shortfall, {})
 
     def by_closed_form(self, form: ClosedForm) -> _Found:
@@ -129,17 +121,10 @@ class _Asked:
         walked = walk(self.chain, form, self.targets, self.start)
         found = _Found(walked.q, walked.branch, walked.reasons, np.zeros(len(walked.q)), walked.singular)
         out = np.flatnonzero(walked.branch == "")
-        if self.tolerance is None or not len(out):
+        if self.search.tolerance is None or not len(out):
             return found
         before = _before(walked.q, self.start)
-        near = solve(
-            self.chain,
-            self.targets.rows(out),
-            start=before[out],
-            tolerance=self.tolerance,
-            restarts=self.restarts,
-            seed=self.seed,
-        )
+        near = solve(self.chain, self.targets.rows(out), start=before[out], search=self.search)
         met = out[near.reached[:, 0]]
         found.q[out], found.reasons[out] = near.q[:, 0], near.reasons[:, 0]
         for first, last in stretches(walked.branch == ""):
@@ -264,14 +249,11 @@ def _time_faults(t_ns: IntArray, count: int) -> Iterator[str]:
         )
 
 
-def _option_faults(
-    chain: Chain, start: FloatArray, tolerance: float | None, restarts: int, seed: int
-) -> Iterator[str]:
-    """Yield what is wrong with the other options."""
+def _start_faults(chain: Chain, start: FloatArray) -> Iterator[str]:
+    """Yield what is wrong with a start."""
     joints = len(chain.coordinates)
     if start.shape != (joints,) or not np.isfinite(start).all():
         yield (
             f"start: found {np.array2string(start, separator=', ')}, allowed: {joints} finite numbers,"
             f" in rad or m, one each of {', '.join(chain.coordinates)}"
         )
-    yield from search_faults(tolerance, restarts, seed)

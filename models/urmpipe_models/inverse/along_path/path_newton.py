@@ -100,8 +100,8 @@ def recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
     other.
 
     Args:
-        matrices: M_k, shape (w, m, m), of norms of at most about 1: products of them stay small.
-        offsets: a_k, shape (w, m).
+        matrices: M_k [-], shape (w, m, m), of norms of at most about 1: products of them stay small.
+        offsets: a_k in any unit, which is that of c_k, shape (w, m).
     """
     count, size = offsets.shape
     length = max(1, math.isqrt(count // SHARE))

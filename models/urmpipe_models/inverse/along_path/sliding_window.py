@@ -83,7 +83,7 @@ class SlidingWindow:
         self._empty()
 
     def slide(self, progress: Callable[[float], None]) -> FloatArray:
-        """Go along the whole path and return the joint values, shape (n, joints).
+        """Go along the whole path and return the joint values in [rad] or [m], shape (n, joints).
 
         Args:
             progress: Told the share of the samples that is done, 0 to 1.

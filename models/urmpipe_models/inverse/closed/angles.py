@@ -10,11 +10,11 @@ from urmpipe_models.inverse.closed.trigonometric import wrapped
 
 
 def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return the angle in (-pi, pi] by which one vector must turn about an axis to point as another does.
+    """Return the angle by which a vector must turn about an axis to point as another, in (-pi, pi] [rad].
 
     Args:
-        axis: Unit vector, shape (3,).
-        start: Shape (3, ...), or (3,) for all.
+        axis: Unit vector [-], shape (3,).
+        start: In any unit, shape (3, ...), or (3,) for all.
         end: See start; what both have along the axis does not count. It is taken off first, so that vectors
             that are almost along the axis lose no digit.
     """

@@ -31,7 +31,7 @@ class Track:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """A wrist centre w as joint 1 sees it, one column a target.
+    """A wrist centre w as joint 1 sees it, one column a target; lengths in units of the arm's size.
 
     Attributes:
         start: X0, relative to o2, shape (3, n).
@@ -88,13 +88,16 @@ class LoopEquations:
     shift: float
 
     def invariants(self, start: FloatArray, radius: FloatArray | float) -> FloatArray:
-        """Return b of X0, shape (3, n), and the radius of the circle about it, shape (n,): shape (2, n)."""
+        """Return b of X0, shape (3, n), and the radius of the circle about it, shape (n,): shape (2, n).
+
+        All are in units of the arm's size, squares in its square.
+        """
         if self.revolute:
             return np.stack((self.axis @ start, (start * start).sum(axis=0) + np.square(radius)))
         return np.asarray(self.across @ start)
 
     def seen(self, wrist: FloatArray) -> Seen:
-        """Return wrist centres w, shape (3, n), as joint 1 sees them."""
+        """Return wrist centres w, shape (3, n), in units of the arm's size, as joint 1 sees them."""
         away = wrist - self.base[:, None]
         height = self.first.axis @ away
         if self.first.revolute:
@@ -108,7 +111,12 @@ class LoopEquations:
 
 
 def loop_equations(screws: Screws, wrist: FloatArray) -> LoopEquations:
-    """Return the equations of the first three screws for the wrist centre at q = 0, both in one unit."""
+    """Return the equations of the first three screws and the wrist centre at q = 0.
+
+    Args:
+        screws: Of the arm, lengths in units of its size.
+        wrist: The wrist centre, shape (3,), in the same unit.
+    """
     (k1, k2, k3), (o1, o2, o3) = screws.direction[:3], screws.point[:3]
     r1, r2, r3 = (bool(one) for one in screws.revolute[:3])
     origin = nearest_point(o2, k2, o1, k1) if r1 and r2 else _foot(wrist, o2, k2)
@@ -134,7 +142,7 @@ def loop_equations(screws: Screws, wrist: FloatArray) -> LoopEquations:
 
 
 def perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return two unit vectors that make a right-handed frame with a unit vector, which comes last."""
+    """Return two unit vectors [-] of a right-handed frame whose third one, of shape (3,), is given."""
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(helper, axis)
     first /= np.linalg.norm(first)
@@ -172,7 +180,14 @@ def _foot(point: FloatArray, origin: FloatArray, axis: FloatArray) -> FloatArray
 
 
 def nearest_point(origin: FloatArray, axis: FloatArray, other: FloatArray, along: FloatArray) -> FloatArray:
-    """Return the point of a line that is nearest to another line; to the other's point where parallel."""
+    """Return the point of a line that is nearest to another line; to the other's point where parallel.
+
+    Args:
+        origin: A point of the line, in any unit, shape (3,).
+        axis: The line's unit vector [-], shape (3,).
+        other: A point of the other line, in the same unit, shape (3,).
+        along: The other line's unit vector [-], shape (3,).
+    """
     normal = np.cross(axis, along)
     square = float(normal @ normal)
     if square < 1e-12:

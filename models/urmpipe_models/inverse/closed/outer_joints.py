@@ -302,7 +302,14 @@ def _everywhere(where: BoolArray, like: FloatArray) -> BoolArray:
 
 
 def texts_where(where: BoolArray, text: str, found: FloatArray, *allowed: FloatArray | float) -> TextArray:
-    """Return a text with what was found and is allowed (see `figures`) where it holds, empty elsewhere."""
+    """Return a text with what was found and is allowed where it holds, empty elsewhere.
+
+    Args:
+        where: Where it holds, shape (..., n).
+        text: With a place for each figure (see `figures`).
+        found: What was found, in [m] or [rad], of a shape that broadcasts to that of `where`.
+        allowed: What is allowed, likewise.
+    """
     texts = np.full(where.shape, "", dtype=np.object_)
     spread = [np.broadcast_to(one, where.shape)[where].tolist() for one in (found, *allowed)]
     texts[where] = [text.format(*figures(*each)) for each in zip(*spread, strict=True)]

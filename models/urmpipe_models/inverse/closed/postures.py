@@ -72,7 +72,7 @@ def leave_out_second(
     """Leave out the second one of two postures that are one.
 
     Args:
-        u1: Shape (2, sides, elbows, n); written.
+        u1: In units of the arm's size, shape (2, sides, elbows, n); written.
         u3: See u1.
         reasons: Shape (sides, elbows, n); written.
         meet: Where both are one, of the shape of reasons.

@@ -22,8 +22,8 @@ def quartic_roots(equations: LoopEquations, seen: Seen) -> tuple[FloatArray, Flo
     almost are parallel loses no digit then.
 
     Returns:
-        u1 and u3, shape (2, 4, n), by rising q3 from where the second equation is largest on; NaN where
-        there is none.
+        u1 and u3 in units of the arm's size, shape (2, 4, n), by rising q3 from where the second equation is
+        largest on; NaN where there is none.
     """
     first, third = equations.first, equations.third
     offset = equations.constant[:, None] - seen.constant

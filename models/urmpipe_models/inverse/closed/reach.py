@@ -41,8 +41,8 @@ class Reach:
             reasons: Written where `missed`.
             missed: Of the shape of reasons, (..., n).
             seen: The wrist centres.
-            alpha: Shape (2,).
-            needed: Of the shape of reasons.
+            alpha: Of the equations, in units of the arm's size, shape (2,).
+            needed: In the same unit as alpha . u1, of the shape of reasons.
         """
         if not self.equations.first.revolute:
             self.tell_place(reasons, missed, seen)
@@ -60,8 +60,8 @@ class Reach:
         Args:
             reasons: Written where `missed`.
             missed: Of the shape of reasons.
-            share: The combination of the equations that joint 3 is solved from.
-            value: What it must give, less its constant, of the shape of reasons.
+            share: The combination of the equations that joint 3 is solved from [-], shape (2,).
+            value: What it must give, less its constant, in units of the arm's size, of the shape of reasons.
         """
         found, what = self._measured(share, value[missed])
         (least, most), _ = self._measured(share, np.array(self._range(share)))
@@ -69,7 +69,13 @@ class Reach:
         reasons[missed] = _outside_range(figures, float(least), float(most), what)[which]
 
     def tell_place(self, reasons: TextArray, missed: BoolArray, seen: Seen) -> None:
-        """Tell where a wrist centre is that no further posture reaches, by its cylinder coordinates."""
+        """Tell where a wrist centre is that no further posture reaches, by its cylinder coordinates.
+
+        Args:
+            reasons: Written where `missed`.
+            missed: Of the shape of reasons, (..., n).
+            seen: The wrist centres.
+        """
         radius = np.broadcast_to(seen.radius, missed.shape)[missed] * self.size
         height = np.broadcast_to(seen.height, missed.shape)[missed] * self.size
         reasons[missed] = [

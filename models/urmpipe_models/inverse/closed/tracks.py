@@ -24,7 +24,8 @@ class Roots:
     """The points u of a track with alpha . u = beta.
 
     Attributes:
-        u: Shape (2, roots, ...); NaN where there is none. Of two the first one is where alpha . u falls.
+        u: In units of the arm's size, shape (2, roots, ...); NaN where there is none. Of two the first one is
+            where alpha . u falls.
         meet: True where both are one, shape (...).
     """
 
@@ -36,9 +37,9 @@ def circle_roots(alpha: FloatArray, beta: FloatArray, radius: FloatArray | float
     """Return u = radius (cos, sin) with alpha . u = beta; the centre, twice, of a circle that is a point.
 
     Args:
-        alpha: Shape (2,), not 0.
-        beta: Shape (...).
-        radius: Shape that broadcasts to that of beta.
+        alpha: In any unit, shape (2,), not 0.
+        beta: In the unit of alpha . u, shape (...).
+        radius: In units of the arm's size, of a shape that broadcasts to that of beta.
     """
     beta, radius = np.broadcast_arrays(beta, radius)
     reach = np.hypot(*alpha) * radius
@@ -53,8 +54,8 @@ def parabola_roots(alpha: FloatArray, beta: FloatArray) -> Roots:
     """Return u = (s, s^2) with alpha . u = beta: one root where alpha[1] = 0, else two.
 
     Args:
-        alpha: Shape (2,), not 0.
-        beta: Shape (...).
+        alpha: In any unit, shape (2,), not 0.
+        beta: In the unit of alpha . u, shape (...).
     """
     if is_straight(alpha):
         s = (beta / alpha[0])[None]
@@ -67,5 +68,5 @@ def parabola_roots(alpha: FloatArray, beta: FloatArray) -> Roots:
 
 
 def is_straight(alpha: FloatArray) -> bool:
-    """Return whether the equation of a parabola is a linear one."""
+    """Return whether the equation of a parabola, alpha of shape (2,) in any unit, is a linear one."""
     return bool(abs(alpha[1]) <= 1e-9 * abs(alpha[0]))

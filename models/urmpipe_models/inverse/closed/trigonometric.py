@@ -24,7 +24,7 @@ POLISHING = 4
 
 
 def wrapped(angle: FloatArray) -> FloatArray:
-    """Return the angle in (-pi, pi], in [rad]."""
+    """Return an angle of any shape in (-pi, pi], in [rad]."""
     turns = np.asarray(angle / (2 * np.pi))
     np.round(turns, out=turns)
     turns *= 2 * np.pi
@@ -40,7 +40,7 @@ def linear_roots(a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[FloatArra
     with x, at the second it rises; both are the same where |c| = r, up to `BOUNDARY`.
 
     Args:
-        a: Any real numbers, of one shape with b and c.
+        a: Any real numbers, of the same shape as b and c, in the same unit.
         b: See a.
         c: See a.
 

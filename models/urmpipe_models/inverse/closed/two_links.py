@@ -39,6 +39,12 @@ def two_links(
 
     With the links' lengths l2, l3, the distance r and the angle psi between the links
     tan^2(psi/2) = (l2 + l3 - r)(l2 + l3 + r) / ((r - |l2 - l3|)(r + |l2 - l3|)).
+
+    Args:
+        arm: The arm.
+        place: Where p4 shall be in the plane in [m], two arrays of the same shape (..., n).
+        side: 1 or -1 [-]: the sign of the first elbow's bend, of a shape that broadcasts to that of place.
+        near: What q2 takes where it is free, in [rad], likewise.
     """
     upper, fore = link_lengths(arm)
     r = np.hypot(*place)

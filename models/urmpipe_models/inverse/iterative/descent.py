@@ -45,7 +45,17 @@ RANK_CUTOFF = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Settings:
-    """How a descent steps and when it has arrived; see `iterative.refine`."""
+    """How a descent steps and when it has arrived; see `iterative.refine`.
+
+    Attributes:
+        lower: Lower limits of the joints in [rad] or [m], shape (joints,); -inf where there is none.
+        upper: Upper limits, likewise.
+        method: How to step.
+        metres: The distance from the target that counts as none in [m].
+        radians: The angle from the target that counts as none in [rad].
+        damping: Of damped least squares [-]: mu = (damping l)^2.
+        stationary: The cosine between e and what any joint can change of it that counts as none [-].
+    """
 
     lower: FloatArray
     upper: FloatArray
@@ -61,7 +71,7 @@ class Settings:
         return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
 
     def within(self, q: FloatArray) -> FloatArray:
-        """Return joint values, shape (joints, n), clipped to their limits."""
+        """Return joint values in [rad] or [m], shape (joints, n), clipped to their limits."""
         return np.clip(q, self.lower[:, None], self.upper[:, None]) if self.limited else q
 
 
@@ -89,7 +99,7 @@ class Progress:
 
     @classmethod
     def at(cls, q: FloatArray) -> Progress:
-        """Return the progress of rows that have not moved from q, shape (n, joints)."""
+        """Return the progress of rows that have not moved from q in [rad] or [m], shape (n, joints)."""
         n = len(q)
         return cls(
             np.array(q.T, order="C"),
@@ -104,7 +114,15 @@ class Progress:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rows:
-    """The rows of a block that are still on their way: q of shape (joints, n), gain of shape (n,)."""
+    """The rows of a block that are still on their way.
+
+    Attributes:
+        index: Where they stand in the batch, shape (n,).
+        task: Their targets.
+        q: Joint values in [rad] or [m], shape (joints, n).
+        gain: mu / |e|^2 of Levenberg-Marquardt [-], shape (n,).
+        miss: At q.
+    """
 
     index: IndexArray
     task: Task
@@ -113,7 +131,7 @@ class Rows:
     miss: Miss
 
     def kept(self, rows: IndexArray) -> Rows:
-        """Return some of the rows."""
+        """Return some of the rows, indices of shape (m,)."""
         task, q, miss = self.task.kept(rows), rows_of(self.q, rows), self.miss.kept(rows)
         return Rows(self.index[rows], task, q, self.gain[rows], miss)
 
@@ -124,7 +142,7 @@ def descend(progress: Progress, task: Task, index: IndexArray, settings: Setting
     Args:
         progress: Of the batch; the rows at `index` are brought up to date.
         task: The targets of the rows at `index`.
-        index: Where the rows stand in the batch.
+        index: Where the rows stand in the batch, shape (n,).
         settings: How to step.
         steps: The most to take.
     """
@@ -227,8 +245,8 @@ def damped_step(J: FloatArray, error: FloatArray, damping: FloatArray | float) -
     """Return dq = (J^T J + mu I)^-1 J^T e = J^T (J J^T + mu I)^-1 e, by the smaller of the two systems.
 
     Args:
-        J: Shape (m, joints, n).
-        error: e, shape (m, n).
+        J: Metres a unit of each joint, [m/rad] or [-], shape (m, joints, n).
+        error: e in [m], shape (m, n).
         damping: mu, in the unit of J squared, shape (n,) or one for all.
     """
     if J.shape[0] <= J.shape[1]:
@@ -237,6 +255,11 @@ def damped_step(J: FloatArray, error: FloatArray, damping: FloatArray | float) -
 
 
 def pseudoinverse_step(J: FloatArray, error: FloatArray) -> FloatArray:
-    """Return dq = J^+ e, J^+ the Moore-Penrose pseudoinverse by singular values; shapes as `damped_step`."""
+    """Return dq = J^+ e, J^+ the Moore-Penrose pseudoinverse by singular values.
+
+    Args:
+        J: Metres a unit of each joint, [m/rad] or [-], shape (m, joints, n).
+        error: e in [m], shape (m, n).
+    """
     inverse = np.linalg.pinv(J.transpose(2, 0, 1), rcond=RANK_CUTOFF).transpose(1, 2, 0)
     return product(np.asarray(inverse, dtype=np.float64), error)

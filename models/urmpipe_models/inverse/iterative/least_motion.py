@@ -74,15 +74,15 @@ class Tangent:
 
     @property
     def size(self) -> FloatArray:
-        """The largest entry of t, shape (n,)."""
+        """The largest entry of t in [rad] or [m], shape (n,)."""
         return np.asarray(np.abs(self.t).max(axis=0))
 
     def kept(self, rows: IndexArray) -> Tangent:
-        """Return some of the rows."""
+        """Return some of the rows, indices of shape (m,)."""
         return Tangent(rows_of(self.t, rows), self.free[:, rows])
 
     def where(self, chosen: BoolArray, other: Tangent) -> Tangent:
-        """Return the rows that are chosen, and the other's elsewhere."""
+        """Return the rows that are chosen, a mask of shape (n,), and the other's elsewhere."""
         return Tangent(np.where(chosen, self.t, other.t), np.where(chosen, self.free, other.free))
 
 

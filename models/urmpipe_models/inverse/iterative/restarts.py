@@ -14,6 +14,7 @@ from urmpipe_models.inverse.iterative.descent import STATIONARY
 from urmpipe_models.inverse.iterative.refine import Refined, refine
 from urmpipe_models.inverse.iterative.task import turn_length
 from urmpipe_models.inverse.limits import TURN, turning, within_limits
+from urmpipe_models.inverse.search import USUAL_SEARCH, Search
 from urmpipe_models.inverse.solutions import NEAREST_POINT, Solutions
 from urmpipe_models.inverse.targets import Targets, misses
 from urmpipe_models.kinematics.singularity import characteristic_length
@@ -50,9 +51,7 @@ def solve_iteratively(
     *,
     start: FloatArray | None = None,
     every: bool = False,
-    restarts: int = 20,
-    seed: int = 0,
-    tolerance: float | None = None,
+    search: Search = USUAL_SEARCH,
 ) -> Solutions:
     """Return joint values within limits that bring the tool to its targets, found from several starts.
 
@@ -74,11 +73,7 @@ def solve_iteratively(
             target, of the first random starts that do (one, two, four, ... at a time) the nearest to
             `start`. That there is no other, or none nearer, cannot be known. Where a target leaves freedoms
             there is a continuum, and what is returned are its points of least motion from `start`.
-        restarts: Random starts.
-        seed: Of the random starts.
-        tolerance: In [m]: a target that is met from no start takes the nearest point found, if the tool is
-            no farther away than this along each axis and turned by no more than tolerance / l, l the
-            `turn_length`; `shortfall` says how far it stays.
+        search: How many random starts, and how near to a target that is met from none of them is enough.
 
     Returns:
         Solutions, each joint in the turn nearest to `start` that its limits allow.
@@ -86,19 +81,18 @@ def solve_iteratively(
     begin = np.broadcast_to(
         np.asarray(chain.start if start is None else start, dtype=float), (len(targets), len(chain.start))
     )
-    search = _Search(chain, targets, begin)
-    search.attempt(begin[None], every)
-    starts = random_starts(chain, restarts, seed)[:, None]
+    attempts = _Attempts(chain, targets, begin)
+    attempts.attempt(begin[None], every)
+    starts = random_starts(chain, search.restarts, search.seed)[:, None]
     for some in [starts] if every else _growing(starts):
-        if len(some) and (every or search.pending.any()):
-            search.attempt(some, every)
-    search.finish()
-    solutions = _solutions(chain, search, begin, every)
-    return _told(chain, targets, solutions, search, restarts, tolerance)
+        if len(some) and (every or attempts.pending.any()):
+            attempts.attempt(some, every)
+    attempts.finish()
+    return _told(attempts, _solutions(attempts, every), search)
 
 
 def random_starts(chain: Chain, count: int, seed: int) -> FloatArray:
-    """Return uniformly random joint values within the limits, shape (count, joints).
+    """Return uniformly random joint values in [rad] or [m] within the limits, shape (count, joints).
 
     A revolute joint that is open at an end is drawn from one turn: from its only limit, or (-pi, pi]; a
     prismatic one from as far as the arm is long: from its only limit, or to both sides. The first draws do
@@ -129,7 +123,7 @@ def _growing(starts: FloatArray) -> Iterator[FloatArray]:
         done = 2 * done + 1
 
 
-class _Search:
+class _Attempts:
     """What the attempts of a search have found.
 
     Attributes:
@@ -182,9 +176,10 @@ class _Search:
         self.distance[to], self.angle[to] = refined.distance[of], refined.angle[of]
 
 
-def _solutions(chain: Chain, search: _Search, begin: FloatArray, every: bool) -> Solutions:
+def _solutions(attempts: _Attempts, every: bool) -> Solutions:
     """Return what was found, each joint in the allowed turn nearest to the start, nearest solution first."""
-    shifted = within_limits(chain, _listed(np.stack(search.found, axis=1)), begin).q
+    chain, begin = attempts.chain, attempts.begin
+    shifted = within_limits(chain, _listed(np.stack(attempts.found, axis=1)), begin).q
     found = _nearest_first(shifted, begin, None if every else 1)
     return _listed(_distinct(chain, found) if every else found)
 
@@ -221,47 +216,42 @@ def _apart(chain: Chain, a: FloatArray, b: FloatArray) -> FloatArray:
     return apart
 
 
-def _told(
-    chain: Chain,
-    targets: Targets,
-    solutions: Solutions,
-    search: _Search,
-    restarts: int,
-    tolerance: float | None,
-) -> Solutions:
+def _told(attempts: _Attempts, solutions: Solutions, search: Search) -> Solutions:
     """Return solutions with the nearest points within the tolerance, and why there are no others."""
-    near = _near_enough(chain, targets, search, tolerance)
+    near = _near_enough(attempts, search.tolerance)
     q, reasons, labels = solutions.q.copy(), solutions.reasons.copy(), solutions.labels.copy()
     shortfall = np.zeros(q.shape[:2])
-    turned = within_limits(chain, _listed(search.q[near][:, None]), search.begin[near])
-    q[near, 0], labels[near, 0], shortfall[near, 0] = turned.q[:, 0], NEAREST_POINT, search.distance[near]
+    turned = within_limits(attempts.chain, _listed(attempts.q[near][:, None]), attempts.begin[near])
+    q[near, 0], labels[near, 0], shortfall[near, 0] = turned.q[:, 0], NEAREST_POINT, attempts.distance[near]
     lacking = np.asarray(~np.isfinite(q).all(axis=2))
-    reasons[lacking] = f"no further solution {_tries(restarts)}"
+    reasons[lacking] = f"no further solution {_tries(search.restarts)}"
     for row in np.flatnonzero(lacking.all(axis=1)):
-        reasons[row] = _reason(targets, search, int(row), restarts, tolerance)
+        reasons[row] = _reason(attempts, int(row), search)
     return replace(solutions, q=q, reasons=reasons, labels=labels, shortfall=shortfall)
 
 
-def _near_enough(chain: Chain, targets: Targets, search: _Search, tolerance: float | None) -> BoolArray:
+def _near_enough(attempts: _Attempts, tolerance: float | None) -> BoolArray:
     """Return where the nearest point found of a target that is not met is within the tolerance."""
-    near = np.asarray(search.pending & np.isfinite(search.residual))
+    near = np.asarray(attempts.pending & np.isfinite(attempts.residual))
     if tolerance is None or not near.any():
-        return np.zeros(len(targets), np.bool_)
-    position, turn = misses(chain, search.q[near], targets.rows(near))
+        return np.zeros(len(near), np.bool_)
+    position, turn = misses(attempts.chain, attempts.q[near], attempts.targets.rows(near))
     within = np.abs(position).max(axis=1) <= tolerance
-    near[near] = within & (np.linalg.norm(turn, axis=1) <= tolerance / turn_length(chain))
+    near[near] = within & (np.linalg.norm(turn, axis=1) <= tolerance / turn_length(attempts.chain))
     return near
 
 
-def _reason(targets: Targets, search: _Search, row: int, restarts: int, tolerance: float | None) -> str:
+def _reason(attempts: _Attempts, row: int, search: Search) -> str:
     """Say that a target has no solution and how near the tool comes."""
-    if not np.isfinite(search.residual[row]):
+    if not np.isfinite(attempts.residual[row]):
         return "the target is not finite, allowed: finite numbers"
-    text = f"no solution {_tries(restarts)}; nearest: {search.distance[row]:.3g} m"
-    if targets.rotation is not None:
-        text += f", {search.angle[row]:.3g} rad"
+    text = f"no solution {_tries(search.restarts)}; nearest: {attempts.distance[row]:.3g} m"
+    if attempts.targets.rotation is not None:
+        text += f", {attempts.angle[row]:.3g} rad"
     text += " away"
-    return text if tolerance is None else f"{text}, allowed: {tolerance:g} m along each axis"
+    if search.tolerance is None:
+        return text
+    return f"{text}, allowed: {search.tolerance:g} m along each axis"
 
 
 def _tries(restarts: int) -> str:

@@ -4,6 +4,7 @@
 unknowns is about. Here a matrix is an array of shape (k, k, n), so that an entry's n values lie side by side
 and each elimination is a few NumPy operations on all systems. Sums run term by term (see `_sum`): their
 rounding must not depend on n, or what one row comes to would depend on which others are solved beside it.
+Entries may be in any unit.
 """
 
 from __future__ import annotations
@@ -21,15 +22,15 @@ class Factor:
     """A = L D L^T, the Cholesky factor without square roots.
 
     Attributes:
-        lower: L below its diagonal of ones, shape (k, k, n); what stands elsewhere is not used.
-        inverse: 1 / D_i, shape (k, n).
+        lower: L below its diagonal of ones [-], shape (k, k, n); what stands elsewhere is not used.
+        inverse: 1 / D_i in one over the unit of A, shape (k, n).
     """
 
     lower: FloatArray
     inverse: FloatArray
 
     def solve(self, b: FloatArray) -> FloatArray:
-        """Return x of A x = b, both of shape (k, n)."""
+        """Return x of A x = b, both of shape (k, n), b in any unit, x in that over the unit of A."""
         x = np.array(b)
         for j in range(len(x) - 1):
             x[j + 1 :] -= self.lower[j + 1 :, j] * x[j]
@@ -46,8 +47,8 @@ def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> Factor:
     singular, is held to that: the factor is finite for any such A if mu > 0.
 
     Args:
-        A: Symmetric, shape (k, k, n); positive definite where mu is 0.
-        damping: mu, not negative, shape (n,) or one for all.
+        A: Symmetric, in any unit, shape (k, k, n); positive definite where mu is 0.
+        damping: mu in the same unit, not negative, shape (n,) or one for all.
     """
     lower, scaled, inverse = np.empty(A.shape), np.empty(A.shape), np.empty(A.shape[1:])
     for j in range(len(A)):
@@ -59,37 +60,37 @@ def factor(A: FloatArray, damping: FloatArray | float = 0.0) -> Factor:
 
 
 def gram(M: FloatArray) -> FloatArray:
-    """Return M M^T, shape (k, k, n), of matrices of shape (k, p, n)."""
+    """Return M M^T, shape (k, k, n), of matrices of shape (k, p, n) in any unit."""
     return _sum("ipn,jpn->ijn", M, M)
 
 
 def product(M: FloatArray, x: FloatArray) -> FloatArray:
-    """Return M x, shape (k, n), of matrices of shape (k, p, n) and vectors of shape (p, n)."""
+    """Return M x, shape (k, n), of matrices of shape (k, p, n) and vectors of shape (p, n) in any unit."""
     return _sum("kpn,pn->kn", M, x)
 
 
 def transposed_product(M: FloatArray, x: FloatArray) -> FloatArray:
-    """Return M^T x, shape (p, n), of matrices of shape (k, p, n) and vectors of shape (k, n)."""
+    """Return M^T x, shape (p, n), of matrices of shape (k, p, n) and vectors of shape (k, n) in any unit."""
     return _sum("kpn,kn->pn", M, x)
 
 
 def dot_product(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return sum_k a_k b_k, shape (n,), of a and b of shape (k, n)."""
+    """Return sum_k a_k b_k, shape (n,), of a and b of shape (k, n) in any unit."""
     return _sum("kn,kn->n", a, b)
 
 
 def column_squares(M: FloatArray) -> FloatArray:
-    """Return the squares of the columns' lengths, shape (p, n), of matrices of shape (k, p, n)."""
+    """Return the squared lengths of columns, shape (p, n), of matrices of shape (k, p, n) in any unit."""
     return _sum("kpn,kpn->pn", M, M)
 
 
 def outer_sum(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return sum_k a_k b_k^T, shape (p, r, n), of a of shape (k, p, n) and b of shape (k, r, n)."""
+    """Return sum_k a_k b_k^T, shape (p, r, n), of shapes (k, p, n) and (k, r, n), in any unit."""
     return _sum("kpn,krn->prn", a, b)
 
 
 def rows_of(a: FloatArray, rows: NDArray[np.intp]) -> FloatArray:
-    """Return some of the n of an array of shape (..., n), their values side by side.
+    """Return some of the n of an array of shape (..., n) in any unit, their values side by side.
 
     a[..., rows] has them a matrix apart, which makes all that follows several times as slow.
     """

@@ -44,10 +44,15 @@ def _rank(chain: Chain, rows: int) -> int:
 class Miss:
     """How far the tool is from its target at joint values q, and how that changes with them.
 
+    The gradient of |e|^2 / 2 is -J^T e at any target. e itself changes by -A J dq: A is 1 for the position,
+    and for the rotation vector, of length a, the Jacobian of the logarithm,
+    1 + E/2 + (1/a^2 - (1 + cos a) / (2 a sin a)) E^2 with E = [e]x / l, which goes to 1 with a. It is left
+    out: it leaves e where it is, so that the gradient is the same without it, and near the target steps are.
+
     Attributes:
         error: e, shape (3, n) or, of poses, (6, n): target minus tool along x, y, z in [m], then the rotation
             vector that turns the tool into its target, in the world, in [rad], times l in [m].
-        jacobian: J with de = -J dq, shape (3 or 6, joints, n); the rows of the rotation times l.
+        jacobian: J of the tool's velocity and, times l, of its angular velocity, shape (3 or 6, joints, n).
         distance2: |target - tool|^2 in [m2], shape (n,).
         turn2: The square of l times the angle in [m2], shape (n,); 0 where any orientation will do.
         length: l in [m].
@@ -61,20 +66,20 @@ class Miss:
 
     @property
     def square(self) -> FloatArray:
-        """|e|^2 in [m2]."""
+        """|e|^2 in [m2], shape (n,)."""
         return np.asarray(self.distance2 + self.turn2)
 
     def within(self, metres: float, radians: float) -> BoolArray:
-        """Return where position and orientation are as near as that, in [m] and [rad]."""
+        """Return where position and orientation are as near as that, in [m] and [rad], shape (n,)."""
         return np.asarray((self.distance2 <= metres**2) & (self.turn2 <= (self.length * radians) ** 2))
 
     def kept(self, rows: IndexArray) -> Miss:
-        """Return some of the rows."""
+        """Return some of the rows, indices of shape (m,)."""
         error, jacobian = rows_of(self.error, rows), rows_of(self.jacobian, rows)
         return Miss(error, jacobian, self.distance2[rows], self.turn2[rows], self.length)
 
     def restore(self, rows: IndexArray, before: Miss) -> None:
-        """Write another's rows over some of this one's."""
+        """Write another's rows, indices of shape (m,), over some of this one's."""
         for mine, other in (
             (self.error, before.error),
             (self.jacobian, before.jacobian),
@@ -102,7 +107,7 @@ class Task:
     columns: FloatArray | None
 
     def kept(self, rows: IndexArray) -> Task:
-        """Return some of the rows."""
+        """Return some of the rows, indices of shape (m,)."""
         columns = None if self.columns is None else rows_of(self.columns, rows)
         return replace(self, position=rows_of(self.position, rows), columns=columns)
 

@@ -1,4 +1,4 @@
-// Draws each figure when it comes near the window, links the time axes of a run, and readies the page for print.
+// Draws each figure when it comes near the window or the browser is idle, links the time axes of a run, and readies the page for print.
 "use strict";
 (() => {
   const PRINT_WIDTH = 680; // px; what an A4 page holds between its margins
@@ -101,6 +101,23 @@
     { rootMargin: "300px 0px" },
   );
   plots.forEach((plot) => watcher.observe(plot));
+
+  // Draws the others one after the other when there is nothing else to do: a picture of the whole page, a search and
+  // a jump find them drawn. Scenes only as many as may be drawn at once.
+  function drawIdle() {
+    const next = plots.find((plot) => !plot.dataset.drawn && !(isScene(plot) && scenes.length >= most));
+    if (!next) return;
+    draw(next);
+    whenIdle();
+  }
+
+  function whenIdle() {
+    if (window.requestIdleCallback) requestIdleCallback(drawIdle);
+    else setTimeout(drawIdle, 200);
+  }
+
+  if (document.readyState === "complete") whenIdle();
+  else addEventListener("load", whenIdle);
   addEventListener("beforeprint", beforePrint);
   addEventListener("afterprint", afterPrint);
 })();

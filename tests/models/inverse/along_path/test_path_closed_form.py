@@ -16,6 +16,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.along_path.jumps import jump_samples
 from urmpipe_models.inverse.along_path.path import follow
+from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import solve
 from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.robots.catalogue import load_robot
@@ -53,7 +54,7 @@ def line(first: FloatArray, last: FloatArray, count: int) -> FloatArray:
 amounts = st.lists(st.floats(-0.4, 0.4), min_size=6, max_size=6)
 
 
-@settings(deadline=None)  # the first case imports
+@settings(max_examples=15, deadline=None)  # the first case imports
 @given(amounts, amounts, st.sampled_from(["ur3", "ur5e", "ur10e"]))
 def test_the_motion_that_a_path_was_made_from_is_found_again(
     one: list[float], other: list[float], robot: str
@@ -112,7 +113,7 @@ def test_a_path_within_an_aligned_wrist_keeps_the_free_joints_still(robot: str) 
     assert [one.text for one in path.singular] == ["samples 0 to 200, 0.000 to 1.000 s: wrist aligned"]
 
 
-@settings(deadline=None, max_examples=30)
+@settings(deadline=None, max_examples=15)
 @given(st.integers(0, 10_000), st.sampled_from(["arm6", "ur5e"]))
 def test_a_walk_is_what_taking_the_nearest_sample_by_sample_gives(seed: int, robot: str) -> None:
     """All solutions in all allowed turns, and of them the nearest: written plainly, on coarse motions."""
@@ -216,7 +217,7 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     away = targets.position[-1] - shoulder
     targets.position[-1] += 0.002 * away / np.linalg.norm(away)
     assert not follow(arm, targets, times(41), start=q[0]).reached[-1]
-    path = follow(arm, targets, times(41), start=q[0], tolerance=0.0035)
+    path = follow(arm, targets, times(41), start=q[0], search=Search(tolerance=0.0035))
     assert path.reached.all()
     assert path.branch[-1] == "nearest point"
     assert 0.0 < path.shortfall[-1] <= 0.002 + 1e-9  # m: the pose before the shift is that near
@@ -231,7 +232,7 @@ def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
     away = targets.position - np.array([0.0, 0.0, 0.1625])
     away /= np.linalg.norm(away, axis=1)[:, None]
     targets.position[:] += np.linspace(0.0, 0.004, 41)[:, None] * away
-    path = follow(arm, targets, times(41), start=q[0], tolerance=0.0035)
+    path = follow(arm, targets, times(41), start=q[0], search=Search(tolerance=0.0035))
     assert path.reached.all()
     assert (path.branch == "nearest point").sum() > 10
     # rad: restarts find other turns of the same points, up to 12.6 away
@@ -332,23 +333,14 @@ def test_a_step_is_a_jump_only_if_half_of_it_leaves_the_path() -> None:
 def test_all_that_is_wrong_with_the_options_is_told_at_once() -> None:
     arm = load_robot("ur5e")
     targets = targets_of(arm, line(UR, UR + 0.1, 3))
+    search = Search(tolerance=-1.0, restarts=-1, seed=-1)
     with pytest.raises(OptionError) as caught:
-        follow(
-            arm,
-            targets,
-            np.array([0, 5, 5]),
-            start=np.zeros(5),
-            tolerance=-1.0,
-            restarts=-1,
-            seed=-1,
-        )
+        follow(arm, targets, np.array([0, 5, 5]), start=np.zeros(5), search=search)
     assert [str(one) for one in caught.value.findings] == [
         "t_ns: found 5 ns at sample 2 after 5 ns, allowed: times that rise",
         "start: found [0., 0., 0., 0., 0.], allowed: 6 finite numbers, in rad or m, one each of"
         f" {', '.join(arm.coordinates)}",
-        "tolerance: found -1 m, allowed: more than 0, finite",
-        "restarts: found -1, allowed: 0 or more",
-        "seed: found -1, allowed: 0 or more",
+        *search.faults(),
     ]
     with pytest.raises(
         OptionError, match=r"t_ns: found float64 of shape \(2,\), allowed: integer ns of shape \(3,\)"

@@ -16,6 +16,7 @@ from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.along_path.least_motion_path import LeastMotionPath
 from urmpipe_models.inverse.along_path.path import follow
 from urmpipe_models.inverse.along_path.sliding_window import SlidingWindow
+from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.repolarizer import repolarize
@@ -229,7 +230,9 @@ def test_within_the_tolerance_the_nearest_point_is_taken() -> None:
     arm = planar(3)
     reach = 2.9 + 0.102 * np.sin(np.linspace(0.0, math.pi, 101))
     line = np.column_stack((reach, np.zeros((101, 2))))
-    path = follow(arm, Targets(line), times(101), start=np.array([0.3, -0.5, 0.1]), tolerance=0.003)
+    path = follow(
+        arm, Targets(line), times(101), start=np.array([0.3, -0.5, 0.1]), search=Search(tolerance=0.003)
+    )
     assert path.reached.all()
     # m: along x the arm reaches 3 m; the nearest point is found to 1e-6 rad about it, so much better
     np.testing.assert_allclose(path.shortfall, np.maximum(reach - 3.0, 0.0), rtol=0.0, atol=1e-9)
@@ -243,7 +246,7 @@ def test_nearest_points_one_after_the_other_stay_in_their_turns() -> None:
     away = targets.position - np.array([0.0, 0.0, 0.1625])
     away /= np.linalg.norm(away, axis=1)[:, None]
     targets.position[:] += np.linspace(0.0, 0.004, 41)[:, None] * away
-    path = LeastMotionPath(arm, targets, q[0], 0.0035, 20, 0, lambda share: None)
+    path = LeastMotionPath(arm, targets, q[0], Search(tolerance=0.0035), lambda share: None)
     assert np.isfinite(path.q).all()
     assert (path.shortfall > 0.0).sum() > 10
     # rad: restarts find other turns of the same points, 6.28 away
@@ -281,7 +284,7 @@ def test_a_path_of_which_no_sample_has_a_solution_has_a_reason_each(robot: str, 
     arm = load_robot(robot)
     targets = targets_of(arm, np.full((3, 6), 0.3))
     targets.position[:] = place
-    path = follow(arm, targets, times(3), within_pi=True, restarts=2)
+    path = follow(arm, targets, times(3), within_pi=True, search=Search(restarts=2))
     assert not path.reached.any()
     assert all("finite numbers" in text if math.isnan(place) else " m" in text for text in path.reasons)
     assert list(path.branch) == ["", "", ""]
@@ -380,5 +383,5 @@ def test_the_same_seed_gives_the_same_motion_bit_for_bit() -> None:
     arm = planar(3)
     rng = np.random.default_rng(5)
     targets = Targets(np.column_stack((rng.uniform(-2.5, 2.5, (8, 2)), np.zeros(8))))
-    one, other = (follow(arm, targets, times(8), seed=3, restarts=5) for _ in range(2))
+    one, other = (follow(arm, targets, times(8), search=Search(seed=3, restarts=5)) for _ in range(2))
     assert np.array_equal(one.q, other.q, equal_nan=True)

@@ -73,7 +73,7 @@ def test_ten_thousand_poses_are_reached_by_every_solution_the_given_one_among_th
 @pytest.mark.parametrize("special", SPECIAL)
 def test_random_arms_are_reached_by_every_solution_the_given_one_among_them(special: str) -> None:
     generator = np.random.default_rng(len(special))
-    for _ in range(100 if special == "plain" else 15):
+    for _ in range(40 if special == "plain" else 8):
         chain = random_arm(generator, special)
         q = random_joints(generator, chain, 60)
         targets = targets_of(chain, q)
@@ -88,7 +88,7 @@ def test_random_arms_are_reached_by_every_solution_the_given_one_among_them(spec
 def test_prismatic_joints_among_the_first_three(kinds: str, special: str) -> None:
     generator = np.random.default_rng(7)
     forms = 0
-    for _ in range(10):
+    for _ in range(6):
         chain = random_arm(generator, special, kinds)
         form = spherical_wrist(screws_of(chain), chain.coordinates)
         if form is None:
@@ -101,7 +101,7 @@ def test_prismatic_joints_among_the_first_three(kinds: str, special: str) -> Non
         assert_explained(solutions)
         assert away_from(chain, solutions, q).min(axis=1).max() < FOUND
     # two parallel prismatic joints bring the wrist nowhere but to a surface
-    assert forms == (0 if special == "axes 1 and 2 parallel" and kinds.startswith("PP") else 10)
+    assert forms == (0 if special == "axes 1 and 2 parallel" and kinds.startswith("PP") else 6)
 
 
 @pytest.mark.parametrize(

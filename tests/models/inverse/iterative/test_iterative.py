@@ -16,7 +16,7 @@ from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.iterative.descent import METHODS, Method
 from urmpipe_models.inverse.iterative.refine import refine
-from urmpipe_models.inverse.iterative.task import redundancy, task_of, turn_between, turn_length
+from urmpipe_models.inverse.iterative.task import redundancy, turn_between, turn_length
 from urmpipe_models.inverse.limits import limits_of
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.kinematics.forward import jacobian_over_log
@@ -311,18 +311,6 @@ def test_the_turn_between_two_frames_is_scipys_rotation_vector(
     np.testing.assert_allclose(again, wanted, atol=3e-8)  # within 1e-6 of half a turn the axis has 8 digits
     if angle < 3.0:
         np.testing.assert_allclose(found, vector, atol=1e-14)
-
-
-def test_the_jacobian_of_the_miss_is_its_derivative_in_the_limit_of_small_misses() -> None:
-    chain = load_robot("panda")
-    q = within(chain, 5)
-    task = task_of(chain, targets_of(chain, q))
-    h = 1e-6
-    for joint in range(7):
-        step = np.zeros((7, 1))
-        step[joint] = h
-        slope = (task.miss(q.T + step).error - task.miss(q.T - step).error) / (2 * h)
-        np.testing.assert_allclose(-slope, task.miss(q.T).jacobian[:, joint], atol=1e-9)  # h^2 and eps / h
 
 
 @pytest.mark.parametrize(

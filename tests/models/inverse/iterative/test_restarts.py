@@ -13,6 +13,7 @@ from urmpipe_models.inverse.closed.closed_form import closed_form
 from urmpipe_models.inverse.iterative.refine import refine
 from urmpipe_models.inverse.iterative.restarts import DISTINCT, ROUGH, random_starts, solve_iteratively
 from urmpipe_models.inverse.limits import limits_of, within_limits
+from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solutions import NEAREST_POINT, Solutions
 from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.robots.catalogue import load_robot
@@ -47,7 +48,7 @@ def planar() -> Chain:
 @pytest.mark.parametrize("robot", ["urm6", "panda", "ur5e"])
 def test_random_reachable_poses_are_solved(robot: str) -> None:
     chain = load_robot(robot)
-    targets = random_targets(chain, 60)
+    targets = random_targets(chain, 30)
     solutions = solve_iteratively(chain, targets, start=np.zeros(len(chain.coordinates)))
     assert solutions.branches == ("1",)
     assert solutions.reached.all()
@@ -62,10 +63,10 @@ def test_random_poses_of_urm6_take_no_more_restarts_than_promised() -> None:
     chain = load_robot("urm6")
     targets = random_targets(chain, 1000, seed=2021)
     start = np.random.default_rng(9).uniform(-math.pi, math.pi, (1000, 6))
-    few = solve_iteratively(chain, targets, start=start, restarts=20)
+    few = solve_iteratively(chain, targets, start=start, search=Search(restarts=20))
     print(f"within 20 restarts: {few.reached.sum()} of 1000")
     assert few.reached.sum() >= 995
-    many = solve_iteratively(chain, targets, start=start, restarts=200)
+    many = solve_iteratively(chain, targets, start=start, search=Search(restarts=200))
     print(f"within 200 restarts: {many.reached.sum()} of 1000")
     assert many.reached.all()
     assert_solved(chain, targets, many)
@@ -91,7 +92,7 @@ def test_a_singular_target_is_met_however_short_the_steps_towards_it() -> None:
 def test_of_the_solutions_that_are_found_first_the_nearest_to_the_start_is_taken() -> None:
     """Attempts come one, two, four, ... at a time; here each is made alone."""
     chain = load_robot("urm6")
-    targets, start = random_targets(chain, 80), np.array(chain.start)
+    targets, start = random_targets(chain, 40), np.array(chain.start)
     found = solve_iteratively(chain, targets).q[:, 0]
     restarts, others = random_starts(chain, 7, 0), 0
     for row in np.flatnonzero(~refine(chain, targets, start).converged):
@@ -140,7 +141,7 @@ def test_every_solution_of_a_closed_form_is_found() -> None:
     assert form is not None
     start = np.array(chain.start)
     peer = within_limits(chain, form.solve(targets), start)
-    found = solve_iteratively(chain, targets, every=True, restarts=150)
+    found = solve_iteratively(chain, targets, every=True, search=Search(restarts=150))
     for row in range(12):
         ours = found.q[row][found.reached[row]]
         theirs = peer.q[row][peer.reached[row]]
@@ -179,7 +180,9 @@ def test_every_solution_is_distinct_ordered_and_met() -> None:
 def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: str) -> None:
     chain = load_robot(robot)
     targets = random_targets(chain, 12)
-    first, again = (solve_iteratively(chain, targets, every=True, restarts=6, seed=4) for _ in range(2))
+    first, again = (
+        solve_iteratively(chain, targets, every=True, search=Search(restarts=6, seed=4)) for _ in range(2)
+    )
     np.testing.assert_array_equal(first.q, again.q)
     assert (random_starts(chain, 6, 4) != random_starts(chain, 6, 5)).all()
     np.testing.assert_array_equal(random_starts(chain, 6, 4), random_starts(chain, 20, 4)[:6])
@@ -189,9 +192,11 @@ def test_the_same_seed_finds_the_same_and_another_seed_begins_elsewhere(robot: s
 def test_what_is_found_for_a_target_does_not_depend_on_the_others(every: bool) -> None:
     chain = load_robot("urm6")
     targets = random_targets(chain, 15)
-    together = solve_iteratively(chain, targets, every=every, restarts=8)
+    together = solve_iteratively(chain, targets, every=every, search=Search(restarts=8))
     for row in (14, 3):
-        alone = solve_iteratively(chain, targets.rows(slice(row, row + 1)), every=every, restarts=8)
+        alone = solve_iteratively(
+            chain, targets.rows(slice(row, row + 1)), every=every, search=Search(restarts=8)
+        )
         count = alone.q.shape[1]
         np.testing.assert_array_equal(together.q[row, :count], alone.q[0])
         assert not together.reached[row, count:].any()
@@ -216,15 +221,19 @@ def test_random_starts_lie_within_limits() -> None:
 
 def test_a_target_out_of_reach_says_how_near_the_tool_comes() -> None:
     arm = planar()
-    found = solve_iteratively(arm, Targets(np.array([[1.2, 0.0, 0.0], [0.5, 0.1, 0.0]])), restarts=3)
+    found = solve_iteratively(
+        arm, Targets(np.array([[1.2, 0.0, 0.0], [0.5, 0.1, 0.0]])), search=Search(restarts=3)
+    )
     assert found.reached[:, 0].tolist() == [False, True]
     assert found.reason(0) == "no solution in 3 restarts; nearest: 0.3 m away"
     pose = targets_of(arm, np.array([[0.0, 0.0]]))
-    found = solve_iteratively(arm, replace(pose, position=pose.position + 0.1), restarts=1)
+    found = solve_iteratively(arm, replace(pose, position=pose.position + 0.1), search=Search(restarts=1))
     assert found.reason(0) is not None
     assert str(found.reason(0)).startswith("no solution in 1 restart; nearest: 0.1")
     assert str(found.reason(0)).endswith(" rad away")
-    found = solve_iteratively(arm, Targets(np.array([[1.2, 0.0, 0.0]])), restarts=0, tolerance=0.29)
+    found = solve_iteratively(
+        arm, Targets(np.array([[1.2, 0.0, 0.0]])), search=Search(restarts=0, tolerance=0.29)
+    )
     assert found.reason(0) == (
         "no solution from the start; nearest: 0.3 m away, allowed: 0.29 m along each axis"
     )
@@ -233,7 +242,7 @@ def test_a_target_out_of_reach_says_how_near_the_tool_comes() -> None:
 def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
     arm = planar()
     targets = Targets(np.array([[0.903, 0.0, 0.0], [0.91, 0.0, 0.0], [0.5, 0.1, 0.0]]))
-    found = solve_iteratively(arm, targets, start=np.array([0.1, 0.2]), tolerance=0.0035)
+    found = solve_iteratively(arm, targets, start=np.array([0.1, 0.2]), search=Search(tolerance=0.0035))
     assert found.reached[:, 0].tolist() == [True, False, True]
     np.testing.assert_allclose(found.shortfall[:, 0], [0.003, 0.0, 0.0], atol=1e-9)
     assert found.labels[:, 0].tolist() == [NEAREST_POINT, "1", "1"]
@@ -247,7 +256,9 @@ def test_a_nearest_pose_that_is_turned_too_far_is_none() -> None:
     tilted = targets_of(arm, np.array([[0.3, 0.8]]))
     c, s = math.cos(0.1), math.sin(0.1)
     tilt = np.array([[1.0, 0.0, 0.0], [0.0, c, -s], [0.0, s, c]])
-    found = solve_iteratively(arm, replace(tilted, rotation=tilt @ tilted.rotation), tolerance=0.0035)
+    found = solve_iteratively(
+        arm, replace(tilted, rotation=tilt @ tilted.rotation), search=Search(tolerance=0.0035)
+    )
     assert found.reason(0) is not None
 
 

@@ -14,7 +14,7 @@ from urmpipe_models.kinematics.forward import jacobian_over_log, poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 
 
-@settings(max_examples=100, deadline=None)
+@settings(max_examples=40, deadline=None)
 @given(data=st.data(), rows=st.integers(1, 4))
 def test_any_chain_has_the_pose_and_the_jacobian_of_its_kinematics(
     chains: SearchStrategy[Chain], data: st.DataObject, rows: int

@@ -1,4 +1,4 @@
-"""Options that name units, systems, and their values on the command line."""
+"""NAME=VALUE options: arguments of systems, and options of units."""
 
 from __future__ import annotations
 
@@ -8,36 +8,6 @@ from typing import Any
 
 import click
 from click.shell_completion import CompletionItem
-
-
-class UnitType(click.ParamType[str]):
-    """A unit's name, or a Python file with one in it; names complete in the shell."""
-
-    name = "UNIT|FILE"
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """Offer the names of the units and then files."""
-        from urmpipe_fmus.units import unit_names
-
-        names = [CompletionItem(name) for name in unit_names() if name.startswith(incomplete)]
-        return [*names, CompletionItem(incomplete, type="file")]
-
-
-class SystemType(click.ParamType[str]):
-    """A shipped system's name, or a system file; names complete in the shell."""
-
-    name = "SYSTEM"
-
-    def shell_complete(
-        self, ctx: click.Context, param: click.Parameter, incomplete: str
-    ) -> list[CompletionItem]:
-        """Offer the names of the systems and then files."""
-        from urmpipe_fmus.cosim import system_names
-
-        names = [CompletionItem(name) for name in system_names() if name.startswith(incomplete)]
-        return [*names, CompletionItem(incomplete, type="file")]
 
 
 class NamedType(click.ParamType[str]):

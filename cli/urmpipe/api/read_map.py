@@ -1,0 +1,23 @@
+"""`urmpipe.read_map`: how to read logs, as a file says it."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from urmpipe.edge import public
+from urmpipe.guards import PathLike
+from urmpipe_pipeline import sources
+from urmpipe_pipeline.sources import LogMap
+
+
+@public
+def read_map(path: PathLike) -> LogMap:
+    """Return what a map (TOML) says: `read`, how to read a log, and its `robot`, `base` and `tool`.
+
+    Args:
+        path: The file.
+
+    Raises:
+        OptionError: With everything that is wrong with it.
+    """
+    return sources.read_map(Path(path))

@@ -1,0 +1,63 @@
+"""What errors become at the edge of the command line: lines on standard error, or one JSON object."""
+
+from __future__ import annotations
+
+import os
+import sys
+from collections.abc import Sequence
+from contextlib import suppress
+from typing import TYPE_CHECKING
+
+import click
+
+from urmpipe.usage import usage_finding
+
+if TYPE_CHECKING:
+    from urmpipe_models.errors import Finding
+
+SHOWN_FINDINGS = 20
+"""Errors printed line by line; the others are counted."""
+
+
+def leave_output() -> None:
+    """Let nothing more go to standard output, which took no more."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+def findings_of(error: BaseException) -> Sequence[Finding]:
+    """Return what to tell the user about an error, whoever raised it."""
+    from urmpipe_models.errors import Finding, UrmpipeError
+
+    match error:
+        case UrmpipeError():
+            return error.findings
+        case OSError():
+            return [Finding(error.strerror or str(error), file=error.filename and str(error.filename))]
+        case click.UsageError():
+            return [usage_finding(error)]
+        case click.ClickException():
+            said = error.format_message()
+        case click.Abort() | KeyboardInterrupt():
+            said = "stopped before it was done; nothing was written"
+        case MemoryError():
+            said = "out of memory"
+        case _:
+            said = f"{type(error).__name__}: {error} (a fault of urmpipe itself; --debug shows where)"
+    return [Finding(said)]
+
+
+def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
+    """Print errors on standard error, a line each, and as one JSON object if it is asked for."""
+    for finding in findings[:SHOWN_FINDINGS]:
+        click.echo(f"error: {finding}", err=True)
+    if len(findings) > SHOWN_FINDINGS:
+        click.echo(f"error: and {len(findings) - SHOWN_FINDINGS} more", err=True)
+    if as_json:
+        from urmpipe.printing.terminal import echo_json
+
+        errors = [
+            {name: getattr(one, name) for name in ("file", "line", "row", "column", "message")}
+            for one in findings
+        ]
+        with suppress(OSError):  # where standard output takes no more, that is told already
+            echo_json({"schema": 1, "errors": errors})

@@ -1,0 +1,192 @@
+"""What the values of options are: names of catalogues, frames, joint values, times."""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any
+
+import click
+from click.shell_completion import CompletionItem
+
+TIMES = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
+LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
+ANGLES = {"": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
+"""Units that a value on the command line may have behind it, in the SI unit; without one it is in that."""
+
+
+class CatalogueType(click.ParamType[str]):
+    """A name of a catalogue, or a file; names complete in the shell.
+
+    Args:
+        name: What the value is called in the help.
+        names: Gives the names; called when they are to be completed.
+    """
+
+    def __init__(self, name: str, names: Callable[[], Iterable[str]]) -> None:
+        self.name = name
+        self._names = names
+
+    def shell_complete(
+        self, ctx: click.Context, param: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
+        """Offer the catalogue's names and then files."""
+        names = [CompletionItem(name) for name in self._names() if name.startswith(incomplete)]
+        return [*names, CompletionItem(incomplete, type="file")]
+
+
+def _robots() -> Iterable[str]:
+    """Return the names of the robots."""
+    from urmpipe_models.robots.catalogue import robot_names
+
+    return robot_names()
+
+
+def _units() -> Iterable[str]:
+    """Return the names of the units."""
+    from urmpipe_fmus.units import unit_names
+
+    return unit_names()
+
+
+def _systems() -> Iterable[str]:
+    """Return the names of the systems."""
+    from urmpipe_fmus.cosim import system_names
+
+    return system_names()
+
+
+ROBOT = CatalogueType("NAME|FILE", _robots)
+"""A robot's name, or a TOML or URDF file."""
+
+UNIT = CatalogueType("UNIT|FILE", _units)
+"""A unit's name, or a Python file with one in it."""
+
+SYSTEM = CatalogueType("SYSTEM|FILE", _systems)
+"""A shipped system's name, or a system file."""
+
+
+class OneOf(click.Choice[str]):
+    """One of some words."""
+
+    def get_invalid_choice_message(self, value: Any, ctx: click.Context | None) -> str:
+        """Return what was found, what may have been meant, and what is allowed."""
+        from urmpipe_models.names import not_among
+
+        return not_among(str(value), self.choices)
+
+
+def parsed(
+    parse: Callable[[str], Any], text: str, ctx: click.Context | None, param: click.Parameter | None
+) -> Any:
+    """Return what a function of another package makes of a text.
+
+    Raises:
+        OptionError: With everything that is wrong with it, by the option or the key that says it.
+    """
+    from urmpipe.usage import place_of
+    from urmpipe_models.errors import OptionError, UrmpipeError
+
+    try:
+        return parse(text)
+    except UrmpipeError as error:
+        if param is None:
+            raise
+        own = f"{max(param.opts, key=len)}: "
+        found = [one.message.removeprefix(own) for one in error.findings]
+        raise OptionError(*(place_of(ctx, param, said) for said in found)) from None
+
+
+class ParsedType(click.ParamType[Any]):
+    """What a function of another package reads, which tells of what is wrong by an `UrmpipeError`.
+
+    Args:
+        name: What the value is called in the help.
+        parse: Returns the value of a text.
+    """
+
+    def __init__(self, name: str, parse: Callable[[str], Any]) -> None:
+        self.name = name
+        self._parse = parse
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the value."""
+        return parsed(self._parse, value, ctx, param) if isinstance(value, str) else value
+
+
+def quantity(text: str, units: Mapping[str, float]) -> float:
+    """Return a number with its unit behind it in SI; one without a unit is in SI; NaN if it is none."""
+    match = re.fullmatch(r"(.*?)\s*([a-z]*)", text.strip())
+    try:
+        return float(match[1]) * units[match[2]] if match else math.nan
+    except (ValueError, KeyError):
+        return math.nan
+
+
+class OffsetType(click.ParamType[Any]):
+    """A frame as X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, or with units: 0,0,150mm."""
+
+    name = "X,Y,Z[,RX,RY,RZ]"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the transform."""
+        from urmpipe_models.transform import from_offset
+
+        if not isinstance(value, str):
+            return value
+        parts = value.split(",")
+        values = [quantity(part, LENGTHS) for part in parts[:3]]
+        values += [quantity(part, ANGLES) for part in parts[3:]]
+        if len(values) not in (3, 6) or not all(map(math.isfinite, values)):
+            allowed = "X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
+            self.fail(f"found {value!r}, allowed: {allowed}", param, ctx)
+        return from_offset(values)
+
+
+class NamesType(click.ParamType[Any]):
+    """Some names, parted by commas."""
+
+    name = "A,B,C"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> Any:
+        """Return the names as a tuple."""
+        return tuple(part.strip() for part in value.split(",")) if isinstance(value, str) else value
+
+
+class JointValuesType(click.ParamType[tuple[float, ...]]):
+    """Joint values as Q1,Q2,... in rad and m, one for each joint in the robot's order."""
+
+    name = "Q1,Q2,..."
+
+    def convert(
+        self, value: Any, param: click.Parameter | None, ctx: click.Context | None
+    ) -> tuple[float, ...]:
+        """Return the values."""
+        if isinstance(value, tuple):
+            return value
+        try:
+            values = tuple(float(part) for part in str(value).split(","))
+        except ValueError:
+            values = ()
+        if not values or not all(map(math.isfinite, values)):
+            self.fail(f"found {value!r}, allowed: numbers in rad and m, such as 0,3.14,0.5", param, ctx)
+        return values
+
+
+class DurationType(click.ParamType[float]):
+    """A positive time in s, or with its unit behind it: 0.005 or 5ms."""
+
+    name = "SECONDS"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> float:
+        """Return the time in [s]."""
+        if isinstance(value, float):
+            return value
+        seconds = quantity(str(value), TIMES)
+        if not 0.0 < seconds < math.inf:
+            self.fail(f"found {value!r}, allowed: a positive time in s, such as 0.005 or 5ms", param, ctx)
+        return seconds
+
+
+DURATION = DurationType()

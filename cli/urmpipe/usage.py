@@ -1,0 +1,113 @@
+"""Wrong use of the command line, told as everything else that is wrong: found, allowed, and the next step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+from click.core import ParameterSource
+
+if TYPE_CHECKING:
+    from urmpipe_models.errors import Finding
+
+
+@dataclass(frozen=True, slots=True)
+class Defaults:
+    """What an urmpipe.toml says for a command.
+
+    Attributes:
+        path: The file.
+        values: Its values by the long names of options, without dashes.
+    """
+
+    path: Path
+    values: dict[str, Any]
+
+    def __str__(self) -> str:
+        """Return what is told of them: the file, and each value as TOML has it, without quotes."""
+        return f"defaults of {self.path}: {', '.join(f'{k}={_shown(v)}' for k, v in self.values.items())}"
+
+
+def _shown(value: Any) -> str:
+    """Return a default as TOML would have it, without quotes."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    return ",".join(value) if isinstance(value, list) else str(value)
+
+
+class Group(click.Group):
+    """A group of commands that knows what a wrong name may have meant."""
+
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return the command that the first word names.
+
+        Raises:
+            UsageError: If there is none of that name, with the name that may have been meant.
+        """
+        name = args[0]
+        if name.startswith("-") or ctx.resilient_parsing or self.get_command(ctx, name):
+            return super().resolve_command(ctx, args)
+        from urmpipe_models.names import not_among
+
+        names = self.list_commands(ctx)
+        deeper = next(self._deeper(ctx, name), None)
+        meant = f"found {name!r} (did you mean {deeper}?), allowed: {', '.join(names)}"
+        raise click.UsageError(meant if deeper else not_among(name, names), ctx)
+
+    def _deeper(self, ctx: click.Context, name: str) -> Iterator[str]:
+        """Yield the commands of the groups in this group that have a name."""
+        for own in self.list_commands(ctx):
+            command = self.get_command(ctx, own)
+            if isinstance(command, click.Group) and name in command.commands:
+                yield f"{own} {name}"
+
+
+def usage_finding(error: click.UsageError) -> Finding:
+    """Return what is wrong with a line, or with the urmpipe.toml that speaks for it."""
+    from urmpipe_models.errors import Finding
+    from urmpipe_models.names import did_you_mean
+
+    ctx = error.ctx
+    match error:
+        case click.NoSuchOption():
+            options = [name for param in ctx.command.params for name in param.opts] if ctx else []
+            said = f"{error.option_name}: no such option{did_you_mean(error.option_name, options)}"
+        case click.MissingParameter(param=click.Parameter() as param):
+            said = f"found no {_told(param)}, allowed: {_usage(ctx)}"
+        case click.BadParameter(param=click.Parameter() as param):
+            return place_of(ctx, param, error.message)
+        case _:
+            said = error.format_message()
+    return Finding(said if ctx is None or "allowed: " in said else f"{said}; see {ctx.command_path} --help")
+
+
+def place_of(ctx: click.Context | None, param: click.Parameter, said: str) -> Finding:
+    """Return what is wrong with the value of a parameter: an option's, or a key's of urmpipe.toml."""
+    from urmpipe_models.errors import Finding
+
+    by_file = ctx is not None and ctx.get_parameter_source(param.name or "") == ParameterSource.DEFAULT_MAP
+    if ctx is not None and by_file and isinstance(ctx.obj, Defaults):
+        return Finding(f"key {_long(param)}: {said}", str(ctx.obj.path))
+    return Finding(f"{_told(param)}: {said}")
+
+
+def _long(param: click.Parameter) -> str:
+    """Return the long name of an option without its dashes."""
+    return max(param.opts, key=len).lstrip("-")
+
+
+def _told(param: click.Parameter) -> str:
+    """Return the name of a parameter as a person writes it."""
+    return f"--{_long(param)}" if isinstance(param, click.Option) else str(param.human_readable_name)
+
+
+def _usage(ctx: click.Context | None) -> str:
+    """Return the usage of a command in one line."""
+    if ctx is None:
+        return ""
+    return " ".join([ctx.command_path, *ctx.command.collect_usage_pieces(ctx)])

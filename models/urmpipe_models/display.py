@@ -1,0 +1,58 @@
+"""How results show themselves: one line at a prompt, that line and the head of their table in a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+from urmpipe_models.errors import one_line
+
+LONGEST = 120
+"""Characters of the line: it fits into a terminal, and into a list of results."""
+
+HEAD = 8
+"""Rows of the table in a notebook."""
+
+
+class Shown:
+    """A result that people look at: it has a headline, a table, and what a person should know."""
+
+    __slots__ = ()
+
+    def _headline(self) -> str:
+        """Return its name and what it holds, in one line."""
+        raise NotImplementedError
+
+    def _notes(self) -> Sequence[str]:
+        """Return what a person should know, a line each."""
+        return [warning.message for warning in getattr(self, "warnings", ())]
+
+    def _table(self) -> str:
+        """Return the head of its table in HTML."""
+        frame: Any = self.to_frame()  # type: ignore[attr-defined]
+        more = f"<p>{HEAD} of {len(frame)} rows of to_frame()</p>" if len(frame) > HEAD else ""
+        return f"{frame.head(HEAD).to_html(index=False)}{more}"
+
+    def __repr__(self) -> str:
+        notes = len(self._notes())
+        ending = f", {number_of(notes, 'warning')}>" if notes else ">"
+        line = one_line(f"<{type(self).__name__} {self._headline()}")
+        room = LONGEST - len(ending)
+        return f"{line if len(line) <= room else line[: room - 3] + '...'}{ending}"
+
+    def _repr_html_(self) -> str:
+        """Return the headline, the warnings and the head of the table, for a notebook."""
+        notes = "".join(f"<li>{escape(one_line(note))}</li>" for note in self._notes())
+        headline = f"<p><b>{type(self).__name__}</b> {escape(one_line(self._headline()))}</p>"
+        return f"{headline}{notes and f'<ul>{notes}</ul>'}{self._table()}"
+
+
+def number_of(count: int, what: str) -> str:
+    """Return a number with its noun: 1 row, 2 rows."""
+    return f"{count} {what}{'' if count == 1 else 's'}"
+
+
+def line_of(name: str, *facts: Any) -> str:
+    """Return a headline: the name, then the facts that there are."""
+    return f"{name}: {', '.join(str(fact) for fact in facts if fact)}"

@@ -1,0 +1,37 @@
+"""What a search for solutions is asked, whoever searches."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from numbers import Integral
+
+
+@dataclass(frozen=True, slots=True)
+class Search:
+    """How far a search goes for what does not follow from the start.
+
+    Attributes:
+        tolerance: In [m] along each axis: a target out of reach takes the nearest point that the tool can
+            get to if it is no farther away than this, and turned by no more than tolerance / l with l of
+            `turn_length`; `shortfall` says how far it is. None: it has no solution.
+        restarts: Random starts of the iterative solver for what it does not reach from the start.
+        seed: Of the random starts: the same seed, the same solutions.
+    """
+
+    tolerance: float | None = None
+    restarts: int = 20
+    seed: int = 0
+
+    def faults(self) -> Iterator[str]:
+        """Yield which of the values make no sense."""
+        if self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
+            yield f"tolerance: found {self.tolerance:g} m, allowed: more than 0, finite"
+        for name, value in (("restarts", self.restarts), ("seed", self.seed)):
+            if not isinstance(value, Integral) or value < 0:
+                yield f"{name}: found {value!r}, allowed: a whole number, 0 or more"
+
+
+USUAL_SEARCH = Search()
+"""The search where nothing else is asked."""

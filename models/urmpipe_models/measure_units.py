@@ -1,0 +1,48 @@
+"""Units of measurement that people read and write, and how many of one another is."""
+
+from __future__ import annotations
+
+from decimal import Decimal
+
+from urmpipe_models.errors import OptionError
+
+DEGREE = Decimal("0.01745329251994329576923690768488612713443")
+"""pi / 180."""
+
+MEASURES: dict[str, dict[str, Decimal]] = {
+    "m": {"m": Decimal(1), "mm": Decimal("1e-3"), "um": Decimal("1e-6")},
+    "m/s": {"m/s": Decimal(1), "mm/s": Decimal("1e-3")},
+    "m/s2": {"m/s2": Decimal(1), "mm/s2": Decimal("1e-3")},
+    "rad": {"rad": Decimal(1), "mrad": Decimal("1e-3"), "deg": DEGREE},
+    "rad/s": {"rad/s": Decimal(1), "deg/s": DEGREE, "rpm": 6 * DEGREE},
+    "rad/s2": {"rad/s2": Decimal(1), "deg/s2": DEGREE},
+    "s": {"s": Decimal(1), "ms": Decimal("1e-3"), "us": Decimal("1e-6")},
+    "A": {"A": Decimal(1), "mA": Decimal("1e-3")},
+    "V": {"V": Decimal(1), "mV": Decimal("1e-3")},
+}
+"""What is measured, named by its SI unit: its units, and how many SI units each is."""
+
+
+def units_of(si: str) -> dict[str, Decimal]:
+    """Return the units of what an SI unit measures, and how many of that each is; none of an unknown one."""
+    return MEASURES.get(si, {})
+
+
+def factor(unit: str, to: str) -> float:
+    """Return how many of one unit another is, rounded once: 1000 from m to mm.
+
+    Args:
+        unit: The unit of a value.
+        to: The unit that it is wanted in.
+
+    Raises:
+        OptionError: If one is unknown, or they measure different things.
+    """
+    for units in MEASURES.values():
+        if unit in units and to in units:
+            return float(units[unit] / units[to])
+    known = next((units for units in MEASURES.values() if unit in units), None)
+    if known is None:
+        every = ", ".join(one for units in MEASURES.values() for one in units)
+        raise OptionError(f"unit: found {unit!r}, allowed: {every}")
+    raise OptionError(f"unit: found {to!r} for {unit!r}, allowed: {', '.join(known)}")

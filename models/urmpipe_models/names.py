@@ -1,0 +1,47 @@
+"""How a name that is not there is told: with the one that may have been meant, and those that are allowed."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from difflib import SequenceMatcher
+
+MOST_LISTED = 12
+"""So many names are listed; of more, those most like the one that was given."""
+LEAST_LIKE = 0.6
+"""Share of letters that two names have in common, from where on one may have been meant by the other."""
+
+
+def did_you_mean(name: str, allowed: Iterable[str]) -> str:
+    """Return ` (did you mean NAME?)` with the allowed name most like another, or nothing if none is.
+
+    Small and capital letters count as the same, hyphens, underscores and spaces for nothing.
+    """
+    near = _nearest_first(name, allowed, LEAST_LIKE)
+    return f" (did you mean {near[0]}?)" if near else ""
+
+
+def not_among(name: str, allowed: Iterable[str]) -> str:
+    """Return `found NAME (did you mean ONE?), allowed: ONE, ...` for a name that is not among others."""
+    names = list(dict.fromkeys(allowed))
+    return f"found {name!r}{did_you_mean(name, names)}, allowed: {listed(name, names)}"
+
+
+def listed(name: str, allowed: Iterable[str]) -> str:
+    """Return the allowed names in their order; of more than `MOST_LISTED`, those most like a given one."""
+    names = list(dict.fromkeys(allowed))
+    if len(names) <= MOST_LISTED:
+        return ", ".join(names) or "none"
+    shown = _nearest_first(name, names, 0.0)[:MOST_LISTED]
+    return f"{', '.join(shown)} and {len(names) - len(shown)} others"
+
+
+def _nearest_first(name: str, allowed: Iterable[str], least: float) -> list[str]:
+    """Return the names that are at least so much like another, the nearest first; of equal ones the last."""
+    wanted = _letters(name)
+    like = {one: SequenceMatcher(None, _letters(one), wanted).ratio() for one in allowed}
+    return sorted((one for one in like if like[one] >= least), key=lambda one: (like[one], one), reverse=True)
+
+
+def _letters(name: str) -> str:
+    """Return a name without what is easily written otherwise."""
+    return name.lower().translate(dict.fromkeys(map(ord, "-_ ")))

@@ -1,0 +1,163 @@
+"""What changed since an earlier comparison: quantities, what is new or gone, what was made otherwise."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any, Literal, TypeAlias
+
+from urmpipe_pipeline.comparison.deviation import Statistics, Verdict
+
+Worse: TypeAlias = Literal["max", "rms", "share_out", "samples"]
+
+KEPT = 0.9
+"""A log that keeps a smaller share of its samples lost some: one program, recorded by hand, varies less."""
+
+
+@dataclass(frozen=True, slots=True)
+class Change:
+    """How one quantity of one log stands to the baseline.
+
+    Attributes:
+        run: The log's name now.
+        before: The statistics of the baseline.
+        now: The statistics now.
+        noise: What means nothing, in the unit of the statistics.
+        share_noise: Share of the samples, 0..1, that the noise can have put out of tolerance, before and now:
+            those that are out by no more than it, and one sample where the times differ; None where the
+            shares do not compare (no tolerance, or another one than before).
+        samples_shared: Samples at times that both have, with a value on both sides.
+        largest: Largest absolute change at one of them; None without any.
+        t_largest: When that was, in [s] of the log.
+    """
+
+    run: str
+    before: Statistics
+    now: Statistics
+    noise: float
+    share_noise: tuple[float, float] | None
+    samples_shared: int
+    largest: float | None
+    t_largest: float | None
+
+    @property
+    def worse(self) -> tuple[Worse, ...]:
+        """What of it is larger than before by more than the noise; samples: it rests on far fewer."""
+        return self._larger(self.before, self.now, self.share_noise and self.share_noise[1])
+
+    @property
+    def better(self) -> tuple[Worse, ...]:
+        """What of it is smaller than before by more than the noise; samples: it rests on far more."""
+        return self._larger(self.now, self.before, self.share_noise and self.share_noise[0])
+
+    @property
+    def changed(self) -> bool:
+        """Whether anything changed beyond the noise: the statistics, the verdict, or one sample."""
+        moved = self.largest is not None and self.largest > self.noise
+        return bool(self.worse or self.better or moved or self.before.verdict != self.now.verdict)
+
+    def _larger(self, one: Statistics, other: Statistics, share_noise: float | None) -> tuple[Worse, ...]:
+        """Return what of the other is larger than of the one by more than the noise, or rests on less."""
+        found: list[Worse] = []
+        if other.max > one.max + self.noise:
+            found.append("max")
+        if other.rms > one.rms + self.noise:
+            found.append("rms")
+        if share_noise is not None and (other.share_out or 0.0) > (one.share_out or 0.0) + share_noise:
+            found.append("share_out")
+        if one.samples and other.samples is not None and other.samples < KEPT * one.samples:
+            found.append("samples")
+        return tuple(found)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        both = {
+            name: {"before": getattr(self.before, name), "now": getattr(self.now, name)}
+            for name in ("max", "rms", "share_out", "samples", "verdict")
+        }
+        return {
+            "run": self.run,
+            "quantity": self.now.quantity,
+            "kind": self.now.kind,
+            "unit": self.now.unit,
+            "noise": self.noise,
+            **both,
+            "samples_shared": self.samples_shared,
+            "largest_change": self.largest,
+            "t_largest_change": self.t_largest,
+            "changed": self.changed,
+            "worse": list(self.worse),
+            "better": list(self.better),
+        }
+
+
+@dataclass(frozen=True, slots=True)
+class Absent:
+    """What only one of the two comparisons has.
+
+    Attributes:
+        run: The log's name.
+        quantity: A quantity of it that both logs should have; None if the log itself is absent.
+    """
+
+    run: str
+    quantity: str | None = None
+
+    def __str__(self) -> str:
+        return self.run if self.quantity is None else f"{self.quantity} of {self.run}"
+
+
+@dataclass(frozen=True, slots=True)
+class Difference:
+    """What differs in the way the two comparisons were made, as JSON has it."""
+
+    what: str
+    before: Any
+    now: Any
+
+
+@dataclass(frozen=True, slots=True)
+class BaselineComparison:
+    """A comparison held against an earlier one.
+
+    Attributes:
+        name: The name of the earlier one.
+        recording: Where that stands.
+        noise: Changes in [m] and [rad] that mean nothing, by kind.
+        changes: One a log and quantity that both have.
+        new: What the earlier one did not have.
+        gone: What only the earlier one had.
+        differences: What differs in the way the two were made.
+    """
+
+    name: str
+    recording: Path | None
+    noise: Mapping[str, float]
+    changes: tuple[Change, ...]
+    new: tuple[Absent, ...]
+    gone: tuple[Absent, ...]
+    differences: tuple[Difference, ...]
+
+    @property
+    def worse(self) -> tuple[Change, ...]:
+        """The quantities that are worse than before, beyond the noise."""
+        return tuple(change for change in self.changes if change.worse)
+
+    @property
+    def verdict(self) -> Verdict:
+        """Fail if a quantity is worse, or something that was compared before is compared no more."""
+        return "fail" if self.worse or self.gone else "pass"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {
+            "name": self.name,
+            "recording": str(self.recording) if self.recording else None,
+            "verdict": self.verdict,
+            "noise": dict(self.noise),
+            "changes": [change.to_dict() for change in self.changes],
+            "new": [asdict(one) for one in self.new],
+            "gone": [asdict(one) for one in self.gone],
+            "differences": [asdict(one) for one in self.differences],
+        }

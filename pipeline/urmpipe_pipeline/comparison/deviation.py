@@ -1,0 +1,279 @@
+"""The deviation of one log: arrays at the compared samples, statistics and verdicts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
+from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.runs.results import Run
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Verdict = Literal["pass", "fail"]
+
+Kind = Literal["axis", "norm", "path", "angle", "joint"]
+"""What a deviation is measured of: a coordinate, the distance at one time, the distance from the path,
+the orientation, a joint."""
+
+AXES = ("x", "y", "z", "norm")
+"""The columns of `Deviation.delta`."""
+
+WHOLE = 0.99
+"""A log that covers a smaller share of the reference is told: by hand, starts and ends vary by less."""
+
+
+@dataclass(frozen=True, slots=True)
+class Statistics:
+    """How one quantity deviates; max, rms and p95 are of absolute values, mean and std signed.
+
+    Attributes:
+        quantity: x, y, z, norm, path, angle, or a joint's name.
+        kind: What it is measured of; a tolerance of that name holds for it.
+        unit: m or rad, that of all lengths and angles here.
+        max: Largest absolute value.
+        rms: Root mean square.
+        mean: Mean.
+        std: Standard deviation about the mean, of the samples themselves (n, not n - 1).
+        p95: 95th percentile of the absolute values.
+        t_max: When the largest stands, in [s] of the log.
+        sample_max: Grid sample of the largest, from 0.
+        tolerance: Largest absolute value allowed, or None.
+        out_of_tolerance: Compared samples above it or without a value; None without a tolerance.
+        share_out: Their share of the compared samples, 0..1; None without a tolerance.
+        verdict: pass or fail, None without a tolerance.
+        samples: Compared samples that have a value; None in a recording made before they were counted.
+        missing: Compared samples that have none: they cannot be shown to be within a tolerance.
+    """
+
+    quantity: str
+    kind: Kind
+    unit: str
+    max: float
+    rms: float
+    mean: float
+    std: float
+    p95: float
+    t_max: float
+    sample_max: int
+    tolerance: float | None
+    out_of_tolerance: int | None
+    share_out: float | None
+    verdict: Verdict | None
+    samples: int | None = None
+    missing: int = 0
+
+    @property
+    def used(self) -> float | None:
+        """Share of the tolerance that the largest value uses up; None without one, inf if one is missing."""
+        if not self.tolerance:
+            return None
+        return math.inf if self.missing else self.max / self.tolerance
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object."""
+        return {key: value for key, value in asdict(self).items() if key not in ("quantity", "kind")}
+
+
+@dataclass(frozen=True, slots=True)
+class Stretch:
+    """Samples in a row that are out of tolerance.
+
+    Attributes:
+        samples: How many.
+        sample: The first of them, by its grid sample.
+        t: When it begins, in [s] of the log.
+        duration: From its first to its last sample in [s].
+    """
+
+    samples: int
+    sample: int
+    t: float
+    duration: float
+
+
+@dataclass(frozen=True, slots=True, eq=False, repr=False)
+class Deviation(Shown):
+    """The deviation of one log from the reference.
+
+    Attributes:
+        name: The log's name, unique in the comparison.
+        run: The ingested log.
+        sample: Grid samples that were compared, shape (m,).
+        t_ns: Their times on the log's clock in integer [ns], shape (m,).
+        reference: Where the reference was, in [m], shape (m, 3).
+        actual: Where the log was, aligned, in [m], shape (m, 3).
+        delta: x, y, z and norm of reference - actual, in [m], shape (m, 4).
+        path: Distance of `actual` from the nearest point of the reference's path, in [m], shape (m,).
+        speed: Speed of the log's tool centre point in [m/s], shape (m,); NaN where it is not known.
+        angle: Angle between the orientations in [rad], shape (m,); None where a side has none.
+        joint_delta: reference - log of each joint, turns included, in [rad] or [m], shape (m, joints); None
+            where a side has none.
+        joint_turns: Whole turns that the two logs count apart for the pose they start in, one a joint; they
+            are taken out of `joint_delta`.
+        outside: Where any quantity with a tolerance is out of it, shape (m,).
+        sync: How the clocks were put together.
+        alignment: How the log was moved in space.
+        left_out: Samples of the log without a reference or without a value.
+        reference_left_out: Samples of the reference outside the log's time.
+        statistics: One for each of x, y, z, norm and path, and for angle where there is one.
+        joint_statistics: One a joint, by its name in the log; none where a side has no joints.
+        start: delta at the first compared sample in [m]: x, y, z, norm (the paper's mutual calibration).
+        speed_correlation: Pearson's r of the norm and the speed; None where one of them does not change.
+        verdict: pass or fail.
+    """
+
+    name: str
+    run: Run
+    sample: IntArray
+    t_ns: IntArray
+    reference: FloatArray
+    actual: FloatArray
+    delta: FloatArray
+    path: FloatArray
+    speed: FloatArray
+    angle: FloatArray | None
+    joint_delta: FloatArray | None
+    joint_turns: tuple[int, ...]
+    outside: NDArray[np.bool_]
+    sync: Sync
+    alignment: Alignment
+    left_out: int
+    reference_left_out: int
+    statistics: dict[str, Statistics]
+    joint_statistics: dict[str, Statistics]
+    start: tuple[float, float, float, float]
+    speed_correlation: float | None
+    verdict: Verdict
+
+    @property
+    def t(self) -> FloatArray:
+        """Times of the compared samples in [s], shape (m,)."""
+        return seconds(self.t_ns)
+
+    @property
+    def duration(self) -> float:
+        """From the first to the last compared sample in [s]."""
+        return float(self.t_ns[-1] - self.t_ns[0]) / 1e9
+
+    @property
+    def worst(self) -> int:
+        """Index into the compared samples of the largest norm."""
+        return int(np.argmax(self.delta[:, 3]))
+
+    @property
+    def share_out(self) -> float:
+        """Share of the compared samples out of tolerance, 0..1."""
+        return float(np.count_nonzero(self.outside)) / len(self.sample)
+
+    @property
+    def longest_out(self) -> Stretch | None:
+        """The longest stretch out of tolerance, the first of equally long ones; None without any."""
+        edges = np.flatnonzero(np.diff(self.sample) > 1) + 1  # a stretch ends where samples are left out
+        changes = np.flatnonzero(np.diff(self.outside)) + 1
+        starts = np.unique(np.concatenate(([0], edges, changes)))
+        ends = np.append(starts[1:], len(self.sample))
+        lengths = np.where(self.outside[starts], ends - starts, 0)
+        longest = int(np.argmax(lengths))
+        if not lengths[longest]:
+            return None
+        first, last = int(starts[longest]), int(ends[longest]) - 1
+        return Stretch(
+            int(lengths[longest]),
+            int(self.sample[first]),
+            float(self.t[first]),
+            float(self.t_ns[last] - self.t_ns[first]) / 1e9,
+        )
+
+    @property
+    def all_statistics(self) -> tuple[Statistics, ...]:
+        """Of every quantity: x, y, z, norm, path, angle and the joints."""
+        return (*self.statistics.values(), *self.joint_statistics.values())
+
+    @property
+    def values(self) -> tuple[FloatArray, ...]:
+        """Every quantity at the compared samples in [m] or [rad], shape (m,) each; as `all_statistics`."""
+        angle = () if self.angle is None else (self.angle,)
+        joints = () if self.joint_delta is None else tuple(self.joint_delta.T)
+        return (*self.delta.T, self.path, *angle, *joints)
+
+    def furthest_joint(self, unit: str) -> Statistics | None:
+        """Return the joint in rad or m that is furthest off; None without one."""
+        joints = [one for one in self.joint_statistics.values() if one.unit == unit]
+        return max(joints, key=lambda one: one.max, default=None)
+
+    def place(self, one: Statistics) -> FloatArray:
+        """Return where the log was when one of its quantities was largest, in [m], shape (3,)."""
+        return np.asarray(self.actual[np.searchsorted(self.sample, one.sample_max)])
+
+    def row(self, one: Statistics) -> int:
+        """Return the log's row of numbers, from 1, that is nearest to where a quantity was largest."""
+        t_ns = self.run.log.t_ns
+        at = int(self.t_ns[np.searchsorted(self.sample, one.sample_max)])
+        return int(np.argmin(np.abs(t_ns - at))) + 1
+
+    @property
+    def decisive(self) -> Statistics:
+        """The quantity that uses up most of its tolerance; the norm where nothing has one."""
+        held = [one for one in self.all_statistics if one.used is not None]
+        return max(held, key=lambda one: one.used or 0.0, default=self.statistics["norm"])
+
+    def _headline(self) -> str:
+        """Return its verdict, and by what it is decided."""
+        one, samples = self.decisive, number_of(len(self.sample), "sample")
+        largest = f"{one.quantity} up to {one.max:.4g} {one.unit}"
+        return line_of(self.name, self.verdict, largest, f"{samples} compared")
+
+    def _notes(self) -> list[str]:
+        """Return what is to be known of the log."""
+        return [warning.message for warning in self.run.warnings]
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return one row a compared sample: t [s], then every quantity, in [m] or [rad].
+
+        Its columns are called as its statistics: x, y, z, norm, path, angle where there is one, the joints.
+        """
+        import pandas as pd
+
+        names = [one.quantity for one in self.all_statistics]
+        return pd.DataFrame({"t": self.t, **dict(zip(names, self.values, strict=True))})
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of one run."""
+        worst, longest = self.worst, self.longest_out
+        angle = self.statistics.get("angle")
+        return {
+            "name": self.name,
+            "samples": len(self.sample),
+            "left_out": self.left_out,
+            "reference_left_out": self.reference_left_out,
+            "duration": self.duration,
+            "sync_offset": self.sync.offset,
+            "sync": self.sync.to_dict(),
+            "alignment": self.alignment.to_dict(),
+            "delta": {axis: self.statistics[axis].to_dict() for axis in AXES},
+            "path": self.statistics["path"].to_dict(),
+            "angle": None if angle is None else angle.to_dict(),
+            "joints": {name: one.to_dict() for name, one in self.joint_statistics.items()},
+            "joint_turns": dict(zip(self.joint_statistics, self.joint_turns, strict=True)),
+            "start": dict(zip(AXES, self.start, strict=True)),
+            "worst": {
+                "t": float(self.t[worst]),
+                "sample": int(self.sample[worst]),
+                "norm": float(self.delta[worst, 3]),
+            },
+            "out_of_tolerance": int(np.count_nonzero(self.outside)),
+            "share_out": self.share_out,
+            "longest_out": None if longest is None else asdict(longest),
+            "speed_correlation": self.speed_correlation,
+            "verdict": self.verdict,
+            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.run.warnings],
+        }

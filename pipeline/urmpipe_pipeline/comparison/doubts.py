@@ -1,0 +1,79 @@
+"""What a person should know about a verdict: that it rests on little, or answers another question."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.tolerance import UNITS
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.runs.results import Run
+
+AT_REST = 1e-4
+"""What moves by less in [m] or [rad] rests: five times what the best arms repeat a pose to (0.02 mm)."""
+
+LARGE_LENGTH = 0.1
+"""A larger tolerance in [m] was meant in mm: no arm misses by a tenth of a metre and is accepted."""
+
+LARGE_ANGLE = float(np.radians(10.0))
+"""A larger tolerance in [rad] was meant in deg."""
+
+
+def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
+    """Yield what a verdict on a log rests on, where that is little: missing values, or one pose.
+
+    Args:
+        one: The deviation of the log.
+    """
+    for found in one.all_statistics:
+        if found.tolerance is not None and found.missing:
+            said = f"judged at {found.samples} of {len(one.sample)} compared samples"
+            told = f"{one.name}: {found.quantity}: {said}; one without a value is out of tolerance"
+            yield LogWarning("partly-judged", told)
+    if not one.run.single_poses and _rests(one):
+        said = f"{text.counted(len(one.sample), 'sample')} compared, all in one pose"
+        yield LogWarning("one-pose", f"{one.name}: {said}: the verdict is on that pose alone")
+
+
+def _rests(one: Deviation) -> bool:
+    """Tell whether a log stays where it is: its tool centre point, and its joints where it has some."""
+    return _extent(one.actual) < AT_REST and (len(one.sample) < 2 or _extent(one.run.log.q) < AT_REST)
+
+
+def _extent(values: FloatArray) -> float:
+    """Return the largest span of a column of shape (n, k), in its unit; 0 without a value."""
+    known = values[np.isfinite(values).all(axis=1)]
+    return float(np.ptp(known, axis=0).max()) if known.size else 0.0
+
+
+def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
+    """Yield a warning for each tolerance that nobody means.
+
+    Args:
+        tolerance: In [m] or [rad], by kind or coordinate.
+    """
+    for kind, value in tolerance.items():
+        unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
+        if value > most:
+            said = f"a tolerance of {text.limit(value, unit)} {other} ({kind}) lets anything pass"
+            yield LogWarning("large-tolerance", f"{said}: {value:g} is in {unit}; {value:g}{other} meant?")
+
+
+def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
+    """Yield a warning if a log that is compared by its joints recorded a tool centre point elsewhere.
+
+    Args:
+        run: The log.
+        allowed: Distance in [m] that is not told.
+    """
+    if run.tcp is None or run.tcp_recorded is None:
+        return
+    apart = np.linalg.norm(run.tcp.position - run.tcp_recorded, axis=1)
+    if (known := apart[np.isfinite(apart)]).size and (most := float(known.max())) > allowed:
+        said = f"by its joints it is up to {text.quantity(most, 'm')} from the tool centre point it recorded"
+        remedy = f"which this verdict does not judge; urmpipe compare with {run.name} alone does"
+        yield LogWarning("recorded-tcp-apart", f"{run.name}: {said}, {remedy}")

@@ -1,0 +1,98 @@
+"""What results show of themselves at a prompt and in a notebook."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import urmpipe
+from urmpipe_datasets import LOGS
+from urmpipe_models.display import Shown
+from urmpipe_pipeline.simulations.simulation import Signal, Simulation
+
+OTHERS = {"LogMap", "ReadOptions", "Targets", "Transform"}
+"""Public classes that are no results: what they hold is what they show."""
+
+
+@pytest.fixture(scope="module")
+def results(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """One of each public result class, by its name."""
+    folder = tmp_path_factory.mktemp("results")
+    for name in ("matlab", "path"):
+        head = (LOGS / f"{name}.csv").read_text(encoding="utf-8").splitlines()[:101]
+        (folder / f"{name}.csv").write_text("\n".join(head) + "\n", encoding="utf-8")
+    run = replace(urmpipe.ingest(folder / "matlab.csv", "urm6"), name="<b>&log")
+    comparison = urmpipe.compare(folder / "path.csv", run)
+    simulation = Simulation(
+        name="system", description="", t_ns=np.arange(2), step=0.005, system_svg="", system_text="",
+        signals=(Signal("meter", "norm", np.zeros(2)),), blocks=(), failed=None, warnings=(),
+        provenance=run.provenance,
+    )  # fmt: skip
+    made = [
+        run, run.log, comparison, comparison.runs[0], urmpipe.load_robot("urm6"),
+        urmpipe.ik([[0.4, 0.1, 0.4]], "ur5e"), simulation,
+        urmpipe.build_fmu("dc_drive", backend="python", output=folder),
+        urmpipe.export(run, folder / "log.csv"), urmpipe.report([run], folder / "report.html"),
+    ]  # fmt: skip
+    return {type(one).__name__: one for one in made}
+
+
+def test_each_public_class_is_a_result_or_named_as_another(results: dict[str, Any]) -> None:
+    public = {name for name in urmpipe.__all__ if isinstance(getattr(urmpipe, name), type)}
+    errors = {name for name in public if issubclass(getattr(urmpipe, name), Exception)}
+    assert public - errors - OTHERS == set(results)
+    assert all(isinstance(one, Shown) for one in results.values())
+
+
+def test_each_result_is_one_line_at_a_prompt(results: dict[str, Any]) -> None:
+    for name, one in results.items():
+        shown = repr(one)
+        assert shown.startswith(f"<{name} ")
+        assert shown.endswith(">")
+        assert shown.isprintable()
+        assert len(shown) <= 120
+
+
+def test_each_result_shows_its_headline_and_escapes_names_in_a_notebook(results: dict[str, Any]) -> None:
+    for name, one in results.items():
+        html = one._repr_html_()
+        assert html.startswith(f"<p><b>{name}</b> ")
+        assert "<table" in html
+        assert "<b>&log" not in html
+    assert "&lt;b&gt;&amp;log: urm6" in results["Run"]._repr_html_()
+
+
+def test_each_result_has_a_dictionary_and_all_but_the_arm_a_frame(results: dict[str, Any]) -> None:
+    for name, one in results.items():
+        assert one.to_dict()
+        assert name == "Chain" or len(one.to_frame().columns) > 1 or name == "Report"
+
+
+def test_the_lines_say_what_each_holds(results: dict[str, Any]) -> None:
+    assert repr(results["Run"]) == "<Run <b>&log: urm6, 100 rows in 0.495 s, grid of 100 samples, 1 warning>"
+    line = "<Comparison <b>&log-against-path: pass: <b>&log pass (4.56e-05 m), 2 warnings>"
+    assert repr(results["Comparison"]) == line
+    assert repr(results["InverseResult"]) == (
+        "<InverseResult targets: pass, ur5e, 1 of 1 target reached, iterative>"
+    )
+
+
+def test_a_deviation_has_every_quantity_over_time(results: dict[str, Any]) -> None:
+    deviation = results["Deviation"]
+    frame = deviation.to_frame()
+    assert list(frame.columns) == ["t", *(one.quantity for one in deviation.all_statistics)]
+    assert (frame["norm"].to_numpy() == deviation.delta[:, 3]).all()
+    assert frame["x"].abs().max() == deviation.statistics["x"].max
+
+
+def test_warnings_are_counted_in_the_line_and_told_in_the_notebook(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("t,q1\n0,0.1\n0.005,0.2\n0.01,0.3\n", encoding="utf-8")
+    with pytest.warns(urmpipe.UrmpipeWarning):
+        run = urmpipe.ingest(log)
+    assert repr(run).endswith(f", {len(run.warnings)} warning{'s' if len(run.warnings) > 1 else ''}>")
+    assert all(warning.message.split(":")[0] in run._repr_html_() for warning in run.warnings)

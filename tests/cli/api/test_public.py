@@ -1,0 +1,175 @@
+"""The public functions: what they take in one way everywhere, and what they refuse."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from inspect import Parameter, signature
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pandas as pd
+import pytest
+
+import urmpipe
+from urmpipe.guards import frame_of
+from urmpipe_models.transform import Transform, from_offset
+from urmpipe_pipeline.sources import ReadOptions
+
+COMMANDS = ("ingest", "compare", "ik", "report", "export", "simulate", "build_fmu", "view")
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A log of an arm, and the path of its tool."""
+    place = tmp_path_factory.mktemp("logs")
+    t = np.arange(40) / 100
+    q = 0.4 * np.sin(t[:, None] + np.arange(6))
+    names = [f"q{i} [rad]" for i in range(1, 7)]
+    pd.DataFrame(np.column_stack([t, q]), columns=["t [s]", *names]).to_csv(place / "log.csv", index=False)
+    run = urmpipe.ingest(place / "log.csv", "urm6")
+    assert run.tcp is not None
+    rows = np.column_stack([run.t, run.tcp.position])
+    path = pd.DataFrame(rows, columns=["t [s]", "x [m]", "y [m]", "z [m]"])
+    path.to_csv(place / "path.csv", index=False)
+    return place
+
+
+@pytest.fixture
+def run(folder: Path) -> urmpipe.Run:
+    return urmpipe.ingest(folder / "log.csv", "urm6")
+
+
+TOOL = (0.0, 0.0, 0.15)
+
+
+def test_a_run_is_held_as_its_log_is_with_another_tool(folder: Path, run: urmpipe.Run) -> None:
+    of_run = urmpipe.compare(folder / "path.csv", run, "urm6", tool=TOOL)
+    of_log = urmpipe.compare(folder / "path.csv", folder / "log.csv", "urm6", tool=TOOL)
+    assert of_run.verdict == "fail"
+    assert of_run.runs[0].statistics == of_log.runs[0].statistics
+    assert urmpipe.compare(folder / "path.csv", run).verdict == "pass"
+
+
+def test_what_cannot_be_applied_to_a_run_is_refused(folder: Path, run: urmpipe.Run) -> None:
+    with pytest.raises(urmpipe.OptionError) as error:
+        urmpipe.compare(run, run, read=ReadOptions(time="none"), tsp=0.01, derivative="savgol")
+    assert str(error.value) == (
+        "read, tsp, derivative: found with what was ingested before, allowed: with a log; a run or a"
+        " recording stands as `ingest` made it"
+    )
+    with pytest.raises(urmpipe.UrmpipeError, match="allowed: 7"):
+        urmpipe.compare(folder / "path.csv", run, "panda")
+
+
+def test_one_is_a_list_of_one(folder: Path, run: urmpipe.Run, tmp_path: Path) -> None:
+    path, log = folder / "path.csv", folder / "log.csv"
+    given: list[Any] = [str(log), log, run, [run], (log,), (one for one in [run])]
+    names = [urmpipe.compare(path, logs, "urm6").name for logs in given]
+    assert names == ["log-against-path"] * 6
+    assert urmpipe.report(run, tmp_path / "one.html").results == (run,)
+
+
+def test_arrays_and_tables_are_told_the_way() -> None:
+    frame = pd.DataFrame({"t": [0.0], "q1": [1.0]})
+    way = 'arrays and tables are written first, such as table.to_csv("log.csv", index=False)'
+    tables = {"a DataFrame": frame, "a ndarray": np.array(3.0), "a dict": {"t": []}, "''": ""}
+    for found, given in tables.items():
+        with pytest.raises(urmpipe.OptionError) as error:
+            urmpipe.ingest(given)  # type: ignore[arg-type]
+        allowed = "a file, several of one log, or a folder of them"
+        assert str(error.value) == f"log: found {found}, allowed: {allowed}; {way}"
+        with pytest.raises(urmpipe.OptionError) as error:
+            urmpipe.compare("path.csv", given)  # type: ignore[arg-type]
+        allowed = "a log, a path, a recording or a Run"
+        assert str(error.value) == f"operands: found {found}, allowed: {allowed}; {way}"
+
+
+@pytest.mark.parametrize(
+    "given", [(0.1, 0.2, 0.3), [0.1, 0.2, 0.3, 0.4, -0.5, 0.6], np.array([0.1, 0.2, 0.3, 3.0, 0.0, 0.0])]
+)
+def test_a_frame_is_numbers_a_matrix_or_a_transform(given: Any) -> None:
+    wanted = from_offset([float(value) for value in given])
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = wanted.rotation, wanted.translation
+    assert frame_of("tool", given) == frame_of("tool", wanted) == frame_of("tool", matrix) == wanted
+
+
+@pytest.mark.parametrize(
+    ("given", "found"),
+    [
+        ("0,0,0.15", "found '0,0,0.15'"),
+        ([0.0, 0.0], "found a list of shape (2,)"),
+        (2.0 * np.eye(4), "found a matrix that is no rigid motion"),
+        ([0.0, 0.0, float("nan")], "found a list of shape (3,)"),
+    ],
+)
+def test_what_is_no_frame_is_refused(given: Any, found: str) -> None:
+    with pytest.raises(urmpipe.OptionError, match="tool: ") as error:
+        urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", tool=given)
+    assert str(error.value).startswith(f"tool: {found}")
+
+
+def test_all_keywords_of_a_wrong_kind_are_told_at_once() -> None:
+    wrong: dict[str, Any] = {"tsp": "5ms", "read": {}, "strict": 1, "output": "", "progress": True}
+    with pytest.raises(urmpipe.OptionError) as error:
+        urmpipe.ingest("log.csv", **wrong)
+    assert str(error.value).splitlines() == [
+        "read: found {}, allowed: ReadOptions, such as urmpipe.read_map(FILE).read",
+        "tsp: found '5ms', allowed: a number, in s",
+        "strict: found 1, allowed: True or False",
+        "output: found '', allowed: a path: text or a Path, not empty",
+        "progress: found True, allowed: a function of the share that is done, 0 to 1, such as print",
+    ]
+
+
+def test_robot_and_log_are_told_together() -> None:
+    with pytest.raises(urmpipe.UrmpipeError) as error:
+        urmpipe.ingest(3, "urm66")  # type: ignore[arg-type]
+    assert [str(one).split(";")[0].split(",")[0] for one in error.value.findings] == [
+        "unknown robot 'urm66' (did you mean urm6?)",
+        "log: found a int",
+    ]
+
+
+def test_an_unknown_backend_is_refused() -> None:
+    with pytest.raises(urmpipe.OptionError, match=r"^backend: found 'cc', allowed: native, python$"):
+        urmpipe.build_fmu("dc_drive", backend="cc")  # type: ignore[arg-type]
+
+
+def test_a_result_without_a_page_is_refused(tmp_path: Path) -> None:
+    solved = urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e")
+    with pytest.raises(urmpipe.OptionError, match=r"^results: found a InverseResult, allowed: a rec"):
+        urmpipe.report([solved], tmp_path / "report.html")  # type: ignore[list-item]
+    with pytest.raises(urmpipe.OptionError, match=r"^result: found a InverseResult, allowed: a Run"):
+        urmpipe.write_recording(solved, tmp_path / "solved.rrd")  # type: ignore[arg-type]
+
+
+def test_files_may_be_text(folder: Path, run: urmpipe.Run, tmp_path: Path) -> None:
+    urmpipe.write_recording(run, f"{tmp_path}/log.rrd")
+    assert isinstance(urmpipe.read_recording(f"{tmp_path}/log.rrd"), urmpipe.Run)
+    urmpipe.write_map(run, f"{tmp_path}/log.toml")
+    again = urmpipe.ingest(folder / "log.csv", "urm6", read=urmpipe.read_map(f"{tmp_path}/log.toml").read)
+    assert (again.q == run.q).all()
+
+
+SHARED = ("base", "tool", "read", "tsp", "strict", "output", "inputs", "progress")
+
+
+def test_shared_keywords_have_one_name_and_one_order() -> None:
+    for name in COMMANDS:
+        parameters = signature(getattr(urmpipe, name)).parameters
+        shared = [one for one in parameters if one in SHARED]
+        assert shared == [one for one in SHARED if one in shared], name
+        if "robot" in parameters:
+            assert list(parameters).index("robot") == (2 if name == "compare" else 1)
+            assert parameters["robot"].kind == Parameter.POSITIONAL_OR_KEYWORD
+
+
+def test_the_robot_of_a_run_may_be_exchanged(folder: Path, run: urmpipe.Run) -> None:
+    arm = run.robot
+    assert arm is not None
+    other = replace(arm, name="other", tool=Transform(translation=TOOL))
+    held = urmpipe.compare(folder / "path.csv", run, other).runs[0].run
+    assert held.robot == other
+    assert run.robot == arm

@@ -1,0 +1,94 @@
+"""docs/ci.md against the code: its jobs are YAML, their commands run, and give what the page says."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+import xml.etree.ElementTree as ET
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from pages import lay_files, run_in_process, snippets, text_of
+
+PAGE = "docs/ci.md"
+yaml: Any = pytest.importorskip("yaml", reason="PyYAML, which evo brings along, reads the jobs")
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with the files that pages name."""
+    lay_files(tmp_path, monkeypatch)
+    return tmp_path
+
+
+def jobs() -> tuple[dict[str, Any], dict[str, Any]]:
+    """Return the job of GitLab, and that of GitHub."""
+    blocks = re.findall(r"^```yaml\n(.*?)^```$", text_of(PAGE), re.DOTALL | re.MULTILINE)
+    gitlab, github = map(yaml.safe_load, blocks)
+    return gitlab["verdict"], github["jobs"]["verdict"]
+
+
+def commands() -> list[str]:
+    """Return the commands of urmpipe of both jobs."""
+    gitlab, github = jobs()
+    lines = [*gitlab["script"], *gitlab["after_script"], *(step.get("run", "") for step in github["steps"])]
+    return [line for line in lines if line.startswith("urmpipe ")]
+
+
+def test_both_jobs_run_the_same_and_keep_what_they_write(folder: Path) -> None:
+    compare, report, *of_github = commands()
+    assert of_github == [compare, report]
+    assert (run_in_process(compare), run_in_process(report)) == (0, 0)
+    gitlab, _ = jobs()
+    kept = {*gitlab["artifacts"]["paths"], gitlab["artifacts"]["reports"]["junit"]}
+    assert kept == {path.name for path in folder.glob("verdict.*")}
+
+
+def test_each_exit_code_leaves_the_junit_file_that_the_page_says(
+    folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    compare = commands()[0]
+    assert run_in_process(compare) == 0
+    assert capsys.readouterr() == ("", "")
+    recording = (folder / "verdict.rrd").read_bytes()
+    found = {}
+    for code, line in ((1, compare.replace("3.5mm", "1um")), (2, f"{compare} --joints q9")):
+        assert run_in_process(line) == code
+        root = ET.parse(folder / "verdict.xml").getroot()
+        found[code] = (root.get("failures") != "0", root.get("errors") != "0")
+        assert capsys.readouterr().err.startswith(("", "FAIL  log out of tolerance", "error: ")[code])
+        assert ((folder / "verdict.rrd").read_bytes() == recording) == (code == 2)
+        recording = (folder / "verdict.rrd").read_bytes()
+    assert found == {1: (True, False), 2: (False, True)}
+
+
+def test_the_worst_exit_code_of_several_logs_is_kept(folder: Path) -> None:
+    (folder / "logs").mkdir()
+    log = (folder / "robot_data.csv").read_text(encoding="utf-8")
+    (folder / "logs" / "a.csv").write_text("broken\n")
+    (folder / "logs" / "b.csv").write_text(log, encoding="utf-8")
+    shim = folder / "bin" / "urmpipe"
+    shim.parent.mkdir()
+    shim.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m urmpipe "$@"\n')
+    shim.chmod(0o755)
+    path = os.pathsep.join([str(shim.parent), os.environ["PATH"]])
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": os.pathsep.join(sys.path)}
+    (script,) = snippets(PAGE, "sh")
+    done = subprocess.run(["sh", "-e", "-c", script], cwd=folder, env=environment, check=False)
+    assert done.returncode == 2
+    errors = {
+        path.name: ET.parse(path).getroot().get("errors") for path in sorted(folder.glob("verdict-*.xml"))
+    }
+    assert errors == {"verdict-a.xml": "1", "verdict-b.xml": "0"}
+
+
+def test_the_defaults_of_the_page_are_those_of_a_call(folder: Path) -> None:
+    (defaults,) = snippets(PAGE, "toml")
+    (folder / "urmpipe.toml").write_text(defaults, encoding="utf-8")
+    assert run_in_process("urmpipe compare path.csv log.csv -q -o a.rrd") == 0
+    assert run_in_process("urmpipe compare a.rrd --baseline a.rrd -q") == 0

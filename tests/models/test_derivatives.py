@@ -1,0 +1,154 @@
+"""Derivatives that are written out, against differences of what they are derivatives of."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import product
+from typing import TypeAlias
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.strategies import SearchStrategy
+
+from differences import assert_jacobian, assert_slope
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.drives.set_point import RAMP, STEP, TRAPEZOID, set_point
+from urmpipe_models.inverse.closed import polishing, trigonometric
+from urmpipe_models.inverse.iterative.task import Task, task_of
+from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.kinematics.forward import jacobian_over_log
+from urmpipe_models.kinematics.screws import Screws, chain_of
+from urmpipe_models.robots.catalogue import load_robot, robot_names
+
+# --- what an iterative inverse misses its targets by ---------------------------------------------------
+
+
+def columns(chain: Chain, count: int, seed: int) -> FloatArray:
+    """Return random joint values, shape (joints, count)."""
+    return np.random.default_rng(seed).uniform(-2.0, 2.0, (len(chain.coordinates), count))
+
+
+def gradients(task: Task, q: FloatArray) -> None:
+    """Hold grad(|e|^2 / 2) = -J^T e of every joint, at any miss."""
+    miss = task.miss(q)
+    slope = -np.einsum("ijn,in->jn", miss.jacobian, miss.error)
+    # m2: entries of e of up to 10 m, three derivatives of their products; 1 / sin(angle) near half a turn
+    assert_jacobian(lambda at: 0.5 * task.miss(at).square, slope, q, third=1e4, size=100.0)
+
+
+@pytest.mark.parametrize("robot", robot_names())
+@pytest.mark.parametrize("pose", [True, False], ids=["pose", "position"])
+def test_the_gradient_of_the_squared_miss_is_minus_j_transposed_e_at_any_target(
+    robot: str, pose: bool
+) -> None:
+    chain = load_robot(robot)
+    targets = targets_of(chain, columns(chain, 20, 1).T)
+    gradients(task_of(chain, targets if pose else Targets(targets.position)), columns(chain, 20, 2))
+
+
+@settings(max_examples=20, deadline=None)
+@given(data=st.data(), pose=st.booleans())
+def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObject, pose: bool) -> None:
+    chain = data.draw(chains)
+    targets = targets_of(chain, columns(chain, 3, 1).T)
+    task = task_of(chain, targets if pose else Targets(targets.position))
+    q = columns(chain, 3, 2)
+    miss = task.miss(q)
+    if np.sqrt(miss.turn2).max() < 3.0 * miss.length:  # at half a turn the axis leaps
+        gradients(task, q)
+
+
+@pytest.mark.parametrize("robot", ["urm6", "ur5e", "panda", "iiwa14"])
+def test_the_miss_changes_by_the_jacobian_and_its_turn_by_that_of_the_logarithm(robot: str) -> None:
+    """-de = A J dq with A of `log_jacobian` for the turn, and A = 1 for the position."""
+    chain = load_robot(robot)
+    task, q = task_of(chain, targets_of(chain, columns(chain, 40, 1).T)), columns(chain, 40, 2)
+    miss = task.miss(q)
+    regular = np.sqrt(miss.turn2) < 3.0 * miss.length
+    task, q, miss = task.kept(np.flatnonzero(regular)), q[:, regular], miss.kept(np.flatnonzero(regular))
+    changes = miss.jacobian.copy()
+    changes[3:] = np.einsum("ijn,jkn->ikn", log_jacobian(miss.error[3:] / miss.length), changes[3:])
+    # m: three derivatives of an arm of up to 10 m, and 1 / (pi - 3)^3 of the logarithm
+    assert_jacobian(lambda at: task.miss(at).error, -changes.transpose(1, 0, 2), q, third=1e4, size=100.0)
+
+
+def log_jacobian(vector: FloatArray) -> FloatArray:
+    """Return A = 1 + E/2 + (1/a^2 - (1 + cos a) / (2 a sin a)) E^2 of rotation vectors, E = [e]x, a = |e|.
+
+    With R(e) = R_target R^T, a tool that turns by w changes e by -A w.
+    """
+    x, y, z = vector
+    none = np.zeros_like(x)
+    E = np.array([[none, -z, y], [z, none, -x], [-y, x, none]])
+    a = np.linalg.norm(vector, axis=0)
+    square = np.einsum("ijn,jkn->ikn", E, E)
+    factor = 1.0 / a**2 - (1.0 + np.cos(a)) / (2.0 * a * np.sin(a))
+    return np.asarray(np.eye(3)[:, :, None] + 0.5 * E + factor * square)
+
+
+# --- closed forms --------------------------------------------------------------------------------------
+
+Quadric: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
+
+
+@pytest.mark.parametrize(
+    ("of", "derivative"),
+    [
+        (trigonometric._value, trigonometric._slope),
+        (trigonometric._slope, trigonometric._curvature),
+    ],
+    ids=["slope", "curvature"],
+)
+def test_slope_and_curvature_of_a_quadric_are_its_derivatives(of: Quadric, derivative: Quadric) -> None:
+    rng = np.random.default_rng(3)
+    k, x = rng.uniform(-1.0, 1.0, (6, 200)), rng.uniform(-4.0, 4.0, 200)
+    # up to 2^3 of each of the three products, 1 of the two others
+    assert_slope(lambda h: of(k, x + h), derivative(k, x), third=40.0, size=6.0)
+
+
+def random_screws(kinds: tuple[bool, ...], seed: int) -> tuple[Screws, FloatArray, FloatArray, FloatArray]:
+    """Return three joints of some kinds, a wrist, joint values and targets of it, shape (3, 50) each."""
+    rng = np.random.default_rng(seed)
+    direction = rng.normal(size=(3, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    wrist, q = rng.uniform(-1.0, 1.0, 3), rng.uniform(-2.0, 2.0, (3, 50))
+    arm = Screws(direction, rng.uniform(-1.0, 1.0, (3, 3)), np.array(kinds), np.eye(3), wrist)
+    return arm, wrist, q, rng.uniform(-2.0, 2.0, (3, 50))
+
+
+KINDS = list(product((True, False), repeat=3))
+
+
+@pytest.mark.parametrize("kinds", KINDS, ids=str)
+def test_the_columns_that_newton_s_rule_polishes_with_are_the_miss_s_derivatives(
+    kinds: tuple[bool, ...],
+) -> None:
+    arm, wrist, q, target = random_screws(kinds, 4)
+    _, found = polishing._miss(arm, wrist, q, target)
+    assert_jacobian(lambda at: polishing._miss(arm, wrist, at, target)[0], -found, q, third=10.0, size=10.0)
+
+
+@pytest.mark.parametrize("kinds", KINDS, ids=str)
+def test_their_determinant_is_that_of_the_wrist_s_jacobian(kinds: tuple[bool, ...]) -> None:
+    arm, wrist, q, _ = random_screws(kinds, 5)
+    J = jacobian_over_log(chain_of(arm, ("a", "b", "c")), q.T)[:, :3]
+    # products of three levers of up to 10 m
+    np.testing.assert_allclose(polishing.jacobian_determinant(arm, wrist, q), np.linalg.det(J), atol=1e-11)
+
+
+# --- set points ----------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", [STEP, RAMP, TRAPEZOID])
+@pytest.mark.parametrize(("value", "rate"), [(0, 1), (1, 2)], ids=["velocity", "acceleration"])
+def test_rates_of_a_set_point_are_its_derivatives_but_at_corners(kind: int, value: int, rate: int) -> None:
+    """The difference of a parabola is its derivative but for rounding; impulses at corners are left out."""
+    h, t = 1e-5, np.linspace(0.0, 4.0, 397)
+    arguments = (0.5, -1.0, 3.0, 2.0, 4.0)
+    corners = np.array([0.5, 1.0, 2.5, 3.0])  # of the trapezoid; the step and the ramp have some of them
+    within = t[(np.abs(t[:, None] - corners) > h).all(axis=1)]
+    slope = set_point(kind, within, *arguments)[rate]
+    assert_slope(lambda s: set_point(kind, within + s, *arguments)[value], slope, third=0.0, size=4.0, h=h)

@@ -1,0 +1,48 @@
+"""Units of measurement: exact factors, and no way from one measure to another."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from urmpipe_models.errors import OptionError
+from urmpipe_models.measure_units import MEASURES, factor, units_of
+
+EVERY = [(si, unit) for si, units in MEASURES.items() for unit in units]
+PAIRS = [(one, other) for units in MEASURES.values() for one in units for other in units]
+
+
+def test_factors_are_those_of_the_definitions() -> None:
+    assert {pair: factor(*pair) for pair in (("m", "mm"), ("mm", "um"), ("um", "m"), ("us", "ms"))} == {
+        ("m", "mm"): 1e3, ("mm", "um"): 1e3, ("um", "m"): 1e-6, ("us", "ms"): 1e-3,
+    }  # fmt: skip
+    assert (factor("rad", "deg"), factor("deg", "rad")) == (180.0 / math.pi, math.pi / 180.0)
+    # 30 / pi = 9.549296585513720146, and 360 deg in 60 s
+    assert (factor("rad/s", "rpm"), factor("rpm", "deg/s")) == (9.54929658551372, 6.0)
+
+
+@given(st.sampled_from(PAIRS), st.floats(1e-6, 1e6))
+def test_there_and_back_is_the_same_value(pair: tuple[str, str], value: float) -> None:
+    there = factor(*pair)
+    back = factor(*reversed(pair))
+    assert value * there * back == pytest.approx(value, rel=1e-15)  # four roundings of 2^-53
+
+
+@pytest.mark.parametrize(("si", "unit"), EVERY)
+def test_no_unit_stands_in_another_measure(si: str, unit: str) -> None:
+    others = [one for measure, one in EVERY if measure != si]
+    assert unit not in others
+    for other in others:
+        with pytest.raises(OptionError) as error:
+            factor(unit, other)
+        assert str(error.value) == f"unit: found {other!r} for {unit!r}, allowed: {', '.join(units_of(si))}"
+
+
+def test_an_unknown_unit_is_refused_with_all_that_are_known() -> None:
+    with pytest.raises(OptionError) as error:
+        factor("inch", "mm")
+    assert str(error.value) == f"unit: found 'inch', allowed: {', '.join(unit for _, unit in EVERY)}"
+    assert units_of("inch") == {}

@@ -1,0 +1,43 @@
+from __future__ import annotations
+
+from string import ascii_lowercase, digits
+
+from hypothesis import assume, given
+from hypothesis import strategies as st
+
+from urmpipe_models.names import MOST_LISTED, did_you_mean, listed, not_among
+
+# No letter twice in a name: then what two names have in common is found without a doubt.
+LETTERS = st.lists(st.sampled_from(ascii_lowercase + digits), min_size=2, max_size=12, unique=True)
+NAMES = st.lists(LETTERS.map("".join), min_size=1, max_size=30)
+
+
+def test_the_name_most_like_it_may_have_been_meant() -> None:
+    assert did_you_mean("igest", ("compare", "ingest", "export")) == " (did you mean ingest?)"
+    assert did_you_mean("UR-5E", ("ur3e", "ur5e")) == " (did you mean ur5e?)"
+    assert did_you_mean("base-link", ("base", "base_link")) == " (did you mean base_link?)"
+    assert did_you_mean("lenght", ()) == did_you_mean("q1", ("tool", "base")) == ""
+
+
+@given(NAMES, st.data())
+def test_a_name_with_a_letter_missing_is_answered_with_it(names: list[str], data: st.DataObject) -> None:
+    meant = data.draw(st.sampled_from(names))
+    at = data.draw(st.integers(0, len(meant) - 1))
+    written = meant[:at] + meant[at + 1 :]
+    assume(written not in names)
+    could_be = [one for one in names if any(written == one[:i] + one[i + 1 :] for i in range(len(one)))]
+    assert did_you_mean(written.upper(), names) == f" (did you mean {max(could_be)}?)"
+
+
+def test_what_is_found_and_what_is_allowed_is_said() -> None:
+    assert not_among("q", ["q1", "q2"]) == "found 'q' (did you mean q2?), allowed: q1, q2"
+    assert not_among("q", []) == "found 'q', allowed: none"
+
+
+def test_of_many_names_the_nearest_are_listed() -> None:
+    names = [f"u{i:02}" for i in range(20)] + ["speed"]
+    text = listed("sped", names)
+    assert text.startswith("speed, ")
+    assert text.endswith(" and 9 others")
+    assert len(text.removesuffix(" and 9 others").split(", ")) == MOST_LISTED
+    assert listed("sped", names[:12]) == ", ".join(names[:12])

@@ -1,0 +1,98 @@
+"""What is told of a verdict that rests on little, or answers another question."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.doubts import large_tolerances, recorded_apart, thin_evidence
+from urmpipe_pipeline.comparison.statistics import Measured, describe
+
+Compared = Callable[..., Comparison]
+
+
+def off(samples: int) -> FloatArray:
+    """No deviation at all."""
+    return np.zeros((samples, 3))
+
+
+def told(result: Comparison) -> list[tuple[str, str]]:
+    """Return the warnings of a comparison."""
+    return [(one.kind, one.message) for one in result.warnings]
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    values=hnp.arrays(float, st.integers(1, 30), elements=st.floats(-2.0, 2.0)),
+    missing=st.sets(st.integers(0, 29)),
+)
+def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArray, missing: set[int]) -> None:
+    rows = [row for row in missing if row < len(values)][: len(values) - 1]
+    values[rows] = np.nan
+    count, t = np.arange(len(values)), np.linspace(0.0, 1.0, len(values))
+    measured = Measured("angle", "angle", "rad", values)
+    one = describe(measured, t, count, {"angle": 1.0})
+    assert (one.samples, one.missing) == (len(values) - len(rows), len(rows))
+    above = int(np.count_nonzero(np.abs(values) > 1.0))
+    assert (
+        one.out_of_tolerance == above + len(rows) == int(np.count_nonzero(measured.outside({"angle": 1.0})))
+    )
+    assert one.share_out is not None
+    assert round(one.share_out * len(values)) == one.out_of_tolerance
+    assert one.verdict == ("fail" if above or rows else "pass")
+    free = describe(measured, t, count, {"axis": 1.0})
+    assert (free.verdict, free.out_of_tolerance, free.missing) == (None, None, len(rows))
+
+
+def test_one_sample_is_one_pose(paths: Compared) -> None:
+    assert told(paths({"one": off(1)})) == [
+        ("one-pose", "one: 1 sample compared, all in one pose: the verdict is on that pose alone")
+    ]
+
+
+def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not(arms: Compared) -> None:
+    moving = arms({"log": np.zeros((50, 6))}).runs[0]
+    still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)))
+    assert list(thin_evidence(moving)) == list(thin_evidence(still)) == []
+    at_rest = replace(moving.run, log=replace(moving.run.log, q=np.tile(moving.run.log.q[0], (50, 1))))
+    assert [one.kind for one in thin_evidence(replace(still, run=at_rest))] == ["one-pose"]
+
+
+def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compared) -> None:
+    whole, early = np.full((1000, 3), 0.001), off(44)
+    result = paths({"early": early, "whole": whole, "nearly": off(990)})
+    assert [run.name for run in result.ranking] == ["nearly", "whole", "early"]
+    assert [result.covered(run) for run in result.runs] == pytest.approx([0.044, 1.0, 0.99], abs=1e-12)
+    assert told(result) == [
+        ("not-covered", "early: it covers 0.215 s of the 4.995 s of path (4.4 %): the rest was not judged")
+    ]
+
+
+def test_a_tolerance_that_nobody_means_is_told(paths: Compared) -> None:
+    assert told(paths({"log": off(50)}, tolerance={"axis": 3.5, "norm": 0.1})) == [
+        ("large-tolerance", "a tolerance of 3500 mm (axis) lets anything pass: 3.5 is in m; 3.5mm meant?")
+    ]
+    assert [one.message for one in large_tolerances({"angle": 0.5, "joint": 0.17})] == [
+        "a tolerance of 28.6479 deg (angle) lets anything pass: 0.5 is in rad; 0.5deg meant?"
+    ]
+
+
+def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(arms: Compared) -> None:
+    run = arms({"bad": np.zeros((50, 6))}).runs[0].run
+    assert run.tcp is not None
+    for away, expected in ((0.0005, []), (0.005, ["recorded-tcp-apart"])):
+        beside = replace(run, tcp_recorded=run.tcp.position + np.array([0.0, 0.0, away]))
+        assert [one.kind for one in recorded_apart(beside, 1e-3)] == expected
+    assert next(recorded_apart(beside, 1e-3)).message == (
+        "bad: by its joints it is up to 5.0000 mm from the tool centre point it recorded, which this verdict"
+        " does not judge; urmpipe compare with bad alone does"
+    )
+    assert list(recorded_apart(run, 1e-3)) == []

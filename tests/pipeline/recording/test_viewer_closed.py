@@ -1,0 +1,43 @@
+"""A window that is closed before it shows its recording, against a viewer that fails."""
+
+from __future__ import annotations
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from urmpipe_models.errors import ViewerError
+from urmpipe_pipeline.recording import viewer, write_recording
+from urmpipe_pipeline.runs.results import Run
+
+MakeRun = Callable[..., Run]
+
+
+@pytest.fixture
+def recording(make_run: MakeRun, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A recording, on a computer that says it has a display."""
+    monkeypatch.setenv("DISPLAY", ":0")
+    return write_recording(make_run(rows=5), tmp_path / "run.rrd")
+
+
+def ends_as(program: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let a program that ends at once stand where the viewer does."""
+    found = shutil.which(program)
+    if found is None:
+        pytest.skip(f"there is no program {program} here")
+    monkeypatch.setattr(viewer, "_program", lambda: Path(found))
+
+
+def test_a_window_may_be_closed_at_any_time(recording: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    ends_as("true", monkeypatch)
+    viewer.view_recordings([recording])  # raises nothing: a closed window is no fault
+
+
+def test_a_viewer_that_fails_is_told_with_its_exit_code(
+    recording: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    ends_as("false", monkeypatch)
+    with pytest.raises(ViewerError, match=r"^the viewer ended with exit code 1, allowed: a display and "):
+        viewer.view_recordings([recording])

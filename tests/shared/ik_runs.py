@@ -1,0 +1,34 @@
+"""`urmpipe ik` run for its JSON, and paths for it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from urmpipe.main import run
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.orientation import quaternions
+from urmpipe_models.robots.catalogue import load_robot
+
+Captured = pytest.CaptureFixture[str]
+
+
+def answer(capsys: Captured, code: int, *arguments: str | Path) -> dict[str, Any]:
+    """Return what a command prints as JSON."""
+    assert run(["ik", *map(str, arguments), "--json"]) == code
+    found: dict[str, Any] = json.loads(capsys.readouterr().out)
+    return found
+
+
+def write_path(path: Path, robot: str, q: FloatArray, period: float = 0.01) -> None:
+    """Write the poses of joint values as a path of poses."""
+    targets = targets_of(load_robot(robot), q)
+    assert targets.rotation is not None
+    quat = quaternions(targets.rotation.reshape(-1, 9), "matrix")
+    table = np.column_stack([period * np.arange(len(q)), targets.position, quat])
+    np.savetxt(path, table, delimiter=",", header="t,x,y,z,qx,qy,qz,qw", comments="", fmt="%.16g")

@@ -1,0 +1,110 @@
+"""What pages show: their commands and their code, and commands run in this process."""
+
+from __future__ import annotations
+
+import os
+import re
+import shlex
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from urmpipe.main import run
+from urmpipe_datasets import LOGS
+from urmpipe_models.kinematics.forward import forward
+from urmpipe_models.robots.catalogue import load_robot
+
+ROOT = Path(__file__).resolve().parents[2]
+DOCS = ROOT / "docs"
+
+
+def text_of(page: str) -> str:
+    """Return the text of a page, named from the root of the checkout."""
+    return (ROOT / page).read_text(encoding="utf-8")
+
+
+def pages() -> list[str]:
+    """Return all pages that people read."""
+    return ["README.md", *sorted(path.relative_to(ROOT).as_posix() for path in DOCS.rglob("*.md"))]
+
+
+def command_lines(page: str) -> list[str]:
+    """Return the commands that a page shows: lines of indented or fenced blocks, without their comments."""
+    return [
+        match[1].strip()
+        for match in re.finditer(r"^ {4}(urmpipe [a-z].*?)(?: {2,}.*| # .*)?$", text_of(page), re.MULTILINE)
+    ] + [line for block in snippets(page, "sh") for line in block.splitlines() if line.startswith("urmpipe ")]
+
+
+def snippets(page: str, language: str) -> list[str]:
+    """Return the fenced code of a language in a page."""
+    found = re.findall(rf"^ *```{language}\n(.*?)^ *```$", text_of(page), re.DOTALL | re.MULTILINE)
+    return ["\n".join(line.removeprefix("  ") for line in one.splitlines()) for one in found]
+
+
+def indented(page: str, first: str) -> str:
+    """Return the indented block of a page that begins with a line, without its indent."""
+    lines = text_of(page).split(f"    {first}", 1)[1].splitlines()
+    return "\n".join([first + lines[0], *_while_indented(lines[1:])])
+
+
+def _while_indented(lines: list[str]) -> Iterator[str]:
+    """Yield lines up to the first that stands at the margin, without their indent."""
+    for line in lines:
+        if line and not line.startswith("    "):
+            return
+        yield line[4:]
+
+
+def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Make a folder the working one, with the files that pages name."""
+    monkeypatch.chdir(folder)
+    named = {"log": "matlab", "a": "matlab", "b": "matlab", "coppelia": "coppeliasim", "path": "path"}
+    for name, source in named.items():
+        (folder / f"{name}.csv").write_bytes((LOGS / f"{source}.csv").read_bytes())
+    (folder / "targets.csv").write_text("x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n")
+    (folder / "poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0.1,0.3,1,0,0,0\n")
+    (folder / "robot_data.csv").write_text(rtde_log(), encoding="utf-8")
+    (folder / "my_unit.py").write_bytes((DOCS / "examples" / "low_pass.py").read_bytes())
+    system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
+    (folder / "my-system.toml").write_text(system, encoding="utf-8")
+
+
+def rtde_log() -> str:
+    """Return what a UR5e records in half a second in which it turns its joints: joints and its own TCP."""
+    arm = load_robot("ur5e")
+    t = 0.008 * np.arange(60)
+    q = np.array([0.3, -1.2, 1.1, -0.7, -1.5, 0.4]) + 0.3 * np.sin(2.0 * t)[:, None]
+    tip = [forward(arm, row)[-1] for row in q]
+    poses = [(*one.translation, *Rotation.from_matrix(one.rotation).as_rotvec()) for one in tip]
+    names = ["timestamp", *(f"actual_q_{i}" for i in range(6)), *(f"actual_TCP_pose_{i}" for i in range(6))]
+    rows = [" ".join(f"{value:.9g}" for value in row) for row in np.column_stack([t, q, poses]).tolist()]
+    return "\n".join([" ".join(names), *rows]) + "\n"
+
+
+def run_in_process(line: str) -> int:
+    """Run a command of urmpipe quietly in this process, and return its exit code."""
+    name, *arguments = shlex.split(line)
+    assert name == "urmpipe", line
+    return run([*arguments, "-q"])
+
+
+def run_lines(lines: str, folder: Path) -> None:
+    """Run the commands of a page in a folder: those of this Python, wherever they are installed."""
+    programs = {"urmpipe": ["-m", "urmpipe"], "fmpy": ["-m", "fmpy"]}
+    for line in lines.splitlines():
+        name, *arguments = shlex.split(line)
+        done = subprocess.run(
+            [sys.executable, *programs[name], *arguments],
+            cwd=folder,
+            env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert (done.returncode, done.stderr) == (0, ""), line
