@@ -58,7 +58,7 @@ SPELLINGS = {
     "--duration": Spelling("duration", _SHOWN),
     "--figures": Spelling("figures"),
     "--format": Spelling("formats"),
-    "--interval": Spelling("interval", r"[^;,()=]*=LOW:HIGH|LOW:HIGH", "interval"),
+    "--interval": Spelling("interval", r"[^';,()=]*=LOW:HIGH|LOW:HIGH", "interval"),
     "--joints": Spelling("joints", r"A,B,C|[0-9]+,[0-9,]+,\.\.\.|[^\s;()]+,[^\s;()]+", "list"),
     "--map": Spelling("read", _SHOWN),
     "--method": Spelling("method", "auto|closed|iterative"),
@@ -83,7 +83,7 @@ SPELLINGS = {
     "--tolerance": Spelling("tolerance"),
     "--tool": Spelling("tool", _FRAME),
     "--tsp": Spelling("tsp", rf"{_SHOWN}|[0-9][0-9.e-]*"),
-    "--unit": Spelling("units", r"[^;,()=]*=[A-Za-z]\w*|(?:rad|deg|mm|m|s|ms|us|ns)(?![\w:])", "units"),
+    "--unit": Spelling("units", r"[^';,()=]*=[A-Za-z]\w*|(?:rad|deg|mm|m|s|ms|us|ns)(?![\w:])", "units"),
     "--write-map": Spelling("write_map", _SHOWN),
     "-o": Spelling("output", _SHOWN),
 }
@@ -129,7 +129,7 @@ def _spelled(text: str) -> str:
 def _pattern(option: str) -> re.Pattern[str]:
     """Return what finds an option, its value, and whether it is the subject of the message."""
     value = SPELLINGS[option].value
-    behind = rf"(?: (?P<value>{value}))?" if value else "(?P<value>)"
+    behind = rf"(?: '?(?P<value>{value})'?)?" if value else "(?P<value>)"  # quoted as for a shell
     return re.compile(rf"(?<![\w-]){option}(?![\w-])(?P<subject>(?=:| [^:;,=]{{1,80}}: ))?{behind}")
 
 
