@@ -267,11 +267,11 @@ def _found_in_all(q: FloatArray, dt: FloatArray, periods: FloatArray, speeds: Fl
         present = np.flatnonzero(np.abs(q[:, j]) < LARGEST_VALUE)
         one = slice(j, j + 1)
         found = _judged(q[present, one], _elapsed(present, dt), periods[one], speeds[one])
-        between = np.where(found.between < 0, -1, np.append(present, -1)[found.between])
+        between = np.append(present, -1)[found.between]  # -1, for none, is the last entry
         parts.append(found._replace(rows=present[found.rows], joints=found.joints + j, between=between))
     rows = np.concatenate([one.rows for one in parts])
     columns = np.concatenate([one.joints for one in parts])
-    order = np.argsort(rows * max(joints, 1) + columns, kind="stable")
+    order = np.argsort(rows * joints + columns)
     return _Found(
         rows[order],
         columns[order],
@@ -288,9 +288,9 @@ def _judged(values: FloatArray, elapsed: FloatArray, periods: FloatArray, speeds
     """
     rows, columns = _candidates(values, periods)
     step = values[rows, columns] - values[rows - 1, columns]
-    first = rows < 2  # nothing stands before the step from the first value to the second
-    before = np.where(first, 0.0, values[rows - 1, columns] - values[rows - 2, columns])
-    lasted = np.where(first, 0.0, elapsed[rows - 1])
+    # Nothing stands before the step from the first value to the second, whatever time it took.
+    before = np.where(rows < 2, 0.0, values[rows - 1, columns] - values[rows - 2, columns])
+    lasted = elapsed[rows - 1]
     period, speed = periods[columns], speeds[columns]
     residual = before + period * wrap_change(before, period, max_step(lasted, period, speed))
     flags = notice(step, elapsed[rows], residual, lasted, period, speed)
@@ -311,8 +311,8 @@ def _candidates(values: FloatArray, periods: FloatArray) -> tuple[IntArray, IntA
             at_row, at_column = np.nonzero(large)
             keys.append(at_column * count + at_row + block.start + 1)
     large_keys = np.concatenate(keys)
-    following = large_keys[large_keys % max(count, 1) < count - 1] + 1
-    columns, rows = np.divmod(np.unique(np.concatenate((large_keys, following))), max(count, 1))
+    following = large_keys[large_keys % count < count - 1] + 1
+    columns, rows = np.divmod(np.unique(np.concatenate((large_keys, following))), count)
     return rows, columns
 
 
@@ -326,9 +326,8 @@ def _after_in_between(rows: IntArray, columns: IntArray, paired: NDArray[np.bool
 
 
 def _elapsed(present: IntArray, dt: FloatArray) -> FloatArray:
-    """Return the time from each value to the next, the first 0; added from left to right as in `step`."""
+    """Return the time from each value to the next, added from left to right as in `step`."""
     elapsed = dt[present]
-    elapsed[:1] = 0.0
     apart = np.diff(present, prepend=present[:1])
     for length in np.unique(apart[apart > 1]):
         at = np.flatnonzero(apart == length)

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.repolarizer import FULL_TURN, State, max_step, repolarize, step
+from urmpipe_models.row_blocks import BLOCK
 
 SHARED = Path(__file__).resolve().parents[2].parent / "shared"
 TSP = 0.005
@@ -86,7 +87,15 @@ def test_the_batch_is_the_steps_bit_for_bit(
     q = np.where(missing[: len(q), : q.shape[1]], np.nan, q)
     dt = period_of_samples * (1.0 + np.arange(len(q), dtype=np.float64) % 3)
     periods = np.array([FULL_TURN, 4.0, 2.0 * FULL_TURN])[: q.shape[1]]
+    assert_batch_is_the_steps(q, dt, periods, max_speed)
+
+
+def assert_batch_is_the_steps(q: FloatArray, dt: FloatArray, periods: FloatArray, max_speed: float) -> None:
+    """Hold `repolarize` against `step`, joint by joint; what it tells comes by row and then by joint."""
     batch = repolarize(q, dt, period=periods, max_speed=max_speed)
+    assert batch.change.dtype == np.int64
+    for told in (np.column_stack((batch.rows, batch.joints)), batch.unexplained, batch.in_between):
+        assert told.tolist() == sorted(told.tolist())
     for j in range(q.shape[1]):
         single = run_steps(q[:, j], dt, period=float(periods[j]), max_speed=max_speed)
         assert single.out.tobytes() == np.ascontiguousarray(batch.q[:, j]).tobytes()
@@ -95,6 +104,81 @@ def test_the_batch_is_the_steps_bit_for_bit(
         assert np.array_equal(single.changes[single.changes != 0], batch.change[mine])
         assert np.array_equal(np.flatnonzero(single.odd), batch.unexplained[batch.unexplained[:, 1] == j, 0])
         assert single.in_between == batch.in_between[batch.in_between[:, 1] == j, 0].tolist()
+
+
+NAN, TURNS = math.nan, FULL_TURN * np.arange(9.0)
+
+
+@pytest.mark.parametrize(
+    "q",
+    [
+        [3.0 - TURNS / 2],  # half a turn a sample: each second sample is in between, and no step counts twice
+        [3.0 + TURNS / 2, 3.0 - np.insert(TURNS, 0, 0.0)[:9] / 2],
+        [3.0 - TURNS * 0.4, -3.0 + TURNS * 0.6],
+        # the last step judged of one joint and the first of the next both end a pair, a row apart
+        [3.0 - FULL_TURN * np.array([0.0, 0.8, 1.0, 1.0]), 3.0 - FULL_TURN * np.array([0.0, 0.0, 0.2, 1.0])],
+        [3.0 - FULL_TURN * np.array([0.0, 0.0, 0.8, 1.0])],  # the small half comes last in the log
+        [
+            3.0 - FULL_TURN * np.array([0.0, 0.2, 1.0, 1.2, 1.2])
+        ],  # a large step ends one pair and begins no other
+        [[0.0, FULL_TURN - 1.0, FULL_TURN - 1.0]],  # nothing stands before the first step
+        [[3.0, NAN, 3.0 - FULL_TURN / 2, NAN, NAN, 3.0 - FULL_TURN, 3.0]],
+        [
+            [NAN, 3.0, NAN, 3.0 - FULL_TURN, NAN, NAN, 3.0, NAN, NAN, NAN, 3.0 - FULL_TURN],
+            [0.0, 4.0, 8.0] * 3 + [4.0] * 2,
+        ],
+    ],
+)
+@pytest.mark.parametrize("max_speed", [math.inf, 1.0])
+def test_pairs_of_steps_and_gaps_are_the_same_in_the_batch(q: list[FloatArray], max_speed: float) -> None:
+    values = np.array(q).T
+    dt = 0.01 * (1.0 + np.arange(len(values), dtype=np.float64) % 3)
+    dt[0] = NAN  # is not used
+    assert_batch_is_the_steps(values, dt, np.array([FULL_TURN, FULL_TURN])[: len(q)], max_speed)
+
+
+@pytest.mark.parametrize("gap", [0, 1, 2, 3, 4])
+def test_all_the_time_of_a_gap_counts_for_what_a_joint_can_have_moved(gap: int) -> None:
+    """Over the gap the joint moves 0.5 rad beyond a whole turn, and has just time for that at its speed."""
+    q = np.array([[2.0], [2.0], *[[NAN]] * gap, [2.0 - FULL_TURN + 0.5], [2.0 - FULL_TURN + 0.5]])
+    dt = np.ldexp(0.01, np.arange(len(q)))  # each row's time is told apart from all others'
+    just = 0.5 / dt[2 : 3 + gap].sum()
+    assert repolarize(q, dt, max_speed=just * (1.0 + 1e-9)).rows.tolist() == [2 + gap]
+    assert repolarize(q, dt, max_speed=just * (1.0 - 1e-9)).rows.tolist() == []
+
+
+def test_a_log_of_many_blocks_is_judged_across_their_edges() -> None:
+    """Wraps on both sides of each edge of a block, and far from any."""
+    x = np.zeros((3 * BLOCK + 100, 2))
+    for edge in (BLOCK, 2 * BLOCK, 3 * BLOCK):
+        x[edge - 1 :, 0] += 1.0
+        x[edge:, 1] += 1.0
+        x[edge + 1 :, 0] += 1.0
+        x[edge + 50 :] += 1.0
+    x = 2.9 + np.where(x % 2 == 1.0, 0.5, 0.0)  # 2.9 and 3.4 in turn: each step crosses pi
+    result = repolarize(wrap(x), np.full(len(x), TSP))
+    # wrapping and adding P k each round once, of 3.4: a unit in the last place is 4.4e-16
+    np.testing.assert_allclose(result.q, x, rtol=0, atol=1e-15)
+    at, joints = np.nonzero(np.diff(x, axis=0))
+    assert result.rows.tolist() == (at + 1).tolist()
+    assert result.joints.tolist() == joints.tolist()
+
+
+def test_a_step_of_just_a_quarter_of_the_period_needs_no_explanation() -> None:
+    q, above = np.array([[0.0], [1.0], [0.0]]), np.nextafter(1.0, 2.0)
+    assert repolarize(q, np.full(3, TSP), period=4.0).unexplained.tolist() == []
+    assert repolarize(q * above, np.full(3, TSP), period=4.0).unexplained.tolist() == [[1, 0], [2, 0]]
+    assert not step(State(0.0, seen=1.0), 1.0, TSP, period=4.0)[2].unexplained
+    assert step(State(0.0, seen=1.0), above, TSP, period=4.0)[2].unexplained
+
+
+def test_values_that_are_no_joint_values_are_missing_and_warn_of_nothing() -> None:
+    q = np.array([[3.0, 3.0, 3.0], [1e308, np.inf, np.nan], [1e308, -np.inf, np.nan], [-3.0, -3.0, -3.0]])
+    with np.errstate(all="raise"):
+        result = repolarize(q, np.full(4, TSP))
+    assert result.rows.tolist() == [3, 3, 3]
+    assert len(result.unexplained) == 0
+    assert step(State(), 1e300, TSP)[0].seen == 0.0  # at the bound already
 
 
 def test_before_the_first_repolarization_nothing_changes_by_a_bit() -> None:
