@@ -88,6 +88,7 @@ def _nearest_turns(angles: FloatArray) -> FloatArray:
 
 
 def _vectors(v: FloatArray) -> FloatArray:
+    """Return rotation vectors in [rad], shape (n, 3), each of its names the nearest to the one before."""
     largest = np.abs(v).max(axis=1)
     turning = np.flatnonzero(largest > 0.0)
     if not len(turning):
@@ -104,6 +105,7 @@ def _vectors(v: FloatArray) -> FloatArray:
 
 
 def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
+    """Return Euler angles in [rad], shape (n, 3), of both families the one nearest to the sample before."""
     other = angles * np.array([1.0, -1.0, 1.0]) + apart
     own, across = (_distance(one[1:], angles[:-1]) for one in (angles, other))
     switches = np.append(False, across < own)[: len(angles)]

@@ -192,6 +192,7 @@ def best_rotation(crossed: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def _of_matrix(r: FloatArray) -> FloatArray:
+    """Return the unit quaternions x, y, z, w of rotation matrices, shape (n, 3, 3) [-]."""
     trace = np.trace(r, axis1=1, axis2=2)
     (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = r.transpose(1, 2, 0)
     candidates = np.array(

@@ -2,7 +2,7 @@ from __future__ import annotations
 
 from string import ascii_lowercase, digits
 
-from hypothesis import assume, given
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.names import MOST_LISTED, did_you_mean, listed, not_among
@@ -19,6 +19,7 @@ def test_the_name_most_like_it_may_have_been_meant() -> None:
     assert did_you_mean("lenght", ()) == did_you_mean("q1", ("tool", "base")) == ""
 
 
+@settings(max_examples=40, deadline=None)
 @given(NAMES, st.data())
 def test_a_name_with_a_letter_missing_is_answered_with_it(names: list[str], data: st.DataObject) -> None:
     meant = data.draw(st.sampled_from(names))

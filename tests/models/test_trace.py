@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import ast
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import casadi
@@ -10,14 +12,24 @@ import numpy as np
 import pytest
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.articulated_6r import articulated_6r
+from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
 from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.drives.controller import Gains, next_voltage, sample_number
-from urmpipe_models.drives.drive import Drive, current_rate, shaft_acceleration, shaft_torque
+from urmpipe_models.drives.drive import (
+    Drive,
+    current_rate,
+    driving_torque,
+    load_acceleration,
+    shaft_acceleration,
+    shaft_torque,
+)
 from urmpipe_models.drives.set_point import JointMotion, set_point
 from urmpipe_models.kinematics.forward import forward, jacobian
 from urmpipe_models.kinematics.motion import motions
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_models.transform import euler_zxz, euler_zyx, from_zxz, rotation_z
+from urmpipe_models.transform import euler_zxz, euler_zyx, from_rpy, from_zxz, rotation_z, translation
 
 TRACED = 1e-14
 """The same operations on values of about 1; CasADi may take another sine and simplify, each some 1e-16."""
@@ -111,12 +123,47 @@ def test_one_trace_serves_a_float_and_a_column() -> None:
     np.testing.assert_allclose(np.array(pose_of.map(50)(rows.T)).T, singles, rtol=0.0, atol=TRACED)
 
 
+def arms_of(x: Sequence[Any]) -> list[Chain]:
+    """Return arms of every kind by 12 lengths and angles: rows of DH, articulated, sliding, following."""
+    kinds: tuple[JointKind, ...] = ("revolute", "fixed", "prismatic")
+    rows = [
+        DHRow(x[k], x[k + 1], x[k + 2], x[k + 3], kind=kind) for k, kind in zip((0, 4, 8), kinds, strict=True)
+    ]
+    follows = Joint("c", origin=from_rpy(x[0], x[1], x[2]), mimic=Mimic("b", 0.5, 0.1))
+    slides = Joint("b", "prismatic", translation(*x[3:6]), (0.0, 0.6, 0.8))
+    return [
+        dh_chain("dh", rows),
+        modified_dh_chain("modified", rows),
+        articulated_6r(*x[:5]),
+        Chain("follows", (Joint("a"), slides, follows), translation(*x[6:9])),
+    ]
+
+
+@pytest.mark.parametrize("number", range(4), ids=["dh", "modified", "articulated", "follows"])
+def test_arms_of_every_kind_trace_with_all_their_parameters(number: int) -> None:
+    casadi.GlobalOptions.setNumpyMode(-1)
+    x = casadi.SX.sym("x", 12)
+    joints = len(arms_of([0.1] * 12)[number].coordinates)
+    q = casadi.SX.sym("q", joints)
+
+    def values_of(arm: Chain, at: Sequence[Any]) -> list[Any]:
+        return [*everything(motions(arm, at, at, at)[-1]), *flat(jacobian(arm, at))]
+
+    function = traced("arm", [x, q], values_of(arms_of(x.elements())[number], q.elements()))
+    rng = np.random.default_rng(15)
+    for _ in range(10):
+        parameters, at = rng.uniform(0.1, 1.0, 12).tolist(), rng.uniform(-1.0, 1.0, joints).tolist()
+        assert_traced(function(parameters, at), values_of(arms_of(parameters)[number], at), size=100.0)
+
+
 def drive_values(x: Sequence[Any]) -> list[Any]:
     """Return what the drive's functions give for 13 elements: seven constants, then states and inputs."""
     drive, (theta1, omega1, current, theta2, omega2, voltage) = Drive(*x[:7]), x[7:]
     torque = shaft_torque(drive, theta1, omega1, theta2, omega2)
     return [
         torque,
+        driving_torque(drive, current),
+        load_acceleration(x[0], x[1], omega2, torque, voltage),
         shaft_acceleration(drive, current, torque),
         current_rate(drive, voltage, omega1, current),
     ]
@@ -145,3 +192,32 @@ def test_set_points_trace_before_within_and_after_a_move(kind: float) -> None:
     for time in np.linspace(0.0, 3.0, 31).tolist():
         values = [kind, time, 0.5, 3.0, 1.5, 1.0, 4.0]
         assert_traced(function(values), [*set_point(*values)], size=4.0)
+
+
+def test_each_model_is_traced() -> None:
+    """What is called in a test of traces, or by what is called there, is."""
+    folder = Path(__file__).parent
+    tests = [file.read_text(encoding="utf-8") for file in folder.rglob("*.py")]
+    called = {name for text in tests if "import casadi" in text for name in names_in(ast.parse(text))}
+    models: dict[str, list[ast.FunctionDef]] = {}
+    for file in (folder.parents[1] / "models").rglob("*.py"):
+        for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.FunctionDef):
+                models.setdefault(node.name, []).append(node)
+    for _ in range(5):  # calls are no deeper
+        called |= {name for one in called for node in models.get(one, ()) for name in names_in(node)}
+    elementwise = {name for name, nodes in models.items() if any(map(takes_elements, nodes))}
+    assert elementwise - called == {"rpy_of"}  # writes numbers into files
+
+
+def names_in(tree: ast.AST) -> set[str]:
+    return {node.id for node in ast.walk(tree) if isinstance(node, ast.Name)} | {
+        node.attr for node in ast.walk(tree) if isinstance(node, ast.Attribute)
+    }
+
+
+def takes_elements(node: ast.FunctionDef) -> bool:
+    """Tell whether a public function takes elements, which a symbol may be."""
+    given = [argument.annotation for argument in (*node.args.args, *node.args.kwonlyargs)]
+    texts = [ast.unparse(annotation) for annotation in given if annotation]
+    return not node.name.startswith("_") and any("Element" in text or "Vector" in text for text in texts)

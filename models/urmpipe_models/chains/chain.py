@@ -92,6 +92,7 @@ class Chain(Shown):
             raise RobotError(*faults)
 
     def _faults(self) -> Iterator[str]:
+        """Yield what is wrong with the joints, their names and the start."""
         names = [joint.name for joint in self.joints]
         repeated = sorted({name for name in names if names.count(name) > 1})
         if repeated:

@@ -134,6 +134,7 @@ def _screw_x(row: DHRow) -> Transform:
 
 
 def _joints(rows: Sequence[DHRow], origins: Sequence[Transform]) -> tuple[Joint, ...]:
+    """Return the joints of rows, each at its origin."""
     return tuple(
         Joint(
             name,

@@ -148,12 +148,14 @@ class Table:
                 self.fault(key, f"unknown{hint}; allowed: {allowed}")
 
     def _get(self, key: str, allowed: str, default: Any) -> Any:
+        """Return what a key holds, its default, or that it is missing."""
         self._known.append(key)
         if key in self._data:
             return self._data[key]
         return _Missing if default is None else default
 
     def _refuse(self, key: str, value: Any, allowed: str) -> None:
+        """Note that the value of a key is not allowed."""
         found = "nothing" if value is _Missing else shown(value)
         self.fault(key, f"found {found}, allowed: {allowed}")
 
@@ -169,6 +171,7 @@ def shown(value: Any) -> str:
 
 
 def _is_number(value: Any, infinite: bool = False) -> bool:
+    """Tell whether a value is a number that a float holds."""
     if isinstance(value, bool) or not isinstance(value, (int, float)):
         return False
     try:
@@ -178,9 +181,11 @@ def _is_number(value: Any, infinite: bool = False) -> bool:
 
 
 def _are_numbers(value: Any, count: int, infinite: bool = False) -> bool:
+    """Tell whether a value is a list of so many numbers."""
     given = isinstance(value, (list, tuple)) and len(value) == count
     return given and all(_is_number(item, infinite) for item in value)
 
 
 def _one_of(allowed: Sequence[str]) -> str:
+    """Say that one of some texts is allowed."""
     return f"one of {', '.join(allowed)}"

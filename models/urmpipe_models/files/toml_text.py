@@ -56,6 +56,7 @@ def toml_text(text: str) -> str:
 
 
 def _toml_value(value: Any) -> str:
+    """Return a value as TOML writes it."""
     if isinstance(value, str):
         return toml_text(value)
     if isinstance(value, bool):

@@ -39,6 +39,7 @@ def moved(at_joint: Transform, joint: Joint, value: Element) -> Transform:
 
 
 def _value(joint: Joint, of: dict[str, Element]) -> Element:
+    """Return the value of a joint from those of the coordinates."""
     if joint.kind == "fixed":
         return 0.0
     if joint.mimic is None:

@@ -29,6 +29,8 @@ Build: TypeAlias = Callable[[str], Chain]
 
 
 class _Limits(NamedTuple):
+    """Limits of a joint in [rad] or [m], and its largest speed in [rad/s] or [m/s]."""
+
     lower: float
     upper: float
     velocity: float
@@ -169,6 +171,7 @@ def _unsaid_units(data: Mapping[str, Any], chain: Chain) -> Iterator[str]:
 
 
 def _read_urm(table: Table, units: Units, folder: Path) -> Build:
+    """Read the keys of an arm of modules."""
     lengths = tuple(units.length(value) for value in table.numbers("lengths", None))
     tilts = tuple(units.angle(value) for value in table.numbers("tilts", None))
     directions = table.numbers("directions", None, ())
@@ -185,6 +188,7 @@ def _read_urm(table: Table, units: Units, folder: Path) -> Build:
 
 
 def _read_dh(table: Table, units: Units, folder: Path, *, modified: bool = False) -> Build:
+    """Read the keys of an arm by Denavit-Hartenberg parameters."""
     rows = [_dh_row(row, units) for row in table.tables("joints")]
     moving = [row.kind for row in rows if row.kind != "fixed"]
     limits = iter(_limits(table.table("limits"), moving, units))
@@ -193,6 +197,7 @@ def _read_dh(table: Table, units: Units, folder: Path, *, modified: bool = False
 
 
 def _read_articulated6r(table: Table, units: Units, folder: Path) -> Build:
+    """Read the keys of an articulated 6R arm."""
     lengths = tuple(units.length(value) for value in table.numbers("lengths", 5))
     limits = _limits(table.table("limits"), ["revolute"] * 6, units)
 
@@ -208,11 +213,13 @@ def _read_articulated6r(table: Table, units: Units, folder: Path) -> Build:
 
 
 def _read_joints(table: Table, units: Units, folder: Path) -> Build:
+    """Read the keys of an arm joint by joint."""
     joints = tuple(_joint(row, units) for row in table.tables("joints"))
     return partial(Chain, joints=joints, tip=read_frame(table.table("tip"), units))
 
 
 def _read_urdf(table: Table, units: Units, folder: Path) -> Build:
+    """Read the keys of an arm that a URDF describes."""
     file = table.text("file")
     base_link, tip_link = (table.text(key, "") or None for key in ("base_link", "tip_link"))
     return lambda name: read_urdf(folder / file, base_link=base_link, tip_link=tip_link)
@@ -229,6 +236,7 @@ _READERS: dict[str, Callable[[Table, Units, Path], Build]] = {
 
 
 def _dh_row(table: Table, units: Units) -> DHRow:
+    """Read a row of parameters."""
     row = DHRow(
         theta=units.angle(table.number("theta", 0.0)),
         d=units.length(table.number("d", 0.0)),
@@ -242,6 +250,7 @@ def _dh_row(table: Table, units: Units) -> DHRow:
 
 
 def _joint(table: Table, units: Units) -> Joint:
+    """Read a joint with its frame, axis, limits and mimic."""
     kind = table.choice("kind", ("revolute", "prismatic", "fixed"), "revolute")
     joint = Joint(
         table.text("name"),
@@ -258,6 +267,7 @@ def _joint(table: Table, units: Units) -> Joint:
 
 
 def _mimic(table: Table, kind: str, units: Units) -> Mimic:
+    """Read which joint another follows."""
     mimic = Mimic(
         table.text("joint"),
         table.number("multiplier", 1.0),
@@ -281,12 +291,14 @@ def _limits(table: Table, kinds: Sequence[JointKind], units: Units) -> list[_Lim
 
 
 def _start(chain: Chain, values: tuple[float, ...], units: Units) -> tuple[float, ...]:
+    """Return the calibration pose in SI; a wrong count is left to the chain to refuse."""
     if len(values) != len(chain.moving):  # Chain says what is wrong
         return values
     return tuple(units.of_joint(joint.kind, value) for joint, value in zip(chain.moving, values, strict=True))
 
 
 def _joint_to_dict(joint: Joint) -> dict[str, Any]:
+    """Return a joint as a JSON object."""
     return {
         "name": joint.name,
         "kind": joint.kind,
@@ -300,8 +312,10 @@ def _joint_to_dict(joint: Joint) -> dict[str, Any]:
 
 
 def _mimic_to_dict(mimic: Mimic) -> dict[str, Any]:
+    """Return a mimic as a JSON object."""
     return {"joint": mimic.joint, "multiplier": float(mimic.multiplier), "offset": float(mimic.offset)}
 
 
 def _finite_or_none(value: float) -> float | None:
+    """Return a number, None of an infinite one."""
     return float(value) if math.isfinite(value) else None

@@ -51,6 +51,7 @@ def read_frame(table: Table, units: Units) -> Transform:
 
 
 def _is_rotation(frame: Transform) -> bool:
+    """Tell whether the rows of a frame are a rotation."""
     x, y, z = frame.rotation
     product = (frame @ Transform(frame.columns)).rotation
     orthonormal = all(abs(product[i][j] - float(i == j)) <= ORTHONORMAL for i in range(3) for j in range(3))

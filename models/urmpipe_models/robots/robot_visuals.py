@@ -54,6 +54,7 @@ def _shape(table: Table, units: Units) -> Shape:
 
 
 def _shape_to_dict(shape: Shape) -> dict[str, Any]:
+    """Return a shape as keys of a JSON object."""
     if isinstance(shape, Mesh):
         return {"mesh": shape.file, "scale": [float(factor) for factor in shape.scale]}
     if isinstance(shape, Box):

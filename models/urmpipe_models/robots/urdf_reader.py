@@ -75,6 +75,7 @@ def _choose(tree: UrdfTree, base: str | None, tip: str | None) -> list[Edge]:
 
 
 def _is_link(tree: UrdfTree, role: str, link: str) -> bool:
+    """Tell whether a chosen link is in the file, and note a fault if not."""
     if link in tree.links:
         return True
     hint = did_you_mean(link, tree.links)
@@ -83,6 +84,7 @@ def _is_link(tree: UrdfTree, role: str, link: str) -> bool:
 
 
 def _root(tree: UrdfTree) -> str | None:
+    """Return the only link that no joint carries; nothing, and a fault noted, if there is none."""
     carried = {edge.child for edge in tree.edges.values()}
     roots = [link for link in tree.links if link not in carried]
     if len(roots) == 1:
@@ -137,6 +139,7 @@ def _carried(ways: dict[str, list[Edge]], tip: str) -> Iterator[tuple[Edge, str]
 
 
 def _moves(edge: Edge) -> bool:
+    """Tell whether a joint has a coordinate of its own."""
     return edge.joint.kind != "fixed" and edge.joint.mimic is None
 
 
@@ -211,4 +214,5 @@ def _on(frame: Transform, visuals: Iterable[Visual]) -> Iterator[Visual]:
 
 
 def _listed(names: Iterable[str]) -> str:
+    """Return names as a list in a sentence."""
     return ", ".join(names) or "none"

@@ -108,6 +108,7 @@ def read_tree(path: Path) -> UrdfTree:
 
 
 def _add_link(tree: UrdfTree, node: Node) -> None:
+    """Note a link of the file."""
     name = node.attributes.get("name")
     if not name:
         tree.fault("link without a name", node.line)
@@ -118,6 +119,7 @@ def _add_link(tree: UrdfTree, node: Node) -> None:
 
 
 def _add_joint(tree: UrdfTree, node: Node) -> None:
+    """Note a joint of the file."""
     name, type_ = node.attributes.get("name"), node.attributes.get("type", "")
     if not name:
         tree.fault("joint without a name", node.line)
@@ -144,6 +146,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
 
 
 def _link_of(tree: UrdfTree, node: Node, joint: str, end: Literal["parent", "child"]) -> str:
+    """Return the link at one end of a joint, which must be in the file."""
     element = node.first(end)
     link = element.attributes.get("link") if element else None
     if not link:
@@ -208,6 +211,7 @@ def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, 
 
 
 def _mimic(tree: UrdfTree, node: Node, joint: str) -> Mimic | None:
+    """Return which joint another follows, if it follows one."""
     element = node.first("mimic")
     if element is None:
         return None
@@ -244,6 +248,7 @@ def numbers_of(
 
 
 def _infinite(value: float) -> float:
+    """Return an infinite limit for one that `write_urdf` wrote in place of it."""
     return math.copysign(math.inf, value) if abs(value) >= UNLIMITED else value
 
 

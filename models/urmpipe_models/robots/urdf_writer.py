@@ -124,6 +124,7 @@ def _shape(shape: Shape) -> str:
 
 
 def _joint_lines(joint: Joint, parent: str, child: str) -> list[str]:
+    """Return a joint as lines of URDF."""
     xyz, rpy = _numbers(joint.origin.translation), _numbers(rpy_of(joint.origin.rotation))
     lines = [
         f'  <joint name={quoteattr(joint.name)} type="{_type(joint)}">',
@@ -143,13 +144,16 @@ def _joint_lines(joint: Joint, parent: str, child: str) -> list[str]:
 
 
 def _type(joint: Joint) -> str:
+    """Return the type that URDF calls a joint by."""
     unlimited = joint.lower == -math.inf and joint.upper == math.inf
     return "continuous" if joint.kind == "revolute" and unlimited else joint.kind
 
 
 def _finite(value: float) -> float:
+    """Return a limit that URDF can hold."""
     return max(-UNLIMITED, min(UNLIMITED, float(value)))
 
 
 def _numbers(values: Sequence[float]) -> str:
+    """Return numbers as an attribute holds them, all digits of them."""
     return " ".join(repr(float(value)) for value in values)

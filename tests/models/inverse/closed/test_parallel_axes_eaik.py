@@ -42,9 +42,9 @@ def test_eaik_finds_as_many_solutions_and_the_same(wrist: str) -> None:
     chains = [random_arm(rng, wrist) for _ in range(10)] if wrist != "ur" else [load_robot(one) for one in UR]
     short = 0
     for number, chain in enumerate(chains):
-        _, targets = poses(chain, 30, number)
+        _, targets = poses(chain, 15, number)
         solutions = form_of(chain).solve(targets)
-        for row in range(30):
+        for row in range(15):
             theirs, mine = eaik_solutions(chain, targets, row), solutions.q[row][solutions.reached[row]]
             away = np.abs(np.remainder(theirs[:, None] - mine + math.pi, 2 * math.pi) - math.pi).max(axis=2)
             assert (away.min(axis=1) < 1e-5).all()  # their root finder of general wrists leaves 1e-7

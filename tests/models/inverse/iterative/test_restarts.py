@@ -48,7 +48,7 @@ def planar() -> Chain:
 @pytest.mark.parametrize("robot", ["urm6", "panda", "ur5e"])
 def test_random_reachable_poses_are_solved(robot: str) -> None:
     chain = load_robot(robot)
-    targets = random_targets(chain, 30)
+    targets = random_targets(chain, 20)
     solutions = solve_iteratively(chain, targets, start=np.zeros(len(chain.coordinates)))
     assert solutions.branches == ("1",)
     assert solutions.reached.all()
