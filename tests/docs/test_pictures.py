@@ -22,7 +22,7 @@ SIZES = {
 }
 """Width and height in [px]."""
 
-SETTLE = 6.0
+SETTLE = 8.0
 """Time in [s] that the viewer has to draw one arm with eight branches."""
 
 LOST = 0.02

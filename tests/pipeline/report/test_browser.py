@@ -156,23 +156,16 @@ def test_the_verdict_is_seen_first(browser: Browser, report: Path) -> None:
         assert page.locator("h1 svg.icon").count() == 1
 
 
-def test_figures_are_drawn_before_anybody_scrolls(browser: Browser, report: Path) -> None:
-    """So a picture of the whole page has no empty box: as many scenes as may be drawn at once among them."""
+def test_figures_are_drawn_before_anybody_scrolls(
+    browser: Browser, report: Path, figures: list[Figure]
+) -> None:
+    """So a picture of the whole page has no empty box."""
+    spaces = sum(figure.space for figure in figures)
     with opened(browser, report) as page:
+        assert page.locator(".plot").count() == len(figures)
         for plot in page.locator(".plot").all():
             plot.locator(".main-svg").first.wait_for()
         assert page.evaluate("scrollY") == 0
-
-
-def test_figures_are_drawn_when_they_come_into_view(
-    browser: Browser, report: Path, figures: list[Figure]
-) -> None:
-    spaces = sum(figure.space for figure in figures)
-    with opened(browser, report) as page:
-        page.locator(".plot").first.scroll_into_view_if_needed()
-        page.wait_for_selector(".plot[data-drawn]")
-        assert page.locator(".plot").count() == len(figures)
-        scroll_through(page)
         assert page.locator(".plot[data-drawn]").count() == len(figures)
         assert page.locator(".plot.space").count() == spaces
         assert page.locator(".plot.space canvas").count() >= spaces

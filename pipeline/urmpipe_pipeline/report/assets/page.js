@@ -3,6 +3,7 @@
 (() => {
   const PRINT_WIDTH = 680; // px; what an A4 page holds between its margins
   const SCENES = { seen: 8, printed: 16 }; // drawn at once; browsers drop the oldest WebGL context beyond 16
+  const REST = 1500; // ms after which a page that nobody scrolls draws what is further down
   const touch = matchMedia("(pointer: coarse)").matches;
   const plots = [...document.querySelectorAll(".plot")];
   const ranges = new Map(); // part -> [from, to] of its time axes in s, once someone has zoomed
@@ -116,8 +117,7 @@
     else setTimeout(drawIdle, 200);
   }
 
-  if (document.readyState === "complete") whenIdle();
-  else addEventListener("load", whenIdle);
+  addEventListener("load", () => setTimeout(whenIdle, REST));
   addEventListener("beforeprint", beforePrint);
   addEventListener("afterprint", afterPrint);
 })();
