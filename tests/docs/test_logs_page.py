@@ -93,7 +93,7 @@ def test_the_map_and_the_defaults_of_the_page_are_sound(tmp_path: Path) -> None:
     (tmp_path / "urmpipe.toml").write_text(defaults, encoding="utf-8")
     command = getattr(import_module("urmpipe.commands.compare"), "compare")  # noqa: B009
     values = defaults_for(command, tmp_path / "urmpipe.toml", {"compare": command})
-    assert values == {"robot": "ur5e", "log_map": str(tmp_path / "maps/lab.toml"), "tolerance": "0.002"}
+    assert values == {"robot": "ur5e", "log_map": str(tmp_path / "maps/lab.toml"), "tolerance": ["0.002"]}
 
 
 SPECIMENS = {
