@@ -134,7 +134,7 @@ def test_a_chain_is_taken_as_a_robot() -> None:
     ("arguments", "said"),
     [
         (("kinematic_chan",), "unit kinematic_chan: found (did you mean kinematic_chain?), allowed: kine"),
-        (("kinematic_chain", "--robot", "urm7"), "unknown robot 'urm7' (did you mean urm4?)"),
+        (("kinematic_chain", "--robot", "urm7"), "unknown robot 'urm7' (did you mean urm8?)"),
         (
             ("repolarizer", "-s", "joints=nan"),
             "repolarizer: option joints: found nan, allowed: an integer",

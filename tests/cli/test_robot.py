@@ -90,7 +90,7 @@ def test_show_draws_a_picture_and_replaces_only_its_own(urmpipe: Any, tmp_path: 
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (["urm7"], "error: unknown robot 'urm7' (did you mean urm4?); allowed: " + ", ".join(NAMES)),
+        (["urm7"], "error: unknown robot 'urm7' (did you mean urm8?); allowed: " + ", ".join(NAMES)),
         (
             ["urm4", "--q", "1,2"],
             "error: --q: found 2 values, allowed: 4, one for each of phi1, phi2, phi3, phi4",

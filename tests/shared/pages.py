@@ -64,26 +64,29 @@ def _while_indented(lines: list[str]) -> Iterator[str]:
 def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Make a folder the working one, with the files that pages name."""
     monkeypatch.chdir(folder)
-    named = {"log": "matlab", "a": "matlab", "b": "matlab", "coppelia": "coppeliasim", "path": "path"}
+    named = {"coppelia": "coppeliasim", "path": "path", **dict.fromkeys(("log", "a", "b", "other"), "matlab")}
     for name, source in named.items():
         (folder / f"{name}.csv").write_bytes((LOGS / f"{source}.csv").read_bytes())
     (folder / "targets.csv").write_text("x,y,z,rz,ry,rx\n0.1,0.05,0.25,0.3,0.4,0.1\n0,0,0.3,0,0,0\n")
     (folder / "poses.csv").write_text("x,y,z,qx,qy,qz,qw\n0.4,0.1,0.3,1,0,0,0\n")
-    (folder / "robot_data.csv").write_text(rtde_log(), encoding="utf-8")
+    (folder / "other.toml").write_text('robot = "urm6"\n')
+    for name in ("robot_data", "monday"):
+        (folder / f"{name}.csv").write_text(rtde_log(), encoding="utf-8")
     (folder / "my_unit.py").write_bytes((DOCS / "examples" / "low_pass.py").read_bytes())
     system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
     (folder / "my-system.toml").write_text(system, encoding="utf-8")
 
 
 def rtde_log() -> str:
-    """Return what a UR5e records in half a second in which it turns its joints: joints and its own TCP."""
+    """Return what a UR5e that turns its joints records in half a second: joints and its own TCP."""
     arm = load_robot("ur5e")
     t = 0.008 * np.arange(60)
     q = np.array([0.3, -1.2, 1.1, -0.7, -1.5, 0.4]) + 0.3 * np.sin(2.0 * t)[:, None]
     tip = [forward(arm, row)[-1] for row in q]
     poses = [(*one.translation, *Rotation.from_matrix(one.rotation).as_rotvec()) for one in tip]
-    names = ["timestamp", *(f"actual_q_{i}" for i in range(6)), *(f"actual_TCP_pose_{i}" for i in range(6))]
-    rows = [" ".join(f"{value:.9g}" for value in row) for row in np.column_stack([t, q, poses]).tolist()]
+    kinds = ("target_q", "actual_q", "actual_TCP_pose")
+    names = ["timestamp", *(f"{kind}_{i}" for kind in kinds for i in range(6))]
+    rows = [" ".join(f"{value:.9g}" for value in row) for row in np.column_stack([t, q, q, poses]).tolist()]
     return "\n".join([" ".join(names), *rows]) + "\n"
 
 
