@@ -135,7 +135,7 @@ def prepare(
     faults += wiring.faults
     count = _count(step, system.duration or duration or max(ends, default=0.0), faults)
     wiring.notes += _cut_short(system.duration, step, count)
-    times = np.arange(count + 1) * step
+    times = np.arange(count + 1, dtype=np.float64) * step
     logged = tuple(_logged(system, one, columns, wiring, times, faults) for one in wiring.logged)
     order = _order(system, interfaces, wiring, faults)
     _refuse(system, faults)
