@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import TypeVar
+from typing import Any, cast
 
 import numpy as np
 
@@ -28,8 +28,6 @@ FRAME_ALLOWED = "x, y, z in m and rx, ry, rz in rad (3 or 6 numbers), a 4 x 4 ma
 
 WRITTEN_FIRST = 'arrays and tables are written first, such as table.to_csv("log.csv", index=False)'
 
-Given = TypeVar("Given")
-
 
 def place_robot(
     robot: Robot | None,
@@ -43,8 +41,8 @@ def place_robot(
 
     Args:
         robot: Name, file (TOML, URDF) or chain of the arm.
-        base: Where the arm stands in the world.
-        tool: The tool centre point in the frame of the arm's tip.
+        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of the arm's tip, likewise.
         base_link: Link of a URDF where the arm begins.
         tip_link: Link of a URDF where it ends.
 
@@ -93,16 +91,14 @@ def frame_of(name: str, given: Frame | None) -> Transform | None:
         raise OptionError(
             f"{name}: found a matrix that is no rigid motion, allowed: a rotation and a translation"
         )
-    x, y, z = (tuple(map(float, row)) for row in turn)
-    return Transform((x, y, z), tuple(map(float, values[:3, 3])))
+    rows, place = tuple(map(tuple, turn.tolist())), tuple(values[:3, 3].tolist())
+    return Transform(cast("Any", rows), cast("Any", place))
 
 
-def one_or_many(given: Given | Sequence[Given]) -> list[Given]:
+def one_or_many(given: object) -> list[Any]:
     """Return what was given as a list: a path, a run or another result alone is a list of one."""
     alone = isinstance(given, (str, Path, Mapping)) or hasattr(given, "__array__")  # a table is no list
-    if alone or not isinstance(given, Iterable):
-        return [given]  # type: ignore[list-item]
-    return list(given)
+    return [given] if alone or not isinstance(given, Iterable) else list(given)
 
 
 def refuse_others(name: str, given: Sequence[object], kinds: tuple[type, ...], allowed: str) -> None:
@@ -172,7 +168,8 @@ def refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:
 
 def _told(warning: LogWarning) -> str:
     """Return a warning with its kind and its row, as the terminal prints it."""
-    return ": ".join(filter(None, (warning.kind, warning.row and f"row {warning.row}", warning.message)))
+    row = f"row {warning.row}: " if warning.row else ""
+    return f"{warning.kind}: {row}{warning.message}"
 
 
 def offset_of(frame: Transform) -> tuple[float, ...]:

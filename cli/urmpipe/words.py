@@ -9,7 +9,7 @@ from __future__ import annotations
 import re
 import sys
 from dataclasses import dataclass, is_dataclass, replace
-from functools import cache
+from functools import cache, partial
 from typing import Any, Literal, TypeVar
 
 from urmpipe_models.errors import UrmpipeError
@@ -58,7 +58,7 @@ SPELLINGS = {
     "--duration": Spelling("duration", _SHOWN),
     "--figures": Spelling("figures"),
     "--format": Spelling("formats"),
-    "--interval": Spelling("interval", r"[^;,()=]*=LOW:HIGH|LOW:HIGH", "interval"),
+    "--interval": Spelling("interval", r"[^';,()=]*=LOW:HIGH|LOW:HIGH", "interval"),
     "--joints": Spelling("joints", r"A,B,C|[0-9]+,[0-9,]+,\.\.\.|[^\s;()]+,[^\s;()]+", "list"),
     "--map": Spelling("read", _SHOWN),
     "--method": Spelling("method", "auto|closed|iterative"),
@@ -66,9 +66,11 @@ SPELLINGS = {
     "--output": Spelling("output", _SHOWN),
     "--period": Spelling("period", _SHOWN, "number"),
     "--repair": Spelling("repair", "", "flag"),
+    "--restarts": Spelling("restarts"),
     "--robot": Spelling("robot", _SHOWN),
     "--rotation": Spelling("rotation", r"FORM|[a-z][a-z_|]+(?=[ ;,|]|$)", "text"),
     "--rows": Spelling("rows", "grid|file"),
+    "--seed": Spelling("seed"),
     "--skip-bad": Spelling("skip_bad", "", "flag"),
     "--source": Spelling("source", "NAME|path", "text"),
     "--start": Spelling("start"),
@@ -81,7 +83,7 @@ SPELLINGS = {
     "--tolerance": Spelling("tolerance"),
     "--tool": Spelling("tool", _FRAME),
     "--tsp": Spelling("tsp", rf"{_SHOWN}|[0-9][0-9.e-]*"),
-    "--unit": Spelling("units", r"[^;,()=]*=[A-Za-z]\w*|(?:rad|deg|mm|m|s|ms|us|ns)(?![\w:])", "units"),
+    "--unit": Spelling("units", r"[^';,()=]*=[A-Za-z]\w*|(?:rad|deg|mm|m|s|ms|us|ns)(?![\w:])", "units"),
     "--write-map": Spelling("write_map", _SHOWN),
     "-o": Spelling("output", _SHOWN),
 }
@@ -119,7 +121,7 @@ def _spelled(text: str) -> str:
     """Return a text with each option of the table as Python writes it."""
     for option in sorted(SPELLINGS, key=len, reverse=True):
         if option in text:
-            text = _pattern(option).sub(lambda found, one=SPELLINGS[option]: _in_python(one, found), text)
+            text = _pattern(option).sub(partial(_in_python, SPELLINGS[option]), text)
     return text
 
 
@@ -127,7 +129,7 @@ def _spelled(text: str) -> str:
 def _pattern(option: str) -> re.Pattern[str]:
     """Return what finds an option, its value, and whether it is the subject of the message."""
     value = SPELLINGS[option].value
-    behind = rf"(?: (?P<value>{value}))?" if value else "(?P<value>)"
+    behind = rf"(?: '?(?P<value>{value})'?)?" if value else "(?P<value>)"  # quoted as for a shell
     return re.compile(rf"(?<![\w-]){option}(?![\w-])(?P<subject>(?=:| [^:;,=]{{1,80}}: ))?{behind}")
 
 

@@ -19,6 +19,7 @@ from click.shell_completion import ShellComplete
 from numpy.typing import NDArray
 
 import urmpipe
+from urmpipe.commands.compare import SYNC
 from urmpipe.main import cli, run
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison.comparison import Comparison, Statistics
@@ -184,16 +185,20 @@ def test_options_complete_in_the_shell() -> None:
         assert [item.type for item in shell.get_completions(["compare", option], "")] == ["file"]
 
 
-def test_a_verdict_of_fail_writes_all_and_bad_input_nothing(folder: Path, capsys: Captured) -> None:
+def test_a_verdict_of_fail_writes_all_and_bad_input_nothing_but_its_error(
+    folder: Path, capsys: Captured
+) -> None:
     files = ["--junit", "v.xml", "--csv", "v.csv", "-o", "v.rrd"]
     assert compare("bad.csv", *files) == 1
     out = capsys.readouterr().out.splitlines()
     assert {"JUnit: v.xml", "Statistics: v.csv"} <= set(out)
     assert names() == {"v.xml", "v.csv", "v.rrd"}
     before = {name: (folder / name).read_bytes() for name in names()}
-    assert compare("good.csv", "missing.csv", *files, "-q") == 2
-    assert compare("good.csv", "--strict", "--tsp", "7ms", *files, "-q") == 2
-    assert compare("good.csv", "--tolerance", "0", *files, "-q") == 2
+    for wrong in (["missing.csv"], ["--strict", "--tsp", "7ms"], ["--tolerance", "0"]):
+        assert compare("good.csv", *wrong, *files, "-q") == 2
+        told = (folder / "v.xml").read_text(encoding="utf-8")
+        assert ("<error" in told) == (wrong[0] != "--tolerance")  # click refuses that one before
+        (folder / "v.xml").write_bytes(before["v.xml"])
     (folder / "notes.txt").write_text("mine")
     assert compare("good.csv", "--junit", "v.xml", "--csv", "notes.txt", "-o", "v.rrd", "-q") == 2
     assert compare("good.csv", "--junit", "v.xml", "--csv", "v.csv", "-o", "notes.txt", "-q") == 2
@@ -300,6 +305,30 @@ def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
     assert said(capsys) == f"error: --noise: found '-1', {ALLOWED}"
 
 
+@pytest.mark.parametrize("flags", [("-q",), ("-q", "--json")])
+def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[str, ...]) -> None:
+    assert compare("good.csv", *flags) == 0
+    assert capsys.readouterr().err == ""
+    assert compare("bad.csv", *flags) == 1
+    out, err = capsys.readouterr()
+    assert bool(out) == ("--json" in flags)
+    assert err.startswith("FAIL  bad out of tolerance against wanted\n      max |")
+    assert err.count("\n") == 2
+
+
+def test_tolerances_add_up(capsys: Captured) -> None:
+    assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "norm=2mm", "--json") == 0
+    assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.001, "norm": 0.002}
+    assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "axis=2mm") == 2
+
+
+@pytest.mark.parametrize("offset", ["0.2", "200ms", "0.2 s", "-200 ms"])
+def test_an_offset_of_clocks_may_have_its_unit(offset: str) -> None:
+    seconds = SYNC.convert(offset, None, None)
+    assert abs(seconds) == 0.2
+    assert (seconds < 0.0) == offset.startswith("-")
+
+
 def test_a_baseline_is_never_replaced(capsys: Captured) -> None:
     assert compare("good.csv", "-q") == 0
     assert compare("good.csv", "--baseline", "good-against-wanted.rrd", "-q") == 2
@@ -323,7 +352,7 @@ def test_results_are_operands_of_the_function() -> None:
     )
     with pytest.raises(OptionError) as error:
         urmpipe.compare(before, baseline=before, output="a.rrd")
-    assert str(error.value) == "-o: found a.rrd with a comparison that stands already, allowed: without"
+    assert str(error.value) == "output: found a.rrd with a comparison that stands already, allowed: without"
 
 
 def test_the_option_of_a_file_is_a_path() -> None:

@@ -67,6 +67,15 @@ def test_a_start_of_the_wrong_length(capsys: Captured) -> None:
     )
 
 
+def test_a_start_beyond_the_limits_of_joints(capsys: Captured) -> None:
+    start = "0,-45,0,-135,0,90,2.8974"  # joint 7 ends at 2.8973
+    assert refused(capsys, "targets.csv", "--robot", "panda", "--start", start) == [
+        "error: --start: found panda_joint2 = -45, allowed: -1.7628 to 1.7628 rad; in deg?",
+        "error: --start: found panda_joint4 = -135, allowed: -3.0718 to -0.0698 rad; in deg?",
+        "error: --start: found panda_joint6 = 90, allowed: -0.0175 to 3.7525 rad; in deg?",
+    ]
+
+
 FIXED = '<robot name="fixed"><link name="a"/><link name="b"/>{}</robot>'
 JOINT = (
     '<joint name="{0}" type="{1}"><parent link="a"/><child link="{2}"/><axis xyz="0 0 1"/>'
@@ -118,9 +127,11 @@ def test_targets_in_mm_that_are_read_as_m(capsys: Captured, folder: Path) -> Non
     assert run(["ik", "mm.csv", "--robot", "arm6", "--restarts", "0"]) == 1
     assert capsys.readouterr().err == (
         "warning: no unit is given for x, y, z: they are taken as m, though every row is beyond any arm;"
-        " --unit x=mm says otherwise\n"
+        " --unit mm says otherwise\n"
     )
-    assert run(["ik", "mm.csv", "--robot", "arm6", "--unit", "x=mm", "--unit", "y=mm", "--unit", "z=mm"]) == 0
+    for units in (["mm"], ["x=mm"], ["m", "x=mm", "y=mm", "z=mm"]):
+        given = [word for unit in units for word in ("--unit", unit)]
+        assert run(["ik", "mm.csv", "--robot", "arm6", "-q", *given]) == 0
 
 
 def test_no_row_that_is_a_target(capsys: Captured, folder: Path) -> None:

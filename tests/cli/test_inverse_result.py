@@ -124,7 +124,7 @@ def test_progress_is_told_and_changes_nothing(robot: str, every: bool) -> None:
 
 def test_a_notebook_shows_the_table() -> None:
     shown = urmpipe.ik(TARGETS, "arm6")._repr_html_()
-    assert shown.startswith("<table")
+    assert shown.startswith("<p><b>InverseResult</b> targets: pass, arm6, 2 of 2 targets reached, ")
     assert "<th>theta1</th>" in shown
     assert "right, elbow" in shown
 
@@ -220,18 +220,18 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
         ({"tsp": np.nan}, "tsp: found nan, allowed: a positive time in s"),
         ({"t": [1.0, 1.0]}, "t: found times that do not increase, allowed: strictly increasing, by 1 ns or"),
         ({"t": [0.0, 1.0], "tsp": 1.0}, "found t and tsp, allowed: one of both"),
-        ({"start": [0.0]}, "--start: found 1 values, allowed: 6, one for each of theta1, "),
-        ({"start": "zero"}, "--start: found 'zero', allowed: 6, one for each of theta1, "),
-        ({"start": [np.nan] * 6}, "--start: found a value that is not finite, allowed: 6, one for each of "),
-        ({"seed": -1}, "--seed: found -1, allowed: a whole number, 0 or more"),
-        ({"seed": -1, "tsp": 1.0}, "--seed: found -1, allowed: a whole number, 0 or more"),
-        ({"restarts": 1.5}, "--restarts: found 1.5, allowed: a whole number, 0 or more"),
-        ({"tolerance": np.nan, "tsp": 1.0}, "--tolerance: found nan m, allowed: more than 0, finite"),
-        ({"method": "magic", "tsp": 1.0}, "--method: found 'magic', allowed: auto, closed, iterative"),
-        ({"robot": None}, "found no robot; allowed: --robot NAME|FILE, a TOML, a URDF or one of arm6, "),
+        ({"start": [0.0]}, "start: found 1 values, allowed: 6, one for each of theta1, "),
+        ({"start": "zero"}, "start: found 'zero', allowed: 6, one for each of theta1, "),
+        ({"start": [np.nan] * 6}, "start: found a value that is not finite, allowed: 6, one for each of "),
+        ({"seed": -1}, "seed: found -1, allowed: a whole number, 0 or more"),
+        ({"seed": -1, "tsp": 1.0}, "seed: found -1, allowed: a whole number, 0 or more"),
+        ({"restarts": 1.5}, "restarts: found 1.5, allowed: a whole number, 0 or more"),
+        ({"tolerance": np.nan, "tsp": 1.0}, "tolerance: found nan m, allowed: more than 0, finite"),
+        ({"method": "magic", "tsp": 1.0}, "method: found 'magic', allowed: auto, closed, iterative"),
+        ({"robot": None}, "found no robot; allowed: robot=NAME|FILE, a TOML, a URDF or one of arm6, "),
         (
             {"output": "log.txt"},
-            "-o: found 'log.txt', allowed: a name that ends in .csv (a joint log) or .rrd",
+            "output: found 'log.txt', allowed: a name that ends in .csv (a joint log) or .rrd",
         ),
     ],
 )

@@ -113,7 +113,7 @@ def test_targets_in_mm_are_told_from_those_out_of_reach() -> None:
     assert found.kind == "too-far"
     assert found.message == (
         "row 1: up to 131.548 m from the base, while arm6 reaches no farther than 0.4001 m:"
-        " in mm? Allowed: m, or of a file --unit x=mm"
+        " in mm? Allowed: m, or of a file --unit mm"
     )
 
 

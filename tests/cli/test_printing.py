@@ -21,6 +21,9 @@ def test_the_command_that_opens_a_recording_works_without_an_activated_environme
     monkeypatch.setenv("PATH", str(command.parent))
     print_recording(Path("run.rrd"))
     assert capsys.readouterr().out == "Recording: run.rrd  (open it: urmpipe view run.rrd)\n"
+    print_recording(Path("run.rrd"), replaced=True)
+    said = "Recording: run.rrd  (open it: urmpipe view run.rrd; it replaced an earlier one)\n"
+    assert capsys.readouterr().out == said
 
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(command.with_name("python")))

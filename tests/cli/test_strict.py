@@ -61,7 +61,7 @@ def test_a_doubt_is_a_warning_and_with_strict_an_error(
     (tmp_path / "run.rrd").unlink()
     strict = urmpipe("ingest", log, "--robot", "ur5e", "--strict", "-o", "run.rrd")
     assert strict.code == 2
-    assert f"error: {kind}: {warnings[0]['message']} (--strict)" in strict.err.splitlines()
+    assert f"error: {kind}: row {row}: {warnings[0]['message']} (--strict)" in strict.err.splitlines()
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
 
 

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import re
+import shlex
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import click
 import numpy as np
 import pytest
 
 import urmpipe
+from urmpipe.main import COMMANDS, cli, run
 from urmpipe_datasets import LOGS
 from urmpipe_models.inverse.targets import targets_of
 from urmpipe_models.robots.catalogue import load_robot
@@ -21,7 +25,10 @@ from urmpipe_pipeline.simulations.simulation import Signal, SimulatedBlock, Simu
 
 PAGE = (Path(__file__).parents[2] / "docs" / "json.md").read_text(encoding="utf-8")
 NAMED = set(re.findall(r"`(\w+)`", PAGE))
-FREE = {"steps", "units", "tolerance", "noise", "before", "now", "delta", "start", "joints", "joint_turns"}
+FREE = {
+    "steps", "units", "tolerance", "noise", "before", "now", "delta", "start", "joints", "joint_turns",
+    "arguments", "points",
+}  # fmt: skip
 """Objects whose keys are names of columns, axes, joints, kinds or options."""
 
 
@@ -31,7 +38,7 @@ def keys(value: Any) -> set[str]:
         return set().union(*map(keys, value))
     if not isinstance(value, dict):
         return set()
-    inner = [keys(item) for key, item in value.items() if key not in FREE]
+    inner = [keys(item) for key, item in value.items() if key not in FREE or isinstance(item, list)]
     return set(value).union(*inner)
 
 
@@ -76,3 +83,49 @@ def test_each_key_of_a_simulation_is_named() -> None:
     found = keys(simulation.to_dict())
     assert found - NAMED == set()
     assert {"t_min", "quantity", "content", "message"} <= found
+
+
+CALLS = {
+    "compare compare": "compare path.csv log.csv --robot urm6",
+    "export export": "export log.rrd -o log.parquet",
+    "fmu build": "fmu build dc_drive --backend python",
+    "fmu check": "fmu check dc_drive.fmu",
+    "fmu list": "fmu list",
+    "ik ik": "ik path.csv --robot urm6",
+    "ingest ingest": "ingest log.csv --robot urm6 -o log.rrd",
+    "report report": "report log.rrd",
+    "robot export": "robot export urm6 -o urm6.toml",
+    "robot list": "robot list",
+    "robot show": "robot show urm6",
+    "simulate simulate": "simulate --list",
+}
+"""A call of each command that has --json; demo prints what compare prints."""
+
+
+def test_each_key_of_each_command_is_named(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    for name, source in (("log", "matlab"), ("path", "path")):
+        head = (LOGS / f"{source}.csv").read_text(encoding="utf-8").splitlines()[:31]
+        (tmp_path / f"{name}.csv").write_text("\n".join(head) + "\n", encoding="utf-8")
+    for call in sorted(CALLS.values(), key=lambda one: not one.startswith(("ingest", "fmu build"))):
+        assert run([*shlex.split(call), "--json"]) == 0, call
+        assert keys(json.loads(capsys.readouterr().out)) - NAMED == set(), call
+    assert run(["ingest", "missing.csv", "--json"]) == 2
+    assert keys(json.loads(capsys.readouterr().out)) - NAMED == set()
+
+
+def test_each_command_with_json_is_called_and_named() -> None:
+    context = click.Context(cli)
+    asked = {
+        f"{name} {one.name}"
+        for name in COMMANDS
+        for command in [cli.get_command(context, name)]
+        for one in (command.commands.values() if isinstance(command, click.Group) else [command])
+        if one is not None and any("--json" in param.opts for param in one.params)
+    }
+    assert asked - {"demo demo"} == set(CALLS)
+    of_page = {one.removesuffix(" --list") for one in re.findall(r"^\| `([a-z -]+)` \|", PAGE, re.MULTILINE)}
+    shown = {" ".join(dict.fromkeys(one.split())) for one in asked}
+    assert shown - of_page == set()

@@ -7,13 +7,13 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from closed_forms import form_by
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint, JointKind
 from urmpipe_models.chains.dh import DHRow, dh_chain
 from urmpipe_models.inverse.closed.spherical_wrist import SphericalWrist, spherical_wrist
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets, misses
-from urmpipe_models.kinematics.screws import screws
 from urmpipe_models.transform import Transform, from_offset
 
 SPECIAL: Mapping[str, Mapping[str, float]] = {
@@ -66,11 +66,7 @@ def random_joints(generator: np.random.Generator, chain: Chain, count: int) -> F
 
 def inverse_of(chain: Chain) -> SphericalWrist:
     """Return the closed form of an arm that must have one."""
-    found = screws(chain)
-    assert found is not None
-    form = spherical_wrist(found, chain.coordinates)
-    assert form is not None
-    return form
+    return form_by(spherical_wrist, chain)
 
 
 def described_anew(chain: Chain, base: Transform, tool: Transform, zeros: FloatArray) -> Chain:

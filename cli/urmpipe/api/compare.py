@@ -105,19 +105,23 @@ def compare(
     outputs: dict[OutputKind, PathLike | None] = {
         "recording": output, "junit": junit, "statistics": statistics,
     }  # fmt: skip
-    with told_in_junit(None if junit is None else Path(junit), kept), guarded_outputs(outputs, kept) as parts:
-        allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
-        options = CompareOptions(allowed, tcp, sync, align)
-        level = _noise_level(noise, baseline)
-        given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
-        given.refuse_unused(operands)
-        earlier = None if baseline is None else _earlier(baseline)
-        made = None if operands[1:] or earlier is None else _made_before(reference, output)
-        made = made or _compared(operands, given, options)
-        _refuse_doubts(strict, made)
-        result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
-        if junit is not None:
-            write_junit(result, parts["junit"], Path(junit))
+    told = None if junit is None else Path(junit)
+    with guarded_outputs(outputs, kept) as parts:
+        with told_in_junit(told, kept):
+            allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
+            options = CompareOptions(allowed, tcp, sync, align)
+            level = _noise_level(noise, baseline)
+            given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
+            given.refuse_unused(operands)
+            earlier = None if baseline is None else _earlier(baseline)
+            made = None if operands[1:] or earlier is None else _made_before(reference, output)
+            made = made or _compared(operands, given, options)
+            _refuse_doubts(strict, made)
+            result = (
+                made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
+            )
+        if told is not None:
+            write_junit(result, parts["junit"], told)
         if statistics is not None:
             write_statistics(result, parts["statistics"], Path(statistics))
         return result if output is None else record(lambda early: result, Path(output), kept, progress)
@@ -175,10 +179,8 @@ def _noise_level(
 
 def _compared(operands: Sequence[Operand | Comparison], given: _Given, options: CompareOptions) -> Comparison:
     """Return the comparison of some logs with a reference, or of one log with what it recorded itself."""
-    made = [one for one in operands if isinstance(one, Comparison)]
-    if made:
-        allowed = "a Comparison alone, with a baseline"
-        raise OptionError(f"found {made[0].name}, a Comparison, among what is compared, allowed: {allowed}")
+    if any(isinstance(one, Comparison) for one in operands):
+        raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
     first, *others = given.runs([one for one in operands if not isinstance(one, Comparison)])
     return compare_runs(first, others, options) if others else compare_recorded(first, options)
 

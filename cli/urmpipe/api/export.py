@@ -32,8 +32,8 @@ def export(
 
     Args:
         result: A recording (.rrd), or what `ingest`, `compare` or `simulate` returned.
-        output: The file to write; default: NAME-grid.csv and the like in the working folder, with `to`.
-        to: csv, parquet, mat or tum; default: by the output's suffix.
+        output: The file to write; default: NAME-grid.csv and the like in the working folder.
+        to: csv, parquet, mat or tum; default: by the output's suffix, csv without one.
         rows: grid: t, q, rates and the tool centre point on the run's grid, in SI; file: the columns of
             the log that were used as its file has them: their names, units, rows, numbers and clock.
             Default: grid; file with tcp recorded.

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import Any
 
 from urmpipe.api.write_map import write_map_part
 from urmpipe.edge import public
@@ -55,8 +56,8 @@ def ingest(
     Args:
         log: The log's file; several files, or a folder of them, if its source writes one a plot.
         robot: The arm; without it there are no kinematics.
-        base: Where the arm stands in the world.
-        tool: The tool centre point in the frame of the arm's tip.
+        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of the arm's tip, likewise.
         read: How to read the log where it cannot tell by itself.
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for quantised logs, else central.
@@ -71,7 +72,10 @@ def ingest(
     Raises:
         UrmpipeError: With everything that is wrong with the input or the output.
     """
-    parts = (lambda: place_robot(robot, base, tool), lambda: _files_and_name(log))
+    parts: tuple[Callable[[], Any], ...] = (
+        lambda: place_robot(robot, base, tool),
+        lambda: _files_and_name(log),
+    )
     arm, (files, name) = for_each(lambda make: make(), parts)
     outputs: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": write_map}
     kept = [*files, *map(Path, inputs)]

@@ -54,6 +54,9 @@ def _noise(text: str) -> dict[str, float]:
     return parse_noise(text)
 
 
+SYNC = ParsedType("sync", _sync)
+
+
 def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command], Command]:
     """Return an option that names a file to write or to read."""
     return click.option(name, *names, metavar=metavar, type=click.Path(path_type=Path), help=help)
@@ -85,7 +88,7 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
     "--sync",
     default="start",
     show_default=True,
-    type=ParsedType("sync", _sync),
+    type=SYNC,
     metavar="start|auto|SECONDS",
     help="Start both together, find the offset by the motion, or t_reference = t_log + SECONDS.",
 )
@@ -152,6 +155,7 @@ def compare(
         options["noise"] = None  # what a lab says for the calls that have a baseline
     reading = log.reading()
     target = None if made else output or Path(default_name(reference, logs))
+    replaces = target is not None and target.exists()
     with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
         result = urmpipe.compare(
             made or reference,
@@ -166,11 +170,13 @@ def compare(
         terminal.warn(one.run.warnings, one.name)
     terminal.warn(result.warnings)
     written = {"JUnit": options["junit"], "Statistics": options["statistics"]}
-    terminal.answer(result.to_dict, lambda: _print(result, written))
+    terminal.answer(result.to_dict, lambda: _print(result, replaces, written))
+    if terminal.quiet and result.verdict == "fail":
+        _tell_failure(result)
     return 0 if result.verdict == "pass" else 1
 
 
-def _print(result: Comparison, written: dict[str, Path | None]) -> None:
+def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:
     """Print a comparison, and what was written."""
     from urmpipe.printing.comparison import print_comparison
     from urmpipe.printing.terminal import print_recording, say
@@ -179,7 +185,14 @@ def _print(result: Comparison, written: dict[str, Path | None]) -> None:
     for title, path in written.items():
         if path:
             say(f"{title}: {path}")
-    print_recording(result.recording)
+    print_recording(result.recording, replaced=replaces)
+
+
+def _tell_failure(result: Comparison) -> None:
+    """Print the verdict alone on standard error: a job that fails says why, however quiet it is."""
+    from urmpipe.printing.comparison import print_verdict
+
+    print_verdict(result, err=True)
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:

@@ -19,6 +19,9 @@ EXPECTED = {"coppeliasim": "pass", "matlab": "pass", "solidworks": "pass", "coun
 """The bundled logs and the verdict each should get: the last comes from an arm with one module the wrong
 way round."""
 
+EXPLAINED = """Four logs of one motion: three should pass; the fourth, of an arm with one module the wrong way
+round, should fail, and so does all of it."""
+
 AS_EXPECTED = """The verdicts are as they should be: the three environments agree with the path, the arm with
 the counter-rotating module does not."""
 
@@ -74,8 +77,11 @@ def _print(result: Comparison, report: Report, as_expected: bool) -> None:
     """Print the verdicts, and how to go on from there."""
     from urmpipe.printing.comparison import print_comparison
     from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_datasets import LOGS
 
+    click.echo(f"{EXPLAINED}\n")
     print_comparison(result)
     click.echo(AS_EXPECTED if as_expected else f"These are not the verdicts expected: {EXPECTED}")
+    say(f"Logs:      {LOGS}  (to look at, or to try the commands with)")
     say(f"Report:    {report.path}  (open it in any browser)")
     print_recording(result.recording)

@@ -69,6 +69,7 @@ def ingest(
         )
     tune_pyarrow()
     target = None if explain else output or Path(default_name(logs))
+    replaces = target is not None and target.exists()
     reading = log.reading()
     with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
         run = urmpipe.ingest(
@@ -84,18 +85,18 @@ def ingest(
             **options,
         )
     terminal.warn(run.warnings)
-    terminal.answer(run.to_dict, lambda: _print(run, explain, audit, map_output))
+    terminal.answer(run.to_dict, lambda: _print(run, explain, replaces, audit, map_output))
     return 0
 
 
-def _print(run: Run, explain: bool, audit: Path | None, map_output: Path | None) -> None:
+def _print(run: Run, explain: bool, replaces: bool, audit: Path | None, map_output: Path | None) -> None:
     """Print what was found in a log, and what was written."""
     from urmpipe.printing.terminal import print_recording, print_run, say
     from urmpipe_pipeline.text import counted
 
     print_run(run, alternatives=explain)
     if run.recording:
-        print_recording(run.recording)
+        print_recording(run.recording, replaced=replaces)
     if audit:
         say(f"Audit: {audit}  ({counted(len(run.audit), 'line')})")
     if map_output:

@@ -95,6 +95,7 @@ def simulate(
 
     started = perf_counter()
     target = output or Path(default_name(system))
+    replaces = target.exists()
     with prints_apart(), terminal.progress(f"Simulating {system}") as progress:
         result = urmpipe.simulate(
             system,
@@ -109,13 +110,13 @@ def simulate(
         )
     wall = perf_counter() - started
     terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
-    terminal.answer(result.to_dict, lambda: _print(result, wall, draw))
+    terminal.answer(result.to_dict, lambda: _print(result, wall, replaces, draw))
     if result.failed is not None:
         say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
     return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0
 
 
-def _print(result: Simulation, wall: float, draw: Path | None) -> None:
+def _print(result: Simulation, wall: float, replaces: bool, draw: Path | None) -> None:
     """Print what a simulation, which took `wall` seconds, came to."""
     from urmpipe.printing.simulation import print_simulation
     from urmpipe.printing.terminal import print_recording, say
@@ -123,7 +124,7 @@ def _print(result: Simulation, wall: float, draw: Path | None) -> None:
     print_simulation(result, wall)
     if draw:
         say(f"Drawing: {draw}")
-    print_recording(result.recording)
+    print_recording(result.recording, replaced=replaces)
 
 
 def _list(terminal: Terminal) -> int:

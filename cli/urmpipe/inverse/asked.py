@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
@@ -18,6 +19,9 @@ from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, e
 from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import METHODS, Method
 from urmpipe_models.robots.catalogue import robot_names
+
+TYPED = 1e-3
+"""A start beyond a limit by this, in [rad] or [m], is on it: people type limits with few digits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -54,7 +58,7 @@ class Asked:
 
     @property
     def begin(self) -> FloatArray:
-        """Joint values that solutions are to be near to, shape (joints,)."""
+        """Joint values in [rad] and [m] that solutions are to be near to, shape (joints,)."""
         return np.array(self.arm.start, dtype=float) if self.start is None else self.start
 
     @property
@@ -109,10 +113,10 @@ def _what_no_path_has(asked: Asked, kind: Written | None) -> Iterator[str]:
 
 
 def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
-    """Return the start as an array, shape (joints,).
+    """Return the start as an array in [rad] and [m], shape (joints,).
 
     Raises:
-        OptionError: If it has not one finite value for each joint.
+        OptionError: If it has not one finite value for each joint, within the joint's limits.
     """
     if start is None:
         return None
@@ -125,7 +129,20 @@ def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArr
         raise OptionError(f"--start: found {values.size} values, {allowed}")
     if not np.isfinite(values).all():
         raise OptionError(f"--start: found a value that is not finite, {allowed}, in rad and m")
+    beyond = list(_beyond_limits(arm, values))
+    if beyond:
+        raise OptionError(*beyond)
     return values
+
+
+def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[str]:
+    """Yield which values of a start the limits of their joints do not allow."""
+    for joint, value in zip(arm.moving, start.tolist(), strict=True):
+        if not joint.lower - TYPED <= value <= joint.upper + TYPED:
+            unit = "rad" if joint.kind == "revolute" else "m"
+            degrees = "; in deg?" if unit == "rad" and abs(value) > 2.0 * math.pi else ""
+            limits = f"{joint.lower:.6g} to {joint.upper:.6g} {unit}"
+            yield f"--start: found {joint.name} = {value:g}, allowed: {limits}{degrees}"
 
 
 def arm_of(robot: Robot | None, base: Frame | None, tool: Frame | None) -> Chain:

@@ -61,7 +61,7 @@ def given_targets(
     """Return targets with their rows and times.
 
     Args:
-        given: A file, or arrays.
+        given: A file, or arrays: positions in [m], shape (n, 3), or poses, shape (n, 4, 4).
         t: Times of arrays in [s], shape (n,): they are a path then.
         tsp: Time from target to target in [s], of a path without times.
         read: How to read a file where it cannot tell by itself.

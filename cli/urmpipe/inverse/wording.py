@@ -38,7 +38,7 @@ MANY_TURNS = 4.0 * np.pi
 
 
 def rows_text(rows: Sequence[int] | IntArray) -> str:
-    """Return rows for a sentence, stretches of them as such: "row 3", "rows 3, 7-9 and 40 more"."""
+    """Return rows, shape (n,), for a sentence: "row 3", "rows 3, 7-9 and 40 more"."""
     rows = np.asarray(rows)
     first = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) != 1)
     last = np.append(first[1:], len(rows)) - 1
@@ -114,7 +114,7 @@ def singular_warnings(solutions: Solutions, row: IntArray, listed: BoolArray) ->
 
     Args:
         solutions: What was found.
-        row: Data row of each target.
+        row: Data row of each target, shape (n,).
         listed: True of the solutions that a person is shown, shape (n, k).
     """
     for one in solutions.singular:
@@ -135,7 +135,7 @@ def near_singular_warnings(
     Args:
         chain: The arm.
         solutions: What was found.
-        row: Data row of each target.
+        row: Data row of each target, shape (n,).
         listed: True of the solutions that a person is shown, shape (n, k).
         orientation: Whether poses were asked for; False of positions.
     """
@@ -172,7 +172,7 @@ def start_warnings(chain: Chain, start: FloatArray | None) -> Iterator[LogWarnin
 
 
 def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarning]:
-    """Yield a warning of the targets that the tool only comes near to."""
+    """Yield a warning of the targets in data rows `row`, shape (n,), that the tool only comes near to."""
     short = np.asarray(np.where(solutions.reached, solutions.shortfall, 0.0)).max(axis=1)
     if short.any():
         worst = int(np.argmax(short))
@@ -184,7 +184,14 @@ def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarni
 
 
 def far_warnings(chain: Chain, targets: Targets, row: IntArray, reached: BoolArray) -> Iterator[LogWarning]:
-    """Yield a warning of targets that are far out of reach, and would not be if they were in mm."""
+    """Yield a warning of targets that are far out of reach, and would not be if they were in mm.
+
+    Args:
+        chain: The arm.
+        targets: What was asked for.
+        row: Data row of each, shape (n,).
+        reached: True of those that have a solution, shape (n,).
+    """
     reach = longest(chain)
     away = np.linalg.norm(targets.position - np.asarray(chain.base.translation, dtype=float), axis=1)
     with np.errstate(invalid="ignore"):
@@ -192,7 +199,7 @@ def far_warnings(chain: Chain, targets: Targets, row: IntArray, reached: BoolArr
     if far.any():
         said = (
             f"{rows_text(row[far])}: up to {away[far].max():.6g} m from the base, while {chain.name} reaches"
-            f" no farther than {reach:.4g} m: in mm? Allowed: m, or of a file --unit x=mm"
+            f" no farther than {reach:.4g} m: in mm? Allowed: m, or of a file --unit mm"
         )
         yield LogWarning("too-far", said)
 

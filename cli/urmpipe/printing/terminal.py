@@ -51,13 +51,14 @@ def say(line: str, *, err: bool = False) -> None:
     click.echo(one_line(line), err=err)
 
 
-def print_recording(recording: Path | None) -> None:
-    """Print where a recording is and how to open it, with the urmpipe that is running."""
+def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
+    """Print where a recording is, and how to open it with the urmpipe that is running."""
     command = "urmpipe"
     if shutil.which(command) is None:  # not on the path, as in an environment that was not activated
         installed, here = Path(sys.executable).parent / command, Path.cwd()
         command = str(installed.relative_to(here) if installed.is_relative_to(here) else installed)
-    say(f"Recording: {recording}  (open it: {command} view {recording})")
+    earlier = "; it replaced an earlier one" if replaced else ""
+    say(f"Recording: {recording}  (open it: {command} view {recording}{earlier})")
 
 
 def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
@@ -83,9 +84,12 @@ def print_run(run: Run, *, alternatives: bool = False) -> None:
         table.add_row(*cells[: len(columns)])
     grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
     resampled = any(warning.kind == "resampled" for warning in run.warnings)
-    table.add_row("grid", grid, "resampled" if resampled else "the log's own rows")
+    made = [("grid", grid, "resampled" if resampled else "the log's own rows", "--tsp SECONDS")]
     if not any(inference.what == "robot" for inference in log.inferences):
-        table.add_row("robot", run.robot.name if run.robot else "none", _why_robot(run))
+        name = run.robot.name if run.robot else "none"
+        made.append(("robot", name, _why_robot(run), "--robot NAME|FILE"))
+    for row in made:
+        table.add_row(*row[: len(columns)])
     console.print(table)
     _print_audit(console, run)
 
@@ -109,7 +113,7 @@ def _print_audit(console: Console, run: Run) -> None:
     wraps = len(run.repolarizations)
     others = f", {counted(len(run.audit) - wraps, 'other finding')}" if len(run.audit) > wraps else ""
     title = f"{counted(wraps, 'repolarization')}{others}"
-    audit = new_table("What", "Joint", "Row", "t_r [s]", "Step [rad]", "Turns", title=title)
+    audit = new_table("What", "Joint", "Data row", "Time [s]", "Step [rad]", "Turns", title=title)
     for one in run.audit[:LISTED]:
         instant = f"{one.t:.6g} ± {one.half_period:.4g}"
         turns = f"{one.before:+d} → {one.after:+d}"

@@ -143,7 +143,11 @@ def _deviation(run: Deviation) -> dict[str, Any]:
 
 
 def cells(items: Sequence[Any]) -> np.ndarray[tuple[int, int], np.dtype[np.object_]]:
-    """Return items as a row of MATLAB's cells."""
+    """Return items as a row of MATLAB's cells.
+
+    Args:
+        items: n texts, numbers or structs; [-]; the cells have the shape (1, n).
+    """
     row = np.empty((1, len(items)), dtype=object)
     for k, item in enumerate(items):
         row[0, k] = item

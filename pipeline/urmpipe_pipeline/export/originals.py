@@ -19,7 +19,12 @@ roundings moves it by half a unit in the last place of a number that may be twic
 
 
 def to_si(numbers: FloatArray, column: LogColumn) -> FloatArray:
-    """Return factor (sign value + offset) as the reader computes it."""
+    """Return factor (sign value + offset) as the reader computes it.
+
+    Args:
+        numbers: In the unit of the column, shape (n,).
+        column: How they are converted.
+    """
     values = numbers if column.sign == 1 else -numbers
     values = values + column.offset if column.offset else values
     return values if column.factor == 1.0 else values * column.factor

@@ -40,7 +40,7 @@ class Column:
     Attributes:
         name: Its name, unique in the table.
         unit: Its unit; empty for counts and names.
-        values: Shape (n,); NaN where a sample is missing.
+        values: In [`unit`], shape (n,); NaN where a sample is missing.
     """
 
     name: str

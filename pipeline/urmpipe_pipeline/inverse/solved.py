@@ -94,7 +94,7 @@ def solved_run(
 
 
 def row_times(count: int) -> IntArray:
-    """Return the times of so many targets that have none, in integer [ns]: a second apart."""
+    """Return times of targets that have none in integer [ns], shape (count,): a second apart."""
     return np.arange(count, dtype=np.int64) * TARGET_PERIOD_NS
 
 

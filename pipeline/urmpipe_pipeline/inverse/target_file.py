@@ -26,7 +26,7 @@ from urmpipe_pipeline.sources.targets.sniff_targets import sniff_targets
 from urmpipe_pipeline.sources.targets.target_rotation import rotation_units, target_form, target_rotations
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.units.units import LONGEST_REACH, UnitFinder
-from urmpipe_pipeline.sources.vocabulary import Unit
+from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,8 +88,12 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
     Source: [UrmArm2021]_ eq. 22 (t = i Tsp).
     """
     asked = replace(options or ReadOptions(), joints=(), names=(), signs=(), offsets=())
+    asked, length = _plain_length(asked)
     tables = open_tables([Path(file)], asked, partial(sniff_targets, position=asked.position))
     plan = make_plan(tables, replace(asked, source=PATH), None)
+    if length is not None:  # what a column's own option says comes first
+        plain = dict.fromkeys((column.number for column in plan.roles.position), length)
+        plan = replace(plan, units={**plain, **plan.units})
     _refuse_unclear(plan, named=bool(asked.position))
     columns = [c for c in columns_of(tables.layouts, tables.titles) if c not in plan.clock.columns]
     form, assumed = target_form(plan.roles, columns, str(file), asked)
@@ -108,6 +112,14 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
         inferences=(*_about_file(plan), *rows.inferences, *said, *poses.inferences),
         warnings=(*plan.clock.warnings, *rows.warnings, *assumed, *poses.warnings, *noticed),
     )
+
+
+def _plain_length(asked: ReadOptions) -> tuple[ReadOptions, Unit | None]:
+    """Return the options without a plain length (--unit mm), and that unit, which is of x, y, z here."""
+    unit = vocabulary().unit(asked.units.get("", ""))
+    if unit is None or unit.quantity != "length" or unit.order:
+        return asked, None
+    return replace(asked, units={name: one for name, one in asked.units.items() if name}), unit
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -156,7 +168,7 @@ def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[l
     if told or not LONGEST_REACH < nearest < np.inf:
         return units, []
     said = f"no unit is given for {listed(columns)}: they are taken as m, though every row is beyond any arm"
-    return units, [LogWarning("assumed-unit", f"{said}; --unit {columns[0].header}=mm says otherwise")]
+    return units, [LogWarning("assumed-unit", f"{said}; --unit mm says otherwise")]
 
 
 def _finite(values: FloatArray) -> FloatArray:

@@ -19,6 +19,11 @@ def time_columns(
     """Return the time columns: t in integer [ns], and a sequence if one is named.
 
     Rerun truncates seconds given as floats, which puts some times off by a nanosecond; integers are exact.
+
+    Args:
+        t_ns: In integer [ns], shape (n,).
+        name: Of the sequence.
+        numbers: The sequence, shape (n,).
     """
     import rerun as rr
 
@@ -29,7 +34,11 @@ def time_columns(
 
 
 def scalar_column(values: FloatArray) -> ComponentColumn:
-    """Return an array as a column of lists; `Scalars.columns` takes six times as long over it."""
+    """Return an array as a column of lists; `Scalars.columns` takes six times as long over it.
+
+    Args:
+        values: In the unit of their plot, shape (n, k).
+    """
     import rerun as rr
 
     offsets = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.shape[1])

@@ -35,7 +35,7 @@ def draw(stream: RecordingStream, result: Result, every: Sequence[Block], scene:
     words = simulation_summary(result) if isinstance(result, Simulation) else summary(result)
     stream.log(SUMMARY, rr.TextDocument(words, media_type="text/markdown"), static=True)
     few = list(overviews(result, every))
-    _draw_styles(stream, [*every, *few], lone=isinstance(result, Run) and result.single_poses)
+    _draw_styles(stream, [*every, *few], lone=_lone(result))
     for block in few:
         times, values = block_columns(block, slice(None))
         stream.send_columns(block.entity, times, [values])
@@ -46,6 +46,14 @@ def draw(stream: RecordingStream, result: Result, every: Sequence[Block], scene:
     else:
         _draw_comparison(stream, result)
     draw_scene(stream, scene)
+
+
+def _lone(result: Result) -> bool:
+    """Tell whether no motion joins one sample and the next."""
+    if isinstance(result, Simulation):
+        return False
+    runs = [result] if isinstance(result, Run) else [one.run for one in result.runs]
+    return all(run.single_poses for run in runs)
 
 
 def _draw_simulation(stream: RecordingStream, result: Simulation) -> None:

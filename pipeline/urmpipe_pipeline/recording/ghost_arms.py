@@ -174,7 +174,12 @@ def bones_of(robot: Chain, q: FloatArray) -> tuple[FloatArray, FloatArray]:
 
 
 def gone_after(run: Run, t_ns: IntArray) -> Gone:
-    """Return when something that is at some rows of a run has just ended: at the next row."""
+    """Return when something that is at some rows of a run has just ended: at the next row.
+
+    Args:
+        run: The run.
+        t_ns: When it is there, in integer [ns], shape (m,).
+    """
     there = np.isin(run.log.t_ns, t_ns)
     gone = run.log.t_ns[1:][there[:-1] & ~there[1:]]
     return Gone(gone, _rows_at(run.t_ns, gone))

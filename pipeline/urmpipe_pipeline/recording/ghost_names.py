@@ -54,6 +54,10 @@ def placed_names(arms: FloatArray, view: float = 0.0) -> IntArray:
 
 
 def extent_of(points: FloatArray) -> float:
-    """Return the diagonal of the box around points in [m]; 1 around one point. NaN is no point."""
+    """Return the diagonal of the box around points in [m]; 1 around one point. NaN is no point.
+
+    Args:
+        points: In [m], shape (..., 3).
+    """
     flat = points.reshape(-1, 3)
     return float(np.linalg.norm(np.fmax.reduce(flat) - np.fmin.reduce(flat))) or 1.0

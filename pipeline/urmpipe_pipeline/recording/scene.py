@@ -204,7 +204,7 @@ def _run_ways(run: Run, place: Place) -> Iterator[Way]:
 def _asked(reference: Trajectory, shown: Deviation) -> Way:
     """Return the reference: its lines whole, its point where it is at the samples of a run."""
     entities = entity_path("path", "reference"), entity_path("point", "reference")
-    strips = dashed(lines_of(reference.position))
+    strips = () if shown.run.single_poses else dashed(lines_of(reference.position))
     track = track_of(shown.t_ns, shown.reference, shown.sample, decided_row(shown))
     return Way(*entities, REFERENCE_COLOUR, True, strips, track)
 
@@ -218,7 +218,7 @@ def _done(one: Deviation, place: Place, colour: str) -> Way:
         place.named("point"),
         colour,
         False,
-        lines_of(one.actual, one.sample, row),
+        () if one.run.single_poses else lines_of(one.actual, one.sample, row),
         track,
     )
 

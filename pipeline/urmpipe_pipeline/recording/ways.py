@@ -103,7 +103,13 @@ def track_of(
 
 
 def thinned(t_ns: IntArray, values: FloatArray, worst: int | None) -> IntArray:
-    """Return the rows to draw: at 50 Hz or less, the last and the worst among them, none without a value."""
+    """Return the rows to draw: at 50 Hz or less, the last and the worst among them, none without a value.
+
+    Args:
+        t_ns: Times in integer [ns], shape (n,).
+        values: In any unit, shape (n, k); NaN where there is none.
+        worst: Row that is drawn in any case.
+    """
     count = len(t_ns)
     if not count:
         return np.empty(0, dtype=np.int64)
@@ -145,7 +151,11 @@ def _within(row: int | None, start: int, end: int) -> list[int]:
 
 
 def dashed(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return every second piece of the lines, all pieces equally long."""
+    """Return every second piece of the lines, all pieces equally long.
+
+    Args:
+        strips: In [m], shape (any, 3) each.
+    """
     if not strips:
         return ()
     lengths = [np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(strip, axis=0), axis=1))] for strip in strips]

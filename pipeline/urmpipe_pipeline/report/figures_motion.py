@@ -79,7 +79,7 @@ def pose_by_row_figure(run: Run) -> Figure | None:
     return Figure(
         "Poses of the tool centre point",
         f"{point} and its Euler angles (moving Z-Y-X, in the colours of their axes), by forward kinematics:"
-        " a pose a target, a second apart.",
+        " a pose a target.",
         f"Poses of {point} of {run.name} by forward kinematics.",
         stacked(panels, run.duration),
         MOTION_PX * len(panels) + AROUND_PX,
@@ -125,7 +125,13 @@ def coordinates(
 
 
 def size(t: FloatArray, motion: PointLog, symbol: str) -> Spec:
-    """Return the norm of the velocity (v) or of the acceleration (a) over time."""
+    """Return the norm of the velocity (v) or of the acceleration (a) over time.
+
+    Args:
+        t: Times in [s], shape (n,).
+        motion: The tool centre point at these.
+        symbol: v or a.
+    """
     values, unit = (motion.velocity, "m/s") if symbol == "v" else (motion.acceleration, "m/s²")
     norm = np.linalg.norm(values, axis=1)
     shown = symbol == "v"

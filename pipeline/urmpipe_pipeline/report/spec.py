@@ -77,7 +77,7 @@ def typed(values: NDArray[Any], dtype: Literal["f4", "f8"] = "f4") -> Spec:
     log would run out of digits.
 
     Args:
-        values: Shape (n,) or (n, k).
+        values: In the unit of the axis, shape (n,) or (n, k).
         dtype: f4 or f8.
     """
     data = base64.b64encode(np.ascontiguousarray(values, f"<{dtype}").tobytes()).decode("ascii")
@@ -117,13 +117,16 @@ def stacked(panels: Sequence[Panel], duration: float, shapes: Sequence[Spec] = (
 
 
 def unjoined(figure: Figure) -> Figure:
-    """Return a figure over time with its samples as points: nothing joins one and the next."""
+    """Return a figure of single poses: points over the rows that nothing joins."""
     data = [
         {name: value for name, value in trace.items() if name != "line"}
         | {"mode": "markers", "marker": {"color": trace["line"]["color"], "size": 7}, "cliponaxis": False}
         for trace in figure.spec["data"]
     ]
-    return replace(figure, spec=figure.spec | {"data": data})
+    layout = figure.spec["layout"]
+    title = layout["xaxis"]["title"] | {"text": "row, the first is 0"}
+    axis_of_rows = layout["xaxis"] | {"title": title, "unifiedhovertitle": {"text": "row %{x}"}}
+    return replace(figure, spec={"data": data, "layout": layout | {"xaxis": axis_of_rows}})
 
 
 def base_layout() -> Spec:

@@ -74,7 +74,12 @@ def line(
 
 
 def told(values: FloatArray, digits: int = DIGITS) -> str:
-    """Return how values are written under the pointer: as the tables write the largest of them."""
+    """Return how values are written under the pointer: as the tables write the largest of them.
+
+    Args:
+        values: In the unit of the figure, shape (n,).
+        digits: Digits after the point.
+    """
     largest = _largest(values)
     return EXPONENT if 0.0 < largest < SMALL else f".{digits}f"
 
@@ -84,6 +89,10 @@ def precision(values: FloatArray, digits: int = DIGITS) -> Literal["f4", "f8"]:
 
     A tenth of the last digit may be lost, but the least and the largest value are told exactly as they are:
     they also stand in tables.
+
+    Args:
+        values: In the unit of the figure, shape (n,).
+        digits: Digits after the point under the pointer.
     """
     known = values[np.isfinite(values)]
     if not len(known):

@@ -128,6 +128,8 @@ class Run(Shown):
         """Return its name, its arm and how long it is."""
         arm = self.robot.name if self.robot else "no robot"
         rows = number_of(self.log.rows, "row")
+        if self.single_poses:
+            return line_of(self.name, arm, rows)
         grid = f"grid of {number_of(len(self.t_ns), 'sample')}"
         return line_of(self.name, arm, f"{rows} in {self.duration:g} s", grid)
 

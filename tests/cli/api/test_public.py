@@ -64,10 +64,8 @@ def test_what_cannot_be_applied_to_a_run_is_refused(folder: Path, run: urmpipe.R
 
 def test_one_is_a_list_of_one(folder: Path, run: urmpipe.Run, tmp_path: Path) -> None:
     path, log = folder / "path.csv", folder / "log.csv"
-    names = [
-        urmpipe.compare(path, logs, "urm6").name
-        for logs in (str(log), log, run, [run], (log,), (one for one in [run]))
-    ]
+    given: list[Any] = [str(log), log, run, [run], (log,), (one for one in [run])]
+    names = [urmpipe.compare(path, logs, "urm6").name for logs in given]
     assert names == ["log-against-path"] * 6
     assert urmpipe.report(run, tmp_path / "one.html").results == (run,)
 

@@ -84,6 +84,7 @@ def test_each_spelling_is_an_option_and_a_keyword() -> None:
         ("say which with --unit my col=deg or --unit my col=rad",
          'say which with read=ReadOptions(units={"my col": "deg"}) or'
          ' read=ReadOptions(units={"my col": "rad"})'),
+        ("--unit 'my col=deg' says otherwise", 'read=ReadOptions(units={"my col": "deg"}) says otherwise'),
         ("--unit q1: found 'mm'", "ReadOptions.units q1: found 'mm'"),
         ("or --time none with --period SECONDS", 'or read=ReadOptions(time="none", period=SECONDS)'),
         ("name them with --joints 2,3,...", 'name them with read=ReadOptions(joints=["2", "3", ...])'),

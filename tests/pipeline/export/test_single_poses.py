@@ -9,7 +9,7 @@ import pytest
 
 from urmpipe_models.inverse.targets import targets_of
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.export import ExportOptions, export_result
+from urmpipe_pipeline.export import ExportOptions, Format, export_result
 from urmpipe_pipeline.export.mat_file import run_fields
 from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.runs.results import Run
@@ -28,8 +28,9 @@ def test_a_table_of_single_poses_counts_rows_and_has_nothing_per_second(run: Run
     assert run.single_poses and run.robot is not None
     joints = [f"{joint.name} [rad]" for joint in run.robot.moving]
     wanted = ["row", *joints, "px [m]", "py [m]", "pz [m]", "rz [rad]", "ry [rad]", "rx [rad]"]
-    for to in ("csv", "parquet"):
-        found = export_result(run, tmp_path / f"poses.{to}", ExportOptions(to))  # type: ignore[arg-type]
+    formats: tuple[Format, ...] = ("csv", "parquet")
+    for to in formats:
+        found = export_result(run, tmp_path / f"poses.{to}", ExportOptions(to))
         assert [name for name, _ in found.columns] == wanted
     head, first, second = (tmp_path / "poses.csv").read_text().splitlines()
     assert (head.split(",")[0], first.split(",")[0], second.split(",")[0]) == ("row", "1", "2")

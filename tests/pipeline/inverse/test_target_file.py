@@ -494,7 +494,7 @@ def test_options_say_what_a_header_does_not(read: Read) -> None:
         (
             "assumed-unit",
             "no unit is given for x, y, z: they are taken as m, though every row is beyond any arm;"
-            " --unit x=mm says otherwise",
+            " --unit mm says otherwise",
         ),
         (
             "assumed-unit",

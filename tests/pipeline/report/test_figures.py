@@ -378,20 +378,6 @@ def test_a_tolerance_is_told_on_the_side_of_its_line_that_has_room(
     ]
 
 
-def test_a_logarithmic_overview_reaches_the_tolerance(comparison: Comparison) -> None:
-    reference, off = comparison.runs[0].run, comparison.runs[1].run
-    assert reference.tcp is not None
-    near = replace(reference, name="near", tcp=replace(reference.tcp, position=reference.tcp.position + 1e-6))
-    logs = [near, off]
-    figure = overview_figure(compare_runs(reference, logs, CompareOptions({"norm": 2.0})))
-    assert figure is not None
-    axis = figure.spec["layout"]["yaxis"]
-    (line,) = figure.spec["layout"]["shapes"]
-    assert axis["type"] == "log"
-    assert line["y0"] == 2000.0
-    assert axis["range"][1] > np.log10(line["y0"])
-
-
 def test_what_stands_at_the_head_of_a_line_is_not_under_the_legend(comparison: Comparison) -> None:
     run = comparison.runs[0].run
     played = play_back(run)

@@ -1,0 +1,161 @@
+"""Arms with three parallel axes: what their branches are called, and why one has no solution."""
+
+from __future__ import annotations
+
+import math
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from parallel_arms import (
+    WRISTS,
+    form_of,
+    poses,
+    random_arm,
+)
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.kinematics.screws import screws
+from urmpipe_models.kinematics.singularity import singularity_over_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.transform import rotation_about
+
+
+def test_reasons_say_what_was_found_and_what_is_allowed() -> None:
+    chain = load_robot("ur5e")
+    rotation = np.array(np.broadcast_to(np.eye(3), (2, 3, 3)))
+    targets = Targets(np.array([[0.0, 0.05, 0.6], [1.4, 0.0, 0.4]]), rotation)
+    solutions = form_of(chain).solve(targets)
+    assert not solutions.reached.any()
+    # the wrist is the tool's 0.0996 m behind the first target, which is on the axis of its rotation
+    assert solutions.reason(0) == "the wrist is 0.05 m from axis 1, allowed: at least 0.1333 m"
+    reason = solutions.reason(1)
+    assert reason is not None and reason.endswith(" m from axis 2, allowed: 0.0328 to 0.8172 m")
+
+
+def test_a_target_barely_out_of_reach_is_told_with_the_digits_that_say_so() -> None:
+    chain = load_robot("ur5e")
+    targets = targets_of(chain, np.array([[0.3, -math.pi / 2, 0.0, -math.pi / 2, math.pi / 2, 0.2]]))
+    above = Targets(targets.position + np.array([0.0, 0.0, 1e-7]), targets.rotation)
+    reason = str(form_of(chain).solve(above).reason(0)).split("; ")[0]
+    # from axis 2 to axis 4 the stretched arm is 0.425 m + 0.3922 m long
+    assert reason == "axis 4 is 0.8172001 m from axis 2, allowed: 0.0328 to 0.8172 m"
+
+
+def turned_range(chain: Chain) -> tuple[float, float]:
+    """Return the least and the largest angle between axes 4 and 6 in [rad], over a turn of joint 5."""
+    of_chain = screws(chain)
+    assert of_chain is not None
+    k4, k5, k6 = of_chain.direction[3:]
+    axis6 = Rotation.from_rotvec(np.linspace(-math.pi, math.pi, 20_001)[:, None] * k5).apply(k6)
+    angles = np.arccos(axis6 @ k4 * np.sign(k4 @ of_chain.direction[1]))
+    return float(angles.min()), float(angles.max())
+
+
+def test_the_limits_that_reasons_tell_are_those_of_the_arm() -> None:
+    """What joints 2, 3 and 5 can do at all, over a turn of each, bounds what a reason says is allowed."""
+    rng = np.random.default_rng(31)
+    told: set[str] = set()
+    for number in range(10):
+        chain = random_arm(rng, "meet", ((1, 1), (-1, 1), (1, -1), (-1, -1))[number % 4])
+        of_chain = screws(chain)
+        assert of_chain is not None
+        z, p = of_chain.direction[1], of_chain.point
+        upper, fore = (float(np.linalg.norm(np.cross(z, p[k + 1] - p[k]))) for k in (1, 2))
+        bounds = {
+            "from axis 2": (abs(upper - fore), upper + fore),
+            "to axis 4": turned_range(chain),
+        }
+        _, targets = poses(chain, 100, number)
+        texts = set(form_of(chain).solve(targets).reasons.ravel().tolist())
+        for text in texts:
+            for what, (least, most) in bounds.items():
+                if what in text:
+                    figures = [
+                        float(one) for one in re.findall(r"[0-9.]+(?:e-[0-9]+)?(?= (?:m|rad|to))", text)
+                    ]
+                    found, *limits = figures
+                    np.testing.assert_allclose(limits, (least, most), rtol=6e-4, atol=2e-4)  # four digits
+                    assert not limits[0] <= found <= limits[1]
+                    told.add(what)
+    assert told == {"from axis 2", "to axis 4"}
+
+
+def test_branches_are_where_they_say() -> None:
+    chain = load_robot("ur5e")
+    form = form_of(chain)
+    _, targets = poses(chain, 300, 11)
+    solutions = form.solve(targets)
+    assert form.branches[0] == "right, elbow up, not flipped" and len(set(form.branches)) == 8
+    for column, branch in enumerate(form.branches):
+        q1, q2, q3, q4, q5, _ = solutions.q[solutions.reached[:, column], column].T
+        # a positive q2 lifts an arm that points along +x of the frame that q1 turns: there is right
+        wrist = -0.425 * np.cos(q2) - 0.3922 * np.cos(q2 + q3) + 0.0997 * np.sin(q2 + q3 + q4)
+        assert (np.sign(wrist) == (1 if "right" in branch else -1)).all(), q1
+        elbow = -0.425 * np.sin(q2)
+        fore = elbow - 0.3922 * np.sin(q2 + q3)
+        along = -0.425 * np.cos(q2) - 0.3922 * np.cos(q2 + q3)
+        line = elbow * along - fore * (-0.425 * np.cos(q2))  # above the line from axis 2 to axis 4, outwards
+        assert (np.sign(line) == (1 if ("up" in branch) == ("right" in branch) else -1)).all()
+        assert (np.sign(q5) == (-1 if branch.endswith(", flipped") else 1)).all()
+
+
+def test_where_axes_5_and_6_are_parallel_right_is_where_axis_6_points() -> None:
+    rng = np.random.default_rng(23)
+    for number in range(4):
+        chain = random_arm(rng, "parallel", ((1, 1), (1, -1), (-1, 1), (-1, -1))[number])
+        of_chain = screws(chain)
+        _, targets = poses(chain, 50, number)
+        solutions = form_of(chain).solve(targets)
+        assert of_chain is not None and targets.rotation is not None
+        axis1, axis2, *_, axis6 = of_chain.direction
+        row, column = np.nonzero(solutions.reached)
+        turned2 = Rotation.from_rotvec(solutions.q[row, column, :1] * axis1).apply(axis2)
+        turned6 = targets.rotation[row] @ of_chain.rotation.T @ axis6
+        side = (np.cross(axis1, turned2) * turned6).sum(axis=1)
+        right = np.array(["right" in one for one in solutions.branches])[column]
+        np.testing.assert_array_equal(side > 0.0, right)
+        assert 0 < right.sum() < len(right)
+
+
+def with_other_zeros(chain: Chain, shift: FloatArray) -> Chain:
+    """Return the same arm with joints that count from elsewhere: q is the chain's less the shift."""
+    joints = tuple(
+        replace(joint, origin=joint.origin @ rotation_about(joint.axis, by))
+        for joint, by in zip(chain.joints, shift.tolist(), strict=True)
+    )
+    return replace(chain, joints=joints, visuals=())
+
+
+@pytest.mark.parametrize("wrist", ["ur", *WRISTS])
+def test_names_of_branches_do_not_depend_on_where_joints_count_from(wrist: str) -> None:
+    rng = np.random.default_rng(21)
+    for number in range(6):
+        chain = load_robot("ur5e") if wrist == "ur" else random_arm(rng, wrist, ((1, 1), (-1, 1))[number % 2])
+        shift = rng.uniform(-3.0, 3.0, 6)
+        _, targets = poses(chain, 50, number)
+        one = form_of(chain).solve(targets)
+        other = form_of(with_other_zeros(chain, shift)).solve(targets)
+        np.testing.assert_array_equal(other.reached, one.reached)
+        away = np.remainder(other.q + shift - one.q + math.pi, 2.0 * math.pi) - math.pi
+        np.testing.assert_allclose(away[one.reached], 0.0, atol=1e-7)
+
+
+@pytest.mark.parametrize("wrist", ["ur", "meet", "parallel"])
+def test_a_branch_keeps_its_name_along_a_path_between_singular_poses(wrist: str) -> None:
+    rng, looked_at = np.random.default_rng(22), 0
+    for _ in range(6):
+        chain = load_robot("ur5e") if wrist == "ur" else random_arm(rng, wrist)
+        q = rng.uniform(-math.pi, math.pi, 6) + np.linspace(0.0, 1.0, 400)[:, None] * rng.uniform(-1, 1, 6)
+        solutions = form_of(chain).solve(targets_of(chain, q))
+        away = np.abs(np.remainder(solutions.q - q[:, None] + math.pi, 2.0 * math.pi) - math.pi).max(axis=2)
+        column = np.where(solutions.reached, away, np.inf).argmin(axis=1)
+        smallest = singularity_over_log(chain, q).smallest
+        clear = np.minimum(smallest[1:], smallest[:-1]) > 0.01
+        assert not (np.diff(column) != 0)[clear].any()
+        looked_at += int(clear.sum())
+    assert looked_at > 500
