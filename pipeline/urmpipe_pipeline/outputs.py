@@ -186,14 +186,14 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     there = path.exists()
     if there and any(one.exists() and path.samefile(one) for one in inputs):
         return f"found an input of this command, allowed: any other name for the {noun}"
-    if there and not (path.is_file() and _is_ours(path, kind)):
+    if there and not (path.is_file() and kind != "system" and _is_ours(path, kind)):
         return _taken(kind, noun)
     return None
 
 
 def _taken(kind: OutputKind, noun: str) -> str:
     """Return that a file is there which may not be replaced, and what may be."""
-    if kind == "system":
+    if kind == "system":  # it was written to be changed: what it holds now may be somebody's work
         return "found a file, allowed: a new name"
     such = f"such {'an' if kind in ('audit', 'export', 'fmu') else 'a'} {noun}"
     return f"found a file that is no {noun} of urmpipe's, allowed: a new name, or {such} to replace"
@@ -215,8 +215,6 @@ def _is_text(path: Path) -> bool:
 
 
 def _is_ours(path: Path, kind: OutputKind) -> bool:
-    if kind == "system":
-        return False  # it was written to be changed: what it holds now may be somebody's work
     if kind == "report":
         return is_report(path)
     if kind == "fmu":

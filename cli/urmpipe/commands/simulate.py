@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -88,25 +88,23 @@ def simulate(
     if copy is not None:
         return _write(system, copy, terminal)
     tune_pyarrow()
+    target = output or Path(default_name(system))
+    asked = {"arguments": arguments, "step": step, "duration": duration, "backend": backend}
+    return _run(system, target, draw, terminal, asked)
+
+
+def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked: dict[str, Any]) -> int:
+    """Run a system as it is asked, print what it came to, and return the exit code."""
     from time import perf_counter
 
     from urmpipe.printing.terminal import prints_apart, say
     from urmpipe.systems.blocks import ON_PYTHON
 
     started = perf_counter()
-    target = output or Path(default_name(system))
     replaces = target.exists()
     with prints_apart(), terminal.progress(f"Simulating {system}") as progress:
         result = urmpipe.simulate(
-            system,
-            arguments=arguments,
-            step=step,
-            duration=duration,
-            backend=backend,
-            output=target,
-            draw=draw,
-            told=terminal.note,
-            progress=progress,
+            system, output=target, draw=draw, told=terminal.note, progress=progress, **asked
         )
     wall = perf_counter() - started
     terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
