@@ -273,7 +273,7 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
     [
         ((), "error: found neither a system nor --list, allowed: one of both"),
         (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of log-to-delta"),
-        (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo', allowed: log"),
+        (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo' (did you mean log?), allowed: log"),
         (("log-to-delta", "--set", "log"), "found 'log', allowed: NAME=VALUE, each name once"),
         (
             ("log-to-delta", "--set", "log=missing.csv", "--set", "reference=path.csv"),
