@@ -46,7 +46,7 @@ def given(defaults: Mapping[str, Any], arguments: Mapping[str, str], faults: lis
     values = dict(defaults)
     for name, text in arguments.items():
         if name not in defaults:
-            others = "; all else stands in the system's file (urmpipe simulate --list tells how to change it)"
+            others = "; all else stands in the system's file; simulate writes a copy (docs/simulate.md)"
             faults.append(f"argument {name}: {not_among(name, defaults)}{others}")
             continue
         try:

@@ -49,7 +49,7 @@ tolerance = 1e-6
 """
 
 
-ELSE = "; all else stands in the system's file (urmpipe simulate --list tells how to change it)"
+ELSE = "; all else stands in the system's file; simulate writes a copy (docs/simulate.md)"
 
 
 @pytest.fixture
