@@ -149,7 +149,7 @@ def system_part(count: int, folder: Path) -> Part:
     cold = measure(command)
     taken = rounds({"FMUs from the cache": command}, count, outputs=[output])
     plan = planned()
-    length = plan.count * plan.system.step
+    length = plan.count * plan.step
     loops = in_turn(loops_of(plan, folder), count)
     wall = median(taken["FMUs from the cache"], "wall")
     lines = [
@@ -175,8 +175,8 @@ def system_part(count: int, folder: Path) -> Part:
 def planned() -> Plan:
     """Return the shipped system, ready to run."""
     system = load_system(SYSTEM)
-    blocks = Blocks(system, shipped=True)
-    return prepare(system, blocks.make, column=blocks.column, duration=blocks.end)
+    blocks = Blocks(system, bundled=[one for one in system.arguments.values() if isinstance(one, str)])
+    return prepare(system, blocks.make, column=blocks.column, duration=blocks.end, period=blocks.period)
 
 
 def loops_of(plan: Plan, folder: Path) -> dict[str, Callable[[], object]]:

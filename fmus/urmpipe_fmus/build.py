@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ from urmpipe_fmus.description import Backend, model_description
 from urmpipe_fmus.documentation import documentation
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.display import Shown, line_of
+from urmpipe_models.errors import FmuError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -72,7 +73,12 @@ class BuiltFmu(Shown):
 
 
 def build_fmu(
-    unit: Unit, target: Path, *, backend: Backend | None = None, platforms: Sequence[str] = ()
+    unit: Unit,
+    target: Path,
+    *,
+    backend: Backend | None = None,
+    platforms: Sequence[str] = (),
+    told: Callable[[str], None] | None = None,
 ) -> BuiltFmu:
     """Build the FMU of a unit; the same unit, versions and compiler give the same bytes.
 
@@ -81,33 +87,45 @@ def build_fmu(
         target: The file, or a folder that exists: then UNIT.fmu in it.
         backend: Native or Python; None for native if it can be built here, else Python.
         platforms: FMI's names of platforms; by default native is for this one, Python for all it knows.
+        told: Told what takes minutes: compiling for another platform.
 
     Raises:
         FmuError: If a compiler is missing or fails, Python cannot make the unit again, or the file cannot
             be written.
         UnitError: If a function of the unit does what cannot be traced.
     """
-    chosen, note = _backend(unit, backend, platforms)
-    built = _native if chosen == "native" else _python
-    files, guid, found = built(unit, platforms)
+    chosen, missing = chosen_backend(backend, platforms)
+    if chosen == "native":
+        files, guid, found = _native(unit, platforms, told)
+    else:
+        files, guid, found = _python(unit, platforms)
+    note = missing and f"{unit.name}.fmu runs on Python, as no native one can be built here: {missing}"
     path = target / f"{unit.name}.fmu" if target.is_dir() else target
     write_fmu(path, files)
     return BuiltFmu(path, unit, chosen, found, guid, note)
 
 
-def _backend(unit: Unit, backend: Backend | None, platforms: Sequence[str]) -> tuple[Backend, str]:
-    """Return the backend, and why it is Python where nobody asked for it."""
+def chosen_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tuple[Backend, str]:
+    """Return the backend that builds here, and why it is Python where nobody asked for it.
+
+    Args:
+        backend: What is asked for; None for native if it can be built here, else Python.
+        platforms: FMI's names of platforms; by default this one.
+
+    Raises:
+        FmuError: If native is asked for and cannot be built here.
+    """
     from urmpipe_fmus.native import native_missing
 
-    if backend is not None:
-        return backend, ""
-    missing = native_missing(platforms)
-    if missing is None:
-        return "native", ""
-    return "python", f"{unit.name}.fmu runs on Python, as no native one can be built here: {missing}"
+    missing = None if backend == "python" else native_missing(platforms)
+    if missing and backend == "native":
+        raise FmuError(f"backend: found native, which cannot be built here: {missing}; allowed: python")
+    return backend or ("python" if missing else "native"), missing or ""
 
 
-def _native(unit: Unit, platforms: Sequence[str]) -> tuple[dict[str, bytes], str, tuple[str, ...]]:
+def _native(
+    unit: Unit, platforms: Sequence[str], told: Callable[[str], None] | None
+) -> tuple[dict[str, bytes], str, tuple[str, ...]]:
     """Return files, GUID and platforms of a native FMU: machine code, and the C that it is made from."""
     from urmpipe_fmus.native import guid_header, native_binaries, native_sources, this_platform
     from urmpipe_fmus.native.sources import GUID_HEADER
@@ -116,7 +134,7 @@ def _native(unit: Unit, platforms: Sequence[str]) -> tuple[dict[str, bytes], str
     sources = native_sources(unit)
     compiled = [name.removeprefix("sources/") for name in sorted(sources) if name.endswith(".c")]
     files, guid = _described(unit, "native", {**sources, **_table(unit)}, compiled)
-    files |= native_binaries(unit, sources, guid, chosen)
+    files |= native_binaries(unit, sources, guid, chosen, told=told)
     return files | {GUID_HEADER: guid_header(guid)}, guid, chosen
 
 

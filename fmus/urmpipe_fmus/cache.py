@@ -23,8 +23,9 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_fmus.archive import content_guid
-from urmpipe_fmus.build import build_fmu
+from urmpipe_fmus.build import build_fmu, chosen_backend
 from urmpipe_fmus.description import Backend
+from urmpipe_fmus.platforms import this_platform
 from urmpipe_fmus.unit import Recipe, Unit
 from urmpipe_models.errors import Finding, FmuError
 
@@ -69,9 +70,7 @@ def cached_fmu(
         FmuError: If it cannot be built, or the cache cannot be written.
         UnitError: If a function of the unit does what cannot be traced.
     """
-    from urmpipe_fmus.native import native_missing, this_platform
-
-    chosen: Backend = backend or ("python" if native_missing(()) else "native")
+    chosen, _ = chosen_backend(backend)
     tell = told or (lambda name: None)
     folder = cache_folder() / "fmus"
     try:

@@ -46,6 +46,8 @@ class CheckedVariable:
         type: Real, Integer, Boolean, String or Enumeration.
         unit: As the FMU spells it; empty without one.
         start: The start value as the FMU writes it; empty without one.
+        min: The least value allowed; None without a bound.
+        max: The largest value allowed.
         before: Its value after the initialization; None if it is not known or not finite.
         after: Its value after the last step.
         description: One line for people.
@@ -57,6 +59,8 @@ class CheckedVariable:
     type: str
     unit: str
     start: str
+    min: float | None
+    max: float | None
     before: float | int | bool | str | None
     after: float | int | bool | str | None
     description: str
@@ -140,7 +144,7 @@ def _described(path: Path) -> Any:
     except OSError as error:
         raise _refused(path, f"cannot be read: {error.strerror or error}") from error
     except (zipfile.BadZipFile, zlib.error) as error:
-        raise _refused(path, f"found no zip, or a damaged one ({error}), allowed: an FMU") from error
+        raise _refused(path, f"found {_no_zip(path)} ({error}), allowed: an FMU") from error
     except (ET.ParseError, LookupError, ValueError) as error:
         raise _refused(path, f"modelDescription.xml cannot be read: {error}") from error
     version = root.get("fmiVersion")
@@ -153,6 +157,15 @@ def _described(path: Path) -> Any:
     except Exception as error:  # what FMPy raises for a description it does not expect is of any kind
         said = f"modelDescription.xml cannot be read: {type(error).__name__}: {error}"
         raise _refused(path, said) from error
+
+
+def _no_zip(path: Path) -> str:
+    """Return what a file is that cannot be opened as a zip."""
+    with path.open("rb") as file:
+        head = file.read(2)
+    if not head:
+        return "an empty file"
+    return "a zip that is cut off or damaged" if head == b"PK" else "no zip"
 
 
 def _refused(path: Path, said: str) -> FmuError:
@@ -284,6 +297,8 @@ def _variables(described: Any, before: Sequence[Any], after: Sequence[Any]) -> l
             type=one.type,
             unit=one.unit or (one.declaredType.unit if one.declaredType else None) or "",
             start="" if one.start is None else str(one.start),
+            min=_bound(one, "min"),
+            max=_bound(one, "max"),
             before=_finite(first),
             after=_finite(last),
             description=one.description or "",
@@ -292,6 +307,13 @@ def _variables(described: Any, before: Sequence[Any], after: Sequence[Any]) -> l
             described.modelVariables, before or unknown, after or unknown, strict=True
         )
     ]
+
+
+def _bound(one: Any, which: str) -> float | None:
+    """Return a bound of a variable, its own or that of its declared type."""
+    told = getattr(one, which) or getattr(one.declaredType, which, None)
+    value = _number(told, math.nan)
+    return None if math.isnan(value) else value
 
 
 def _type(one: Any) -> str:

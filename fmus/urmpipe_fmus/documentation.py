@@ -31,13 +31,13 @@ def documentation(unit: Unit) -> str:
         version=version("urmpipe"),
         titles=TITLES,
         numbers=NUMBERS,
-        rows=[list(zip(TITLES, _row(one), strict=True)) for one in unit.variables],
+        rows=[list(zip(TITLES, variable_row(one), strict=True)) for one in unit.variables],
         steps=_steps(unit),
     )
     return markup_text(page)
 
 
-def _row(one: Variable) -> tuple[str, ...]:
+def variable_row(one: Variable) -> tuple[str, ...]:
     """Return what the table says of a variable, in the order of `TITLES`."""
     name = one.name if one.size is None else f"{one.name}[1]" + (f" .. [{one.size}]" if one.size > 1 else "")
     part = f"{one.causality}, {one.variability}"

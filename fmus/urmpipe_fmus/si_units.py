@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import math
 import re
+from collections.abc import Collection
 from dataclasses import dataclass
 from functools import cache
 
@@ -92,6 +93,11 @@ GRAM = -3
 """The gram is the base unit times this power of ten."""
 
 _PREFIXES = {"": 0, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3, "u": -6, "n": -9, "p": -12}
+_ELSEWHERE = str.maketrans(
+    {"*": ".", "·": ".", " ": ".", "^": "", "²": "2", "³": "3", "°": "deg", "Ω": "Ohm", "µ": "u"}
+)
+"""How others write what FMI writes in ASCII."""
+
 _POWER = re.compile(r"(1|[A-Za-z]+)([+-]?[1-9])?")
 _PARTS = re.compile(r"([^/()]+)(?:/(?:([^/.()]+)|\(([^/()]+)\)))?")
 
@@ -174,9 +180,44 @@ def _symbol(symbol: str, spelling: str) -> tuple[int, BaseUnit]:
 
 
 def _unknown(spelling: str) -> UnitError:
+    if meant := _meant(spelling):
+        how = "FMI's spelling, a dot between factors and powers as digits, such as N.m, kg.m2, rad/s2"
+        return UnitError(f"unit {spelling!r}: found (did you mean {meant}?), allowed: {how}")
     symbols = ", ".join(one for one in (*_SYMBOLS, *_PLAIN) if one != "1")
     return UnitError(
         f"unit {spelling!r}: found, allowed: powers of {symbols} (the SI ones also with a prefix such as k or"
         " m) as a product over one factor or a product in parentheses, such as N.m, kg.m2, rad/s2,"
         " N.m.s/rad, J/(kg.K), 1/s; degC alone; empty for a number without a unit"
     )
+
+
+def _meant(spelling: str) -> str:
+    """Return how FMI spells a unit that people write as Nm, kg*m^2 or N·m; empty if that is no unit."""
+    if "degC" in spelling:
+        return ""  # a temperature that has no multiple, and no degree times a coulomb
+    text = re.sub(r" */ *", "/", spelling.replace("**", "").replace("rpm", "rev/min").strip())
+    text = text.translate(_ELSEWHERE)
+    text = re.sub(r"[A-Za-z]+", lambda word: ".".join(_factors(word[0])) or word[0], text)
+    try:
+        return text if text != spelling and base_unit(text) else ""
+    except UnitError:
+        return ""
+
+
+def _factors(word: str, prefixes: Collection[str] = _PREFIXES) -> list[str]:
+    """Return the symbols that letters are written of, as few as can be; none if there is no such way.
+
+    Only the first may have a prefix: Nms is N.m.s, not N.ms.
+    """
+    known = {*_PLAIN, *_SYMBOLS}
+    if word in known or (word[:1] in prefixes and word[1:] in _SYMBOLS):
+        return [word]
+    if word[:1] in prefixes and word[1:] in _PLAIN:
+        return []  # mdeg is no metre times a degree
+    if named := [one for one in known if len(one) > 1 and one.lower() == word.lower()]:
+        return named[:1]
+    for k in range(len(word) - 1, 0, -1):
+        first = _factors(word[:k], prefixes)
+        if len(first) == 1 and (rest := _factors(word[k:], ())):
+            return [*first, *rest]
+    return []

@@ -28,6 +28,7 @@ OutputKind = Literal[
     "drawing",
     "fmu",
     "joints",
+    "system",
 ]
 
 NOUNS: dict[str, str] = {
@@ -35,6 +36,7 @@ NOUNS: dict[str, str] = {
     "statistics": "table of statistics",
     "fmu": "FMU",
     "joints": "joint log",
+    "system": "system file",
 }
 """What people call a kind, where that is not its name."""
 
@@ -48,11 +50,15 @@ SUFFIXES: dict[OutputKind, tuple[str, ...]] = {
     "drawing": (".svg",),
     "fmu": (".fmu",),
     "joints": (".csv",),
+    "system": (".toml",),
 }
 """How a file of a kind is called; exports and figures say it by their formats."""
 
 OTHERS = {".parquet", ".mat", ".tum", ".txt", ".xlsx", ".json", ".png", ".pdf", ".jpg", ".webp"}
 """Suffixes of what urmpipe writes as exports and figures, or not at all."""
+
+TABLES = (".csv", ".parquet", ".mat", ".tum")
+"""Suffixes of what `export` makes of a recording."""
 
 AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")
 """The header of an audit, by which one of ours is known."""
@@ -172,23 +178,24 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     if path.is_dir():
         return f"found a folder, allowed: the name of a file for the {noun}"
     if _is_of_another_kind(path, kind):
-        return f"found a name that is none of a {noun}, allowed: {path.stem}{SUFFIXES[kind][0]}"
+        tables = kind == "recording" and path.suffix.lower() in TABLES
+        hint = f"; urmpipe export RUN.rrd -o {path.name} writes tables" if tables else ""
+        return f"found a name that is none of a {noun}, allowed: {path.stem}{SUFFIXES[kind][0]}{hint}"
     if not path.parent.is_dir():
         return f"found no folder {path.parent}, allowed: a folder that exists"
-    if not path.exists():
-        return None
-    return _irreplaceable(path, inputs, kind)
+    return _taken(path, inputs, kind, noun) if path.exists() else None
 
 
-def _irreplaceable(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None:
-    """Return what speaks against replacing what is there, or None."""
-    noun = NOUNS.get(kind, kind)
+def _taken(path: Path, inputs: Sequence[Path], kind: OutputKind, noun: str) -> str | None:
+    """Return what speaks against replacing the file that is there, or None."""
     if any(one.exists() and path.samefile(one) for one in inputs):
         return f"found an input of this command, allowed: any other name for the {noun}"
-    if not path.is_file() or not _is_ours(path, kind):
-        such = f"such {'an' if kind in ('audit', 'export', 'fmu') else 'a'} {noun}"
-        return f"found a file that is no {noun} of urmpipe's, allowed: a new name, or {such} to replace"
-    return None
+    if kind == "system":  # it was written to be changed: what it holds now may be somebody's work
+        return "found a file, allowed: a new name"
+    if path.is_file() and _is_ours(path, kind):
+        return None
+    such = f"such {'an' if kind in ('audit', 'export', 'fmu') else 'a'} {noun}"
+    return f"found a file that is no {noun} of urmpipe's, allowed: a new name, or {such} to replace"
 
 
 def _is_of_another_kind(path: Path, kind: OutputKind) -> bool:

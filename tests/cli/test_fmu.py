@@ -61,9 +61,9 @@ def test_build_writes_the_fmu_and_says_what_is_inside(urmpipe: RunCommand, tmp_p
 
 
 def test_the_same_unit_is_the_same_file(tmp_path: Path) -> None:
-    first = build_fmu("repolarizer", options={"joints": 2}, output=tmp_path / "a.fmu")
-    second = build_fmu("repolarizer", options={"joints": 2}, output=tmp_path / "b.fmu")
-    other = build_fmu("repolarizer", options={"joints": 3}, output=tmp_path / "c.fmu")
+    first = build_fmu("repolarizer", options={"joints": 2}, backend="python", output=tmp_path / "a.fmu")
+    second = build_fmu("repolarizer", options={"joints": 2}, backend="python", output=tmp_path / "b.fmu")
+    other = build_fmu("repolarizer", options={"joints": 3}, backend="python", output=tmp_path / "c.fmu")
     assert first.path.read_bytes() == second.path.read_bytes()
     assert first.guid == second.guid != other.guid
     assert first.path == tmp_path / "a.fmu"
@@ -90,7 +90,7 @@ def test_an_fmu_of_ours_is_replaced_and_another_never(urmpipe: RunCommand, meter
 def test_an_output_is_never_an_input(tmp_path: Path) -> None:
     unit = tmp_path / "unit.py"
     unit.write_text(example(), encoding="utf-8")
-    with pytest.raises(UrmpipeError, match="found no folder"):
+    with pytest.raises(UrmpipeError, match="found no folder, allowed: a folder that exists, or a name that"):
         build_fmu(unit, output=unit)
     shutil.copy(unit, tmp_path / "spring.fmu")
     with pytest.raises(UrmpipeError, match="found a file that is no FMU of urmpipe's"):
@@ -148,7 +148,7 @@ def test_check_of_a_sound_fmu_is_0(urmpipe: RunCommand, meter: Path) -> None:
     assert (told["schema"], told["fmu"], told["problems"]) == (1, "delta_meter.fmu", [])
     assert told["variables"][0] == {
         "name": "tolerance", "causality": "parameter", "variability": "tunable", "type": "Real", "unit": "m",
-        "start": "0.0035", "before": 0.0035, "after": 0.0035,
+        "start": "0.0035", "min": 0.0, "max": None, "before": 0.0035, "after": 0.0035,
         "description": "Largest deviation allowed along x, y and z",
     }  # fmt: skip
 
@@ -173,7 +173,8 @@ def test_check_of_what_is_no_fmu_is_2(urmpipe: RunCommand, tmp_path: Path, conte
     (tmp_path / "file.fmu").write_bytes(content)
     ran = urmpipe("fmu", "check", "file.fmu")
     assert (ran.code, ran.out) == (2, "")
-    assert ran.err.startswith("error: file.fmu: found no zip")
+    found = {b"": "an empty file", b"PK": "a zip that is cut off or damaged"}.get(content[:2], "no zip")
+    assert ran.err.startswith(f"error: file.fmu: found {found} (")
     assert ran.err.endswith("allowed: an FMU\n")
 
 
@@ -194,6 +195,43 @@ def test_without_casadi_it_is_python_and_says_why(
     out, err = capsys.readouterr()
     assert out.startswith("FMU: delta_meter.fmu  (python, ")
     assert err.startswith("note: delta_meter.fmu runs on Python, as no native one can be built here: casadi")
+    said = "backend: found native, which cannot be built here: casadi is not installed; allowed: python"
+    assert run(["fmu", "build", "delta_meter", "--backend", "native"]) == 2
+    assert capsys.readouterr().err == f"error: {said}\n"
+    assert run(["simulate", "one-drive", "--backend", "native"]) == 2
+    assert capsys.readouterr().err == f"error: {said}\n"
+
+
+def test_units_on_python_are_a_warning_of_the_simulation(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("urmpipe_fmus.native.native_missing", lambda platforms=(): "casadi is not installed")
+    told: list[str] = []
+    with pytest.warns(UserWarning, match="the units run on Python"):
+        result = urmpipe.simulate("one-drive", duration=0.002, told=told.append)
+    said = "the units run on Python, a hundred times slower than native ones: casadi is not installed"
+    assert [(one.kind, one.message) for one in result.warnings] == [("on-python", said)]
+    assert told[0] == said
+
+
+def test_the_variables_of_a_unit_are_listed(urmpipe: RunCommand) -> None:
+    listed = json.loads(urmpipe("fmu", "list", "dc_drive", "--json").out)
+    parts = {one["name"]: (one["part"], one["unit"], one["start"]) for one in listed["variables"]}
+    assert parts["u"] == ("input, continuous", "V", "0")
+    assert parts["Mk"] == ("output, continuous", "N.m", "computed")
+    assert parts["C"] == ("parameter, tunable", "N.m/A", "0.05")
+    ran = urmpipe("fmu", "list", "kinematic_chain")
+    assert (ran.code, ran.err) == (0, "")
+    assert "phi[1] .. [6]" in ran.out
+    ran = urmpipe("fmu", "list", "dc-drive")
+    assert (ran.code, ran.err.partition(",")[0]) == (
+        2,
+        "error: unit dc-drive: found (did you mean dc_drive?)",
+    )
+
+
+def test_an_array_is_a_row_of_the_check(urmpipe: RunCommand, meter: Path) -> None:
+    cells = [line.split() for line in urmpipe("fmu", "check", meter.name).out.splitlines()]
+    arrays = [row[0] for row in cells if row and ".." in row[0]]
+    assert arrays == ["reference[1..3]", "actual[1..3]", "delta[1..3]"]
 
 
 def test_no_file_of_the_working_folder_is_taken_for_a_module(

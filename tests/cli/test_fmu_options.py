@@ -117,7 +117,7 @@ def test_a_unit_refuses_what_it_does_not_take() -> None:
     ]
     assert refusal("repolarizer", options={"joints": 6, "turns": 2}) == [
         "unit repolarizer: option turns: found, allowed: joints; a parameter is set where the unit runs, in a"
-        " system by start = { turns = ... }"
+        " system by start = { turns = ... }, in another tool as the FMU's start value"
     ]
     assert refusal(unit_of("delta_meter"), options={"joints": 6}) == [
         "unit delta_meter: found joints, allowed: no options, it is complete"

@@ -273,11 +273,11 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
     [
         ((), "error: found neither a system nor --list, allowed: one of both"),
         (("nosuch",), "system: found 'nosuch', allowed: a TOML file, or one of log-to-delta"),
-        (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo', allowed: log"),
+        (("log-to-delta", "--set", "lgo=1"), "argument lgo: found 'lgo' (did you mean log?), allowed: log"),
         (("log-to-delta", "--set", "log"), "found 'log', allowed: NAME=VALUE, each name once"),
         (
             ("log-to-delta", "--set", "log=missing.csv", "--set", "reference=path.csv"),
-            "error: block log: missing.csv: found no such file",
+            "error: log-to-delta.toml:16: blocks.log: missing.csv: found no such file",
         ),
         (
             ("log-to-delta", "--set", "log=mine.csv"),
@@ -298,6 +298,21 @@ def test_what_is_wrong_is_told_before_the_first_step(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_shipped_system_is_written_to_be_changed(urmpipe: RunCommand, tmp_path: Path) -> None:
+    ran = urmpipe("simulate", "one-drive", "--write-system", "mine.toml")
+    assert (ran.code, ran.err) == (0, "")
+    assert ran.out == "System: mine.toml  (change it, then: urmpipe simulate mine.toml)\n"
+    text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
+    changed = text.replace('unit = "dc_drive"', 'unit = "dc_drive"\nstart = { C = 0.1 }')
+    (tmp_path / "mine.toml").write_text(changed, encoding="utf-8")
+    result = simulate(tmp_path / "mine.toml", duration=0.01)
+    drive = next(one for one in result.blocks if one.name == "drive")
+    assert [(one.variable, one.value) for one in drive.settings if one.given] == [("C", 0.1)]
+    ran = urmpipe("simulate", "one-drive", "--write-system", "mine.toml")
+    assert (ran.code, ran.err) == (2, "error: mine.toml: found a file, allowed: a new name\n")
+    assert (tmp_path / "mine.toml").read_text(encoding="utf-8") == changed
+
+
 def refusal(system: Path, **options: Any) -> list[str]:
     """Return all that is wrong with a system."""
     with pytest.raises(UrmpipeError) as error:
@@ -312,13 +327,15 @@ def test_all_that_is_wrong_with_the_parts_is_told_at_once(following: Path) -> No
     following.write_text(text + arm + meter, encoding="utf-8")
     told = "\n".join(refusal(following))
     assert "found no column 'w', allowed: t, u (V)" in told
-    assert "block arm: robot: found 6, allowed: a name or a file" in told
-    assert "block meter: unit delta_meter: option joints: found, allowed: none, it has no options;" in told
+    assert "blocks.arm: robot: found 6, allowed: a name or a file" in told
+    assert "blocks.meter: unit delta_meter: option joints: found, allowed: none, it has no options;" in told
 
 
 def test_a_start_value_that_is_no_number_is_refused(following: Path) -> None:
     following.write_text(FOLLOWING.replace('gain = "$gain"', "gain = nan"), encoding="utf-8")
-    assert refusal(following) == ["blocks.lag.start.gain: found nan, allowed: a finite number"]
+    assert refusal(following) == [
+        f"{following}:12: blocks.lag.start.gain: found nan, allowed: a finite number"
+    ]
 
 
 def test_a_meter_without_a_tolerance_judges_nothing(tmp_path: Path) -> None:

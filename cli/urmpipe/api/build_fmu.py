@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -12,6 +12,7 @@ from urmpipe.guards import PathLike, Robot, one_or_many
 from urmpipe.systems.log_tables import LogTable
 from urmpipe.systems.units import Backend, unit_of
 from urmpipe_fmus.unit import Unit
+from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.outputs import guarded_output
 
@@ -31,6 +32,7 @@ def build_fmu(
     backend: Backend | None = None,
     platforms: str | Sequence[str] = (),
     output: PathLike = ".",
+    told: Callable[[str], None] | None = None,
 ) -> BuiltFmu:
     """Package a unit as an FMU (FMI 2.0 co-simulation).
 
@@ -44,6 +46,7 @@ def build_fmu(
             machine can build it, else python, with a `note` why.
         platforms: linux64, win64; default: this one. Others than this one need the extra `cross`.
         output: The folder for UNIT.fmu, or a name that ends in .fmu; only an FMU of urmpipe's is replaced.
+        told: Told what takes minutes: compiling for another platform.
 
     Returns:
         The FMU: its `path`, `backend`, `platforms`, `guid` and `note`.
@@ -55,12 +58,14 @@ def build_fmu(
 
     made = unit_of(unit, robot=robot, log=log, options=options, read=read)
     path = Path(output)
-    target = path if path.suffix == ".fmu" else path / f"{made.name}.fmu"
+    if not path.is_dir() and path.suffix.lower() != ".fmu":
+        allowed = "a folder that exists, or a name that ends in .fmu"
+        raise OutputError(Finding(f"found no folder, allowed: {allowed}", str(path)))
+    target = path / f"{made.name}.fmu" if path.is_dir() else path
     inputs = [file for one in (unit, robot, log) for file in _files(one)]
     with guarded_output(target, inputs, "fmu") as part:
-        return replace(
-            build(made, part, backend=backend, platforms=tuple(one_or_many(platforms))), path=target
-        )
+        built = build(made, part, backend=backend, platforms=tuple(one_or_many(platforms)), told=told)
+        return replace(built, path=target)
 
 
 def _files(operand: Any) -> Sequence[Path]:

@@ -38,18 +38,23 @@ def fmu() -> None:
 
 
 @fmu.command("list", short_help="List the units that urmpipe brings along.")
+@click.argument("unit", metavar="[UNIT|FILE.py]", type=UNIT, required=False)
 @output_options
-def list_(terminal: Terminal) -> int:
-    """List the units that urmpipe brings along, and the options that each takes.
+def list_(unit: str | None, terminal: Terminal) -> int:
+    """List the units that urmpipe brings along, and the options that each takes; of one its variables.
 
     \b
     Examples:
       urmpipe fmu list
+      urmpipe fmu list dc_drive
       urmpipe fmu list --json
     """
-    from urmpipe.printing.fmu import print_units, units_dict
+    from urmpipe.printing.fmu import print_unit, print_units, unit_dict, units_dict
 
-    terminal.answer(units_dict, print_units)
+    if unit is None:
+        terminal.answer(units_dict, print_units)
+    else:
+        terminal.answer(lambda: unit_dict(unit), lambda: print_unit(unit))
     return 0
 
 
@@ -124,7 +129,6 @@ def build(
     from urmpipe.printing.terminal import prints_apart
     from urmpipe.systems.log_tables import read_table
     from urmpipe.systems.units import column_names
-    from urmpipe_fmus.native import this_platform
     from urmpipe_pipeline.sources import read_map
 
     if log_map and not log:
@@ -135,11 +139,16 @@ def build(
     table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm, read=read)
     if table:
         terminal.warn(table.warnings)
-    if backend != "python" and {*platforms} - {this_platform()}:
-        terminal.note(f"compiling for {', '.join(platforms)}; the first time on this computer takes minutes")
-    with prints_apart():
+    with prints_apart(), terminal.working(f"Building {unit}"):
         made = urmpipe.build_fmu(
-            unit, robot=robot, log=table, options=options, backend=backend, platforms=platforms, output=output
+            unit,
+            robot=robot,
+            log=table,
+            options=options,
+            backend=backend,
+            platforms=platforms,
+            output=output,
+            told=terminal.note,
         )
     terminal.answer(made.to_dict, lambda: print_built(made))
     return 0

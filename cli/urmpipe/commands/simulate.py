@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
@@ -37,6 +37,13 @@ if TYPE_CHECKING:
     help="How long [default: that of the system, else of the longest log it reads].",
 )
 @click.option(
+    "--write-system",
+    "copy",
+    metavar="FILE.toml",
+    type=click.Path(path_type=Path),
+    help="Write the file of a system that came along, to be changed, and do not run it.",
+)
+@click.option(
     "--draw", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw the system into a file, too."
 )
 @click.option(
@@ -52,6 +59,7 @@ def simulate(
     arguments: dict[str, str],
     step: float | None,
     duration: float | None,
+    copy: Path | None,
     draw: Path | None,
     backend: Literal["native", "python"] | None,
     terminal: Terminal,
@@ -67,6 +75,7 @@ def simulate(
       urmpipe simulate log-to-delta
       urmpipe simulate log-to-delta --set log=log.csv --set reference=path.csv
       urmpipe simulate one-drive --step 0.5ms --draw one-drive.svg
+      urmpipe simulate one-drive --write-system my-drive.toml
       urmpipe simulate my-system.toml -o run.rrd --json
 
     Exit codes: 0 done and within tolerance, 1 a delta meter out of tolerance, 2 bad input or a failed FMU.
@@ -76,28 +85,29 @@ def simulate(
         raise click.UsageError(f"found {found}, allowed: one of both")
     if listed or system is None:
         return _list(terminal)
+    if copy is not None:
+        return _write(system, copy, terminal)
     tune_pyarrow()
+    target = output or Path(default_name(system))
+    asked = {"arguments": arguments, "step": step, "duration": duration, "backend": backend}
+    return _run(system, target, draw, terminal, asked)
+
+
+def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked: dict[str, Any]) -> int:
+    """Run a system as it is asked, print what it came to, and return the exit code."""
     from time import perf_counter
 
     from urmpipe.printing.terminal import prints_apart, say
+    from urmpipe.systems.blocks import ON_PYTHON
 
     started = perf_counter()
-    target = output or Path(default_name(system))
     replaces = target.exists()
     with prints_apart(), terminal.progress(f"Simulating {system}") as progress:
         result = urmpipe.simulate(
-            system,
-            arguments=arguments,
-            step=step,
-            duration=duration,
-            backend=backend,
-            output=target,
-            draw=draw,
-            told=terminal.note,
-            progress=progress,
+            system, output=target, draw=draw, told=terminal.note, progress=progress, **asked
         )
     wall = perf_counter() - started
-    terminal.warn(result.warnings)
+    terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
     terminal.answer(result.to_dict, lambda: _print(result, wall, replaces, draw))
     if result.failed is not None:
         say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
@@ -126,6 +136,20 @@ def _list(terminal: Terminal) -> int:
         for one in systems
     ]
     terminal.answer(lambda: {"schema": 1, "systems": rows}, lambda: print_systems(systems))
+    return 0
+
+
+def _write(system: str, path: Path, terminal: Terminal) -> int:
+    """Write the file of a shipped system, under a name that is new."""
+    from urmpipe.printing.terminal import say
+    from urmpipe_fmus.cosim import system_text
+    from urmpipe_pipeline.outputs import guarded_output
+
+    text = system_text(system)
+    with guarded_output(path, [], "system") as part:
+        part.write_text(text, encoding="utf-8")
+    said = f"System: {path}  (change it, then: urmpipe simulate {path})"
+    terminal.answer(lambda: {"schema": 1, "system": str(path)}, lambda: say(said))
     return 0
 
 

@@ -69,6 +69,12 @@ class Terminal:
 
         return progress_bar(title, quiet=self.quiet or not shown)
 
+    def working(self, title: str) -> AbstractContextManager[None]:
+        """Show on standard error for how long work of unknown length goes on, on a terminal only."""
+        from urmpipe.printing.terminal import clock
+
+        return clock(title, quiet=self.quiet)
+
 
 def output_option(metavar: str, told: str) -> Callable[[Command], Command]:
     """Return the option -o, which names the file that a command writes.

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.printing.terminal import LISTED, new_console, new_table, say
-from urmpipe.systems.units import FROM_LOG
+from urmpipe.systems.units import FROM_LOG, example_of
+from urmpipe_fmus.cosim.interface import ELEMENT
+from urmpipe_fmus.documentation import TITLES as VARIABLE_HEADS
+from urmpipe_fmus.documentation import variable_row
 from urmpipe_fmus.units import unit_help, unit_names, unit_options
-from urmpipe_pipeline.text import NOTHING
+from urmpipe_pipeline import text
 
 if TYPE_CHECKING:
     from urmpipe_fmus.build import BuiltFmu
@@ -49,7 +53,44 @@ def print_units() -> None:
             shown = f"--{option}" if option in ("robot", "log") else option and f"-s {option}="
             table.add_row(*first, shown, said)
     new_console().print(table)
+    say("Its inputs, outputs and parameters: urmpipe fmu list UNIT")
     say("Build one: urmpipe fmu build UNIT [--robot R] [--log LOG] [-s NAME=VALUE]")
+
+
+def unit_dict(name: str) -> dict[str, Any]:
+    """Return the object that `urmpipe fmu list UNIT --json` prints."""
+    unit = example_of(name)
+    options = options_of(name) if name in unit_names() else {}
+    return {
+        "schema": 1,
+        "name": unit.name,
+        "description": unit.description,
+        "options": [{"name": option, "help": said} for option, said in options.items()],
+        "variables": [
+            dict(zip(("name", "part", "unit", "start", "min", "max", "description"), row, strict=True))
+            for row in map(variable_row, unit.variables)
+        ],
+        "equations": list(unit.equations),
+    }
+
+
+def print_unit(name: str) -> None:
+    """Print the inputs, outputs and parameters of a unit, and its equations."""
+    unit = example_of(name)
+    table = new_table(*VARIABLE_HEADS, title=f"{unit.name}: {unit.description}")
+    for row in sorted(map(variable_row, unit.variables), key=lambda row: _part_order(row[1])):
+        table.add_row(*row)
+    new_console().print(table)
+    for line in unit.equations:
+        say(line)
+    say("A parameter is set where the unit runs: in a system by start, in another tool as its start value")
+
+
+def _part_order(part: str) -> int:
+    """Return where a variable stands: what goes in, what comes out, what can be set, the rest."""
+    order = ("input", "output", "parameter", "calculatedParameter", "local", "independent")
+    causality = part.partition(",")[0]
+    return order.index(causality) if causality in order else len(order)
 
 
 def print_built(made: BuiltFmu) -> None:
@@ -77,23 +118,67 @@ def print_checked(checked: Checked) -> None:
         say(f"problem: {problem}")
     if not checked.problems:
         say("No problem found.")
-    heads = ("Variable", "Causality", "Type", "Unit", "Start", "Before", "After", "Description")
-    table = new_table(*heads, title=f"{len(checked.variables)} variables")
-    for one in checked.variables[:LISTED]:
-        table.add_row(*_cells(one))
+    heads = ("Variable", "Causality", "Type", "Unit", "Start", "Min", "Max", "Before", "After", "Description")
+    table = new_table(*heads, title=text.counted(len(checked.variables), "variable"))
+    rows = sorted(_arrays(checked.variables), key=lambda row: _part_order(row[1][0].causality))
+    for name, elements in rows[:LISTED]:
+        table.add_row(*_cells(name, elements))
     console.print(table)
-    if len(checked.variables) > LISTED:
-        console.print(f"... and {len(checked.variables) - LISTED} more; --json has all")
+    if len(rows) > LISTED:
+        console.print(f"... and {len(rows) - LISTED} more; --json has all")
 
 
-def _cells(one: CheckedVariable) -> tuple[str, ...]:
-    """Return the cells of a variable."""
-    values = (_shown(value) for value in (one.before, one.after))
-    return (one.name, one.causality, one.type, one.unit, one.start, *values, one.description)
+def _arrays(variables: Sequence[CheckedVariable]) -> list[tuple[str, list[CheckedVariable]]]:
+    """Return the variables by their names, the elements of an array as one: `phi[1..6]`."""
+    found: dict[tuple[str, str], list[CheckedVariable]] = {}
+    for one in variables:
+        array = ELEMENT.fullmatch(one.name)
+        found.setdefault((array[1] if array else one.name, one.causality), []).append(one)
+    return [(_array_name(name, elements), elements) for (name, _), elements in found.items()]
+
+
+def _array_name(name: str, elements: Sequence[CheckedVariable]) -> str:
+    """Return the name of a variable, or of an array with its first and its last index."""
+    if len(elements) == 1:
+        return elements[0].name
+    first, last = (one.name.removeprefix(name).strip("[]") for one in (elements[0], elements[-1]))
+    return f"{name}[{first}..{last}]"
+
+
+def _cells(name: str, elements: Sequence[CheckedVariable]) -> tuple[str, ...]:
+    """Return the cells of a variable or an array."""
+    one = elements[0]
+    columns = (
+        [_number(each.start) for each in elements],
+        [_bound(each.min) for each in elements],
+        [_bound(each.max) for each in elements],
+        [_shown(each.before) for each in elements],
+        [_shown(each.after) for each in elements],
+    )
+    said = one.description if len({each.description for each in elements}) == 1 else f"{one.description}, ..."
+    return (name, one.causality, one.type, one.unit, *map(_joined, columns), said)
+
+
+def _joined(values: Sequence[str]) -> str:
+    """Return the values of an array's elements; one value if they are all the same."""
+    return values[0] if len(set(values)) == 1 else ", ".join(values)
+
+
+def _number(written: str) -> str:
+    """Return a start value as an FMU writes it, a number in six digits."""
+    try:
+        return _shown(float(written))
+    except ValueError:
+        return written
+
+
+def _bound(value: float | None) -> str:
+    """Return a bound; nothing where there is none."""
+    return "" if value is None else _shown(value)
 
 
 def _shown(value: Any) -> str:
-    """Return a value of a variable."""
+    """Return a value of a variable, a number in six digits."""
     if value is None:
-        return NOTHING
-    return f"{value:.6g}" if isinstance(value, float) else str(value)
+        return text.NOTHING
+    return f"{value + 0.0:.6g}" if isinstance(value, float) else str(value)  # + 0.0: no -0

@@ -103,3 +103,4 @@ def print_systems(systems: Sequence[System]) -> None:
         table.add_row(one.name, one.description, "\n".join(f"{k}={v}" for k, v in one.arguments.items()))
     new_console().print(table)
     say("Run one: urmpipe simulate SYSTEM [--set NAME=VALUE]")
+    say("Change anything else of it: urmpipe simulate SYSTEM --write-system FILE.toml")

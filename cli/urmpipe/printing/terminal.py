@@ -140,6 +140,22 @@ def progress_bar(title: str, *, quiet: bool = False) -> Iterator[Callable[[float
 
 
 @contextmanager
+def clock(title: str, *, quiet: bool = False) -> Iterator[None]:
+    """Show on standard error for how long work goes on whose end nobody knows; on a terminal only."""
+    if quiet or not sys.stderr.isatty():
+        yield
+        return
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    name = TextColumn("{task.description}", markup=False)  # a title holds names of files
+    columns = (SpinnerColumn(), name, TimeElapsedColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as shown:
+        shown.add_task(one_line(title), total=None)
+        yield
+
+
+@contextmanager
 def prints_apart() -> Iterator[None]:
     """Have what a user's unit prints on standard error: standard output is for results, such as JSON."""
     with redirect_stdout(sys.stderr):

@@ -13,9 +13,9 @@ from urmpipe.guards import place_robot
 from urmpipe.systems.log_tables import LogTable, read_table
 from urmpipe.systems.units import Backend, column_names, unit_of
 from urmpipe_datasets import LOGS
+from urmpipe_fmus.build import chosen_backend
 from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.cosim.plan import LogColumn
-from urmpipe_fmus.native import native_missing
 from urmpipe_models.errors import OptionError, UrmpipeError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources import ReadOptions, read_map
@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 
 ON_TIME = 1e-6
 """So far from a sample in [s] a communication point counts as on it: no clock of a log is finer."""
+
+ON_PYTHON = "on-python"
+"""The kind of the warning that no native FMUs can be built; it is told before the first step, too."""
 
 CHAIN, METER = "kinematic_chain", "delta_meter"
 """The units that are shown as an arm, and judged."""
@@ -43,7 +46,7 @@ class Blocks:
         bundled: Names of logs that came with urmpipe, and are those whatever else is called so.
         backend: What the FMUs of units are built with.
         read: How to read a log where it cannot tell by itself.
-        told: Told what takes its time: an FMU that is built.
+        told: Told what takes its time: an FMU that is built, and Python where native is not to be had.
 
     Attributes:
         units: The unit of each block that is one.
@@ -63,9 +66,9 @@ class Blocks:
         read: ReadOptions | None = None,
         told: Callable[[str], None] | None = None,
     ) -> None:
-        self._bundled, self._backend, self._read = bundled, backend, read
+        self._bundled, self._read = bundled, read
         self._told = told or (lambda line: None)
-        self._why = ""
+        self._backend, self._slow = chosen_backend(backend)
         self.units: dict[str, Unit] = {}
         self.chains: dict[str, Chain] = {}
         self.files: list[Path] = []
@@ -79,6 +82,10 @@ class Blocks:
             self._try(block.name, partial(self._take, block))
         for one in system.inputs:
             self._try(str(one.destination), partial(self._follow, one))
+        if self._slow and self.units:
+            said = f"the units run on Python, a hundred times slower than native ones: {self._slow}"
+            self.warnings.append(LogWarning(ON_PYTHON, said))
+            self._told(said)
 
     def make(self, block: Block) -> Path:
         """Return the FMU of a block, built if it is not in the cache.
@@ -169,16 +176,12 @@ class Blocks:
                 yield LogWarning("held", said)
 
     def _fmu(self, block: str) -> Path:
-        """Return the FMU of a block from the cache; tell if it is built, and if Python runs it and why."""
+        """Return the FMU of a block from the cache; tell if it is built."""
 
         def built(name: str) -> None:
             """Tell that the FMU of a unit is built."""
             self._told(f"building {name} for block {block} ...")
 
-        missing = native_missing(()) if self._backend is None else None
-        if missing and not self._why:
-            self._why = missing
-            self._told(f"the units run on Python: {missing}")
         return cached_fmu(self.units[block], self._backend, told=built)
 
     def _table(

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from urmpipe.guards import PathLike, Robot, place_robot
 from urmpipe.systems.log_tables import LogTable, read_table
+from urmpipe_datasets import LOGS
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_options
 from urmpipe_models.chains.chain import Chain
@@ -17,6 +18,13 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.sources import ReadOptions
 
 Backend = Literal["native", "python"]
+
+EXAMPLES: Mapping[str, Mapping[str, Any]] = {
+    "kinematic_chain": {"robot": "urm6"},
+    "repolarizer": {"options": {"joints": 6}},
+    "log_source": {"log": LOGS / "matlab.csv"},
+}
+"""What the units are given, where they need it, to show their variables."""
 
 FROM_LOG = ("table", "columns")
 """Options of a unit that come from a log."""
@@ -58,6 +66,15 @@ def unit_of(
     elif arm is not None:
         given["robot"] = arm
     return make_unit(name, **given)
+
+
+def example_of(unit: str) -> Unit:
+    """Return a unit with the options of an example, as its variables depend on them; from a file as it is.
+
+    Raises:
+        UrmpipeError: If there is no such unit, or with all that is wrong with a file.
+    """
+    return unit_of(unit, **EXAMPLES.get(unit, {}))
 
 
 def _from_file(path: Path) -> Unit:

@@ -25,6 +25,7 @@ if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import System as System
     from urmpipe_fmus.cosim.system_file import load_system as load_system
     from urmpipe_fmus.cosim.system_file import system_names as system_names
+    from urmpipe_fmus.cosim.system_file import system_text as system_text
 
 _HOME = {
     "Block": "system",
@@ -40,6 +41,7 @@ _HOME = {
     "simulate": "simulation",
     "system_names": "system_file",
     "system_svg": "drawing",
+    "system_text": "system_file",
 }
 
 __all__ = sorted(_HOME)  # noqa: PLE0605 - the names are those of _HOME

@@ -6,7 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from urmpipe_fmus.cosim.names import not_among
+from urmpipe_models.names import not_among
 
 NAMES = ("unit", "column")
 """Keys whose texts are names, also where a file beside is called so."""
@@ -46,7 +46,8 @@ def given(defaults: Mapping[str, Any], arguments: Mapping[str, str], faults: lis
     values = dict(defaults)
     for name, text in arguments.items():
         if name not in defaults:
-            faults.append(f"argument {name}: {not_among(name, defaults)}")
+            others = "; all else stands in the system's file; simulate writes a copy (docs/simulate.md)"
+            faults.append(f"argument {name}: {not_among(name, defaults)}{others}")
             continue
         try:
             values[name] = _like(defaults[name], text)

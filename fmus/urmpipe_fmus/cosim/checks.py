@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from urmpipe_fmus.cosim.interface import Interface, Variable, si_base, unit_fault
-from urmpipe_fmus.cosim.names import not_among
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
+from urmpipe_models.names import not_among
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,8 +4,7 @@ A sweep gives g(x), what the sources of the torn inputs are if these are x. x is
 The Jacobian of r is found by differences and kept, from iteration to iteration and from point to point, with
 Broyden's update; it is found anew where it no longer serves.
 
-Source: C. G. Broyden, A class of methods for solving nonlinear simultaneous equations, Math. Comp. 19 (1965),
-577-593.
+Source: [Broyden1965]_.
 """
 
 from __future__ import annotations

@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from urmpipe_fmus.cosim.checks import Link, Start, Wiring
 from urmpipe_fmus.cosim.interface import Interface, Variable, read_interface
 from urmpipe_fmus.cosim.order import Exchange, Loop, Order
-from urmpipe_fmus.cosim.system import STEP, Block, LogInput, Port, System
+from urmpipe_fmus.cosim.places import placed
+from urmpipe_fmus.cosim.system import STEP, SYSTEMS, Block, LogInput, Port, System
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.errors import CosimulationError, Finding, UrmpipeError
@@ -128,28 +129,29 @@ def prepare(
             columns[one.destination] = _column(one, column)
         except UrmpipeError as error:
             faults += error.findings
-    if faults:
-        raise CosimulationError(*dict.fromkeys(faults))
+    _refuse(system, faults)
     wiring = Wiring(system, interfaces, {port: one.unit for port, one in columns.items()})
     ends += [float(one.t_ns[-1]) * 1e-9 for one in columns.values() if len(one.t_ns)]
     faults += wiring.faults
     count = _count(step, system.duration or duration or max(ends, default=0.0), faults)
     wiring.notes += _cut_short(system.duration, step, count)
-    times = np.arange(count + 1) * step
+    times = np.arange(count + 1, dtype=np.float64) * step
     logged = tuple(_logged(system, one, columns, wiring, times, faults) for one in wiring.logged)
     order = _order(system, interfaces, wiring, faults)
+    _refuse(system, faults)
+    notes = tuple(dict.fromkeys(wiring.notes))
+    return Plan(system, interfaces, wiring.links, wiring.starts, logged, order, count, notes)
+
+
+def _refuse(system: System, faults: list[Finding | str]) -> None:
+    """Raise a `CosimulationError` if there are faults, with their lines if the system has a file."""
+    if faults and system.path.is_file():
+        shipped = system.path.parent == SYSTEMS
+        raise CosimulationError(
+            *placed(system.path, system.path.name if shipped else str(system.path), faults)
+        )
     if faults:
         raise CosimulationError(*dict.fromkeys(faults))
-    return Plan(
-        system,
-        interfaces,
-        wiring.links,
-        wiring.starts,
-        logged,
-        order,
-        count,
-        tuple(dict.fromkeys(wiring.notes)),
-    )
 
 
 def _interfaces(
@@ -168,10 +170,10 @@ def _interfaces(
             if made not in read:
                 read[made] = read_interface(made)
             elif read[made].alone:
-                faults.append(f"block {block.name}: {made} can be instantiated only once in a system")
+                faults.append(f"blocks.{block.name}: {made} can be instantiated only once in a system")
             interfaces[block.name] = read[made]
         except UrmpipeError as error:
-            faults += [f"block {block.name}: {finding}" for finding in error.findings]
+            faults += [f"blocks.{block.name}: {finding}" for finding in error.findings]
     return interfaces, ends
 
 

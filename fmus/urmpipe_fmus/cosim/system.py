@@ -8,6 +8,9 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
+SYSTEMS = Path(__file__).parents[1] / "systems"
+"""Where the shipped systems are."""
+
 STEP = 0.005
 """Communication step in [s] of a system that names none and plays no log."""
 

@@ -10,14 +10,17 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_fmus.cosim.arguments import beside, given, replaced, unknown
-from urmpipe_fmus.cosim.names import not_among
-from urmpipe_fmus.cosim.system import TOLERANCE, Block, Connection, LogInput, Port, System
+from urmpipe_fmus.cosim.places import placed
+from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
 from urmpipe_models.errors import CosimulationError, Finding
-
-SYSTEMS = Path(__file__).parents[1] / "systems"
-"""Where the shipped systems are."""
+from urmpipe_models.names import did_you_mean, not_among
 
 BLOCK_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+
+TIME_UNITS = {"s": 1.0, "ms": 1e-3, "us": 1e-6}
+"""What a time may be told in, in [s]."""
+
+TIME = re.compile(r"(\d+\.?\d*(?:e-?\d+)?|\.\d+) ?(s|ms|us)")
 
 TABLES: dict[str, tuple[str, ...] | None] = {
     "system": ("name", "description", "step", "duration", "record_every"),
@@ -33,6 +36,18 @@ TABLES: dict[str, tuple[str, ...] | None] = {
 def system_names() -> tuple[str, ...]:
     """Return the names of the shipped systems."""
     return tuple(sorted(path.stem for path in SYSTEMS.glob("*.toml")))
+
+
+def system_text(name: str) -> str:
+    """Return the file of a shipped system as it is written, to be changed.
+
+    Raises:
+        CosimulationError: If there is no such system.
+    """
+    if name not in system_names():
+        found = f"found {name!r}{did_you_mean(name, system_names())}"
+        raise CosimulationError(f"system: {found}, allowed: one of {', '.join(system_names())}")
+    return _path_of(name).read_text(encoding="utf-8")
 
 
 def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = None) -> System:
@@ -58,7 +73,7 @@ def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
     faults += unknown(rest, values)
     system = _System(path, replaced(rest, values), values, faults).read()
     if faults:
-        raise CosimulationError(*(Finding(fault, file=str(name_or_path)) for fault in faults))
+        raise CosimulationError(*placed(path, str(name_or_path), faults))
     return system
 
 
@@ -70,8 +85,8 @@ def _path_of(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.is_file():
         return path
-    allowed = ", ".join(system_names())
-    raise CosimulationError(f"system: found {str(name_or_path)!r}, allowed: a TOML file, or one of {allowed}")
+    found = f"found {str(name_or_path)!r}{did_you_mean(str(name_or_path), system_names())}"
+    raise CosimulationError(f"system: {found}, allowed: a TOML file, or one of {', '.join(system_names())}")
 
 
 def _parsed(path: Path) -> dict[str, Any]:
@@ -113,8 +128,8 @@ class _System:
             path=self.path,
             name=self._text(head, "system", "name", self.path.stem),
             description=self._text(head, "system", "description", ""),
-            step=self._positive(head, "system", "step", 0.0) if "step" in head else None,
-            duration=self._positive(head, "system", "duration", 0.0) if "duration" in head else None,
+            step=self._time(head, "step"),
+            duration=self._time(head, "duration"),
             record_every=self._count(head, "record_every"),
             arguments=self.arguments,
             blocks=blocks,
@@ -231,6 +246,19 @@ class _System:
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
             self.faults.append(f"{where}.{key}: found {value!r}, allowed: a number above 0")
             return default
+        return float(value)
+
+    def _time(self, head: Mapping[str, Any], key: str) -> float | None:
+        """Return a time of the system in [s]: a number, or a text with its unit; None if there is none."""
+        value = head.get(key)
+        if value is None:
+            return None
+        if isinstance(value, str) and (told := TIME.fullmatch(value.strip())):
+            value = float(told[1]) * TIME_UNITS[told[2]]
+        if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
+            allowed = 'a time above 0 in s, or with its unit as in "1ms"'
+            self.faults.append(f"system.{key}: found {value!r}, allowed: {allowed}")
+            return None
         return float(value)
 
     def _count(self, table: Mapping[str, Any], key: str) -> int:

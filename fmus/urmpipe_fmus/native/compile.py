@@ -8,7 +8,7 @@ import shutil
 import subprocess
 import sys
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -48,7 +48,12 @@ def native_missing(platforms: Sequence[str] = ()) -> str | None:
 
 
 def native_binaries(
-    unit: Unit, sources: Mapping[str, bytes], guid: str, platforms: Sequence[str]
+    unit: Unit,
+    sources: Mapping[str, bytes],
+    guid: str,
+    platforms: Sequence[str],
+    *,
+    told: Callable[[str], None] | None = None,
 ) -> dict[str, bytes]:
     """Compile the sources of a unit's FMU.
 
@@ -59,6 +64,7 @@ def native_binaries(
         sources: What `native_sources` gave.
         guid: GUID of the FMU.
         platforms: FMI's names of the platforms; this platform alone is compiled by the system's compiler.
+        told: Told each platform that zig compiles for, before it does.
 
     Returns:
         The binaries by their path in the FMU.
@@ -70,10 +76,14 @@ def native_binaries(
     if missing:
         raise FmuError(f"unit {unit.name}: no native FMU can be built: {missing}")
     files = {**sources, GUID_HEADER: guid_header(guid)}
-    return {
-        f"binaries/{one}/{unit.name}{suffix_of(one)}": _compiled(unit, files, one, _command(platforms, one))
-        for one in platforms
-    }
+    binaries = {}
+    for k, one in enumerate(platforms):
+        command = _command(platforms, one)
+        if told and "ziglang" in command:
+            place = f" ({k + 1} of {len(platforms)})" if len(platforms) > 1 else ""
+            told(f"compiling for {one}{place}; zig's first time for a platform takes minutes")
+        binaries[f"binaries/{one}/{unit.name}{suffix_of(one)}"] = _compiled(unit, files, one, command)
+    return binaries
 
 
 def system_compiler() -> list[str] | None:

@@ -6,14 +6,14 @@ has a line of help for each of the function's arguments. A new unit is such a mo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
-from difflib import get_close_matches
+from collections.abc import Callable, Mapping
 from importlib import import_module
 from inspect import Parameter, signature
 from typing import Any, cast
 
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.errors import UnitError
+from urmpipe_models.names import did_you_mean
 
 _UNITS: dict[str, str] = {
     "kinematic_chain": "points of an arm, and velocities and angles of its sensors, from the joints",
@@ -68,8 +68,8 @@ def make_unit(name: str, /, **options: Any) -> Unit:
     needed = [one.name for one in signature(make).parameters.values() if one.default is Parameter.empty]
     allowed = ", ".join(known) or "none, it has no options"
     faults = [
-        f"option {one}: found{_near(one, known)}, allowed: {allowed}; a parameter is set where the unit runs,"
-        f" in a system by start = {{ {one} = ... }}"
+        f"option {one}: found{did_you_mean(one, known)}, allowed: {allowed}; a parameter is set where the"
+        f" unit runs, in a system by start = {{ {one} = ... }}, in another tool as the FMU's start value"
         for one in options
         if one not in known
     ]
@@ -82,10 +82,4 @@ def make_unit(name: str, /, **options: Any) -> Unit:
 def _check(name: str) -> None:
     if name not in _UNITS:
         allowed = f"{', '.join(_UNITS)}, or a .py file with a unit in it"
-        raise UnitError(f"unit {name}: found{_near(name, _UNITS)}, allowed: {allowed}")
-
-
-def _near(name: str, known: Iterable[str]) -> str:
-    """Return the name that may have been meant, as a question."""
-    near = get_close_matches(name.lower(), known, 1)
-    return f" (did you mean {near[0]}?)" if near else ""
+        raise UnitError(f"unit {name}: found{did_you_mean(name, _UNITS)}, allowed: {allowed}")

@@ -69,7 +69,7 @@ def test_every_wrong_connection_is_told() -> None:
     ) == [
         "connections.arm.phi: found i.y of size 1, allowed: 11, as many as arm.phi",
         "connections.arm.fi: input of arm: found 'fi', allowed: phi",
-        "connections.i.u: output of arm: found 'rote', allowed: rate, free, p",
+        "connections.i.u: output of arm: found 'rote' (did you mean rate?), allowed: p, rate, free",
         "connections.i.y: found i.y, causality output, allowed: an input of i: u",
         "connections.arm.length: found arm.length, causality parameter, allowed: an input of arm: phi",
         "connections.n.by: found i.y, Real, allowed: Integer (numbers only)",
@@ -134,7 +134,8 @@ def test_start_values_that_are_refused_are_told() -> None:
         },
     ) == [
         "blocks.arm.start.phi: found 10 values, allowed: 11, or one for all",
-        "blocks.arm.start.lenght: found 'lenght', allowed: length, gain, name, count, strict, phi, p, rate,"
+        "blocks.arm.start.lenght: found 'lenght' (did you mean length?), allowed: length, gain, name, count,"
+        " strict, phi, p, rate,"
         " free",
         "blocks.arm.start.length: found 3, allowed: 0.1 to 2",
         "blocks.arm.start.gain: found nan, allowed: a finite number",
@@ -259,7 +260,7 @@ def test_what_is_no_fmu_for_cosimulation_is_told(tmp_path: Path) -> None:
     blocks = system({"a": gain(), "b": gain()})
     with pytest.raises(CosimulationError) as caught:
         prepare(blocks, lambda block: broken if block.name == "a" else fmu(gain()))
-    assert str(caught.value) == f"block a: {broken}: cannot be read as an FMU: File is not a zip file"
+    assert str(caught.value) == f"blocks.a: {broken}: cannot be read as an FMU: File is not a zip file"
 
 
 @pytest.mark.parametrize(
@@ -288,7 +289,7 @@ def test_an_fmu_of_another_kind_is_told(tmp_path: Path, found: str, replaced: st
         prepare(system({"a": gain()}), lambda block: other)
     binary = f"binaries/{fmpy.platform}/loss{fmpy.sharedLibraryExtension}"
     assert str(caught.value).startswith(
-        f"block a: {other}: {told_as.format(here=fmpy.platform, binary=binary)}"
+        f"blocks.a: {other}: {told_as.format(here=fmpy.platform, binary=binary)}"
     )
 
 
@@ -305,12 +306,12 @@ def test_an_fmu_of_fmi_3_is_told(tmp_path: Path) -> None:
     with pytest.raises(CosimulationError) as caught:
         prepare(system({"a": gain()}), lambda block: other)
     assert str(caught.value) == (
-        f"block a: {other}: found FMI 3.0 for coSimulation, allowed: FMI 2.0 for coSimulation"
+        f"blocks.a: {other}: found FMI 3.0 for coSimulation, allowed: FMI 2.0 for coSimulation"
     )
 
 
 def test_an_fmu_that_lives_alone_is_one_block() -> None:
     alone = gain("alone", once=True)
     assert told({"a": alone, "b": alone}, None, {"a": {"u": 0.0}, "b": {"u": 0.0}}) == [
-        f"block b: {fmu(alone)} can be instantiated only once in a system"
+        f"blocks.b: {fmu(alone)} can be instantiated only once in a system"
     ]

@@ -49,6 +49,9 @@ tolerance = 1e-6
 """
 
 
+ELSE = "; all else stands in the system's file; simulate writes a copy (docs/simulate.md)"
+
+
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:
     (tmp_path / "sub").mkdir()
@@ -145,10 +148,11 @@ iterate = 1
 tolerance = -1.0
 """
     assert said(tmp_path / "bad.toml", text, speed="3") == [
-        "argument speed: found 'speed', allowed: log",
-        "blocks.f.unit: found '$lag', allowed: $log ([arguments] names them)",
+        f"argument speed: found 'speed', allowed: log{ELSE}",
+        "blocks.f.unit: found '$lag' (did you mean $log?), allowed: $log ([arguments] names them)",
         "surprise: found 'surprise', allowed: system, arguments, blocks, connections, inputs, loops",
-        "system.durations: found 'durations', allowed: duration, description, name, step, record_every",
+        "system.durations: found 'durations' (did you mean duration?), allowed: name, description, step,"
+        " duration, record_every",
         "blocks.a: found unit and fmu, allowed: one of unit, file, fmu",
         "blocks.a.fmu: found 'none.fmu', allowed: a file that is there",
         "blocks.b: found none of them, allowed: one of unit, file, fmu",
@@ -157,12 +161,12 @@ tolerance = -1.0
         "blocks.e.robot: found 'robot', allowed: fmu, start",
         "blocks.e.fmu: found 'none.fmu', allowed: a file that is there",
         "system.name: found 5, allowed: a text",
-        "system.step: found 0.0, allowed: a number above 0",
+        'system.step: found 0.0, allowed: a time above 0 in s, or with its unit as in "1ms"',
         "system.record_every: found 1.5, allowed: an integer from 1",
         "connections.a.u: block found 'z', allowed: a, b, c.d, e, f",
         "connections.a: found 'a', allowed: block.variable",
         "connections.a.v: found 7, allowed: its source as 'block.variable'",
-        "inputs.a.w.colunm: found 'colunm', allowed: column, log, interpolate",
+        "inputs.a.w.colunm: found 'colunm' (did you mean column?), allowed: log, column, interpolate",
         "inputs.a.w.column: not found, allowed: a text",
         "inputs.a.x: found 1, allowed: { log = FILE, column = NAME }",
         "loops.iterate: found 1, allowed: true, false",
@@ -176,7 +180,7 @@ def test_arguments_must_be_of_their_defaults_type(folder: Path) -> None:
     assert str(caught.value).splitlines() == [
         f"{folder / 'two.toml'}: argument k: found 'fast', allowed: a number, like 2500.0",
         f"{folder / 'two.toml'}: argument held: found 'maybe', allowed: true, false, like False",
-        f"{folder / 'two.toml'}: argument lock: found 'lock', allowed: log, k, joints, held",
+        f"{folder / 'two.toml'}: argument lock: found 'lock', allowed: log, k, joints, held{ELSE}",
     ]
 
 
@@ -185,7 +189,43 @@ def test_a_step_is_a_finite_number_above_zero(tmp_path: Path, value: str) -> Non
     text = f'[system]\nstep = {value}\n[blocks.a]\nunit = "x"\n'
     (found,) = said(tmp_path / "bad.toml", text)
     assert found.startswith("system.step: found ")
-    assert found.endswith(", allowed: a number above 0")
+    assert found.endswith(', allowed: a time above 0 in s, or with its unit as in "1ms"')
+
+
+@pytest.mark.parametrize(
+    ("told", "step"),
+    [("0.005", 0.005), ('"5ms"', 0.005), ('"5 ms"', 0.005), ('".5 s"', 0.5), ('"20us"', 2e-5)],
+)
+def test_a_step_is_told_in_s_or_with_its_unit(tmp_path: Path, told: str, step: float) -> None:
+    (tmp_path / "a.toml").write_text(f'[system]\nstep = {told}\n[blocks.a]\nunit = "x"\n', encoding="utf-8")
+    assert load_system(tmp_path / "a.toml").step == pytest.approx(step, rel=1e-15)  # a product's rounding
+
+
+def test_what_is_wrong_is_told_with_its_line(tmp_path: Path) -> None:
+    text = """# a system
+[system]
+step = 0
+[blocks.a]
+unit = "x"
+start = 3  # no table
+[blocks."b c"]
+unit = "x"
+[connections]
+"a.u" = "z.y"
+a.v = 7
+"""
+    (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(CosimulationError) as caught:
+        load_system(tmp_path / "bad.toml")
+    places = [(one.message.partition(": ")[0], one.line) for one in caught.value.findings]
+    assert places == [
+        ("blocks.a.start", 6),
+        ("blocks.b c", 7),
+        ("system.step", 3),
+        ("connections.a.u", 10),
+        ("connections.a.v", 11),
+    ]
+    assert {one.file for one in caught.value.findings} == {str(tmp_path / "bad.toml")}
 
 
 def test_what_is_no_toml_or_no_file_is_told(tmp_path: Path) -> None:

@@ -86,9 +86,9 @@ def test_unknown_and_missing_options_are_all_told_at_once() -> None:
         make_unit("repolarizer", axes=6, period=1.0)
     assert str(error.value).splitlines() == [
         "unit repolarizer: option axes: found, allowed: joints; a parameter is set where the unit runs, in"
-        " a system by start = { axes = ... }",
+        " a system by start = { axes = ... }, in another tool as the FMU's start value",
         "unit repolarizer: option period: found, allowed: joints; a parameter is set where the unit runs, in"
-        " a system by start = { period = ... }",
+        " a system by start = { period = ... }, in another tool as the FMU's start value",
         "unit repolarizer: option joints: not found, it needs the number of joints, such as 6",
     ]
     with pytest.raises(UnitError, match=r"^unit delta_meter: option name: found, allowed: none"):
@@ -97,7 +97,8 @@ def test_unknown_and_missing_options_are_all_told_at_once() -> None:
         make_unit("delta_meter", tolerance=0.001)
     assert str(error.value) == (
         "unit delta_meter: option tolerance: found, allowed: none, it has no options; a parameter is set"
-        " where the unit runs, in a system by start = { tolerance = ... }"
+        " where the unit runs, in a system by start = { tolerance = ... }, in another tool as the FMU's"
+        " start value"
     )
     with pytest.raises(UnitError, match=r"option joint: found \(did you mean joints\?\), allowed: joints;"):
         make_unit("repolarizer", joint=6)

@@ -1,0 +1,52 @@
+"""Where in a system file a thing stands that is told by its name: `blocks.load.file` in line 12."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator
+from pathlib import Path
+
+from urmpipe_models.errors import Finding
+
+HEADER = re.compile(r"\s*\[([^\[\]]+)\]")
+KEY = re.compile(r"\s*((?:\"[^\"]*\"|'[^']*'|[\w-]+)(?:\s*\.\s*(?:\"[^\"]*\"|'[^']*'|[\w-]+))*)\s*=")
+
+
+def placed(path: Path, name: str, faults: Iterable[Finding | str]) -> tuple[Finding, ...]:
+    """Return faults as findings of a system file, each with its line and each once.
+
+    Args:
+        path: The file.
+        name: What the user called it.
+        faults: A text begins with the name of what is wrong, such as `blocks.load: `; findings stay.
+    """
+    lines = dict(_named_lines(path.read_text(encoding="utf-8-sig").splitlines()))
+    return tuple(
+        one if isinstance(one, Finding) else Finding(one, file=name, line=_line_of(lines, one))
+        for one in dict.fromkeys(faults)
+    )
+
+
+def _named_lines(text: Iterable[str]) -> Iterator[tuple[str, int]]:
+    """Yield the full name and the line of each table and key."""
+    table = ""
+    for number, line in enumerate(text, 1):
+        if header := HEADER.match(line):
+            table = _plain(header[1])
+            yield table, number
+        elif key := KEY.match(line):
+            name = _plain(key[1])
+            yield f"{table}.{name}" if table else name, number
+
+
+def _plain(name: str) -> str:
+    """Return a name of TOML without quotes and spaces."""
+    return ".".join(part.strip().strip("\"'") for part in name.split("."))
+
+
+def _line_of(lines: dict[str, int], fault: str) -> int | None:
+    """Return the line of what a fault names, else that of the table that it stands in."""
+    name = fault.partition(": ")[0]
+    while name not in lines and "." in name:
+        name = name.rpartition(".")[0]
+    return lines.get(name)
