@@ -109,9 +109,10 @@ class LoopJob:
         exchanges: One sweep.
         torn: Places of the torn inputs.
         sources: Places of their sources.
-        minimum: The least value that an input of the loop may have, at the place that it follows.
-        maximum: The largest.
-        nominal: Of each torn input, the size of its values.
+        minimum: The least value that an input of the loop may have, in that input's unit, at the place that
+            it follows, shape (places,).
+        maximum: The largest, likewise.
+        nominal: The size of the values of each torn input, in its unit, shape (torn,).
         ring: The loop, for people.
     """
 

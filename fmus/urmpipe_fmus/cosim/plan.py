@@ -46,7 +46,7 @@ class Logged:
 
     Attributes:
         destination: The input.
-        values: Its value at every communication point, shape (points,).
+        values: Its value at every communication point, in the input's own unit, shape (points,).
     """
 
     destination: Port

@@ -89,10 +89,10 @@ class Moved(NamedTuple):
     """What a loop moves of a block.
 
     Attributes:
-        values: The vector of the Reals.
-        places: Where the inputs that the loop moves stand in it.
-        minimum: The least values that they may have.
-        maximum: The largest.
+        values: The vector of the Reals, each in its own unit, shape (reals,).
+        places: Where the inputs that the loop moves stand in it, shape (moved,).
+        minimum: The least values that they may have, each in its own unit, shape (moved,).
+        maximum: The largest, likewise.
         read: The outputs that may follow them.
     """
 

@@ -66,7 +66,7 @@ class Recorded:
     notes: tuple[str, ...]
 
     def column(self, block: str, variable: str) -> NDArray[np.float64]:
-        """Return the values of a scalar, shape (n,).
+        """Return the values of a scalar in its own unit, shape (n,).
 
         Raises:
             CosimulationError: If it was not recorded.

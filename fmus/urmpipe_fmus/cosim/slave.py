@@ -119,13 +119,23 @@ class Slave:
         return worst
 
     def getter(self, transfer: Transfer, values: Mapping[str, NDArray[Any]]) -> tuple[int, Call]:
-        """Return the code and the call that reads values into their places, which are neighbours."""
+        """Return the code and the call that reads values into their places, which are neighbours.
+
+        Args:
+            transfer: Which variables, and where they stand.
+            values: Of each FMI type, all values of the system, each in its own unit, shape (places,).
+        """
         vector = values[transfer.type]
         target = vector.ctypes.data + transfer.places[0] * vector.itemsize
         return self._exchange(f"fmi2Get{transfer.type}", transfer.references, target)
 
     def setter(self, transfer: Transfer, values: Mapping[str, NDArray[Any]]) -> tuple[int, Call]:
-        """Return the code and the call that sets values from their places."""
+        """Return the code and the call that sets values from their places.
+
+        Args:
+            transfer: Which variables, and where they stand.
+            values: Of each FMI type, all values of the system, each in its own unit, shape (places,).
+        """
         vector, places = values[transfer.type], transfer.places
         function = f"fmi2Set{transfer.type}"
         if all(b == a + 1 for a, b in pairwise(places)):

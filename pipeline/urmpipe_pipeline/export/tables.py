@@ -40,7 +40,7 @@ class Column:
     Attributes:
         name: Its name, unique in the table.
         unit: Its unit; empty for counts and names.
-        values: In [`unit`], shape (n,); NaN where a sample is missing.
+        values: In the column's own unit, shape (n,); NaN where a sample is missing.
     """
 
     name: str

@@ -39,7 +39,8 @@ class Audited:
     """A log's joints, repolarized, and what there is to say about it.
 
     Attributes:
-        q: Repolarized values on the file's own rows, repaired if that was asked for, shape (n, joints).
+        q: Repolarized values in [rad] or [m] on the file's own rows, repaired if that was asked for, shape
+            (n, joints).
         entries: The audit, by row.
         warnings: What a person should know.
         inferences: The intervals that the joints are limited to.

@@ -51,7 +51,9 @@ def check_interval(name: str, low: float, high: float) -> Interval:
 
 
 def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, Interval]) -> FloatArray:
-    """Return P of each joint in [rad]: of the interval given, or a full turn; infinite for those that slide.
+    """Return P of each joint in [rad], shape (joints,): of the interval given, or a full turn.
+
+    It is infinite for joints that slide.
 
     Args:
         log: The log.
@@ -126,7 +128,14 @@ def double_turns(
 def said_intervals(
     log: JointLog, fixed: Repolarized, periods: FloatArray, given: Mapping[str, Interval]
 ) -> tuple[list[Inference], list[LogWarning]]:
-    """Return the interval of each joint that was given or seen to wrap, and what contradicts it."""
+    """Return the interval of each joint that was given or seen to wrap, and what contradicts it.
+
+    Args:
+        log: The log.
+        fixed: Its joints, repolarized.
+        periods: P of each joint in [rad], shape (joints,).
+        given: Interval of a joint by its name, by "" that of all that turn; in the file's own unit.
+    """
     groups: dict[tuple[str, bool], list[int]] = {}
     warnings = []
     ends: dict[int, Interval] = {}

@@ -42,7 +42,13 @@ class JointMotion:
 
     @classmethod
     def of(cls, log: JointLog, q: FloatArray, turning: NDArray[np.bool_]) -> JointMotion:
-        """Return the motion of a log from its repolarized values, and which of its joints turn."""
+        """Return the motion of a log.
+
+        Args:
+            log: The log.
+            q: Its joints, repolarized, in [rad] or [m], shape (n, joints).
+            turning: Which joints turn, shape (joints,).
+        """
         inner = largest_steps(q[1:-1]) if len(q) > 3 else np.zeros(q.shape[1])
         units = tuple("rad" if turns else "m" for turns in turning)
         return cls(log.joints, units, q, log.t_ns, log.period, inner, format_steps(log))
@@ -58,7 +64,7 @@ def largest_steps(q: FloatArray) -> FloatArray:
     """Return the largest step of each column from row to row, shape (joints,); NaN if a value is missing.
 
     Args:
-        q: Shape (n, joints), n > 1.
+        q: In [rad] or [m], shape (n, joints), n > 1.
     """
     blocks = row_blocks(len(q) - 1)
     steps = [over_rows(np.maximum, np.abs(q[1:][block] - q[:-1][block])) for block in blocks]
@@ -95,7 +101,15 @@ def _format_step(written: FloatArray, digits: int | None) -> float:
 
 
 def over_rows(fold: np.ufunc, values: FloatArray) -> FloatArray:
-    """Fold the rows into one, many side by side: NumPy is slow over rows as short as a log's."""
+    """Fold the rows into one, many side by side: NumPy is slow over rows as short as a log's.
+
+    Args:
+        fold: Of two values the one, such as `np.maximum`.
+        values: In any unit, which the result has, too, shape (n, columns).
+
+    Returns:
+        Shape (columns,).
+    """
     count, joints = values.shape
     whole = count - count % _SIDE_BY_SIDE
     if whole == 0:

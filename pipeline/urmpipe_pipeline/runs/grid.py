@@ -50,7 +50,10 @@ class Grid:
     warnings: tuple[LogWarning, ...]
 
     def resample(self, values: FloatArray) -> FloatArray:
-        """Return values of the rows, shape (n, k), on the grid, shape (g, k): linear, NaN inside gaps."""
+        """Return values of the rows, shape (n, k), on the grid, shape (g, k): linear, NaN inside gaps.
+
+        They may be in any unit, which does not change.
+        """
         if self.own:
             return values
         return interpolate(self.t_ns, self.source_ns, values)
@@ -61,7 +64,7 @@ class Grid:
         """Return joint values on the grid; NaN inside gaps and between the rows of an unresolved step.
 
         Args:
-            values: Repolarized values of the rows, shape (n, joints).
+            values: Repolarized values of the rows in [rad] or [m], shape (n, joints).
             unresolved: Row before, row after and joint index of steps that no motion explains, shape (u, 3).
 
         Returns:
@@ -143,7 +146,15 @@ def apart(known_ns: IntArray) -> NDArray[np.bool_]:
 
 
 def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> NDArray[np.bool_]:
-    """Tell which times lie strictly between two known ones that are more than 3 median periods apart."""
+    """Tell which times lie strictly between two known ones that are more than 3 median periods apart.
+
+    Args:
+        at_ns: Times in [ns], shape (n,).
+        known_ns: Rising times in [ns], shape (k,).
+
+    Returns:
+        Shape (n,).
+    """
     if len(known_ns) < 2:
         return np.zeros(len(at_ns), dtype=np.bool_)
     after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)

@@ -81,7 +81,7 @@ def implausible(
 
 
 def outlying_ends(motion: JointMotion) -> NDArray[np.int64]:
-    """Return row and joint index where the first or the last row is off the motion of the others.
+    """Return row and joint index, shape (k, 2), where the first or last row is off the motion of the others.
 
     It is if the joint steps there by more than `FAR` times what it does anywhere else, and starts or stops
     harder than an arm can.
@@ -97,7 +97,12 @@ def outlying_ends(motion: JointMotion) -> NDArray[np.int64]:
 
 
 def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[LogWarning]:
-    """Return a warning for each end that is an outlier: which joints are off, and by how much."""
+    """Return a warning for each end that is an outlier: which joints are off, and by how much.
+
+    Args:
+        motion: The motion.
+        outliers: Row and joint index, shape (k, 2), as `outlying_ends` returns them.
+    """
     q, warnings = motion.q, []
     for row, beside in motion.ends:
         joints = outliers[outliers[:, 0] == row, 1].tolist()
@@ -184,7 +189,15 @@ def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
 
 
 def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
-    """Return the largest speed of each joint: the robot's, else `FASTEST` for one that turns, else inf."""
+    """Return the largest speed of each joint: the robot's, else `FASTEST` for one that turns, else inf.
+
+    Args:
+        robot: The arm, or None.
+        turning: Which joints turn, shape (joints,).
+
+    Returns:
+        In [rad/s] or [m/s], shape (joints,).
+    """
     fallback = np.where(turning, FASTEST, np.inf)
     if robot is None:
         return fallback

@@ -65,7 +65,7 @@ class Signal:
 
     @property
     def columns(self) -> FloatArray:
-        """The values in [`unit`] with a column a scalar, shape (n, size); of a scalar (n, 1)."""
+        """The values in the signal's own unit with a column a scalar, shape (n, size); of a scalar (n, 1)."""
         return self.values if self.values.ndim > 1 else self.values[:, np.newaxis]
 
     @property

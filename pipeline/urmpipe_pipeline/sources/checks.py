@@ -147,7 +147,7 @@ def missing_samples(groups: Iterable[tuple[FloatArray, Sequence[str]]]) -> list[
     """Return a warning for the columns in which samples are missing, those that lack the same rows together.
 
     Args:
-        groups: Values of some columns, shape (n, columns), and their names.
+        groups: Values of some columns, in any unit, shape (n, columns), and their names.
     """
     alike: dict[bytes, tuple[BoolArray, list[str]]] = {}
     for values, names in groups:
@@ -166,6 +166,11 @@ def missing_samples(groups: Iterable[tuple[FloatArray, Sequence[str]]]) -> list[
 
 def refuse_empty(values: FloatArray, names: Sequence[str], file: str) -> None:
     """Raise if a column has no value at all.
+
+    Args:
+        values: In the file's own units, shape (n, columns).
+        names: Of the columns.
+        file: The file that they are of.
 
     Raises:
         LogError: With a finding for each such column.

@@ -35,7 +35,7 @@ class Content:
     Attributes:
         columns: The columns that were read, by table.
         numbers: Their numbers, by table.
-        clock: Times of the rows in [ns] on the file's clock, None without one.
+        clock: Times of the rows in [ns] on the file's clock, shape (n,); None without one.
         rows: How many rows there are.
         roles: The columns, without those that could not be joined.
         inferences: What was found out while reading the times and joining.
@@ -56,7 +56,10 @@ class Content:
         return self.clock is not None
 
     def values(self, group: Sequence[Column]) -> FloatArray:
-        """Return the numbers of some columns, shape (n, columns), C-contiguous; no copy if they are all."""
+        """Return the numbers of some columns in the file's own units, shape (n, columns).
+
+        They are C-contiguous, and no copy if they are all.
+        """
         if not group:
             return np.empty((self.rows, 0))
         table = group[0].table

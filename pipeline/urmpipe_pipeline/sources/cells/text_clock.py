@@ -114,7 +114,7 @@ class Form:
         return match is not None and bool(match.groupdict().get("zone"))
 
     def nanoseconds(self, parts: Parts) -> tuple[IntArray, Flags]:
-        """Return what cells mean in [ns], and which of them mean something.
+        """Return what cells mean in [ns], and which of them mean something, a value a cell: shape (n,).
 
         A date counts from 1970 in UTC (without a time zone it is taken as UTC), a time of day from midnight.
 

@@ -176,7 +176,9 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
 def even_clock(
     rows: int, period: float | None, option: str = "--period"
 ) -> tuple[IntArray, tuple[Inference, ...], list[LogWarning]]:
-    """Return the times in [ns] of a log without a clock, what that rests on, and a warning if it is assumed.
+    """Return the times in [ns], shape (rows,), of a log without a clock, what they rest on, and a warning.
+
+    The warning tells that the period is assumed, if it is.
 
     Args:
         rows: Number of rows.

@@ -14,7 +14,7 @@ from urmpipe_pipeline.sources.tables.table import NO_TIME, UNREADABLE
 
 
 def read_cells(cells: TextCells, form: Form) -> IntArray:
-    """Return the times of cells in [ns]: NO_TIME where one is missing, UNREADABLE where it is no such time.
+    """Return the times of cells in [ns], shape (n,): NO_TIME for a missing one, UNREADABLE for no such time.
 
     Args:
         cells: The cells.

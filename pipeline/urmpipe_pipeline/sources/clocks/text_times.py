@@ -52,7 +52,7 @@ class Reading:
 
     Attributes:
         forms: The form of each column.
-        times: Their sum in [ns], or NO_TIME, or UNREADABLE.
+        times: Their sum in [ns], or NO_TIME, or UNREADABLE, shape (n,).
         nights: How often a time of day fell back over midnight.
     """
 
@@ -67,7 +67,7 @@ class Reading:
 
     @property
     def steps(self) -> IntArray:
-        """Steps between the rows that have a time in [ns]."""
+        """Steps between the rows that have a time in [ns], shape (timed - 1,)."""
         return np.diff(self.times[self.times > UNREADABLE])
 
     @property

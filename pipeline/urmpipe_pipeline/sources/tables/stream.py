@@ -42,7 +42,7 @@ def open_table(layout: Layout) -> TableStream | NativeFile:
 
 
 def as_written(layout: Layout, cells: Bytes) -> Bytes:
-    """Return cells that a stream has read with the signs that the file has."""
+    """Return cells that a stream has read, shape (bytes,), with the signs that the file has."""
     return _FROM_POINTS[cells] if layout.decimal == "," != layout.delimiter else cells
 
 

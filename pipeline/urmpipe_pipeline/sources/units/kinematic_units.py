@@ -57,8 +57,8 @@ def by_kinematics(robot: Chain | None, q: FloatArray, position: FloatArray) -> K
 
     Args:
         robot: The arm, or None; one with a joint that slides is not judged.
-        q: Joint values as the file has them, shape (n, joints).
-        position: Recorded positions as the file has them, shape (n, 3) or without columns.
+        q: Joint values in the file's own unit, shape (n, joints).
+        position: Recorded positions in the file's own unit, shape (n, 3) or without columns.
     """
     if robot is None or position.shape[1] != 3 or q.shape[1] != len(robot.moving):
         return None

@@ -98,7 +98,7 @@ def peak(values: FloatArray) -> float:
     """Return the largest absolute value, missing samples left out; NaN if there is none.
 
     Args:
-        values: Shape (n, columns), n > 0.
+        values: In any unit, which the result has, too, shape (n, columns), n > 0.
     """
     largest = max(values.max(), -values.min())
     if np.isnan(largest):  # slower, but deaf to NaN

@@ -1,0 +1,101 @@
+"""`log-to-delta`: what `compare` measures, as connected blocks."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import urmpipe
+from urmpipe.api.simulate import simulate
+from urmpipe_datasets import LOGS
+from urmpipe_models.kinematics.forward import point_over_log
+from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.sources.tables.text import fingerprint
+
+
+@pytest.mark.parametrize("log", ["coppeliasim.csv", "matlab.csv", "solidworks", "counter_rotating.csv"])
+def test_log_to_delta_is_what_compare_says(log: str) -> None:
+    result = simulate(
+        "log-to-delta",
+        arguments={"log": str(LOGS / log), "reference": str(LOGS / "path.csv"), "robot": "urm6"},
+    )
+    compared = urmpipe.compare(LOGS / "path.csv", [LOGS / log], robot="urm6")
+    (run,), (judged,) = compared.runs, result.verdicts
+    np.testing.assert_array_equal(result.t_ns, run.run.t_ns[run.sample])
+    # The same formulas on the same doubles; a compiler may round products that it fuses, 1e-16 m each.
+    np.testing.assert_allclose(result.signal("delta.delta").values, run.delta[:, :3], rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(result.signal("delta.norm").values, run.delta[:, 3], rtol=0.0, atol=1e-12)
+    out = np.abs(run.delta[:, :3]).max(axis=1) > 0.0035
+    np.testing.assert_array_equal(result.signal("delta.out_of_tolerance").values, out)
+    assert judged.out_of_tolerance == int(out.sum())
+    assert judged.worst == pytest.approx(np.abs(run.delta[:, :3]).max(), rel=0.0, abs=1e-12)  # as above
+    assert judged.verdict == result.verdict == compared.verdict
+    turns = result.signal("repolarizer.turns").values
+    assert int(np.abs(np.diff(turns, axis=0)).sum()) == len(run.run.repolarizations)
+
+
+@pytest.fixture
+def slow_motion(tmp_path: Path) -> dict[str, str]:
+    """A log at 10 ms, twice the step of most systems, and the path of exactly its motion."""
+    t = np.arange(100) * 0.01
+    q = 0.8 * np.sin(3.0 * t)[:, None] * np.linspace(0.3, 1.0, 6)
+    x = point_over_log(load_robot("urm6"), q, np.zeros_like(q), np.zeros_like(q)).position
+    files = {"log": tmp_path / "log.csv", "reference": tmp_path / "path.csv"}
+    header = ",".join(f"phi{i} [rad]" for i in range(1, 7))
+    np.savetxt(files["log"], np.column_stack([t, q]), delimiter=",", header=f"t [s],{header}", comments="")
+    np.savetxt(
+        files["reference"],
+        np.column_stack([t, x]),
+        delimiter=",",
+        header="t [s],x [m],y [m],z [m]",
+        comments="",
+    )
+    return {name: str(path) for name, path in files.items()}
+
+
+def test_a_log_of_another_period_is_judged_at_its_samples(slow_motion: dict[str, str]) -> None:
+    result = simulate("log-to-delta", arguments=slow_motion)
+    assert (result.step, result.verdict, result.warnings) == (0.01, "pass", ())
+    assert result.verdicts[0].worst < 1e-12  # the path is the log's own, but for rounding
+
+
+def test_a_step_between_the_samples_of_a_log_is_told(slow_motion: dict[str, str]) -> None:
+    result = simulate("log-to-delta", arguments=slow_motion, step=0.005)
+    assert [(one.kind, one.message) for one in result.warnings] == [(
+        "held",
+        "block log: 99 of 199 communication points lie between samples of the log, where the one before is"
+        " held, 5 ms at most: a deviation there is none of the log's",
+    )]  # fmt: skip
+
+
+def test_the_bundled_logs_are_those_of_a_shipped_system(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "path.csv").write_text("t,x,y,z\n0,0,0,9\n1,0,0,9\n")  # of the user's, for something else
+    monkeypatch.chdir(tmp_path)
+    result = simulate("log-to-delta", duration=0.5)
+    assert result.verdict == "pass"
+    assert fingerprint(LOGS / "path.csv") in result.provenance.inputs
+
+
+def test_the_arm_of_a_kinematic_chain_is_that_of_its_joints() -> None:
+    result = simulate("log-to-delta", duration=0.5)
+    (arm,) = result.arms
+    assert (arm.block, arm.chain.name) == ("chain", "urm6")
+    np.testing.assert_array_equal(arm.q, result.signal("repolarizer.q").values)
+    assert result.t[-1] == 0.5
+
+
+def test_every_file_is_traced_and_every_log_warns() -> None:
+    result = simulate("log-to-delta", duration=0.02)
+    assert [one.name for one in result.provenance.inputs] == [
+        "log-to-delta.toml", "coppeliasim.csv", "path.csv",
+    ]  # fmt: skip
+    assert [one.kind for one in result.warnings] == ["assumed-unit"]
+    assert result.provenance.options["arguments"]["robot"] == "urm6"
+    blocks = {one.name: one for one in result.blocks}
+    assert [(one.variable, one.value, one.given) for one in blocks["delta"].settings] == [
+        ("tolerance", 0.0035, False)
+    ]
