@@ -12,11 +12,11 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import yaml
 
 from pages import lay_files, run_in_process, snippets, text_of
 
 PAGE = "docs/ci.md"
-yaml: Any = pytest.importorskip("yaml", reason="PyYAML, which evo brings along, reads the jobs")
 
 
 @pytest.fixture(autouse=True)
