@@ -258,7 +258,7 @@ def _found_in_all(q: FloatArray, dt: FloatArray, periods: FloatArray, speeds: Fl
     complete = np.ones(joints, dtype=np.bool_)
     # Least and largest of all are quick, and mostly enough: NaN is neither, nor within the bounds.
     if not -LARGEST_VALUE < q.min(initial=0.0) <= q.max(initial=0.0) < LARGEST_VALUE:
-        complete = (np.abs(q) < LARGEST_VALUE).all(axis=0)
+        complete[:] = (np.abs(q) < LARGEST_VALUE).all(axis=0)
     whole = np.flatnonzero(complete)
     part = q if complete.all() else q[:, whole]
     found = _judged(part, dt, periods[whole], speeds[whole])
