@@ -36,9 +36,9 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--only", nargs="+", metavar="PATTERN", help="as repolarizer or 'inverse.*'")
     parser.add_argument("--tests", nargs="+", metavar="PATH", help="tests to hold them against")
     parser.add_argument(
-        "--models", type=int, default=40, metavar="N", help="mutants tried of a model; 0: all"
+        "--models", type=int, default=60, metavar="N", help="mutants tried of a model; 0: all"
     )
-    parser.add_argument("--sample", type=int, default=8, metavar="N", help="and of any other module")
+    parser.add_argument("--sample", type=int, default=5, metavar="N", help="and of any other module")
     parser.add_argument("--seed", type=int, default=1, help="of the samples")
     parser.add_argument("--processes", type=int, default=2, help="mutants tried side by side")
     parser.add_argument("--survivors", action="store_true", help="print what each survivor changes")

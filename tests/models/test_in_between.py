@@ -193,6 +193,14 @@ def test_four_steps_on_either_side_tell_how_fast_the_joint_moves(offset: int) ->
     assert beside_a_wrap(FAR * 16.0, slower, {STILL + offset: 32.0}) == [STILL] * (not counts)
 
 
+def test_a_sample_is_told_though_a_wrap_leads_to_its_neighbour() -> None:
+    q = np.array([-508.0, -508.0, -508.0, 508.0, 512.0 - 33.0, -508.0, -508.0, -508.0])
+    x = q + 1024.0 * np.array([1, 1, 1, 0, 0, 1, 1, 1])
+    # the joint goes 8 a sample there: 33 is more than four times that
+    t = TSP * np.arange(8.0)
+    assert beside_wraps(q, x, t, indices(3, 5), 1024.0).tolist() == [4]
+
+
 def indices(*values: int) -> IntArray:
     return np.array(values, dtype=np.int64)
 
