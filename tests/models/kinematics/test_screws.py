@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 
 import numpy as np
+import pytest
 
 from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
 from urmpipe_models.kinematics.forward import tip_pose
@@ -22,6 +23,8 @@ ARM = Chain(
     base=Transform(rotation_z(math.pi / 2).rotation, (1.0, 0.0, 0.0)),
     tool=rotation_x(-math.pi / 2),
 )
+
+WHOLE = ((1, 0, 0), (0, 1, 0), (0, 0, 1))
 
 
 def test_screws_stand_in_the_world_base_and_tool_included() -> None:
@@ -44,6 +47,22 @@ def test_an_arm_whose_axes_meet_in_its_tip_has_the_size_1() -> None:
 
 def test_a_joint_that_follows_another_is_no_screw() -> None:
     assert screws(Chain("arm", (Joint("a"), Joint("b", mimic=Mimic("a"))))) is None
+
+
+def test_screws_are_floats_whatever_numbers_describe_the_arm() -> None:
+    whole = Chain("arm", (Joint("a", origin=translation(1, 2, 3), axis=(0, 0, 1)),), base=Transform(WHOLE))
+    found = screws(whole)
+    assert found is not None
+    for one in (found.direction, found.point, found.rotation, found.position):
+        assert one.dtype == np.float64
+
+
+def test_each_screw_of_a_chain_has_a_name() -> None:
+    found = screws(ARM)
+    assert found is not None
+    for names in (("a",), ("a", "b", "c")):
+        with pytest.raises(ValueError, match="zip"):
+            chain_of(found, names)
 
 
 def random_arm(rng: np.random.Generator) -> Chain:
