@@ -201,6 +201,14 @@ def test_a_sample_is_told_though_a_wrap_leads_to_its_neighbour() -> None:
     assert beside_wraps(q, x, t, indices(3, 5), 1024.0).tolist() == [4]
 
 
+def test_beyond_the_ends_of_a_log_nothing_moves() -> None:
+    """The joint stands still, so that whatever can be perceived is off the line: 0.01 rad is."""
+    q = np.full(7, np.pi - 1e-9)
+    q[3:] = -np.pi + 1e-9
+    q[3] += 0.01
+    assert found_by_all(q)[1] == [3]
+
+
 def indices(*values: int) -> IntArray:
     return np.array(values, dtype=np.int64)
 

@@ -21,6 +21,13 @@ modules = st.lists(st.tuples(lengths, tilts, st.sampled_from([1.0, -1.0])), min_
 ARM = urm_chain("two", (0.3, 0.2, 0.1), (0.5, -0.7), directions=(1, -1))
 
 
+def test_name_start_and_words_go_into_the_chain() -> None:
+    chain = urm_chain("two", (0.3, 0.2, 0.1), (0.5, -0.7), start=(1, 2), description="short", source="a test")
+    assert (chain.name, chain.start) == ("two", (1.0, 2.0))
+    assert (chain.description, chain.source) == ("short", "a test")
+    assert (ARM.start, ARM.description, ARM.source) == ((0.0, 0.0), "", "")
+
+
 @settings(max_examples=30)
 @given(modules, lengths)
 def test_an_arm_tells_what_it_was_made_from_wherever_it_stands(

@@ -88,7 +88,7 @@ def test_a_chain_of_the_screws_is_the_same_arm() -> None:
         assert found is not None
         names = tuple(f"n{k}" for k in range(len(chain.coordinates)))
         again = chain_of(found, names)
-        assert again.coordinates == names
+        assert (again.name, again.coordinates) == ("screws", names)
         q = rng.uniform(-3.0, 3.0, len(names)).tolist()
         expected, got = tip_pose(chain, q), tip_pose(again, q)
         # ten frames and more with shifts of up to 1.7 m and slides of up to 3 m: some 30 m, rounded each time
