@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
@@ -45,3 +47,10 @@ def test_frames_are_the_base_and_what_each_joint_moves() -> None:
         (0.25, 2.0, 3.125),
     ]
     assert all(frame.rotation == Transform().rotation for frame in found)
+
+
+def test_a_revolute_joint_turns_and_does_not_shift() -> None:
+    *_, turned, flange = frames(ARM, [0.5, math.pi / 2])
+    assert turned.translation == (0.25, 2.0, 3.0)
+    assert turned.rotation == ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
+    assert flange.translation == (0.375, 2.0, 3.0)  # z of the flange is x of the world
