@@ -256,9 +256,9 @@ def _found_in_all(q: FloatArray, dt: FloatArray, periods: FloatArray, speeds: Fl
     """Judge the steps of all columns, by row and then by joint: whole columns at once, others one by one."""
     joints = q.shape[1]
     complete = np.ones(joints, dtype=np.bool_)
-    with np.errstate(over="ignore", invalid="ignore"):
-        if not np.isfinite(q.sum()):  # one pass over all says whether to look column by column
-            complete = np.isfinite(q.sum(axis=0))
+    # Least and largest of all are quick, and mostly enough: NaN is neither, nor within the bounds.
+    if not -LARGEST_VALUE < q.min(initial=0.0) <= q.max(initial=0.0) < LARGEST_VALUE:
+        complete[:] = (np.abs(q) < LARGEST_VALUE).all(axis=0)
     whole = np.flatnonzero(complete)
     part = q if complete.all() else q[:, whole]
     found = _judged(part, dt, periods[whole], speeds[whole])

@@ -97,6 +97,12 @@ def test_euler_angles_go_straight_through_the_vertical() -> None:
     np.testing.assert_allclose(continuous_euler(recorded), true, rtol=0, atol=1e-14)
 
 
+def test_of_two_names_that_are_equally_near_the_recorded_one_stays() -> None:
+    """A quarter turn of two axes: the other family, half a turn off, is a quarter turn away as well."""
+    recorded = np.array([[0.0, 0.0, 0.0], [-np.pi / 2, 0.0, -np.pi / 2]])
+    np.testing.assert_array_equal(continuous_euler(recorded, proper=True), recorded)
+
+
 @pytest.mark.parametrize(
     ("work", "width"), [(continuous_quaternions, 4), (continuous_vectors, 3), (continuous_euler, 3)]
 )

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.in_between import FAR, PERCEPTIBLE, beside_wraps, repair
+from urmpipe_models.in_between import AROUND, FAR, PERCEPTIBLE, beside_wraps, repair
 from urmpipe_models.repolarizer import FULL_TURN, repolarize
 
 TSP = 0.005
@@ -149,6 +149,64 @@ def test_a_deviation_too_small_to_matter_is_not_told() -> None:
     assert found_by_all(q)[1] == []
     q[10] += 0.2 * PERCEPTIBLE * FULL_TURN
     assert found_by_all(q)[1] == [10]
+
+
+STILL = 12
+
+
+def beside_a_wrap(deviation: float, t: FloatArray, moves: dict[int, float] | None = None) -> list[int]:
+    """Judge a sample beside a wrap of a joint that stands still but for 8 over it and some steps around.
+
+    The sample lies off the line of its neighbours, which is 4 above the one before, by a deviation.
+    """
+    period = 1024.0
+    x = np.where(np.arange(2 * STILL) > STILL, 516.0, 508.0)
+    for to, move in (moves or {}).items():
+        x[to:] += move
+        x -= x[STILL - 1] - 508.0  # the wrap stays where it is
+    x[STILL] = 512.0 - deviation
+    q = x - np.where(np.arange(2 * STILL) > STILL, period, 0.0)
+    return [int(at) for at in beside_wraps(q, x, t, indices(STILL + 1), period)]
+
+
+def test_a_sample_is_off_the_line_beyond_four_times_half_the_way_of_its_neighbours() -> None:
+    even = np.ldexp(np.arange(2.0 * STILL), -8)
+    assert beside_a_wrap(FAR * 8.0 / 2.0, even) == []
+    assert beside_a_wrap(FAR * 8.0 / 2.0 + 2.0**-40, even) == [STILL]
+
+
+@pytest.mark.parametrize("offset", [*range(-6, 0), *range(2, 8)])
+def test_four_steps_on_either_side_tell_how_fast_the_joint_moves(offset: int) -> None:
+    """A step of 32 is eight times the speed over the wrap, where it counts; each takes its own time."""
+    even = np.ldexp(np.arange(2.0 * STILL), -8)
+    counts = offset in AROUND
+    assert counts == (-4 <= offset <= 5)
+    for deviation, told in (
+        (FAR * 8.0 / 2.0 + 1.0, not counts),
+        (FAR * 32.0, not counts),
+        (FAR * 32.0 + 1.0, True),
+    ):
+        assert beside_a_wrap(deviation, even, {STILL + offset: 32.0}) == [STILL] * told
+    slower = even.copy()
+    slower[STILL + offset :] += 2.0**-8  # twice the time for that step
+    assert beside_a_wrap(FAR * 16.0 + 1.0, slower, {STILL + offset: 32.0}) == [STILL]
+    assert beside_a_wrap(FAR * 16.0, slower, {STILL + offset: 32.0}) == [STILL] * (not counts)
+
+
+def test_a_sample_is_told_though_a_wrap_leads_to_its_neighbour() -> None:
+    q = np.array([-508.0, -508.0, -508.0, 508.0, 512.0 - 33.0, -508.0, -508.0, -508.0])
+    x = q + 1024.0 * np.array([1, 1, 1, 0, 0, 1, 1, 1])
+    # the joint goes 8 a sample there: 33 is more than four times that
+    t = TSP * np.arange(8.0)
+    assert beside_wraps(q, x, t, indices(3, 5), 1024.0).tolist() == [4]
+
+
+def test_beyond_the_ends_of_a_log_nothing_moves() -> None:
+    """The joint stands still, so that whatever can be perceived is off the line: 0.01 rad is."""
+    q = np.full(7, np.pi - 1e-9)
+    q[3:] = -np.pi + 1e-9
+    q[3] += 0.01
+    assert found_by_all(q)[1] == [3]
 
 
 def indices(*values: int) -> IntArray:

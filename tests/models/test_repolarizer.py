@@ -122,6 +122,8 @@ NAN, TURNS = math.nan, FULL_TURN * np.arange(9.0)
             3.0 - FULL_TURN * np.array([0.0, 0.2, 1.0, 1.2, 1.2])
         ],  # a large step ends one pair and begins no other
         [[0.0, FULL_TURN - 1.0, FULL_TURN - 1.0]],  # nothing stands before the first step
+        # two pairs share the large half, which is the first step judged of all
+        [3.0 - FULL_TURN * np.array([0.0, 0.24, 0.98, 1.22])],
         [[3.0, NAN, 3.0 - FULL_TURN / 2, NAN, NAN, 3.0 - FULL_TURN, 3.0]],
         [
             [NAN, 3.0, NAN, 3.0 - FULL_TURN, NAN, NAN, 3.0, NAN, NAN, NAN, 3.0 - FULL_TURN],
@@ -135,6 +137,15 @@ def test_pairs_of_steps_and_gaps_are_the_same_in_the_batch(q: list[FloatArray], 
     dt = 0.01 * (1.0 + np.arange(len(values), dtype=np.float64) % 3)
     dt[0] = NAN  # is not used
     assert_batch_is_the_steps(values, dt, np.array([FULL_TURN, FULL_TURN])[: len(q)], max_speed)
+
+
+def test_nothing_stands_before_the_first_step_whatever_time_the_first_row_gives() -> None:
+    """The step misses a whole turn by 1.7 rad, more than P / 4; one of 1 rad before it would make it up."""
+    q = np.array([[0.0], [FULL_TURN - 1.7], [FULL_TURN - 1.7]])
+    result = repolarize(q, np.full(3, TSP))
+    assert result.q.tobytes() == q.tobytes()
+    assert result.unexplained.tolist() == [[1, 0]]
+    assert result.in_between.tolist() == []
 
 
 @pytest.mark.parametrize("gap", [0, 1, 2, 3, 4])
@@ -179,6 +190,16 @@ def test_values_that_are_no_joint_values_are_missing_and_warn_of_nothing() -> No
     assert result.rows.tolist() == [3, 3, 3]
     assert len(result.unexplained) == 0
     assert step(State(), 1e300, TSP)[0].seen == 0.0  # at the bound already
+
+
+@pytest.mark.parametrize("value", [1e300, -1e300, 1e301, np.nextafter(1e300, 0.0), -np.nextafter(1e300, 0.0)])
+def test_a_value_is_missing_from_the_bound_on_in_the_batch_as_in_the_steps(value: float) -> None:
+    """Though the column beside it misses none: over a missing value a step is a wrap."""
+    q = np.array([[3.0, value, -3.0, -3.0], [3.0, 3.0, 3.0, 3.0]]).T
+    with np.errstate(over="ignore"):  # a product of steps of almost 1e300
+        assert_batch_is_the_steps(q, np.full(4, TSP), np.full(2, FULL_TURN), math.inf)
+        wraps = repolarize(q, np.full(4, TSP)).rows.tolist()
+    assert wraps == ([2] if abs(value) >= 1e300 else [])
 
 
 def test_before_the_first_repolarization_nothing_changes_by_a_bit() -> None:

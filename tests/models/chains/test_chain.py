@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
+from urmpipe_models.chains.chain import AXIS_TOLERANCE, Chain, Joint, Mimic
 from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.errors import RobotError
 from urmpipe_models.transform import Transform, translation
@@ -56,6 +56,25 @@ def test_everything_wrong_is_said_at_once() -> None:
         "robot arm: joint b: velocity 0; allowed: more than 0",
         "robot arm: joint c mimics d, no moving joint of the chain; allowed: a, b, b",
         "robot arm: start has 1 values; allowed: 3, one a coordinate",
+    ]
+
+
+def test_limits_may_meet_a_speed_may_be_small_and_an_axis_may_be_rounded() -> None:
+    held = Joint("held", lower=0.5, upper=0.5, velocity=1e-9)
+    for length in (1.0 - 0.9 * AXIS_TOLERANCE, 1.0 + 0.9 * AXIS_TOLERANCE):
+        assert Chain("arm", (held, Joint("turn", axis=(0.0, length, 0.0)))).coordinates == ("held", "turn")
+    for length in (1.0 - 1.1 * AXIS_TOLERANCE, 1.0 + 1.1 * AXIS_TOLERANCE):
+        with pytest.raises(RobotError, match=r"joint turn: axis \[.*\] has length 1; allowed: 1$"):
+            Chain("arm", (Joint("turn", axis=(0.0, length, 0.0)),))
+
+
+def test_limits_and_speeds_that_are_no_numbers_are_refused() -> None:
+    with pytest.raises(RobotError) as caught:
+        Chain("arm", (Joint("a", lower=math.nan), Joint("b", upper=math.nan), Joint("c", velocity=math.nan)))
+    assert str(caught.value).splitlines() == [
+        "robot arm: joint a: lower limit nan above upper inf",
+        "robot arm: joint b: lower limit -inf above upper nan",
+        "robot arm: joint c: velocity nan; allowed: more than 0",
     ]
 
 

@@ -8,6 +8,7 @@ from hypothesis import example, given
 from hypothesis import strategies as st
 
 from urmpipe_models.drives.set_point import (
+    CORNER_SLACK,
     RAMP,
     STEP,
     TRAPEZOID,
@@ -34,6 +35,12 @@ def test_the_step_is_at_its_target_from_its_time_on() -> None:
     np.testing.assert_array_equal(found.position, [0.5, 0.5, -2.0, -2.0])
     np.testing.assert_array_equal(found.velocity, np.zeros(4))
     np.testing.assert_array_equal(found.acceleration, np.zeros(4))
+
+
+def test_a_corner_is_reached_just_its_slack_early() -> None:
+    early = np.array([np.nextafter(-CORNER_SLACK, -1.0), -CORNER_SLACK])
+    np.testing.assert_array_equal(step(early, 0.0, 0.5, -2.0).position, [0.5, -2.0])
+    np.testing.assert_array_equal(ramp(early, 0.0, 0.5, -2.0, 3.0).velocity, [0.0, -3.0])
 
 
 def test_the_ramp_goes_with_its_speed_all_the_way() -> None:

@@ -1,4 +1,4 @@
-"""The conftest.py of a run of mutants (mutation.py): no caches from test to test, quick tests first."""
+"""The conftest.py of a run of mutants: no caches from test to test, quick tests first."""
 
 from __future__ import annotations
 
