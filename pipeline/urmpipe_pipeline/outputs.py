@@ -177,19 +177,19 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     noun = NOUNS.get(kind, kind)
     if path.is_dir():
         return f"found a folder, allowed: the name of a file for the {noun}"
+    if path.exists() and any(one.exists() and path.samefile(one) for one in inputs):
+        return f"found an input of this command, allowed: any other name for the {noun}"
     if _is_of_another_kind(path, kind):
         tables = kind == "recording" and path.suffix.lower() in TABLES
         hint = f"; urmpipe export RUN.rrd -o {path.name} writes tables" if tables else ""
         return f"found a name that is none of a {noun}, allowed: {path.stem}{SUFFIXES[kind][0]}{hint}"
     if not path.parent.is_dir():
         return f"found no folder {path.parent}, allowed: a folder that exists"
-    return _taken(path, inputs, kind, noun) if path.exists() else None
+    return _taken(path, kind, noun) if path.exists() else None
 
 
-def _taken(path: Path, inputs: Sequence[Path], kind: OutputKind, noun: str) -> str | None:
+def _taken(path: Path, kind: OutputKind, noun: str) -> str | None:
     """Return what speaks against replacing the file that is there, or None."""
-    if any(one.exists() and path.samefile(one) for one in inputs):
-        return f"found an input of this command, allowed: any other name for the {noun}"
     if kind == "system":  # it was written to be changed: what it holds now may be somebody's work
         return "found a file, allowed: a new name"
     if path.is_file() and _is_ours(path, kind):
