@@ -105,6 +105,47 @@ def test_a_period_for_a_log_without_times_is_no_doubt_about_the_others(load: Loa
     ]
 
 
+def test_numbers_of_columns_are_those_of_the_log_without_a_header(load: Load, tmp_path: Path) -> None:
+    (tmp_path / "map.toml").write_text(
+        '[clock]\ncolumn = "1"\nunit = "ms"\n\n'
+        '[[joints]]\ncolumn = "3"\nname = "one"\nunit = "deg"\nsign = -1\n\n'
+        '[[joints]]\ncolumn = "2"\nname = "two"\nunit = "deg"\n'
+    )
+    read = read_map(tmp_path / "map.toml").read
+    given = {name: getattr(read, name) for name in read.__dataclass_fields__}
+    nameless = table(("t", 1e3 * TIMES), ("a", TURN), ("b", TURN)).split("\n", 1)[1]
+    path, log, mapped = load(PATH, LOG, nameless, **given)
+    assert path.log.units == {"t": "s", "x": "m", "y": "m", "z": "m"}
+    assert log.log.units == {"t": "s", "a": "rad", "b": "rad"}
+    np.testing.assert_array_equal(log.log.q, np.column_stack((TURN, -TURN)))
+    np.testing.assert_allclose(mapped.log.q, np.radians(np.column_stack((-TURN, TURN))), rtol=1e-15)
+    assert path.log.t_ns.tolist() == log.log.t_ns.tolist() == mapped.log.t_ns.tolist()
+
+
+def test_units_by_number_are_of_the_log_whose_joints_have_these_numbers(load: Load) -> None:
+    path, log = load(PATH, LOG, joints=("3", "2"), units={"2": "deg", "3": "deg"})
+    assert path.log.units == {"t": "s", "x": "m", "y": "m", "z": "m"}
+    assert log.log.units == {"t": "s", "a": "deg", "b": "deg"}
+
+
+def test_that_there_is_no_time_holds_for_the_log_without_one(load: Load) -> None:
+    unclocked = table(("a [rad]", TURN), ("b [rad]", TURN))
+    path, log = load(PATH, unclocked, time="none", period=0.02)
+    assert (path.log.period, log.log.period) == (0.01, 0.02)
+    uneven = table(("t [s]", TIMES**2), ("a [rad]", TURN), ("b [rad]", TURN))
+    assert [run.log.period for run in load(LOG, uneven, time="none", period=0.02)] == [0.02, 0.02]
+
+
+def test_how_a_table_is_written_is_an_error_if_none_is(load: Load, tmp_path: Path) -> None:
+    with pytest.raises(UrmpipeError) as caught:
+        load(PATH, LOG, delimiter="semicolon")
+    allowed = "and no row of numbers below it, allowed: a table with a row a sample"
+    assert str(caught.value).replace(f"{tmp_path}/", "").split("\n") == [
+        f"log0.csv:1: found 't [s],x,y,z' {allowed}",
+        f"log1.csv:1: found 't [s],a [rad],b [rad]' {allowed}",
+    ]
+
+
 def test_what_no_log_has_is_an_error(load: Load, tmp_path: Path) -> None:
     with pytest.raises(LogError) as caught:
         load(PATH, LOG, joints=("A1", "A2"), units={"c": "deg"})

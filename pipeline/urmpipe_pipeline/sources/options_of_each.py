@@ -1,13 +1,15 @@
 """Options that are given once for several logs: each holds for the logs that it fits.
 
 An option that names columns (--joints, --time, --unit COLUMN=, those of a map) holds for the logs that have
-them; one that says how a table is written (--delimiter, --decimal, --source, --rotation) for those that can
-be read so; a unit of all joints for those whose names tell no other. What fits none of them is an error.
+them: by numbers, which fit any log, for those without a header if there is one; --time none for those whose
+names tell no time, if there is one. An option that says how a table is written (--delimiter, --decimal,
+--source, --rotation) holds for the logs that can be read so; a unit of all joints for those whose names tell
+no other. What fits none of them is an error.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Sequence, Set
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -23,6 +25,12 @@ from urmpipe_pipeline.sources.vocabulary import vocabulary
 ALL_JOINTS = ""
 """Stands among the units for all joints that turn."""
 
+NO_TIME = "none"
+"""Stands for the time of a log that has none."""
+
+WRITTEN = ("delimiter", "decimal", "source", "rotation")
+"""What says how a table is written."""
+
 
 @dataclass(frozen=True, slots=True)
 class _Named:
@@ -36,14 +44,18 @@ class _Named:
     option: str
     columns: tuple[str, ...]
 
-    def found(self, columns: Sequence[Column]) -> bool:
-        """Tell whether a log has one of them by its name, or all of them by their numbers."""
-        numbers = range(1, len(columns) + 1)
-        return self.names(columns) or all(text.isdigit() and int(text) in numbers for text in self.columns)
-
     def names(self, columns: Sequence[Column]) -> bool:
         """Tell whether a log has one of them by its name."""
         return any(called(columns, text) for text in self.columns)
+
+    def counts(self, columns: Sequence[Column]) -> bool:
+        """Tell whether a log has all of them by their numbers."""
+        numbers = range(1, len(columns) + 1)
+        return all(text.isdigit() and int(text) in numbers for text in self.columns)
+
+    def belongs_to(self, other: _Named) -> bool:
+        """Tell whether this is the unit of columns that the other option names."""
+        return self.option == "--unit" != other.option and set(self.columns) <= set(other.columns)
 
     def left_out(self, options: ReadOptions) -> ReadOptions:
         """Return the options without this one."""
@@ -67,6 +79,8 @@ class _Fitted:
         taken: The options that name columns of it.
         columns: Its columns; none if it cannot be opened.
         plan: What is read of it; None if that cannot be told.
+        has_names: Whether it has a header.
+        names_time: Whether its names tell a time, where an option says that there is none.
     """
 
     file: Path
@@ -74,6 +88,8 @@ class _Fitted:
     taken: tuple[_Named, ...] = ()
     columns: tuple[Column, ...] = ()
     plan: Plan | None = None
+    has_names: bool = True
+    names_time: bool = False
 
     @property
     def joints(self) -> tuple[Column, ...]:
@@ -103,17 +119,26 @@ def options_of_each(
         return [options] * len(logs)
     named = list(_named(options))
     fitted = [_fit(files, options, named, robot) for files in logs]
+    numbered = {one for log in fitted if not log.has_names for one in log.taken}
+    if numbered:
+        fitted = [
+            _fit(files, options, named, robot, numbered) if log.has_names else log
+            for files, log in zip(logs, fitted, strict=True)
+        ]
     unused = [one for one in named if not any(one in log.taken for log in fitted)]
     if unused and all(log.columns for log in fitted):
         raise LogError(*(_nowhere(one, fitted) for one in unused))
-    return [replace(log.options, **_of_joints(log, fitted, options)) for log in fitted]
+    return [
+        replace(log.options, **_of_joints(log, fitted, options), **_for_all(log, fitted, options))
+        for log in fitted
+    ]
 
 
 def _named(options: ReadOptions) -> Iterator[_Named]:
     """Yield the options that name columns."""
     if options.joints:
         yield _Named("--joints", options.joints)
-    if options.time is not None and options.time.lower() != "none":
+    if options.time is not None and options.time.lower() != NO_TIME:
         yield _Named("--time", (options.time,))
     if options.position:
         yield _Named("position", (*options.position, *options.orientation))
@@ -123,30 +148,44 @@ def _named(options: ReadOptions) -> Iterator[_Named]:
 
 
 def _fit(
-    files: Sequence[Path], options: ReadOptions, named: Sequence[_Named], robot: Chain | None
+    files: Sequence[Path],
+    options: ReadOptions,
+    named: Sequence[_Named],
+    robot: Chain | None,
+    numbered: Set[_Named] = frozenset(),
 ) -> _Fitted:
-    """Return how one log is read: as the options say it is written, if it can be and has their columns."""
-    as_told = _sound(files, options, named, robot)
+    """Return how one log is read: as the options say it is written, if it can be and has their columns.
+
+    Args:
+        files: The files of the log.
+        options: What the user says of all logs.
+        named: Those of the options that name columns.
+        robot: The arm, or None.
+        numbered: Those of them whose numbers are of other logs.
+    """
+
+    def fitted(given: ReadOptions) -> _Fitted:
+        """Return how it is read; without the form of an orientation that it does not have."""
+        found = _fitted(files, given, named, robot, numbered)
+        if found.plan is None and given.rotation is not None:
+            otherwise = _fitted(files, replace(given, rotation=None), named, robot, numbered)
+            return otherwise if otherwise.plan else found
+        return found
+
+    as_told = fitted(options)
     plain = replace(options, delimiter=None, decimal=None, source=None)
     if plain == options or (as_told.plan and (as_told.taken or not named)):
         return as_told
-    otherwise = _sound(files, plain, named, robot)
+    otherwise = fitted(plain)
     return otherwise if otherwise.plan else as_told
 
 
-def _sound(
-    files: Sequence[Path], options: ReadOptions, named: Sequence[_Named], robot: Chain | None
-) -> _Fitted:
-    """Return how one log is read; without the form of an orientation that it does not have."""
-    found = _fitted(files, options, named, robot)
-    if found.plan is None and options.rotation is not None:
-        otherwise = _fitted(files, replace(options, rotation=None), named, robot)
-        return otherwise if otherwise.plan else found
-    return found
-
-
 def _fitted(
-    files: Sequence[Path], options: ReadOptions, named: Sequence[_Named], robot: Chain | None
+    files: Sequence[Path],
+    options: ReadOptions,
+    named: Sequence[_Named],
+    robot: Chain | None,
+    numbered: Set[_Named],
 ) -> _Fitted:
     """Return how one log is read with the options whose columns it has."""
     try:
@@ -154,12 +193,26 @@ def _fitted(
     except UrmpipeError:
         return _Fitted(files[0], options)  # to be told when it is read
     columns = columns_of(tables.layouts, tables.titles)
-    taken = [
-        one for one in named if one.found(columns) and not _numbers_of_path(one, columns, tables, options)
-    ]
+    taken: list[_Named] = []
+    for one in named:
+        leader = next((other for other in named if one.belongs_to(other)), None)
+        if one.names(columns):
+            taken.append(one)
+        elif leader is not None:
+            taken += [one] if leader in taken else []
+        elif one.counts(columns) and one not in numbered and not _of_path(one, tables, options):
+            taken.append(one)
     for one in named:
         options = options if one in taken else one.left_out(options)
-    return _Fitted(files[0], options, tuple(taken), columns, _plan(tables, options, robot))
+    return _Fitted(
+        file=files[0],
+        options=options,
+        taken=tuple(taken),
+        columns=columns,
+        plan=_plan(tables, options, robot),
+        has_names=any(layout.header is not None for layout in tables.layouts),
+        names_time=_names_time(tables, options),
+    )
 
 
 def _plan(tables: Tables, options: ReadOptions, robot: Chain | None = None) -> Plan | None:
@@ -170,12 +223,20 @@ def _plan(tables: Tables, options: ReadOptions, robot: Chain | None = None) -> P
         return None
 
 
-def _numbers_of_path(named: _Named, columns: Sequence[Column], tables: Tables, options: ReadOptions) -> bool:
-    """Tell whether joints are named by numbers alone, and the log is a path by the names that it has."""
-    if named.option != "--joints" or named.names(columns):
+def _of_path(named: _Named, tables: Tables, options: ReadOptions) -> bool:
+    """Tell whether joints are named, and the log is a path by the names that it has."""
+    if named.option != "--joints":
         return False
     plan = _plan(tables, named.left_out(options))
     return plan is not None and not plan.roles.joints
+
+
+def _names_time(tables: Tables, options: ReadOptions) -> bool:
+    """Tell whether the names of a log tell a time although the options say that there is none."""
+    if options.time is None or options.time.lower() != NO_TIME or tables.layouts[0].header is None:
+        return False
+    plan = _plan(tables, replace(options, time=None))
+    return plan is not None and bool(plan.clock.columns)
 
 
 def _of_joints(log: _Fitted, logs: Sequence[_Fitted], options: ReadOptions) -> dict[str, Any]:
@@ -188,6 +249,22 @@ def _of_joints(log: _Fitted, logs: Sequence[_Fitted], options: ReadOptions) -> d
     if log.tells_other_than(unit) and any(one.joints and not one.tells_other_than(unit) for one in logs):
         del units[ALL_JOINTS]
     return {"interval": interval, "units": units}
+
+
+def _for_all(log: _Fitted, logs: Sequence[_Fitted], options: ReadOptions) -> dict[str, Any]:
+    """Return what holds for one log in view of the others.
+
+    That is the time that its names tell, if another log has none; and how a table is written, if that fits
+    none, so that reading it tells why.
+    """
+    told = {name: getattr(options, name) for name in WRITTEN}
+    lost = {
+        name: value
+        for name, value in told.items()
+        if all(getattr(other.options, name) != value for other in logs)
+    }
+    timed = log.names_time and not all(other.names_time for other in logs)
+    return {**lost, **({"time": None} if timed else {})}
 
 
 def _nowhere(named: _Named, logs: Sequence[_Fitted]) -> Finding:
