@@ -126,11 +126,14 @@ def _roles(
     if plots is not None:
         return _plots(*plots, tables)
     try:
-        return _by_names(columns, tables.layouts, options, robot)
+        roles = _by_names(columns, tables.layouts, options, robot)
     except LogError:
         if several:
             _refuse_several_logs(columns, tables, options, robot)
         raise
+    if several and not options.joints and len({column.table for column in roles.joints}) == 1:
+        _refuse_several_logs(columns, tables, options, None, joints=len(roles.joints))
+    return roles
 
 
 def _by_names(
@@ -145,17 +148,33 @@ def _by_names(
 
 
 def _refuse_several_logs(
-    columns: Sequence[Column], tables: Tables, options: ReadOptions, robot: Chain | None
+    columns: Sequence[Column],
+    tables: Tables,
+    options: ReadOptions,
+    robot: Chain | None,
+    *,
+    joints: int | None = None,
 ) -> None:
-    """Raise a `LogError` if two files or more are logs of their own, each with all joints."""
+    """Raise a `LogError` if two files or more are logs of their own.
+
+    Args:
+        columns: The columns of all files, without the clocks.
+        tables: The files.
+        options: What the user says.
+        robot: The arm; None to go by the names alone.
+        joints: How many joints each has, and names for them; None for any number from two on.
+    """
     whole = []
-    for i, path in enumerate(tables.paths):
+    for i, (path, layout) in enumerate(zip(tables.paths, tables.layouts, strict=True)):
         own = [column for column in columns if column.table == i]
         try:
-            roles = _by_names(own, tables.layouts, options, robot)
+            if layout.header is None and joints is None:
+                count = len(without_header(own, layout, options, robot, path=False).joints)
+            else:
+                count = len(_by_names(own, tables.layouts, options, robot).joints)
         except LogError:
             continue
-        whole += [path] if len(roles.joints) > 1 else []
+        whole += [path] if count > 1 and count == (joints or count) else []
     if len(whole) > 1:
         shown = ", ".join(path.name for path in whole[:SHOWN_LOGS])
         more = f" and {len(whole) - SHOWN_LOGS} more" if len(whole) > SHOWN_LOGS else ""

@@ -70,16 +70,32 @@ def test_a_plot_that_is_missing_between_others_is_an_error(write: Write, arm: Ar
     assert read_log(files, robot=arm(3)).q.shape == (3, 3)
 
 
-def test_a_folder_of_several_logs_is_told_as_such(write: Write, tmp_path: Path) -> None:
-    text = "t,q1,q2\n0,1,2\n0.1,1,2\n"
-    files = [write(text, f"{day}.csv") for day in ("monday", "tuesday")]
-    files.append(write(text.replace("q", "joint"), "wednesday.csv"))
+LOG = "t,q1,q2\n0,1,2\n0.1,1,2\n"
+NAMELESS = "0,1,5\n0.1,3,1\n0.2,2,6\n0.3,4,2\n"
+
+
+@pytest.mark.parametrize(
+    "texts",
+    [(LOG, LOG), (LOG, LOG.replace("q", "joint")), (NAMELESS, NAMELESS)],
+    ids=["of one maker", "of two makers", "without headers"],
+)
+@pytest.mark.parametrize("joints", [None, 2])
+def test_a_folder_of_several_logs_is_told_as_such(
+    texts: tuple[str, str], joints: int | None, write: Write, arm: Arm, tmp_path: Path
+) -> None:
+    files = [write(text, f"{day}.csv") for day, text in zip(("monday", "tuesday"), texts, strict=True)]
     with pytest.raises(LogError) as caught:
-        read_log(files)
+        read_log(files, robot=arm(joints) if joints else None)
     assert str(caught.value) == (
-        f"{tmp_path}: found 3 logs, each with joints of its own (monday.csv, tuesday.csv, wednesday.csv),"
+        f"{tmp_path}: found 2 logs, each with joints of its own (monday.csv, tuesday.csv),"
         " allowed: one log, or its plots with one joint a file; name the logs one by one"
     )
+
+
+def test_a_file_of_torques_or_of_joints_not_named_is_no_log_beside_the_joints(write: Write, arm: Arm) -> None:
+    q, torques, others = (write(LOG.replace("q", name), f"{name}.csv") for name in ("q", "tau", "joint"))
+    assert read_log([q, torques], robot=arm(2)).joints == ("q1", "q2")
+    assert read_log([q, others], ReadOptions(joints=("joint2", "joint1"))).joints == ("joint2", "joint1")
 
 
 def test_german_words_and_equal_titles(write: Write) -> None:
