@@ -13,6 +13,10 @@ from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.orientation import angle_between
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.units.evidence import SAMPLES
+from urmpipe_pipeline.sources.units.rotation import settle_rotation
+from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -102,6 +106,17 @@ def test_the_kinematics_tell_of_a_rotation_vector_in_another_unit_than_its_names
     assert warning.message.endswith(" deg; --unit rotvec_x=rad says otherwise")
     given = read(table, UR5E, units={"rotvec_x": "rad"})
     assert given.units["rotvec_z"] == "rad"
+
+
+def test_rows_spread_over_a_long_log_tell_the_unit_of_its_orientation() -> None:
+    """Of twice the rows that decide every second one is looked at: the others need no kinematics."""
+    rows = np.resize(np.repeat(np.arange(ROWS), 2), 2 * SAMPLES)
+    turned = np.degrees(ROTATION.as_rotvec())[rows]
+    turned[1::2] = 0.0
+    columns = [Column(k + 1, 0, k, name, name, name, None, text=False) for k, name in enumerate("abc")]
+    rad = vocabulary().units["rad"]
+    settled = settle_rotation(columns, ("vector",), turned, (rad,) * 3, (UR5E, Q[rows]))
+    assert [unit.name for unit in settled.units] == ["deg"] * 3
 
 
 def test_rx_ry_rz_without_a_robot_are_not_guessed(read: Read) -> None:

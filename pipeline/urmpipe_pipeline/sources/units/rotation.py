@@ -15,7 +15,7 @@ from urmpipe_models.orientation import RotationForm, angles, quaternions
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.option_text import option
-from urmpipe_pipeline.sources.units.evidence import turned_apart
+from urmpipe_pipeline.sources.units.evidence import spread, turned_apart
 from urmpipe_pipeline.sources.units.unit_evidence import peak
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
@@ -163,6 +163,8 @@ def _by_kinematics(
 ) -> tuple[Choice, str] | None:
     """Return the choice with which the kinematics agree, and by how much; None if none stands out."""
     robot, q = arm
+    rows = spread(len(q))
+    q, values = q[rows], values[rows]
     known = np.isfinite(q).all(axis=1) & np.isfinite(values).all(axis=1)
     if not known.any():
         return None
