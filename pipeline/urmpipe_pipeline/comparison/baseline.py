@@ -80,8 +80,8 @@ def against_baseline(
         recording=before.recording,
         noise=level,
         changes=tuple(change for pair in pairs for change in _changes(*pair, level)),
-        new=tuple(_absent(now, [(run, old) for run, old in pairs])),
-        gone=tuple(_absent(before, [(old, run) for run, old in pairs])),
+        new=tuple(_absent(now, {run.name: (run, old) for run, old in pairs})),
+        gone=tuple(_absent(before, {old.name: (run, old) for run, old in pairs})),
         differences=tuple(_differences(now, before, pairs)),
     )
 
@@ -98,20 +98,22 @@ def _keyed(statistics: tuple[Statistics, ...]) -> dict[Key, Statistics]:
     return {(one.kind, one.quantity, one.unit): one for one in statistics}
 
 
-def _absent(result: Comparison, pairs: Sequence[Pair]) -> Iterator[Absent]:
+def _absent(result: Comparison, pairs: Mapping[str, Pair]) -> Iterator[Absent]:
     """Yield the logs of a comparison that the other lacks, and the quantities that the log of a pair lacks.
+
+    A quantity is that of the log now, whatever the log was called before.
 
     Args:
         result: The comparison.
-        pairs: Its logs that the other has, each with the log there.
+        pairs: Its logs that the other has, by their names in it.
     """
-    others = {own.name: other for own, other in pairs}
     for run in result.runs:
-        if run.name not in others:
+        if run.name not in pairs:
             yield Absent(run.name)
             continue
-        theirs = _keyed(others[run.name].all_statistics)
-        yield from (Absent(run.name, key[1]) for key in _keyed(run.all_statistics) if key not in theirs)
+        now, before = pairs[run.name]
+        theirs = _keyed((before if run is now else now).all_statistics)
+        yield from (Absent(now.name, key[1]) for key in _keyed(run.all_statistics) if key not in theirs)
 
 
 def _changes(now: Deviation, before: Deviation, noise: Mapping[str, float]) -> Iterator[Change]:

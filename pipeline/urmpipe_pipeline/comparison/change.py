@@ -97,7 +97,7 @@ class Absent:
     """What only one of the two comparisons has.
 
     Attributes:
-        run: The log's name.
+        run: The log's name; of a quantity, that which the log has now.
         quantity: A quantity of it that both logs should have; None if the log itself is absent.
     """
 
