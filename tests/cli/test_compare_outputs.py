@@ -187,14 +187,16 @@ def test_a_verdict_of_fail_writes_all_and_bad_input_nothing_but_its_error(
     assert {"JUnit: v.xml", "Statistics: v.csv"} <= set(out)
     assert names() == {"v.xml", "v.csv", "v.rrd"}
     before = {name: (folder / name).read_bytes() for name in names()}
-    for wrong in (["missing.csv"], ["--strict", "--tsp", "7ms"], ["--tolerance", "0"]):
-        assert compare("good.csv", *wrong, *files, "-q") == 2
-        told = (folder / "v.xml").read_text(encoding="utf-8")
-        assert ("<error" in told) == (wrong[0] != "--tolerance")  # click refuses that one before
-        (folder / "v.xml").write_bytes(before["v.xml"])
     (folder / "notes.txt").write_text("mine")
-    assert compare("good.csv", "--junit", "v.xml", "--csv", "notes.txt", "-o", "v.rrd", "-q") == 2
-    assert compare("good.csv", "--junit", "v.xml", "--csv", "v.csv", "-o", "notes.txt", "-q") == 2
+    for wrong in (
+        ["missing.csv"], ["--strict", "--tsp", "7ms"], ["--csv", "notes.txt"], ["-o", "notes.txt"],
+        ["--tolerance", "0"], ["--tool", "1"], ["--nosuch"], ["--map", "missing.toml"], ["--robot", "nosuch"],
+    ):  # fmt: skip
+        call = ["compare", "wanted.csv", "good.csv", "--robot", "ur5e", *files, "-q", *wrong]
+        assert run(call) == 2, wrong
+        errors = [one.text for one in ET.parse("v.xml").iter("error")]
+        assert [f"error: {one}" for one in errors] == capsys.readouterr().err.splitlines(), wrong
+        (folder / "v.xml").write_bytes(before["v.xml"])
     assert {name: (folder / name).read_bytes() for name in before} == before
     assert names() == {"v.xml", "v.csv", "v.rrd", "notes.txt"}
     assert (folder / "notes.txt").read_text() == "mine"
@@ -210,7 +212,23 @@ def test_an_output_is_no_input_and_no_other_output(capsys: Captured) -> None:
     )
     assert compare("good.csv", "--csv", "a", "--junit", "./a", "-q") == 2
     assert said(capsys) == "error: found a as junit and as statistics; allowed: a name for each"
-    assert names() == set()
+    assert names() == {"a"}
+    assert [one.text for one in ET.parse("a").iter("error")] == [
+        "found a as junit and as statistics; allowed: a name for each"
+    ]
+
+
+def test_errors_replace_neither_an_operand_nor_a_file_of_another(folder: Path) -> None:
+    assert compare("good.csv", "-q", "--junit", "v.xml") == 0
+    (folder / "other.xml").write_text("<testsuites/>")
+    before = {name: (folder / name).read_bytes() for name in ("v.xml", "other.xml")}
+    for wrong in (["v.xml", "--junit", "v.xml"], ["v.xml", "--junit=./v.xml"], ["--junit=other.xml"]):
+        assert run(["compare", "wanted.csv", "--nosuch", *wrong]) == 2
+    assert {name: (folder / name).read_bytes() for name in before} == before
+    (folder / "urmpipe.toml").write_text("robot = ur5e")
+    assert run(["compare", "wanted.csv", "good.csv", "-q", "--junit=v.xml"]) == 2
+    (error,) = ET.parse("v.xml").iter("error")
+    assert f"{folder / 'urmpipe.toml'}:1: not valid TOML" in str(error.text)
 
 
 def test_a_log_of_the_baseline_that_is_missing_is_exit_code_1() -> None:
