@@ -40,8 +40,10 @@ def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
 
 
 def _rests(one: Deviation) -> bool:
-    """Tell whether a log stays where it is: its tool centre point, and its joints where it has some."""
-    return _extent(one.actual) < AT_REST and (len(one.sample) < 2 or _extent(one.run.log.q) < AT_REST)
+    """Tell whether a log stays where it is while it is compared: its tool centre point, and its joints."""
+    run = one.run
+    compared = (one.t_ns[0] <= run.t_ns) & (run.t_ns <= one.t_ns[-1])
+    return _extent(one.actual) < AT_REST and _extent(run.q[compared]) < AT_REST
 
 
 def _extent(values: FloatArray) -> float:

@@ -62,8 +62,18 @@ def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not(arms: Co
     moving = arms({"log": np.zeros((50, 6))}).runs[0]
     still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)))
     assert list(thin_evidence(moving)) == list(thin_evidence(still)) == []
-    at_rest = replace(moving.run, log=replace(moving.run.log, q=np.tile(moving.run.log.q[0], (50, 1))))
+    at_rest = replace(moving.run, q=np.tile(moving.run.q[0], (50, 1)))
     assert [one.kind for one in thin_evidence(replace(still, run=at_rest))] == ["one-pose"]
+
+
+def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) -> None:
+    moving = arms({"log": np.zeros((50, 6))}).runs[0]
+    q = moving.run.q.copy()
+    q[:20] = q[0]
+    for compared, expected in ((20, ["one-pose"]), (21, [])):
+        kept = {name: getattr(moving, name)[:compared] for name in ("sample", "t_ns")}
+        resting = replace(moving, **kept, actual=np.zeros((compared, 3)), run=replace(moving.run, q=q))
+        assert [one.kind for one in thin_evidence(resting)] == expected
 
 
 def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compared) -> None:
