@@ -61,8 +61,11 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
     for kind, value in tolerance.items():
         unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
         if value > most:
-            said = f"a tolerance of {text.limit(value, unit)} {other} ({kind}) lets anything pass"
-            yield LogWarning("large-tolerance", f"{said}: {value:g} is in {unit}; {value:g}{other} meant?")
+            shown, bare = text.limit(value, unit), f"{value:g}"
+            said = f"a tolerance of {shown} {other} ({kind}) lets anything pass"
+            hint = f": {bare} is in {unit}; {bare}{other} meant?"
+            plain = len(bare) <= len(shown)  # 0.261799 rad was written as 15deg: it was meant
+            yield LogWarning("large-tolerance", said + hint if plain else said)
 
 
 def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:

@@ -15,6 +15,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.doubts import large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.comparison.statistics import Measured, describe
+from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
 Compared = Callable[..., Comparison]
 
@@ -92,6 +93,10 @@ def test_a_tolerance_that_nobody_means_is_told(paths: Compared) -> None:
     ]
     assert [one.message for one in large_tolerances({"angle": 0.5, "joint": 0.17})] == [
         "a tolerance of 28.6479 deg (angle) lets anything pass: 0.5 is in rad; 0.5deg meant?"
+    ]
+    assert [one.message for one in large_tolerances(parse_tolerance("angle=15deg,norm=150mm"))] == [
+        "a tolerance of 15 deg (angle) lets anything pass",
+        "a tolerance of 150 mm (norm) lets anything pass",
     ]
 
 
