@@ -327,6 +327,31 @@ def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[st
     assert err.count("\n") == 2
 
 
+def test_a_quiet_failure_against_a_baseline_says_what_is_worse(capsys: Captured) -> None:
+    assert compare("good.csv", "bad.csv", "-q", "-o", "before.rrd") == 1
+    capsys.readouterr()
+    noise = ["--noise", "50um,angle=1deg,joint=1deg"]
+    assert compare("slack.csv", "good.csv", "-q", "-o", "now.rrd", "--baseline", "before.rrd", *noise) == 1
+    verdict, decided, *against = capsys.readouterr().err.splitlines()
+    assert verdict.endswith("by the joints on both sides, but worse than the baseline against-wanted")
+    assert decided.startswith("      max |")
+    assert against == [
+        "FAIL  against the baseline against-wanted: 0 quantities worse, 1 gone",
+        "      gone: bad",
+    ]
+    good = read_lines("good.csv")
+    Path("good.csv").write_text("".join(good[:120]))
+    assert compare("good.csv", "bad.csv", "-q", "-o", "now.rrd", "--baseline", "before.rrd", *noise) == 1
+    *_, against_baseline, worse = capsys.readouterr().err.splitlines()
+    assert against_baseline == "FAIL  against the baseline against-wanted: 12 quantities worse"
+    assert worse.startswith("      worse: Δx of good (samples), Δy of good (samples), ")
+
+
+def read_lines(name: str) -> list[str]:
+    """Return the lines of a file with their ends."""
+    return Path(name).read_text(encoding="utf-8").splitlines(keepends=True)
+
+
 def test_tolerances_add_up(capsys: Captured) -> None:
     assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "norm=2mm", "--json") == 0
     assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.001, "norm": 0.002}

@@ -193,7 +193,7 @@ def _made(result: Comparison) -> dict[str, Any]:
 
 def _frame(frame: Transform) -> list[float]:
     """Return a frame as --base and --tool take it: x, y, z in [m], rx, ry, rz in [rad]."""
-    return [*frame.translation, *rpy_of(frame.rotation)]
+    return [float(value) + 0.0 for value in (*frame.translation, *rpy_of(frame.rotation))]  # + 0.0: no -0.0
 
 
 def _facts(run: Deviation) -> dict[str, Any]:
