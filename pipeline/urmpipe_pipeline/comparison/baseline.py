@@ -62,7 +62,7 @@ def against_baseline(
     Logs are the same if their names are; where both comparisons are of one log, these are held against each
     other whatever they are called. A quantity is worse if its largest value or its rms grew by more than the
     noise, if more of its samples are out of the same tolerance than the noise can have put there, or if it
-    rests on less than nine tenths of the samples.
+    rests on less than nine tenths of the samples, counted by the time that they stand for.
 
     Args:
         now: The comparison to judge.
@@ -134,10 +134,18 @@ def _changes(now: Deviation, before: Deviation, noise: Mapping[str, float]) -> I
             now=one,
             noise=level,
             share_noise=_share_noise((old[key], one), (old_values[key], values[key]), level, same),
+            periods=(_period(before), _period(now)),
             samples_shared=len(known),
             largest=None if at is None else float(step[at]),
             t_largest=None if at is None else float(now.t[here[at]]),
         )
+
+
+def _period(run: Deviation) -> float:
+    """Return the time from one sample to the next in [ns], whichever were left out between those compared."""
+    if len(run.sample) < 2:
+        return run.run.tsp * 1e9
+    return float(np.median(np.diff(run.t_ns) / np.diff(run.sample)))
 
 
 def _values(run: Deviation) -> dict[Key, FloatArray]:
