@@ -6,6 +6,8 @@ import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
+from itertools import pairwise, takewhile
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
@@ -61,3 +63,27 @@ def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
         ]
         with suppress(OSError):  # where standard output takes no more, that is told already
             echo_json({"schema": 1, "errors": errors})
+
+
+def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding]) -> None:
+    """Write errors to the JUnit file that `compare` was to write, whatever went wrong: also its own options.
+
+    Args:
+        arguments: The words of the command line.
+        findings: What went wrong, at least one.
+    """
+    options = [*takewhile(lambda word: word != "--", arguments), ""]
+    equal = "--junit="
+    named = [after for word, after in pairwise(options) if word == "--junit"]
+    named += [word.removeprefix(equal) for word in options if word.startswith(equal)]
+    if (
+        "compare" not in arguments[:1]
+        or len(set(named)) != 1
+        or not named[0]
+        or arguments.count(named[0]) > 1
+    ):
+        return  # none, two, or one that is an operand, too
+    from urmpipe_pipeline.comparison.junit_errors import tell_junit
+
+    others = [Path(word) for word in arguments if word != named[0]]
+    tell_junit(Path(named[0]), others, findings)

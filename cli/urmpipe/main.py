@@ -17,7 +17,7 @@ from typing import Any
 import click
 
 from urmpipe import __version__
-from urmpipe.boundary import findings_of, leave_output, print_findings
+from urmpipe.boundary import findings_of, leave_output, print_findings, tell_junit_of
 from urmpipe.defaults import defaults_for, find_defaults
 from urmpipe.process import tune_python
 from urmpipe.usage import Defaults, Group
@@ -126,5 +126,7 @@ def run(arguments: Sequence[str]) -> int:
             import traceback
 
             traceback.print_exception(error)
-        print_findings(findings_of(error), as_json)
+        findings = findings_of(error)
+        print_findings(findings, as_json)
+        tell_junit_of(arguments, findings)
     return 2

@@ -187,14 +187,16 @@ def test_a_verdict_of_fail_writes_all_and_bad_input_nothing_but_its_error(
     assert {"JUnit: v.xml", "Statistics: v.csv"} <= set(out)
     assert names() == {"v.xml", "v.csv", "v.rrd"}
     before = {name: (folder / name).read_bytes() for name in names()}
-    for wrong in (["missing.csv"], ["--strict", "--tsp", "7ms"], ["--tolerance", "0"]):
-        assert compare("good.csv", *wrong, *files, "-q") == 2
-        told = (folder / "v.xml").read_text(encoding="utf-8")
-        assert ("<error" in told) == (wrong[0] != "--tolerance")  # click refuses that one before
-        (folder / "v.xml").write_bytes(before["v.xml"])
     (folder / "notes.txt").write_text("mine")
-    assert compare("good.csv", "--junit", "v.xml", "--csv", "notes.txt", "-o", "v.rrd", "-q") == 2
-    assert compare("good.csv", "--junit", "v.xml", "--csv", "v.csv", "-o", "notes.txt", "-q") == 2
+    for wrong in (
+        ["missing.csv"], ["--strict", "--tsp", "7ms"], ["--csv", "notes.txt"], ["-o", "notes.txt"],
+        ["--tolerance", "0"], ["--tool", "1"], ["--nosuch"], ["--map", "missing.toml"], ["--robot", "nosuch"],
+    ):  # fmt: skip
+        call = ["compare", "wanted.csv", "good.csv", "--robot", "ur5e", *files, "-q", *wrong]
+        assert run(call) == 2, wrong
+        errors = [one.text for one in ET.parse("v.xml").iter("error")]
+        assert [f"error: {one}" for one in errors] == capsys.readouterr().err.splitlines(), wrong
+        (folder / "v.xml").write_bytes(before["v.xml"])
     assert {name: (folder / name).read_bytes() for name in before} == before
     assert names() == {"v.xml", "v.csv", "v.rrd", "notes.txt"}
     assert (folder / "notes.txt").read_text() == "mine"
@@ -210,7 +212,23 @@ def test_an_output_is_no_input_and_no_other_output(capsys: Captured) -> None:
     )
     assert compare("good.csv", "--csv", "a", "--junit", "./a", "-q") == 2
     assert said(capsys) == "error: found a as junit and as statistics; allowed: a name for each"
-    assert names() == set()
+    assert names() == {"a"}
+    assert [one.text for one in ET.parse("a").iter("error")] == [
+        "found a as junit and as statistics; allowed: a name for each"
+    ]
+
+
+def test_errors_replace_neither_an_operand_nor_a_file_of_another(folder: Path) -> None:
+    assert compare("good.csv", "-q", "--junit", "v.xml") == 0
+    (folder / "other.xml").write_text("<testsuites/>")
+    before = {name: (folder / name).read_bytes() for name in ("v.xml", "other.xml")}
+    for wrong in (["v.xml", "--junit", "v.xml"], ["v.xml", "--junit=./v.xml"], ["--junit=other.xml"]):
+        assert run(["compare", "wanted.csv", "--nosuch", *wrong]) == 2
+    assert {name: (folder / name).read_bytes() for name in before} == before
+    (folder / "urmpipe.toml").write_text("robot = ur5e")
+    assert run(["compare", "wanted.csv", "good.csv", "-q", "--junit=v.xml"]) == 2
+    (error,) = ET.parse("v.xml").iter("error")
+    assert f"{folder / 'urmpipe.toml'}:1: not valid TOML" in str(error.text)
 
 
 def test_a_log_of_the_baseline_that_is_missing_is_exit_code_1() -> None:
@@ -307,6 +325,31 @@ def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[st
     said = "FAIL  bad out of tolerance against wanted, by the joints on both sides"
     assert err.startswith(f"{said}\n      max |")
     assert err.count("\n") == 2
+
+
+def test_a_quiet_failure_against_a_baseline_says_what_is_worse(capsys: Captured) -> None:
+    assert compare("good.csv", "bad.csv", "-q", "-o", "before.rrd") == 1
+    capsys.readouterr()
+    noise = ["--noise", "50um,angle=1deg,joint=1deg"]
+    assert compare("slack.csv", "good.csv", "-q", "-o", "now.rrd", "--baseline", "before.rrd", *noise) == 1
+    verdict, decided, *against = capsys.readouterr().err.splitlines()
+    assert verdict.endswith("by the joints on both sides, but worse than the baseline against-wanted")
+    assert decided.startswith("      max |")
+    assert against == [
+        "FAIL  against the baseline against-wanted: 0 quantities worse, 1 gone",
+        "      gone: bad",
+    ]
+    good = read_lines("good.csv")
+    Path("good.csv").write_text("".join(good[:120]))
+    assert compare("good.csv", "bad.csv", "-q", "-o", "now.rrd", "--baseline", "before.rrd", *noise) == 1
+    *_, against_baseline, worse = capsys.readouterr().err.splitlines()
+    assert against_baseline == "FAIL  against the baseline against-wanted: 12 quantities worse"
+    assert worse.startswith("      worse: Δx of good (samples), Δy of good (samples), ")
+
+
+def read_lines(name: str) -> list[str]:
+    """Return the lines of a file with their ends."""
+    return Path(name).read_text(encoding="utf-8").splitlines(keepends=True)
 
 
 def test_tolerances_add_up(capsys: Captured) -> None:

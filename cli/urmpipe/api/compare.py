@@ -106,20 +106,17 @@ def compare(
         "recording": output, "junit": junit, "statistics": statistics,
     }  # fmt: skip
     told = None if junit is None else Path(junit)
-    with guarded_outputs(outputs, kept) as parts:
-        with told_in_junit(told, kept):
-            allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
-            options = CompareOptions(allowed, tcp, sync, align)
-            level = _noise_level(noise, baseline)
-            given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
-            given.refuse_unused(operands)
-            earlier = None if baseline is None else _earlier(baseline)
-            made = None if operands[1:] or earlier is None else _made_before(reference, output)
-            made = made or _compared(operands, given, options)
-            _refuse_doubts(strict, made)
-            result = (
-                made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
-            )
+    with told_in_junit(told, kept), guarded_outputs(outputs, kept) as parts:
+        allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
+        options = CompareOptions(allowed, tcp, sync, align)
+        level = _noise_level(noise, baseline)
+        given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
+        given.refuse_unused(operands)
+        earlier = None if baseline is None else _earlier(baseline)
+        made = None if operands[1:] or earlier is None else _made_before(reference, output)
+        made = made or _compared(operands, given, options)
+        _refuse_doubts(strict, made)
+        result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         if told is not None:
             write_junit(result, parts["junit"], told)
         if statistics is not None:

@@ -23,12 +23,8 @@ WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out", "samp
 
 def print_baseline(console: Console, found: BaselineComparison) -> None:
     """Print whether anything is worse, what changed beyond the noise, and what was made otherwise."""
-    number = len(found.worse)
-    worse = f"{number} {'quantity' if number == 1 else 'quantities'} worse"
-    gone = f", {len(found.gone)} gone" if found.gone else ""
-    said = "nothing worse" if found.verdict == "pass" else worse + gone
     console.print()
-    console.print(judged_line(found.verdict, f"against the baseline {found.name}: {said}"), soft_wrap=True)
+    _print_verdict(console, found)
     changed = [change for change in found.changes if change.changed]
     if changed:
         title = f"Changed since {found.name} by more than the noise"
@@ -39,13 +35,36 @@ def print_baseline(console: Console, found: BaselineComparison) -> None:
         console.print(f"  {line_of}", soft_wrap=True)
 
 
+def print_worse(console: Console, found: BaselineComparison) -> None:
+    """Print the verdict of a baseline and what decides it, a line each."""
+    _print_verdict(console, found)
+    worse = [f"{symbol(one.now)} of {one.run} ({_how(one)})" for one in found.worse]
+    for word, named in (("worse", worse), ("gone", found.gone)):
+        if named:
+            console.print(f"      {word}: {_listed(named)}", soft_wrap=True)
+
+
+def _print_verdict(console: Console, found: BaselineComparison) -> None:
+    """Print whether anything is worse, and how much of it."""
+    number = len(found.worse)
+    worse = f"{number} {'quantity' if number == 1 else 'quantities'} worse"
+    gone = f", {len(found.gone)} gone" if found.gone else ""
+    said = "nothing worse" if found.verdict == "pass" else worse + gone
+    console.print(judged_line(found.verdict, f"against the baseline {found.name}: {said}"), soft_wrap=True)
+
+
+def _how(change: Change) -> str:
+    """Return what of a quantity is worse: "max, rms"."""
+    return ", ".join(WORDS[name] for name in change.worse)
+
+
 def _columns(changes: Sequence[Change]) -> Iterator[Column]:
     """Yield the columns of the table of changes."""
     yield Column("Log", [one.run for one in changes], key=True)
     yield Column(
         "Quantity", [f"{symbol(one.now)} [{text.SHOWN[one.now.unit][0]}]" for one in changes], key=True
     )
-    yield Column("worse", [", ".join(WORDS[name] for name in one.worse) or None for one in changes])
+    yield Column("worse", [_how(one) or None for one in changes])
     for name in ("max", "rms"):
         yield Column(name, [_both(one, name) for one in changes])
     if any("samples" in (*one.worse, *one.better) for one in changes):
@@ -96,6 +115,6 @@ def _unit(kind: str) -> str:
     return "rad" if kind in ("angle", "joint") else "m"
 
 
-def _listed(absent: Sequence[Absent]) -> str:
+def _listed(absent: Sequence[Absent | str]) -> str:
     more = f" and {len(absent) - LISTED} more" if len(absent) > LISTED else ""
     return ", ".join(map(str, absent[:LISTED])) + more

@@ -47,9 +47,13 @@ def print_comparison(result: Comparison) -> None:
 
 def print_verdict(result: Comparison, *, err: bool = False) -> None:
     """Print the verdict alone, on standard error if asked to: why a quiet command fails."""
+    from urmpipe.printing.baseline import print_worse
+
     console = new_console()
     console.stderr = err
     _print_verdict(console, result)
+    if result.baseline and result.baseline.verdict == "fail":
+        print_worse(console, result.baseline)
 
 
 def _print_verdict(console: Console, result: Comparison) -> None:

@@ -62,7 +62,7 @@ def against_baseline(
     Logs are the same if their names are; where both comparisons are of one log, these are held against each
     other whatever they are called. A quantity is worse if its largest value or its rms grew by more than the
     noise, if more of its samples are out of the same tolerance than the noise can have put there, or if it
-    rests on less than nine tenths of the samples.
+    rests on less than nine tenths of the samples, counted by the time that they stand for.
 
     Args:
         now: The comparison to judge.
@@ -80,8 +80,8 @@ def against_baseline(
         recording=before.recording,
         noise=level,
         changes=tuple(change for pair in pairs for change in _changes(*pair, level)),
-        new=tuple(_absent(now, [(run, old) for run, old in pairs])),
-        gone=tuple(_absent(before, [(old, run) for run, old in pairs])),
+        new=tuple(_absent(now, {run.name: (run, old) for run, old in pairs})),
+        gone=tuple(_absent(before, {old.name: (run, old) for run, old in pairs})),
         differences=tuple(_differences(now, before, pairs)),
     )
 
@@ -98,20 +98,22 @@ def _keyed(statistics: tuple[Statistics, ...]) -> dict[Key, Statistics]:
     return {(one.kind, one.quantity, one.unit): one for one in statistics}
 
 
-def _absent(result: Comparison, pairs: Sequence[Pair]) -> Iterator[Absent]:
+def _absent(result: Comparison, pairs: Mapping[str, Pair]) -> Iterator[Absent]:
     """Yield the logs of a comparison that the other lacks, and the quantities that the log of a pair lacks.
+
+    A quantity is that of the log now, whatever the log was called before.
 
     Args:
         result: The comparison.
-        pairs: Its logs that the other has, each with the log there.
+        pairs: Its logs that the other has, by their names in it.
     """
-    others = {own.name: other for own, other in pairs}
     for run in result.runs:
-        if run.name not in others:
+        if run.name not in pairs:
             yield Absent(run.name)
             continue
-        theirs = _keyed(others[run.name].all_statistics)
-        yield from (Absent(run.name, key[1]) for key in _keyed(run.all_statistics) if key not in theirs)
+        now, before = pairs[run.name]
+        theirs = _keyed((before if run is now else now).all_statistics)
+        yield from (Absent(now.name, key[1]) for key in _keyed(run.all_statistics) if key not in theirs)
 
 
 def _changes(now: Deviation, before: Deviation, noise: Mapping[str, float]) -> Iterator[Change]:
@@ -132,10 +134,18 @@ def _changes(now: Deviation, before: Deviation, noise: Mapping[str, float]) -> I
             now=one,
             noise=level,
             share_noise=_share_noise((old[key], one), (old_values[key], values[key]), level, same),
+            periods=(_period(before), _period(now)),
             samples_shared=len(known),
             largest=None if at is None else float(step[at]),
             t_largest=None if at is None else float(now.t[here[at]]),
         )
+
+
+def _period(run: Deviation) -> float:
+    """Return the time from one sample to the next in [ns], whichever were left out between those compared."""
+    if len(run.sample) < 2:
+        return run.run.tsp * 1e9
+    return float(np.median(np.diff(run.t_ns) / np.diff(run.sample)))
 
 
 def _values(run: Deviation) -> dict[Key, FloatArray]:
@@ -191,7 +201,7 @@ def _made(result: Comparison) -> dict[str, Any]:
 
 def _frame(frame: Transform) -> list[float]:
     """Return a frame as --base and --tool take it: x, y, z in [m], rx, ry, rz in [rad]."""
-    return [*frame.translation, *rpy_of(frame.rotation)]
+    return [float(value) + 0.0 for value in (*frame.translation, *rpy_of(frame.rotation))]  # + 0.0: no -0.0
 
 
 def _facts(run: Deviation) -> dict[str, Any]:

@@ -12,7 +12,9 @@ from urmpipe_pipeline.comparison.deviation import Statistics, Verdict
 Worse: TypeAlias = Literal["max", "rms", "share_out", "samples"]
 
 KEPT = 0.9
-"""A log that keeps a smaller share of its samples lost some: one program, recorded by hand, varies less."""
+"""A log that keeps a smaller share of its samples lost some: one program, recorded by hand, varies less.
+
+Samples count by the time that they stand for: another rate of recording loses nothing."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,6 +29,7 @@ class Change:
         share_noise: Share of the samples, 0..1, that the noise can have put out of tolerance, before and now:
             those that are out by no more than it, and one sample where the times differ; None where the
             shares do not compare (no tolerance, or another one than before).
+        periods: Periods of the samples before and now in [ns]: of another rate, they stand for another time.
         samples_shared: Samples at times that both have, with a value on both sides.
         largest: Largest absolute change at one of them; None without any.
         t_largest: When that was, in [s] of the log.
@@ -37,6 +40,7 @@ class Change:
     now: Statistics
     noise: float
     share_noise: tuple[float, float] | None
+    periods: tuple[float, float]
     samples_shared: int
     largest: float | None
     t_largest: float | None
@@ -44,12 +48,14 @@ class Change:
     @property
     def worse(self) -> tuple[Worse, ...]:
         """What of it is larger than before by more than the noise; samples: it rests on far fewer."""
-        return self._larger(self.before, self.now, self.share_noise and self.share_noise[1])
+        return self._larger(self.before, self.now, self.share_noise and self.share_noise[1], self.periods)
 
     @property
     def better(self) -> tuple[Worse, ...]:
         """What of it is smaller than before by more than the noise; samples: it rests on far more."""
-        return self._larger(self.now, self.before, self.share_noise and self.share_noise[0])
+        return self._larger(
+            self.now, self.before, self.share_noise and self.share_noise[0], self.periods[::-1]
+        )
 
     @property
     def changed(self) -> bool:
@@ -57,7 +63,9 @@ class Change:
         moved = self.largest is not None and self.largest > self.noise
         return bool(self.worse or self.better or moved or self.before.verdict != self.now.verdict)
 
-    def _larger(self, one: Statistics, other: Statistics, share_noise: float | None) -> tuple[Worse, ...]:
+    def _larger(
+        self, one: Statistics, other: Statistics, share_noise: float | None, periods: tuple[float, float]
+    ) -> tuple[Worse, ...]:
         """Return what of the other is larger than of the one by more than the noise, or rests on less."""
         found: list[Worse] = []
         if other.max > one.max + self.noise:
@@ -66,8 +74,10 @@ class Change:
             found.append("rms")
         if share_noise is not None and (other.share_out or 0.0) > (one.share_out or 0.0) + share_noise:
             found.append("share_out")
-        if one.samples and other.samples is not None and other.samples < KEPT * one.samples:
-            found.append("samples")
+        if one.samples and other.samples is not None:
+            lasted, lasts = one.samples * periods[0], other.samples * periods[1]
+            if lasts < KEPT * lasted:
+                found.append("samples")
         return tuple(found)
 
     def to_dict(self) -> dict[str, Any]:
@@ -97,7 +107,7 @@ class Absent:
     """What only one of the two comparisons has.
 
     Attributes:
-        run: The log's name.
+        run: The log's name; of a quantity, that which the log has now.
         quantity: A quantity of it that both logs should have; None if the log itself is absent.
     """
 

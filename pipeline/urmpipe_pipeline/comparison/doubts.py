@@ -40,8 +40,10 @@ def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
 
 
 def _rests(one: Deviation) -> bool:
-    """Tell whether a log stays where it is: its tool centre point, and its joints where it has some."""
-    return _extent(one.actual) < AT_REST and (len(one.sample) < 2 or _extent(one.run.log.q) < AT_REST)
+    """Tell whether a log stays where it is while it is compared: its tool centre point, and its joints."""
+    run = one.run
+    compared = (one.t_ns[0] <= run.t_ns) & (run.t_ns <= one.t_ns[-1])
+    return _extent(one.actual) < AT_REST and _extent(run.q[compared]) < AT_REST
 
 
 def _extent(values: FloatArray) -> float:
@@ -59,8 +61,11 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
     for kind, value in tolerance.items():
         unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
         if value > most:
-            said = f"a tolerance of {text.limit(value, unit)} {other} ({kind}) lets anything pass"
-            yield LogWarning("large-tolerance", f"{said}: {value:g} is in {unit}; {value:g}{other} meant?")
+            shown, bare = text.limit(value, unit), f"{value:g}"
+            said = f"a tolerance of {shown} {other} ({kind}) lets anything pass"
+            hint = f": {bare} is in {unit}; {bare}{other} meant?"
+            plain = len(bare) <= len(shown)  # 0.261799 rad was written as 15deg: it was meant
+            yield LogWarning("large-tolerance", said + hint if plain else said)
 
 
 def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:

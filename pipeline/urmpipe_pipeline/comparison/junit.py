@@ -8,7 +8,7 @@ There is no one schema. What the consumers take, and what is written here:
     testcase     classname, name, time: both names are needed, and each pair stands once
     failure      message, type, and the same as text: one a test case, as Jenkins keeps one
     error        the same, of a test case that could not be run
-    system-out   behind the test cases: the warnings of a log
+    system-out   behind the test cases: the warnings of a log, and those of the comparison that are for all
 
 GitLab shows the class names in place of the suites, and of a failure the text alone. Times are 0: consumers
 add them up as run times, and nothing was timed; that of the motion is the property duration. A test case is a
@@ -32,6 +32,7 @@ from urmpipe_pipeline.comparison.change import Absent, Change
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
 from urmpipe_pipeline.comparison.wording import excess
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import JUNIT_HEADER
 
 OUT_OF_TOLERANCE = "out-of-tolerance"
@@ -104,12 +105,16 @@ def _suite(result: Comparison, run: Deviation) -> ET.Element:
     if result.baseline:
         suite.extend(_changed(one) for one in result.baseline.changes if one.run == run.name)
         suite.extend(_lost(one) for one in result.baseline.gone if one.run == run.name)
-    told = [f"{one.kind}: {one.message}" for one in run.run.warnings]
-    of_log = [one for one in result.warnings if one.message.startswith(f"{run.name}: ")]
-    told += [f"{one.kind}: {one.message}" for one in of_log]
-    if told:
+    if told := [f"{one.kind}: {one.message}" for one in _warnings(result, run)]:
         ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, told))
     return _counted(suite, result.provenance.created[:19])
+
+
+def _warnings(result: Comparison, run: Deviation) -> Iterator[LogWarning]:
+    """Yield the warnings of a log, and those of its comparison that are about no other log."""
+    yield from run.run.warnings
+    others = tuple(f"{one.name}: " for one in result.runs if one is not run)
+    yield from (one for one in result.warnings if not one.message.startswith(others))
 
 
 def _counted(suite: ET.Element, timestamp: str = "") -> ET.Element:

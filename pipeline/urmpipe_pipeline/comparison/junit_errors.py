@@ -6,16 +6,14 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from urmpipe_models.errors import OutputError, UrmpipeError
+from urmpipe_models.errors import Finding, OutputError, UrmpipeError
 from urmpipe_pipeline.comparison.junit import write_junit
 from urmpipe_pipeline.outputs import guarded_output
 
 
 @contextmanager
 def told_in_junit(path: Path | None, inputs: Sequence[Path]) -> Iterator[None]:
-    """Write an error of the body to a JUnit file, too, as one test case a finding, and raise it on.
-
-    A file that is no JUnit file of urmpipe's, or an input, is left as it is.
+    """Write an error of the body to a JUnit file, too, as `tell_junit` does, and raise it on.
 
     Args:
         path: The JUnit file; None for none.
@@ -25,6 +23,19 @@ def told_in_junit(path: Path | None, inputs: Sequence[Path]) -> Iterator[None]:
         yield
     except UrmpipeError as error:
         if path is not None:
-            with suppress(OutputError), guarded_output(path, inputs, "junit") as part:
-                write_junit(error.findings, part, path)
+            tell_junit(path, inputs, error.findings)
         raise
+
+
+def tell_junit(path: Path, inputs: Sequence[Path], findings: Sequence[Finding]) -> None:
+    """Write why there is no verdict to a JUnit file, one test case a finding.
+
+    A file that is no JUnit file of urmpipe's, or an input, is left as it is.
+
+    Args:
+        path: The JUnit file.
+        inputs: The files that it may not replace.
+        findings: What was wrong, at least one.
+    """
+    with suppress(OutputError), guarded_output(path, inputs, "junit") as part:
+        write_junit(findings, part, path)

@@ -159,6 +159,26 @@ def test_a_log_that_lost_a_tenth_of_its_samples_is_worse(paths: Compared, sample
     assert unknown.worse == ()
 
 
+@pytest.mark.parametrize(("samples", "verdict"), [(25, "pass"), (20, "fail")])
+def test_samples_count_by_the_time_that_they_stand_for(paths: Compared, samples: int, verdict: str) -> None:
+    before, now = paths({"a": off(0.0)}), paths({"a": off(0.0, samples)})
+    slower = replace(now, runs=(replace(now.runs[0], t_ns=now.runs[0].t_ns * 4),))  # 20 ms instead of 5 ms
+    assert against_baseline(slower, before).verdict == verdict
+    found = against_baseline(before, slower)  # and back: no more than as much time is no loss
+    assert (found.verdict, {change.worse for change in found.changes}) == ("pass", {()})
+    faster = replace(before, runs=(replace(before.runs[0], t_ns=before.runs[0].t_ns // 2),))
+    assert {change.worse for change in against_baseline(faster, before).changes} == {("samples",)}
+
+
+def test_samples_left_out_between_others_are_lost_time(paths: Compared) -> None:
+    before = paths({"a": off(0.0)})
+    run = before.runs[0]
+    kept = {name: getattr(run, name)[::2] for name in ("sample", "t_ns", "delta", "path", "outside")}
+    statistics = {name: replace(one, samples=50) for name, one in run.statistics.items()}
+    now = replace(before, runs=(replace(run, **kept, statistics=statistics),))
+    assert {change.worse for change in against_baseline(now, before).changes} == {("samples",)}
+
+
 def test_another_base_and_another_tool_are_told(arms: Compared) -> None:
     before = arms({"a": np.zeros((20, 6))})
     run = before.runs[0]

@@ -15,6 +15,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.doubts import large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.comparison.statistics import Measured, describe
+from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
 Compared = Callable[..., Comparison]
 
@@ -62,8 +63,18 @@ def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not(arms: Co
     moving = arms({"log": np.zeros((50, 6))}).runs[0]
     still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)))
     assert list(thin_evidence(moving)) == list(thin_evidence(still)) == []
-    at_rest = replace(moving.run, log=replace(moving.run.log, q=np.tile(moving.run.log.q[0], (50, 1))))
+    at_rest = replace(moving.run, q=np.tile(moving.run.q[0], (50, 1)))
     assert [one.kind for one in thin_evidence(replace(still, run=at_rest))] == ["one-pose"]
+
+
+def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) -> None:
+    moving = arms({"log": np.zeros((50, 6))}).runs[0]
+    q = moving.run.q.copy()
+    q[:20] = q[0]
+    for compared, expected in ((20, ["one-pose"]), (21, [])):
+        kept = {name: getattr(moving, name)[:compared] for name in ("sample", "t_ns")}
+        resting = replace(moving, **kept, actual=np.zeros((compared, 3)), run=replace(moving.run, q=q))
+        assert [one.kind for one in thin_evidence(resting)] == expected
 
 
 def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compared) -> None:
@@ -82,6 +93,10 @@ def test_a_tolerance_that_nobody_means_is_told(paths: Compared) -> None:
     ]
     assert [one.message for one in large_tolerances({"angle": 0.5, "joint": 0.17})] == [
         "a tolerance of 28.6479 deg (angle) lets anything pass: 0.5 is in rad; 0.5deg meant?"
+    ]
+    assert [one.message for one in large_tolerances(parse_tolerance("angle=15deg,norm=150mm"))] == [
+        "a tolerance of 15 deg (angle) lets anything pass",
+        "a tolerance of 150 mm (norm) lets anything pass",
     ]
 
 

@@ -139,10 +139,28 @@ def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, 
     assert [one.text for one in lost] == ["angle: in the baseline, not compared any more"]
 
 
+def test_a_quantity_that_is_gone_fails_whatever_the_log_was_called(
+    paths: Compared, arms: Compared, tmp_path: Path
+) -> None:
+    before, now = arms({"monday": np.zeros((100, 6))}), paths({"tuesday": off(0.0)})
+    result = replace(now, baseline=against_baseline(now, before))
+    assert result.baseline is not None
+    gone = ["angle", *(f"q{number}" for number in range(1, 7))]
+    assert [str(one) for one in result.baseline.gone] == [f"{name} of tuesday" for name in gone]
+    root = written(result, tmp_path / "verdict.xml")
+    assert (result.verdict, root.get("failures")) == ("fail", "7")
+    failed = [(case.get("classname"), case.get("name")) for case in root.iter("testcase") if len(case)]
+    assert failed == [("tuesday against baseline", f"{name} is there") for name in gone]
+
+
 def test_the_warnings_of_a_log_stand_behind_its_cases(paths: Compared, tmp_path: Path) -> None:
-    result = paths({"short": off(0.001, 50), "long": off(0.001)})
+    result = paths({"short": off(0.001, 50), "long": off(0.001)}, tolerance={"norm": 0.15})
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
     covered = "it covers 0.245 s of the 0.495 s of path (50.0 %)"
+    for_all = "large-tolerance: a tolerance of 150 mm (norm) lets anything pass"
+    assert told == [f"{for_all}\nnot-covered: short: {covered}: the rest was not judged", for_all]
+    result = paths({"short": off(0.001, 50), "long": off(0.001)})
+    told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
     assert told == [f"not-covered: short: {covered}: the rest was not judged", None]
 
 
