@@ -85,6 +85,8 @@ def test_everything_that_is_wrong_with_it(lab: Path, capsys: Captured) -> None:
         ("tsp = -1", "key tsp: found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
         ("[ingest]\ntsp = -1", "key tsp: found '-1', allowed: a positive time in s, such as 0.005 or 5ms"),
         ("derivative = 'x'", "key derivative: found 'x', allowed: central, savgol"),
+        ("strict = 'yes'", 'key strict: found "yes", allowed: true or false'),
+        ("tsp = true", "key tsp: found true, allowed: a text, a number, or a list of them"),
         ("[ignest]\ntsp = 1", f"key ignest: found 'ignest' (did you mean ingest?), allowed: {NAMES}"),
     ],
 )
@@ -233,4 +235,4 @@ def test_tables_and_truths_are_no_values(lab: Path, capsys: Captured) -> None:
     assert "key unit: found a table, allowed: a value" in capsys.readouterr().err
     (lab / "urmpipe.toml").write_text("robot = true\n")
     assert run([*INGEST]) == 2
-    assert "error: unknown robot 'True'; allowed: " in capsys.readouterr().err
+    assert "urmpipe.toml: key robot: found true, allowed: a text, a number, " in capsys.readouterr().err
