@@ -11,7 +11,7 @@ from click.core import ParameterSource
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import TableOptions, table_options
-from urmpipe.options.types import DURATION, JointValuesType, OneOf
+from urmpipe.options.types import DURATION, JointValuesType, OneOf, WholeType
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -71,14 +71,12 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 )
 @click.option(
     "--restarts",
-    type=click.IntRange(min=0),
+    type=WholeType(),
     default=20,
     show_default=True,
     help="Random starts of the iterative solver where the first fails.",
 )
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random starts."
-)
+@click.option("--seed", type=WholeType(), default=0, show_default=True, help="Of the random starts.")
 @table_options
 @output_options
 def ik(
