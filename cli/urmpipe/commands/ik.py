@@ -106,6 +106,7 @@ def ik(
     """
     tune_pyarrow()
     reading = table.reading()
+    replaces = output is not None and output.exists()
     with terminal.progress(f"Solving {targets}") as progress:
         result = urmpipe.ik(
             targets,
@@ -118,18 +119,19 @@ def ik(
             **options,
         )
     terminal.warn(result.warnings)
-    terminal.answer(result.to_dict, lambda: _print(result, every))
+    terminal.answer(result.to_dict, lambda: _print(result, every, reading.robot, replaces))
     return 0 if result.verdict == "pass" else 1
 
 
-def _print(result: InverseResult, every: bool) -> None:
-    """Print what was found, and what was written."""
+def _print(result: InverseResult, every: bool, robot: str | None, replaces: bool) -> None:
+    """Print what was found, and what was written: how to read it names the robot as the caller does."""
     from urmpipe.printing.inverse import print_inverse
     from urmpipe.printing.terminal import print_recording, say
 
     print_inverse(result, every=every)
     written = result.output
     if written is not None and written.suffix == ".rrd":
-        print_recording(written)
+        print_recording(written, replaced=replaces)
     elif written is not None:
-        say(f"Joints: {written}  (read it: urmpipe ingest {written} --robot {result.robot.name})")
+        earlier = "; it replaced an earlier one" if replaces else ""
+        say(f"Joints: {written}  (read it: urmpipe ingest {written} --robot {robot}{earlier})")
