@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import io
 import os
 import sys
 from collections.abc import Sequence
 from contextlib import suppress
 from itertools import pairwise, takewhile
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TextIO
 
 import click
 
@@ -21,9 +22,33 @@ SHOWN_FINDINGS = 20
 """Errors printed line by line; the others are counted."""
 
 
+def open_streams() -> None:
+    """Make both outputs take whatever a name of a file holds, also where the caller has closed them."""
+    for name in ("stdout", "stderr"):
+        stream = getattr(sys, name)
+        if stream is None:
+            setattr(sys, name, Path(os.devnull).open("w", encoding="utf-8"))  # noqa: SIM115 - to the end
+        elif isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")
+
+
+def close_streams() -> None:
+    """Write what is left of both outputs; Python would tell a full disk again, and exit with its own code."""
+    for stream in (sys.stdout, sys.stderr):
+        try:
+            stream.flush()
+        except OSError:
+            _leave(stream)
+
+
 def leave_output() -> None:
     """Let nothing more go to standard output, which took no more."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+    _leave(sys.stdout)
+
+
+def _leave(stream: TextIO) -> None:
+    """Let nothing more go to a stream."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def findings_of(error: BaseException) -> Sequence[Finding]:
@@ -40,7 +65,7 @@ def findings_of(error: BaseException) -> Sequence[Finding]:
         case click.ClickException():
             said = error.format_message()
         case click.Abort() | KeyboardInterrupt():
-            said = "stopped before it was done; nothing was written"
+            said = "stopped before it was done; no file is left half written"
         case MemoryError():
             said = "out of memory"
         case _:
@@ -50,10 +75,11 @@ def findings_of(error: BaseException) -> Sequence[Finding]:
 
 def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
     """Print errors on standard error, a line each, and as one JSON object if it is asked for."""
-    for finding in findings[:SHOWN_FINDINGS]:
-        click.echo(f"error: {finding}", err=True)
+    lines = [f"error: {finding}" for finding in findings[:SHOWN_FINDINGS]]
     if len(findings) > SHOWN_FINDINGS:
-        click.echo(f"error: and {len(findings) - SHOWN_FINDINGS} more", err=True)
+        lines.append(f"error: and {len(findings) - SHOWN_FINDINGS} more")
+    with suppress(OSError):  # where standard error takes no more, the exit code tells it all the same
+        click.echo("\n".join(lines), err=True)
     if as_json:
         from urmpipe.printing.terminal import echo_json
 

@@ -12,7 +12,8 @@ above it; options on the command line come first. Files named in it are seen fro
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import json
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -75,29 +76,32 @@ def _faults(data: Mapping[str, Any], path: Path, commands: Mapping[str, click.Co
     from urmpipe_models.errors import Finding
     from urmpipe_models.names import not_among
 
-    every = sorted({name for one in commands.values() for name in _options(one)})
+    every = {name: option for one in commands.values() for name, option in _options(one).items()}
     for key, value in data.items():
+        place = ""
         if isinstance(value, Mapping) and key in commands:
-            own = sorted(_options(commands[key]))
+            own, place = _options(commands[key]), f"{key}."
             faults = [_fault(name, inner, own) for name, inner in value.items()]
         elif isinstance(value, Mapping) and key not in every:
             faults = [f"{key}: {not_among(key, commands)}"]
         else:
             faults = [_fault(key, value, every)]
-        place = f"{key}." if key in commands else ""
         yield from (Finding(f"key {place}{fault}", str(path)) for fault in faults if fault)
 
 
-def _fault(name: str, value: Any, allowed: Sequence[str]) -> str | None:
+def _fault(name: str, value: Any, allowed: Mapping[str, click.Option]) -> str | None:
     """Return what is wrong with one key and its value; None if nothing is."""
     from urmpipe_models.names import did_you_mean, listed
 
     if f"--{name}" in EACH_TIME:
         return f"{name}: found what one call is to give, allowed: --{name} on the command line"
     if name not in allowed:
-        return f"{name}: unknown{did_you_mean(name, allowed)}; allowed: {listed(name, allowed)}"
+        return f"{name}: unknown{did_you_mean(name, allowed)}; allowed: {listed(name, sorted(allowed))}"
     if isinstance(value, Mapping) and name not in TABLES:
         return f"{name}: found a table, allowed: a value"
+    if allowed[name].is_flag != isinstance(value, bool):
+        kinds = "true or false" if allowed[name].is_flag else "a text, a number, or a list of them"
+        return f"{name}: found {json.dumps(value, default=str)}, allowed: {kinds}"
     return None
 
 

@@ -7,7 +7,6 @@ checks), 2 bad input or usage.
 from __future__ import annotations
 
 import gc
-import io
 import sys
 from collections.abc import Sequence
 from importlib import import_module
@@ -17,7 +16,14 @@ from typing import Any
 import click
 
 from urmpipe import __version__
-from urmpipe.boundary import findings_of, leave_output, print_findings, tell_junit_of
+from urmpipe.boundary import (
+    close_streams,
+    findings_of,
+    leave_output,
+    open_streams,
+    print_findings,
+    tell_junit_of,
+)
 from urmpipe.defaults import defaults_for, find_defaults
 from urmpipe.process import tune_python
 from urmpipe.usage import Defaults, Group
@@ -49,7 +55,8 @@ class LazyGroup(Group):
         if cmd_name not in COMMANDS:
             return None
         command = self._load(cmd_name)
-        path = None if isinstance(command, click.Group) else find_defaults()
+        asked = not isinstance(command, click.Group) and not ctx.resilient_parsing  # a shell that completes
+        path = find_defaults() if asked else None
         if path is not None:
             ctx.default_map = {cmd_name: self._defaults(ctx, command, path)}
         return command
@@ -101,14 +108,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: errors become lines on standard error and the exit code 2."""
     given = list(sys.argv[1:] if arguments is None else arguments)
     tune_python()
-    for stream in (sys.stdout, sys.stderr):
-        if isinstance(stream, io.TextIOWrapper):
-            stream.reconfigure(errors="backslashreplace")  # names of files and signs that it cannot take
+    open_streams()
     code = run(given)
-    try:
-        sys.stdout.flush()
-    except OSError:  # a full disk, which was told; Python would tell it again
-        leave_output()
+    close_streams()
     gc.freeze()  # else Python looks for cycles among all modules before it exits
     sys.exit(code)
 
@@ -121,6 +123,8 @@ def run(arguments: Sequence[str]) -> int:
     except BrokenPipeError:  # the reader of a help text left, as head does; results are told to the end
         leave_output()
         return 0
+    except click.exceptions.NoArgsIsHelpError as error:  # a group alone, which is answered by its help
+        error.show()
     except (Exception, KeyboardInterrupt) as error:
         if "--debug" in arguments:
             import traceback

@@ -77,6 +77,10 @@ def usage_finding(error: click.UsageError) -> Finding:
         case click.NoSuchOption():
             options = [name for param in ctx.command.params for name in param.opts] if ctx else []
             said = f"{error.option_name}: no such option{did_you_mean(error.option_name, options)}"
+        case click.BadOptionUsage(option_name=name):
+            lacks = "requires" in error.message  # click tells the two apart by its words alone
+            found, allowed = ("no value", "VALUE") if lacks else ("a value", "alone")
+            said = f"{name}: found {found}, allowed: {name} {allowed}"
         case click.MissingParameter(param=click.Parameter() as param):
             said = f"found no {_told(param)}, allowed: {_usage(ctx)}"
         case click.BadParameter(param=click.Parameter() as param):

@@ -195,7 +195,10 @@ def test_a_joint_log_is_what_ingest_reads(capsys: Captured, folder: Path) -> Non
     assert log.joints == load_robot("ur5e").coordinates
     assert np.array_equal(log.t_ns, 10_000_000 * np.arange(60))
     assert np.abs(log.q - q).max() < 1e-9  # the poses stand in the file with 16 digits
-    assert run(["ik", "path.csv", "--robot", "ur5e", "-o", "log.csv", "-q"]) == 0  # one of ours is replaced
+    assert run(["robot", "export", "ur5e", "-o", "mine.toml", "-q"]) == 0
+    assert run(["ik", "path.csv", "--robot", "mine.toml", "-o", "log.csv"]) == 0
+    told = "(read it: urmpipe ingest log.csv --robot mine.toml; it replaced an earlier one)"
+    assert capsys.readouterr().out.splitlines()[-1] == f"Joints: log.csv  {told}"
 
 
 def test_targets_without_solution_are_left_out_of_a_log_and_nothing_at_all_is_not_written(

@@ -187,8 +187,8 @@ def test_a_method_that_a_path_does_not_take(capsys: Captured) -> None:
             )
             for value in ("0", "-1", "nan", "3.5 km", "angle=1deg")
         ),
-        ("--restarts", "-1", "-1 is not in the range x>=0."),
-        ("--seed", "-1", "-1 is not in the range x>=0."),
+        ("--restarts", "-1", "found '-1', allowed: a whole number, 0 or more"),
+        ("--seed", "-1", "found '-1', allowed: a whole number, 0 or more"),
         ("--method", "magic", "found 'magic', allowed: auto, closed, iterative"),
     ],
 )

@@ -16,8 +16,8 @@ from click.testing import CliRunner
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from urmpipe.main import COMMANDS, cli
-from urmpipe.options.types import ROBOT, OffsetType
+from urmpipe.main import COMMANDS, cli, run
+from urmpipe.options.types import OffsetType
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
@@ -81,6 +81,9 @@ FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0
         ("robot lst", "found 'lst' (did you mean list?), allowed: export, list, show"),
         ("ingest", "found no LOG..., allowed: urmpipe ingest [OPTIONS] LOG..."),
         ("ingest x --robt a", "--robt: no such option (did you mean --robot?); see urmpipe ingest --help"),
+        ("ingest x --tsp", "--tsp: found no value, allowed: --tsp VALUE"),
+        ("ingest x --json=1", "--json: found a value, allowed: --json alone"),
+        ("ik x --restarts -1", "--restarts: found '-1', allowed: a whole number, 0 or more"),
         ("ingest x --tsp never", f"--tsp: found 'never', {DURATIONS}"),
         ("ingest x --tsp -1", f"--tsp: found '-1', {DURATIONS}"),
         ("ingest x --tsp 5m", f"--tsp: found '5m', {DURATIONS}"),
@@ -133,9 +136,33 @@ def test_debug_adds_the_traceback(urmpipe: RunCommand) -> None:
     assert "Traceback (most recent call last)" in ran.err
 
 
-def test_shell_completion_offers_commands_and_robots() -> None:
-    robots = ROBOT.shell_complete(click.Context(cli), click.Option(["--robot"]), "ur5")
-    assert {item.value for item in robots} >= {"ur5", "ur5e"}
+@pytest.mark.parametrize("words", [(), ("robot",), ("fmu",)], ids=" ".join)
+def test_a_group_alone_answers_with_its_help(urmpipe: RunCommand, words: tuple[str, ...]) -> None:
+    ran = urmpipe(*words)
+    assert (ran.code, ran.out, ran.err) == (2, "", urmpipe(*words, "--help").out)
+
+
+@pytest.mark.parametrize(
+    ("line", "offered"),
+    [
+        ("urmpipe in", "plain,ingest\n"),
+        ("urmpipe ingest log.csv --robot ur5", "plain,ur5\nplain,ur5e\nfile,ur5\n"),
+        ("urmpipe simulate log-to-delta --set l", "plain,log=\n"),
+    ],
+)
+@pytest.mark.parametrize("lab", ['robot = "urm6"\n', "robot = urm6\n"], ids=["sound", "broken"])
+def test_a_shell_completes_whatever_the_lab_says(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str],
+    line: str, offered: str, lab: str,
+) -> None:  # fmt: skip
+    (tmp_path / "urmpipe.toml").write_text(lab)
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("_URMPIPE_COMPLETE", "bash_complete")
+    monkeypatch.setenv("COMP_WORDS", line)
+    monkeypatch.setenv("COMP_CWORD", str(line.count(" ")))
+    with pytest.raises(SystemExit):
+        run([])
+    assert capsys.readouterr() == (offered, "")
 
 
 @pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
@@ -145,3 +172,20 @@ def test_an_output_that_is_full_is_one_line(arguments: tuple[str, ...]) -> None:
         command = [sys.executable, "-m", "urmpipe", "fmu", "list", *arguments]
         done = subprocess.run(command, stdout=full, stderr=subprocess.PIPE, text=True, check=False)
     assert (done.returncode, done.stderr) == (2, "error: No space left on device\n")
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="no device that is full")
+def test_a_standard_error_that_is_full_is_no_verdict() -> None:
+    with Path("/dev/full").open("w") as full:
+        command = [sys.executable, "-m", "urmpipe", "ingest", "missing.csv"]
+        assert subprocess.run(command, stderr=full, check=False).returncode == 2
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="closes an output as a shell of Unix does")
+def test_outputs_that_are_closed_are_no_fault() -> None:
+    command = [sys.executable, "-m", "urmpipe", "robot", "list"]
+    for closed in (">&-", "2>&-"):
+        done = subprocess.run(
+            ["sh", "-c", f'"$@" {closed}', "sh", *command], capture_output=True, check=False
+        )
+        assert (done.returncode, done.stderr) == (0, b""), closed

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from importlib.util import module_from_spec, spec_from_file_location
 from typing import Any
 
@@ -10,6 +11,9 @@ import pytest
 
 from pages import DOCS, command_lines, pages, text_of
 from urmpipe.defaults import EACH_TIME
+
+OF_OTHERS = {"--start-values", "--debug-logging", "--no-arr", "--truncate-length"}
+"""Options of fmpy and ros2 that pages name."""
 
 
 @pytest.fixture(scope="module")
@@ -48,3 +52,11 @@ def test_every_command_that_a_page_shows_is_one_with_these_options(writer: Any) 
             options = {opt for param in known[name].command.params for opt in param.opts} | {"--help"}
             given = {word.partition("=")[0] for word in words if word.startswith("--")}
             assert given <= options, f"{page}: {line}"
+
+
+def test_every_option_that_a_page_names_in_its_text_is_one_of_a_command(writer: Any) -> None:
+    known = {opt for _, one in writer.commands() for param in one.command.params for opt in param.opts}
+    for page in pages():
+        for code in re.findall(r"`([^`\n]+)`", text_of(page)):
+            named = set(re.findall(r"(?<![\w-])--[a-z][a-z-]*", code))
+            assert named <= known | OF_OTHERS | {"--help"}, f"{page}: {code}"

@@ -11,7 +11,7 @@ from click.core import ParameterSource
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import TableOptions, table_options
-from urmpipe.options.types import DURATION, JointValuesType, OneOf
+from urmpipe.options.types import DURATION, JointValuesType, OneOf, WholeType
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
@@ -71,14 +71,12 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 )
 @click.option(
     "--restarts",
-    type=click.IntRange(min=0),
+    type=WholeType(),
     default=20,
     show_default=True,
     help="Random starts of the iterative solver where the first fails.",
 )
-@click.option(
-    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Of the random starts."
-)
+@click.option("--seed", type=WholeType(), default=0, show_default=True, help="Of the random starts.")
 @table_options
 @output_options
 def ik(
@@ -108,6 +106,7 @@ def ik(
     """
     tune_pyarrow()
     reading = table.reading()
+    replaces = output is not None and output.exists()
     with terminal.progress(f"Solving {targets}") as progress:
         result = urmpipe.ik(
             targets,
@@ -120,18 +119,19 @@ def ik(
             **options,
         )
     terminal.warn(result.warnings)
-    terminal.answer(result.to_dict, lambda: _print(result, every))
+    terminal.answer(result.to_dict, lambda: _print(result, every, reading.robot, replaces))
     return 0 if result.verdict == "pass" else 1
 
 
-def _print(result: InverseResult, every: bool) -> None:
-    """Print what was found, and what was written."""
+def _print(result: InverseResult, every: bool, robot: str | None, replaces: bool) -> None:
+    """Print what was found, and what was written: how to read it names the robot as the caller does."""
     from urmpipe.printing.inverse import print_inverse
     from urmpipe.printing.terminal import print_recording, say
 
     print_inverse(result, every=every)
     written = result.output
     if written is not None and written.suffix == ".rrd":
-        print_recording(written)
+        print_recording(written, replaced=replaces)
     elif written is not None:
-        say(f"Joints: {written}  (read it: urmpipe ingest {written} --robot {result.robot.name})")
+        earlier = "; it replaced an earlier one" if replaces else ""
+        say(f"Joints: {written}  (read it: urmpipe ingest {written} --robot {robot}{earlier})")

@@ -144,6 +144,18 @@ class OffsetType(click.ParamType[Any]):
         return from_offset(values)
 
 
+class WholeType(click.ParamType[int]):
+    """A whole number, 0 or more."""
+
+    name = "N"
+
+    def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
+        """Return the number."""
+        if not isinstance(value, int) and not re.fullmatch("[0-9]+", value):
+            self.fail(f"found {value!r}, allowed: a whole number, 0 or more", param, ctx)
+        return int(value)
+
+
 class NamesType(click.ParamType[Any]):
     """Some names, parted by commas."""
 
