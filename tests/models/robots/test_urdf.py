@@ -109,6 +109,8 @@ def test_joints_that_the_arm_carries_beside_its_tip_need_a_choice_and_wheels_bel
     ]
     assert urdf(robot(*arm, finger), tip_link="b").coordinates == ("j1", "j2")
     assert urdf(robot(*arm, joint("wheel", "r", "d"))).coordinates == ("j1", "j2", "left")
+    footprint = [link("footprint"), joint("stands", "footprint", "r", "fixed")]
+    assert urdf(robot(*footprint, *arm, joint("wheel", "r", "d"))).coordinates == ("j1", "j2", "left")
 
 
 def test_several_roots_need_a_choice(urdf: Any) -> None:
