@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import json
 import os
+import re
 import resource
 import signal
 import subprocess
@@ -21,6 +22,9 @@ from mutants.workspace import codes, stats_file
 ATTEMPTS = 4
 """How often mutmut is started for mutants that are left when it has ended."""
 
+WHEEL = re.compile(r"^[\u2800-\u28ff].*\n?", re.MULTILINE)
+"""A line of its progress: a character of Braille, and what is done."""
+
 LOOKED_AT = 30.0
 """How often it is looked at, in [s]."""
 
@@ -35,7 +39,7 @@ def prepare(workspace: Path, processes: int) -> None:
     """Write all mutants and find out which test reaches which function, without trying a mutant."""
     _watched(workspace, processes, ["none"], ())
     if not stats_file(workspace).exists():
-        raise SystemExit(_said(workspace))
+        raise SystemExit(said(workspace))
 
 
 def try_all(workspace: Path, modules: Sequence[str], processes: int) -> None:
@@ -48,14 +52,17 @@ def try_all(workspace: Path, modules: Sequence[str], processes: int) -> None:
         _watched(workspace, processes, names, modules)
         before, left = left, _left(workspace, modules)
         if left == before:
-            raise SystemExit(f"mutmut tried no mutant:\n{_said(workspace)}")
+            raise SystemExit(f"mutmut tried no mutant:\n{said(workspace)}")
         names = left
     print(f"{len(left)} mutants are left after {ATTEMPTS} attempts", flush=True)
 
 
 def _watched(workspace: Path, processes: int, names: Sequence[str], modules: Sequence[str]) -> None:
     """Run mutmut on some mutants to its end, or until it hangs."""
-    command = [str(Path(sys.executable).with_name("mutmut")), "run", "--max-children", str(processes), *names]
+    program = Path(sys.executable).with_name("mutmut")
+    if not program.exists():
+        raise SystemExit(f"found no {program.name} beside {sys.executable}: pip install -e '.[bench]'")
+    command = [str(program), "run", "--max-children", str(processes), *names]
     variables = {**os.environ, "CI": "true", "OMP_NUM_THREADS": "1", "OPENBLAS_NUM_THREADS": "1"}
     with _log(workspace).open("a") as log:
         process = subprocess.Popen(
@@ -103,6 +110,7 @@ def _log(workspace: Path) -> Path:
     return workspace / "mutmut.log"
 
 
-def _said(workspace: Path) -> str:
-    """Return the last that mutmut printed."""
-    return _log(workspace).read_text(encoding="utf-8", errors="replace")[-5000:]
+def said(workspace: Path) -> str:
+    """Return the last that mutmut printed, without the wheel that it turns while it waits."""
+    said = _log(workspace).read_text(encoding="utf-8", errors="replace")
+    return WHEEL.sub("", said)[-5000:]

@@ -30,7 +30,7 @@ def area_of(module: str) -> str | None:
 
 def imported(source: Source) -> set[str]:
     """Return the dotted names that a file imports anywhere: of `from a import b`, a and a.b."""
-    return {name for node in source.statements for name in _names(node)}
+    return {name for node in source.statements for name in _names(source, node)}
 
 
 def top_level(sources: Sequence[Source]) -> set[str]:
@@ -133,13 +133,14 @@ def _known(source: Source, packaged: Mapping[str, Source]) -> Iterator[str]:
     for statement in _loaded(source.tree):
         if isinstance(statement, ast.Import):
             yield from (alias.name for alias in statement.names if alias.name in packaged)
-        elif isinstance(statement, ast.ImportFrom) and statement.module:
+        elif isinstance(statement, ast.ImportFrom):
+            origin = _origin(source, statement)
             for alias in statement.names:
-                inner = f"{statement.module}.{alias.name}"
+                inner = f"{origin}.{alias.name}"
                 if inner in packaged:
                     yield inner
-                elif statement.module in packaged:
-                    yield statement.module
+                elif origin in packaged:
+                    yield origin
 
 
 def _loaded(node: ast.AST) -> Iterator[ast.AST]:
@@ -154,12 +155,22 @@ def _loaded(node: ast.AST) -> Iterator[ast.AST]:
         yield from _loaded(child)
 
 
-def _names(node: ast.AST) -> Iterator[str]:
+def _names(source: Source, node: ast.AST) -> Iterator[str]:
     if isinstance(node, ast.Import):
         yield from (alias.name for alias in node.names)
-    elif isinstance(node, ast.ImportFrom) and node.module and not node.level:
-        yield node.module
-        yield from (f"{node.module}.{alias.name}" for alias in node.names)
+    elif isinstance(node, ast.ImportFrom):
+        origin = _origin(source, node)
+        yield origin
+        yield from (f"{origin}.{alias.name}" for alias in node.names)
+
+
+def _origin(source: Source, node: ast.ImportFrom) -> str:
+    """Return what a `from` imports out of, in full: of `from ..a import b` in c.d.e, c.a."""
+    if not node.level:
+        return node.module or ""
+    parts = source.module.split(".")
+    up = node.level - source.path.endswith("__init__.py")
+    return ".".join([*parts[: len(parts) - up], *filter(None, [node.module])])
 
 
 def _folder(module: str) -> str:

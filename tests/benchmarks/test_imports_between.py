@@ -42,6 +42,24 @@ def test_a_ring_counts_when_modules_are_loaded_and_not_in_functions_or_for_type_
     }
 
 
+def test_relative_imports_count_as_what_they_stand_for(tmp_path: Path) -> None:
+    house = measured(
+        tmp_path,
+        models__urmpipe_models__a="from .part import b\n",
+        models__urmpipe_models__part__b="from . import c\n",
+        models__urmpipe_models__part__c="from ..a import X\n",
+    )
+    assert house.module_rings == ("urmpipe_models.a ~ urmpipe_models.part.b ~ urmpipe_models.part.c",)
+
+
+def test_a_package_imports_from_itself_with_one_dot(tmp_path: Path) -> None:
+    package = tmp_path / "models" / "urmpipe_models" / "part"
+    package.mkdir(parents=True)
+    (package / "__init__.py").write_text('"""A package."""\n\nfrom .b import X\n', encoding="utf-8")
+    house = measured(tmp_path, models__urmpipe_models__part__b="from urmpipe_models.part import Y\n")
+    assert house.module_rings == ("urmpipe_models.part ~ urmpipe_models.part.b",)
+
+
 def test_a_ring_of_folders_needs_no_ring_of_modules(tmp_path: Path) -> None:
     house = measured(
         tmp_path,

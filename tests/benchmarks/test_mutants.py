@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from mutants.modules import PACKAGE, is_model, modules
 from mutants.results import Known, Score, equivalent, function, known_mutants, outcome, stale
+from mutants.runner import prepare, said
 from mutants.tables import interval, share, table, total, unclear
 from mutants.workspace import BUDGET, codes, codes_file, draw, suited
 
@@ -136,3 +137,19 @@ def test_tests_of_own_files_run_first_and_the_quickest_as_long_as_they_fit() -> 
     assert suited(sorted(seconds), seconds, {"own.py"}) == ["own.py::a"]
     assert suited(sorted(seconds), seconds, set()) == ["other.py::c", "own.py::a", "other.py::d"]
     assert suited(["own.py::b"], seconds, set()) == ["own.py::b"]  # one at least
+
+
+def test_mutmut_is_asked_for_where_it_is_missing(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    python = tmp_path / "bin" / "python"
+    monkeypatch.setattr("sys.executable", str(python))
+    with pytest.raises(SystemExit) as caught:
+        prepare(tmp_path, 1)
+    assert str(caught.value) == f"found no mutmut beside {python}: pip install -e '.[bench]'"
+
+
+def test_what_mutmut_said_comes_without_the_wheel_that_it_turns(tmp_path: Path) -> None:
+    (tmp_path / "mutmut.log").write_text(
+        "E   assert 1 == 2\n" + "\u2819 Running stats\n\u2839 Running stats\n" * 500 + "failed\n",
+        encoding="utf-8",
+    )
+    assert said(tmp_path) == "E   assert 1 == 2\nfailed\n"

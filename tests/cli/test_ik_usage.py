@@ -89,7 +89,7 @@ JOINT = (
         (JOINT.format("j", "fixed", "b"), "robot fixed: has no moving joint; at least one is needed"),
         (
             '<link name="c"/>' + JOINT.format("j", "revolute", "b") + JOINT.format("k", "revolute", "c"),
-            "found 2 ends with 1 moving joints; choose a tip link (--tip, tip_link): b, c",
+            "found 2 ends with 1 moving joints; choose a tip link (--tip): b, c",
         ),
     ],
 )

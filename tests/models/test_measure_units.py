@@ -24,6 +24,15 @@ def test_factors_are_those_of_the_definitions() -> None:
     assert (factor("rad/s", "rpm"), factor("rpm", "deg/s")) == (9.54929658551372, 6.0)
 
 
+def test_each_unit_is_what_its_prefix_or_a_turn_says() -> None:
+    thousand = ("mm", "mm/s", "mm/s2", "mrad", "ms", "mA", "mV")
+    degrees = ("deg", "deg/s", "deg/s2")
+    said = dict.fromkeys(thousand, 1e3) | dict.fromkeys(degrees, 180.0 / math.pi)
+    said |= {"um": 1e6, "us": 1e6, "rpm": 30.0 / math.pi}
+    found = {unit: factor(si, unit) for si, unit in EVERY if unit != si}
+    assert found == pytest.approx(said, rel=1e-15)  # pi and the quotient are rounded, each by 2^-53
+
+
 @given(st.sampled_from(PAIRS), st.floats(1e-6, 1e6))
 def test_there_and_back_is_the_same_value(pair: tuple[str, str], value: float) -> None:
     there = factor(*pair)

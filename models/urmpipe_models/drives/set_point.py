@@ -62,7 +62,7 @@ def ramp(time: Element, begin: Element, initial: Element, target: Element, speed
     """
     way, direction = np.abs(target - initial), np.sign(target - initial)
     end = begin + way / speed
-    gone = np.minimum(np.maximum(time - begin, 0.0), way / speed) * speed
+    gone = np.maximum(time - begin, 0.0) * speed
     moving = _since(time, begin) - _since(time, end)
     position = np.where(_reached(time, end), target, initial + direction * gone)
     return JointMotion(position, direction * speed * moving, 0.0 * time)

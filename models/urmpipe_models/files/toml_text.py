@@ -38,11 +38,15 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
 
 
 def _unquoted(text: str, line: int | None) -> str:
-    """Return what to write where a line has a text without quotes; nothing where that is not its fault."""
+    """Return what to write for a text without quotes or a True; nothing where that is not the fault."""
     lines = text.splitlines()
     written = lines[line - 1] if line and line <= len(lines) else ""
     bare = re.fullmatch(r"\s*([\w.-]+)\s*=\s*([^\s\"'\[{#][^\"'\[{#]*?)\s*(#.*)?", written)
-    return f"; a text needs quotes: {bare[1]} = {toml_text(bare[2])}" if bare else ""
+    if bare is None or not re.search(r"[A-Za-z]", bare[2]):  # 1,5 or .5: a number that is none in TOML
+        return ""
+    if bare[2] in {"True", "False"}:
+        return f"; allowed: {bare[1]} = {bare[2].lower()}"
+    return f"; a text needs quotes: {bare[1]} = {toml_text(bare[2])}"
 
 
 def toml_lines(table: Mapping[str, Any]) -> list[str]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from numbers import Integral
+from numbers import Integral, Real
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,7 +26,9 @@ class Search:
 
     def faults(self) -> Iterator[str]:
         """Yield which of the values make no sense."""
-        if self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
+        if self.tolerance is not None and not isinstance(self.tolerance, Real):
+            yield f"tolerance: found {self.tolerance!r}, allowed: a number of m, more than 0"
+        elif self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
             yield f"tolerance: found {self.tolerance:g} m, allowed: more than 0, finite"
         for name, value in (("restarts", self.restarts), ("seed", self.seed)):
             if not isinstance(value, Integral) or value < 0:

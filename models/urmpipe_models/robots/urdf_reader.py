@@ -114,7 +114,7 @@ def _default_tip(tree: UrdfTree, ways: dict[str, list[Edge]]) -> str | None:
     parents = {edge.parent for edge in tree.edges.values()}
     moving = {link: sum(map(_moves, way)) for link, way in ways.items() if link not in parents}
     most = [link for link, count in moving.items() if count == max(moving.values())]
-    choose = "choose a tip link (--tip, tip_link)"
+    choose = "choose a tip link (--tip)"
     if len(most) > 1:
         found = f"{len(most)} ends with {moving[most[0]]} moving joints"
         tree.fault(f"found {found}; {choose}: {_listed(moving)}")

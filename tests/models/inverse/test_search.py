@@ -21,6 +21,7 @@ def test_the_usual_search_makes_sense() -> None:
         ({"tolerance": -1.0}, "tolerance: found -1 m, allowed: more than 0, finite"),
         ({"tolerance": math.inf}, "tolerance: found inf m, allowed: more than 0, finite"),
         ({"tolerance": math.nan}, "tolerance: found nan m, allowed: more than 0, finite"),
+        ({"tolerance": {"axis": 0.1}}, "tolerance: found {'axis': 0.1}, allowed: a number of m, more than 0"),
         ({"restarts": -2}, "restarts: found -2, allowed: a whole number, 0 or more"),
         ({"restarts": 2.5}, "restarts: found 2.5, allowed: a whole number, 0 or more"),
         ({"seed": -1}, "seed: found -1, allowed: a whole number, 0 or more"),

@@ -321,12 +321,39 @@ def test_rows_that_make_no_arm_in_metres_and_radians_must_tell_their_units(robot
     assert robot(f'length_unit = "m"\nangle_unit = "rad"\n{rows}').tip.translation[0] == 612.0
 
 
+@pytest.mark.parametrize(
+    ("rows", "told"),
+    [
+        ('kind = "dh"\njoints = [{ d = 100 }]', None),
+        ('kind = "dh"\njoints = [{ d = 101 }]', "key length_unit: found none, and links of 101 m"),
+        ('kind = "urm"\nlengths = [0.1, 0.1]\ntilts = [-45]', "key angle_unit: found none, and 45 rad"),
+        ('kind = "dh"\njoints = [{ theta = 6.283185307179586 }]', None),
+        ('kind = "modified_dh"\njoints = [{ theta = -6.3 }]', "key angle_unit: found none, and 6.3 rad"),
+    ],
+)
+def test_units_are_asked_for_beyond_a_hundred_metres_and_beyond_a_turn(
+    robot: Any, rows: str, told: str | None
+) -> None:
+    if told is None:
+        assert len(robot(rows).coordinates) == 1
+    else:
+        (said,) = complaint(robot, rows)
+        assert said.startswith(f"arm.toml: {told}, allowed: ")
+
+
 def test_a_text_without_quotes_is_told_how_to_be_written(robot: Any) -> None:
     with pytest.raises(RobotError) as caught:
         robot('kind = "urm"\nname = ur5e  # mine')
     assert str(caught.value) == (
         'arm.toml:2: not valid TOML: Invalid value (at line 2, column 8); a text needs quotes: name = "ur5e"'
     )
+
+
+@pytest.mark.parametrize(("value", "hint"), [("True", "; allowed: name = true"), ("1,5", ""), (".5", "")])
+def test_what_is_no_text_gets_no_quotes(robot: Any, value: str, hint: str) -> None:
+    (said,) = complaint(robot, f'kind = "urm"\nname = {value}')
+    assert said.startswith("arm.toml:2: not valid TOML: ")
+    assert said.endswith(f"){hint}")
 
 
 def test_toml_that_is_none_names_its_line(robot: Any) -> None:

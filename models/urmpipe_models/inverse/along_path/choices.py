@@ -70,7 +70,7 @@ class Choices:
         Args:
             rows: Samples to look at, one after the other.
             column: Where the sample before them is.
-            last: Joint values of that sample, shape (joints,).
+            last: Joint values of that sample in [rad] or [m], shape (joints,).
         """
         own = self.q[rows, column]
         before = np.vstack((last, own[:-1]))

@@ -22,7 +22,8 @@ def change(
 
     Args:
         q: Joint values in [rad] or [m], shape (m, joints).
-        pull: Where each joint would move if it were free, shape (m, joints); None where all are free.
+        pull: How far each joint would move if it were free, in [rad] or [m], shape (m, joints); None where
+            all are free.
         held: Where a joint is held in [rad] or [m], NaN of one that is free, shape (joints,).
         lower: Limits in [rad] or [m], shape (joints,).
         upper: Limits in [rad] or [m], shape (joints,).

@@ -16,7 +16,7 @@ def in_nearest_turns(chain: Chain, q: FloatArray, last: FloatArray) -> FloatArra
     Args:
         chain: The arm.
         q: Joint values in [rad] or [m], within limits, shape (m, joints); NaN where there are none.
-        last: Those of the sample before them, shape (joints,).
+        last: Those of the sample before them, in [rad] or [m], shape (joints,).
     """
     turned = q.copy()
     none = np.array([[""]], dtype=np.object_)

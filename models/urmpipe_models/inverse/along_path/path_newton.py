@@ -65,7 +65,7 @@ def sweep(task: Task, guess: FloatArray, last: FloatArray, held: FloatArray, dam
     Args:
         task: Targets of the window.
         guess: Joint values in [rad] or [m], shape (w, joints), of joints that are held where they are held.
-        last: Of the sample before the window, shape (joints,).
+        last: Joint values of the sample before the window, in [rad] or [m], shape (joints,).
         held: Where a joint is held in [rad] or [m], NaN of one that is free, shape (joints,).
         damping: lambda^2 of each sample in [m2/rad2], shape (w,).
     """

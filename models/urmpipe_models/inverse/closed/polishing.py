@@ -21,8 +21,8 @@ def polished(
     Args:
         screws: Of the arm.
         wrist: The wrist centre at q = 0, shape (3,), in the unit of the screws.
-        q: Shape (3, ...).
-        target: Where the wrist centre shall be, shape (3, ...).
+        q: Joints 1 to 3 in [rad] or, of a prismatic one, in the unit of the screws, shape (3, ...).
+        target: Where the wrist centre shall be, in the unit of the screws, shape (3, ...).
 
     Returns:
         q, shape (3, ...), and the distance that is left, shape (...), in the unit of the screws.

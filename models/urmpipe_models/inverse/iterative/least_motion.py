@@ -94,7 +94,7 @@ def tangent(task: Task, q: FloatArray, home: FloatArray, settings: Settings) -> 
     Args:
         task: The targets.
         q: Joint values that meet them, in [rad] or [m], shape (joints, n).
-        home: Where least motion counts from, shape (joints, n).
+        home: Where least motion counts from, in [rad] or [m], shape (joints, n).
         settings: The limits.
     """
     J = task.miss(q).jacobian

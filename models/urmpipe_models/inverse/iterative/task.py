@@ -140,8 +140,8 @@ def turn_between(columns: FloatArray, wanted: FloatArray) -> FloatArray:
     column of S - cos(a) I with S the symmetric part, which is (1 - cos(a)) u u^T.
 
     Args:
-        columns: Of R, shape (3, 3, n), first index: which.
-        wanted: Of R_wanted, likewise.
+        columns: Of R [-], shape (3, 3, n), first index: which.
+        wanted: Of R_wanted [-], shape (3, 3, n), likewise.
     """
     turn = outer_sum(wanted, columns)
     cosine = 0.5 * (turn[0, 0] + turn[1, 1] + turn[2, 2] - 1.0)
