@@ -96,7 +96,7 @@ def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) 
     for j, name in enumerate(log.joints):
         found = fit(robot, q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0), recorded)
         if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
-            yield f"with {name} counted the other way they agree (sign = -1 of its column in a --map)"
+            yield f"with {name} counted the other way they agree (sign = -1 of its column in a map, --map)"
     base, distance = _base(robot, q, recorded)
     if distance <= CLOSE_WITH_TOOL:
         yield f"on another base they agree within {distance * 1e3:.2f} mm (--base {base})"
