@@ -10,8 +10,11 @@ from numbers import Real
 from pathlib import Path
 from typing import Any, NamedTuple, ParamSpec, TypeVar, get_args
 
+import numpy as np
+
 from urmpipe.words import by_command_line, error_in_keywords, result_in_keywords
 from urmpipe_models.errors import OptionError, UrmpipeError
+from urmpipe_pipeline.joint_log import LogWarning
 
 Parameters = ParamSpec("Parameters")
 Made = TypeVar("Made")
@@ -42,6 +45,12 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, Real) and not isinstance(value, bool)
 
 
+def _is_robot(value: Any) -> bool:
+    from urmpipe_models.chains.chain import Chain
+
+    return isinstance(value, Chain) or _is_path(value)
+
+
 def _is_read(value: Any) -> bool:
     from urmpipe_pipeline.sources import ReadOptions
 
@@ -56,7 +65,7 @@ def _is_backend(value: Any) -> bool:
 
 PATH = Kind(_is_path, "a path: text or a Path, not empty")
 SECONDS = Kind(_is_number, "a number, in s")
-FLAG = Kind(lambda value: isinstance(value, bool), "True or False")
+FLAG = Kind(lambda value: isinstance(value, (bool, np.bool_)), "True or False")
 KIND_OF_LIMIT = Kind(
     lambda value: _is_number(value) or isinstance(value, Mapping),
     'a number in m, or a mapping of kinds to m or rad, such as {"axis": 0.0035, "angle": 0.01}',
@@ -78,6 +87,7 @@ KINDS = {
     "output": PATH,
     "progress": TOLD,
     "read": Kind(_is_read, "ReadOptions, such as urmpipe.read_map(FILE).read"),
+    "robot": Kind(_is_robot, "a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)"),
     "statistics": PATH,
     "step": SECONDS,
     "strict": FLAG,
@@ -133,13 +143,18 @@ def _checked(known: Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any])
 
 def _doubts(made: Any, given: Iterable[Any]) -> Iterator[str]:
     """Yield the warnings of a result that were not shown when what it was made of was made."""
-    operands = [one for value in given for one in (value if isinstance(value, (list, tuple)) else (value,))]
-    seen = {warning.message for one in operands for warning in getattr(one, "warnings", ())}
     if not hasattr(made, "to_frame"):
         return
-    for warning in getattr(made, "warnings", ()):
-        if warning.message not in seen:
-            yield warning.message
-    for deviation in getattr(made, "runs", ()):
-        doubts = (one for one in deviation.run.warnings if one.message not in seen)
-        yield from (one.of(deviation.name).message for one in doubts)
+    operands = [one for value in given for one in (value if isinstance(value, (list, tuple)) else (value,))]
+    seen = [warning.message for one in operands for _, warning in _warnings_of(one)]
+    for log, warning in _warnings_of(made):
+        told = warning.message  # of a reference behind its name
+        if not any(told == one or told.endswith(f": {one}") for one in seen):
+            yield (warning if log is None else warning.of(log)).message
+
+
+def _warnings_of(result: Any) -> Iterator[tuple[str | None, LogWarning]]:
+    """Yield the warnings of a result, and those of the logs that it compares with the log's name."""
+    yield from ((None, one) for one in getattr(result, "warnings", ()))
+    for deviation in getattr(result, "runs", ()):
+        yield from ((deviation.name, one) for one in deviation.run.warnings)

@@ -101,6 +101,11 @@ def one_or_many(given: object) -> list[Any]:
     return [given] if alone or not isinstance(given, Iterable) else list(given)
 
 
+def paths(given: PathLike | Sequence[PathLike]) -> list[Path]:
+    """Return files that were named as paths; one alone is a list of one."""
+    return [Path(one) for one in one_or_many(given)]
+
+
 def refuse_others(name: str, given: Sequence[object], kinds: tuple[type, ...], allowed: str) -> None:
     """Raise an `OptionError` with everything that is neither a path nor of some kinds.
 

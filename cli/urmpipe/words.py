@@ -92,6 +92,9 @@ SPELLINGS = {
 _FOREIGN = re.compile(r"\b(?:ros2|rosbag|libreoffice|rerun|xacro|apt-get|pip) [^;)]*")
 """A command line of another program: its options stay."""
 
+_KEPT = re.compile(rf"(?P<option>--?[a-z-]+ '[^']*')|{_FOREIGN.pattern}|(?<!\w)'[^']*'(?!\w)")
+"""What stays as it is: that, and what is quoted (names of files and columns) and no value of an option."""
+
 _TOGETHER = re.compile(r"read=ReadOptions\(([^()]*)\) (?:with|and) read=ReadOptions\(([^()]*)\)")
 _CALLED = re.compile(r"\b(?:urmpipe )?(ingest|compare|ik|export) (\w+=[^\s,;)]+)")
 
@@ -108,10 +111,12 @@ def keywords(message: str) -> str:
     if "-" not in message:
         return message
     parts, end = [], 0
-    for foreign in _FOREIGN.finditer(message):
-        parts += [_spelled(message[end : foreign.start()]), foreign[0]]
-        end = foreign.end()
+    for kept in _KEPT.finditer(message):
+        if kept["option"] is None:
+            parts += [_spelled(message[end : kept.start()]), kept[0]]
+            end = kept.end()
     text = "".join([*parts, _spelled(message[end:])])
+    text = text.replace("tip_link, tip_link", "tip_link")  # both are named where no command line is known
     if text == message:
         return message
     return _CALLED.sub(r"\1(\2)", _TOGETHER.sub(r"read=ReadOptions(\1, \2)", text))

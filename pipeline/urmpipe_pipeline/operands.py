@@ -11,7 +11,8 @@ from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_recording, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.ingest import OF_ROBOT, UNUSED_PERIOD, ingest_log, kinematics
+from urmpipe_pipeline.runs.ingest import UNUSED_PERIOD, ingest_log
+from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources import ReadOptions
@@ -64,9 +65,10 @@ def load_runs(
 
 def _without_period_doubts(runs: Sequence[Run]) -> list[Run]:
     """Return the runs; a period that one of them needed is no doubt about the others."""
-    if all(UNUSED_PERIOD in run.warnings for run in runs):
+    doubted = UNUSED_PERIOD.kind  # its message may be in keywords
+    if all(any(one.kind == doubted for one in run.warnings) for run in runs):
         return list(runs)
-    return [replace(run, warnings=tuple(one for one in run.warnings if one != UNUSED_PERIOD)) for run in runs]
+    return [replace(run, warnings=tuple(one for one in run.warnings if one.kind != doubted)) for run in runs]
 
 
 def load_run(
@@ -101,16 +103,6 @@ def load_run(
     if isinstance(result, Simulation):
         raise RecordingError(Finding(SIMULATION, file=str(operand)))
     return on_robot(result, robot)
-
-
-def on_robot(run: Run, robot: Chain | None) -> Run:
-    """Return a run with the kinematics of an arm; as it is without one."""
-    if robot is None or robot == run.robot:
-        return run
-    tcp, warnings = kinematics(robot, run.q, run.qd, run.qdd)
-    others = [warning for warning in run.warnings if warning.kind not in OF_ROBOT]
-    made = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
-    return replace(run, robot=robot, tcp=tcp, warnings=(*others, *warnings), provenance=made)
 
 
 def load_comparison(operand: Path) -> Comparison | None:

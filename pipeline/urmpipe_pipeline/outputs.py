@@ -181,7 +181,7 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
         return f"found an input of this command, allowed: any other name for the {noun}"
     if _is_of_another_kind(path, kind):
         tables = kind == "recording" and path.suffix.lower() in TABLES
-        hint = f"; urmpipe export RUN.rrd -o {path.name} writes tables" if tables else ""
+        hint = "; urmpipe export writes tables" if tables else ""
         return f"found a name that is none of a {noun}, allowed: {path.stem}{SUFFIXES[kind][0]}{hint}"
     if not path.parent.is_dir():
         return f"found no folder {path.parent}, allowed: a folder that exists"

@@ -14,6 +14,7 @@ from urmpipe.guards import (
     Robot,
     guarded_outputs,
     one_or_many,
+    paths,
     place_robot,
     refuse_foreign,
     refuse_others,
@@ -101,7 +102,7 @@ def compare(
     """
     operands = [reference, *one_or_many(logs)]
     refuse_others("operands", operands, (Run, Comparison), OPERANDS)
-    kept = [*_files([*operands, baseline]), *map(Path, inputs)]
+    kept = [*_files([*operands, baseline]), *paths(inputs)]
     outputs: dict[OutputKind, PathLike | None] = {
         "recording": output, "junit": junit, "statistics": statistics,
     }  # fmt: skip

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from urmpipe.edge import public
-from urmpipe.guards import PathLike, refuse_foreign, refuse_others
+from urmpipe.guards import PathLike, paths, refuse_foreign, refuse_others
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import read_recording
 from urmpipe_pipeline.runs.results import Run
@@ -47,7 +47,7 @@ def export(
 
     target = None if output is None else Path(output)
     options = ExportOptions(format_of(to, target), rows, tcp)
-    kept = [Path(one) for one in inputs]
+    kept = paths(inputs)
     if isinstance(result, (Run, Comparison, Simulation)):
         own = [result.recording] if result.recording else []
         return export_result(result, target, options, [*own, *kept])

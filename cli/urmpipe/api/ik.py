@@ -10,7 +10,7 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from urmpipe.edge import public
-from urmpipe.guards import Frame, PathLike, Robot, refuse_warnings
+from urmpipe.guards import Frame, PathLike, Robot, paths, refuse_warnings
 from urmpipe.inverse.asked import Asked, arm_of, refuse_unsolvable, start_of
 from urmpipe.inverse.output import output_kind, run_of_solutions, write_joints
 from urmpipe.inverse.result import InverseResult
@@ -98,7 +98,7 @@ def ik(
     asked = Asked(arm, given, start_of(arm, start), every, within_pi, method, search, solving)
     refuse_unsolvable(asked, kind)
 
-    kept = [Path(one) for one in (*([targets] if isinstance(targets, (str, Path)) else []), *inputs)]
+    kept = [*(paths(targets) if isinstance(targets, (str, Path)) else []), *paths(inputs)]
     if path is not None and kind is not None:
         refuse_output(path, kept, kind)
     result = solved(asked)

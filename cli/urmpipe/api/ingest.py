@@ -15,6 +15,7 @@ from urmpipe.guards import (
     Robot,
     guarded_outputs,
     one_or_many,
+    paths,
     place_robot,
     refuse_others,
     refuse_warnings,
@@ -78,7 +79,7 @@ def ingest(
     )
     arm, (files, name) = for_each(lambda make: make(), parts)
     outputs: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": write_map}
-    kept = [*files, *map(Path, inputs)]
+    kept = [*files, *paths(inputs)]
     with guarded_outputs(outputs, kept) as written:
 
         def make(early: Callable[[JointLog | Run], None] | None) -> Run:

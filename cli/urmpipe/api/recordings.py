@@ -6,7 +6,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from urmpipe.edge import public
-from urmpipe.guards import PathLike
+from urmpipe.guards import PathLike, paths
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline import recording
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -53,4 +53,4 @@ def write_recording(
     if not isinstance(result, (Run, Comparison, Simulation)):
         allowed = "a Run, a Comparison or a Simulation; `ik` writes its own (output=FILE.rrd)"
         raise OptionError(f"result: found a {type(result).__name__}, allowed: {allowed}")
-    return recording.write_recording(result, Path(output), [Path(one) for one in inputs], progress)
+    return recording.write_recording(result, Path(output), paths(inputs), progress)

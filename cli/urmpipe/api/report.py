@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.edge import public
-from urmpipe.guards import PathLike, one_or_many, refuse_foreign, refuse_others
+from urmpipe.guards import PathLike, one_or_many, paths, refuse_foreign, refuse_others
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -106,7 +106,7 @@ def report(
         return found
 
     shown = for_each(read, enumerate(given, start=1))
-    written = write_report(shown, Path(output), [*files, *map(Path, inputs)], wanted, writing)
+    written = write_report(shown, Path(output), [*files, *paths(inputs)], wanted, writing)
     return Report(written.path, tuple(shown), written.figures)
 
 

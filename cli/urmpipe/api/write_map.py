@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from urmpipe.edge import public
-from urmpipe.guards import PathLike, offset_of
+from urmpipe.guards import PathLike, offset_of, paths
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.runs.results import Run
@@ -30,7 +30,7 @@ def write_map(
         UrmpipeError: If it may not be written there.
     """
     path = Path(output)
-    with guarded_output(path, [Path(one) for one in inputs], "map") as part:
+    with guarded_output(path, paths(inputs), "map") as part:
         write_map_part(run, part, path, robot)
     return path
 

@@ -136,7 +136,7 @@ class InverseResult(Shown):
         if self.path is not None:
             found |= self._way(self.path)
         found["warnings"] = [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings]
-        return found | {"output": self.output}
+        return found | {"output": str(self.output) if self.output else None}
 
     def _way(self, path: JointPath) -> dict[str, Any]:
         """Return what --json has of a path: its jumps, joints too fast, and its nearest singularity."""

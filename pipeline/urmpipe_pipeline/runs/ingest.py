@@ -19,7 +19,7 @@ from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree
 from urmpipe_pipeline.runs.grid import Grid, make_grid
-from urmpipe_pipeline.runs.meshes import VISUAL_MISSING, missing_visuals
+from urmpipe_pipeline.runs.meshes import missing_visuals
 from urmpipe_pipeline.runs.plausibility import implausible
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import Run
@@ -38,9 +38,6 @@ UNUSED_PERIOD = LogWarning(
 )
 
 EULER_SINGULAR = "euler-singular"
-
-OF_ROBOT = (EULER_SINGULAR, VISUAL_MISSING)
-"""The kinds of the warnings that rest on the robot."""
 
 
 def ingest_log(

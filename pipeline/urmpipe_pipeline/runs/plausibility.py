@@ -15,6 +15,9 @@ from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import JointMotion, over_rows
 from urmpipe_pipeline.sources.units.unit_evidence import FASTEST
 
+JOINT_LIMIT = "joint-limit"
+SPEED_LIMIT = "speed-limit"
+
 FAR = 5.0
 """An outlying end is further off than so many times the largest step between the other rows."""
 
@@ -184,7 +187,7 @@ def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
             limits = f"its limits of {lower[j]:.6g} to {upper[j]:.6g} {motion.units[j]}"
             where = f"in {len(rows)} of {len(q)} rows, at worst {q[worst, j]:.6g} in row {worst + 1}"
             said = f"{motion.names[j]} is beyond {limits} {where}: check robot, unit, sign and zero"
-            warnings.append(LogWarning("joint-limit", said, int(rows[0]) + 1))
+            warnings.append(LogWarning(JOINT_LIMIT, said, int(rows[0]) + 1))
     return warnings
 
 
@@ -233,7 +236,7 @@ def too_fast(
             worst = f"at worst at {speeds.max():.4g} {motion.units[j]}/s to row {rows[np.argmax(speeds)] + 2}"
             said = f"{motion.names[j]} moves faster than {limits[j]:.4g} {motion.units[j]}/s"
             said = f"{said} in {len(rows)} of {len(steps)} steps, {worst}: check robot, unit and clock"
-            warnings.append(LogWarning("speed-limit", said, int(rows[0]) + 2))
+            warnings.append(LogWarning(SPEED_LIMIT, said, int(rows[0]) + 2))
     return warnings
 
 

@@ -19,6 +19,8 @@ from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, fi
 LACKING_TOOL = "recorded-tcp-tool"
 """The kind of a hint beside a verdict of fail: it says nothing against the log."""
 
+FAR_RECORDED = "recorded-tcp-far"
+
 FAR = 0.03
 """Root mean square distance in [m] that no calibration and no rounding explain."""
 
@@ -49,7 +51,7 @@ def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     )
     unknown = "robot, base, units, zeros, signs or order of the joints may differ"
     remedy = next(_remedies(robot, log, q, recorded), unknown)
-    return [LogWarning("recorded-tcp-far", f"{said}: {remedy}")]
+    return [LogWarning(FAR_RECORDED, f"{said}: {remedy}")]
 
 
 def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
@@ -94,7 +96,7 @@ def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) 
     for j, name in enumerate(log.joints):
         found = fit(robot, q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0), recorded)
         if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
-            yield f"with {name} counted the other way they agree (sign = -1 of its column in a --map)"
+            yield f"with {name} counted the other way they agree (sign = -1 of its column in a map, --map)"
     base, distance = _base(robot, q, recorded)
     if distance <= CLOSE_WITH_TOOL:
         yield f"on another base they agree within {distance * 1e3:.2f} mm (--base {base})"

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import json
+import warnings
 from dataclasses import replace
 from inspect import Parameter, signature
 from pathlib import Path
@@ -70,6 +72,15 @@ def test_one_is_a_list_of_one(folder: Path, run: urmpipe.Run, tmp_path: Path) ->
     assert urmpipe.report(run, tmp_path / "one.html").results == (run,)
 
 
+def test_an_input_alone_is_never_replaced(folder: Path, run: urmpipe.Run, tmp_path: Path) -> None:
+    file = str(urmpipe.write_map(run, tmp_path / "log.toml"))
+    told = "found an input of this command"
+    with pytest.raises(urmpipe.OutputError, match=told):
+        urmpipe.write_map(run, file, inputs=file)
+    with pytest.raises(urmpipe.OutputError, match=told):
+        urmpipe.ingest(folder / "log.csv", "urm6", write_map=file, inputs=file)
+
+
 def test_arrays_and_tables_are_told_the_way() -> None:
     frame = pd.DataFrame({"t": [0.0], "q1": [1.0]})
     way = 'arrays and tables are written first, such as table.to_csv("log.csv", index=False)'
@@ -111,16 +122,34 @@ def test_what_is_no_frame_is_refused(given: Any, found: str) -> None:
 
 
 def test_all_keywords_of_a_wrong_kind_are_told_at_once() -> None:
-    wrong: dict[str, Any] = {"tsp": "5ms", "read": {}, "strict": 1, "output": "", "progress": True}
+    wrong: dict[str, Any] = {"robot": 6, "tsp": "5ms", "read": {}, "strict": 1, "output": ""}
     with pytest.raises(urmpipe.OptionError) as error:
-        urmpipe.ingest("log.csv", **wrong)
+        urmpipe.ingest("log.csv", progress=True, **wrong)  # type: ignore[arg-type]
     assert str(error.value).splitlines() == [
+        "robot: found 6, allowed: a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)",
         "read: found {}, allowed: ReadOptions, such as urmpipe.read_map(FILE).read",
         "tsp: found '5ms', allowed: a number, in s",
         "strict: found 1, allowed: True or False",
         "output: found '', allowed: a path: text or a Path, not empty",
         "progress: found True, allowed: a function of the share that is done, 0 to 1, such as print",
     ]
+
+
+def test_numbers_and_flags_of_numpy_are_taken(folder: Path, run: urmpipe.Run) -> None:
+    held = urmpipe.ingest(folder / "log.csv", "urm6", tsp=np.float32(0.01), strict=np.bool_(True))  # type: ignore[arg-type]
+    np.testing.assert_allclose(held.q[:40], run.q, atol=1e-6)  # the period has seven digits
+
+
+def test_a_warning_is_shown_once(tmp_path: Path) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("t [s],q1,q2,q3,q4,q5,q6\n" + "".join(f"{i / 100},0,{i / 90},0,0,0,0\n" for i in range(9)))
+    with pytest.warns(urmpipe.UrmpipeWarning, match="no unit is given"):
+        run = urmpipe.ingest(log, "urm6", read=ReadOptions(period=0.01))
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        compared = urmpipe.compare(run, run, tolerance=0.01)
+        urmpipe.compare(compared, baseline=compared)
+        urmpipe.report([compared, run], tmp_path / "report.html")
 
 
 def test_robot_and_log_are_told_together() -> None:
@@ -151,6 +180,11 @@ def test_files_may_be_text(folder: Path, run: urmpipe.Run, tmp_path: Path) -> No
     urmpipe.write_map(run, f"{tmp_path}/log.toml")
     again = urmpipe.ingest(folder / "log.csv", "urm6", read=urmpipe.read_map(f"{tmp_path}/log.toml").read)
     assert (again.q == run.q).all()
+
+
+def test_what_was_solved_and_written_is_json(tmp_path: Path) -> None:
+    solved = urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", output=tmp_path / "joints.csv")
+    assert json.loads(json.dumps(solved.to_dict()))["output"] == str(tmp_path / "joints.csv")
 
 
 SHARED = ("base", "tool", "read", "tsp", "strict", "output", "inputs", "progress")

@@ -97,6 +97,10 @@ def test_each_spelling_is_an_option_and_a_keyword() -> None:
         ("ingest --audit FILE.csv lists all", "ingest(audit=FILE.csv) lists all"),
         ("urmpipe ik --tsp S gives the targets some", "ik(tsp=S) gives the targets some"),
         ("ros2 topic echo --csv /joint_states > log.csv", "ros2 topic echo --csv /joint_states > log.csv"),
+        ("--joints: found no column 'q --tsp', allowed: q1",
+         "ReadOptions.joints: found no column 'q --tsp', allowed: q1"),
+        ("the robot's q1 ('a -o b'): --sync auto", "the robot's q1 ('a -o b'): sync=\"auto\""),
+        ("choose a tip link (--tip, tip_link): b", "choose a tip link (tip_link): b"),
         ("found no such file", "found no such file"),
     ],
 )  # fmt: skip

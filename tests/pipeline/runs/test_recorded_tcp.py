@@ -65,7 +65,9 @@ def test_exchanged_joints_are_named_as_the_file_names_its_columns() -> None:
 
 def test_a_joint_that_is_counted_the_other_way_is_found() -> None:
     message = said(Q * np.array([1, 1, -1, 1, 1, 1]), positions_over_log(UR5E, Q))
-    assert message.endswith(": with q3 counted the other way they agree (sign = -1 of its column in a --map)")
+    assert message.endswith(
+        ": with q3 counted the other way they agree (sign = -1 of its column in a map, --map)"
+    )
 
 
 def test_another_base_is_found_and_its_option_helps() -> None:

@@ -1,0 +1,73 @@
+"""A run on another arm: its motion stays as it was ingested, and what rests on the arm is made anew."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import LogError
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.repolarization.audit import audit_log, turning
+from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, kinematics
+from urmpipe_pipeline.runs.meshes import VISUAL_MISSING
+from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, implausible
+from urmpipe_pipeline.runs.recorded_tcp import FAR_RECORDED, far_from_recorded
+from urmpipe_pipeline.runs.results import Run
+
+BY_LIMITS = (JOINT_LIMIT, SPEED_LIMIT)
+OF_ROBOT = (EULER_SINGULAR, VISUAL_MISSING, FAR_RECORDED, *BY_LIMITS)
+"""The kinds of the warnings that rest on the robot."""
+
+
+def on_robot(run: Run, robot: Chain | None) -> Run:
+    """Return a run with the kinematics of an arm; as it is without one.
+
+    Its joint values, their audit and their rates stay; the other branches of what inverse kinematics solved
+    are those of the arm before, and are left out.
+
+    Raises:
+        LogError: If the joints of the run are not the robot's.
+    """
+    if robot is None or robot == run.robot:
+        return run
+    tcp, noticed = kinematics(robot, run.q, run.qd, run.qdd)
+    _refuse_other_kinds(run, robot)
+    others = [warning for warning in run.warnings if warning.kind not in OF_ROBOT]
+    doubts = [*far_from_recorded(robot, run.log), *_beyond_limits(run, robot), *noticed]
+    made = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
+    return replace(run, robot=robot, tcp=tcp, warnings=(*others, *doubts), provenance=made, ghosts=())
+
+
+def _refuse_other_kinds(run: Run, robot: Chain) -> None:
+    """Raise a `LogError` with every joint that turns in the log and slides in the arm, or the other way."""
+    if not run.log.joints:
+        return
+    before, now = turning(run.log, run.robot), turning(run.log, robot)
+    wrong = [
+        f"{run.name}, joint {run.log.joints[j]}: found {_unit(before[j])}, allowed: {_unit(now[j])},"
+        f" as robot {robot.name} has"
+        for j in np.flatnonzero(before != now).tolist()
+    ]
+    if wrong:
+        raise LogError(*wrong)
+
+
+def _unit(turns: np.bool_) -> str:
+    """Return the SI unit of a joint that turns, or slides."""
+    return "rad" if turns else "m"
+
+
+def _beyond_limits(run: Run, robot: Chain) -> list[LogWarning]:
+    """Return what the log's rows say against the arm's limits of place and speed."""
+    if not run.log.joints or run.single_poses:
+        return []
+    read = run.provenance.options.get("read") or {}
+    repaired = bool(read.get("repair"))
+    found = audit_log(run.log, robot, interval=read.get("interval"), repaired=repaired)
+    clocked = any(column.role == "time" for column in run.log.columns)
+    timed = clocked or read.get("period") is not None
+    turns = turning(run.log, robot)
+    doubts = implausible(run.log, found.q, robot, turns, found.broken[:, 1:], timed=timed)
+    return [warning for warning in doubts if warning.kind in BY_LIMITS]
