@@ -104,9 +104,7 @@ def _suite(result: Comparison, run: Deviation) -> ET.Element:
     if result.baseline:
         suite.extend(_changed(one) for one in result.baseline.changes if one.run == run.name)
         suite.extend(_lost(one) for one in result.baseline.gone if one.run == run.name)
-    told = [f"{one.kind}: {one.message}" for one in run.run.warnings]
-    of_log = [one for one in result.warnings if one.message.startswith(f"{run.name}: ")]
-    told += [f"{one.kind}: {one.message}" for one in of_log]
+    told = [f"{one.kind}: {one.message}" for one in result.warnings_of(run)]
     if told:
         ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, told))
     return _counted(suite, result.provenance.created[:19])
