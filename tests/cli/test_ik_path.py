@@ -11,9 +11,14 @@ import numpy as np
 import pytest
 
 from ik_runs import answer, write_path
+from urmpipe import ik
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.recording.reader import read_recording
+from urmpipe_pipeline.recording.summary import summary
+from urmpipe_pipeline.report.banner import Banner, banner
+from urmpipe_pipeline.runs.results import Run
 
 Captured = pytest.CaptureFixture[str]
 
@@ -82,6 +87,31 @@ def test_a_joint_that_is_too_fast_fails_the_path(capsys: Captured, folder: Path)
     )
 
 
+def told(output: Path) -> tuple[list[tuple[int | None, str]], Banner, str]:
+    """Return what a recording says of its path, the verdict of its report, and the head of its summary."""
+    solved = read_recording(output)
+    assert isinstance(solved, Run)
+    kinds = ("jump", "joint-too-fast")
+    said = [(one.row, one.message) for one in solved.warnings if one.kind in kinds]
+    return said, banner([], [solved], []), summary(solved).splitlines()[0]
+
+
+def test_recording_and_report_of_a_path_that_is_too_fast_fail_as_ik_does(folder: Path) -> None:
+    q = np.tile([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], (30, 1))
+    q[:, 0] += 0.05 * np.arange(30)
+    q[:, 5] += 0.05 * np.arange(30)
+    write_path(folder / "path.csv", "ur5e", q)
+    found = ik("path.csv", "ur5e", start=q[0].tolist(), output="path.rrd")
+    assert (found.verdict, int(found.reached.sum())) == ("fail", 30)
+    said, verdict, head = told(folder / "path.rrd")
+    fast = "2 joints too fast, here the first: shoulder_pan_joint at 286.5 deg/s of 180 deg/s allowed"
+    assert said == [(1, fast)]
+    assert (verdict.state, verdict.word) == ("fail", "FAIL")
+    assert verdict.headline == "path: 30 of 30 targets with a solution"
+    assert verdict.detail.startswith(f"{fast}. ")
+    assert head == "### FAIL path: 30 of 30 targets with a solution"
+
+
 def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
     capsys: Captured, folder: Path
 ) -> None:
@@ -98,6 +128,11 @@ def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
     (jump,) = found["jumps"]
     assert (jump["from_row"], jump["row"]) == (16, 24)
     assert jump["steps"] == pytest.approx({"wrist_3_joint": q[23, 5] - q[15, 5] - 2 * np.pi}, abs=1e-9)
+    ik("path.csv", "ur5e", start=q[0].tolist(), output="path.rrd")
+    said, verdict, head = told(folder / "path.rrd")
+    steps = f"wrist_3_joint by {np.degrees(jump['steps']['wrist_3_joint']):.4g} deg"
+    assert said[0] == (24, f"1 jump: {steps}")
+    assert (verdict.word, head) == ("FAIL", "### FAIL path: 33 of 40 targets with a solution")
     assert run(["ik", "path.csv", "--robot", "ur5e", "--start", start]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("      jump at t = 0.230 s (row 24), since row 16, at (") for line in lines)

@@ -11,6 +11,7 @@ from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_pipeline.inverse.joint_file import write_joint_log
 from urmpipe_pipeline.inverse.solved import row_times, solved_run
+from urmpipe_pipeline.inverse.verdict import path_warnings
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.runs.ghosts import ghosts_of, goals_of
@@ -57,7 +58,7 @@ def run_of_solutions(
         goals=goals_of(result.targets, t_ns, result.reasons, result.branch),
         ghosts=() if branches is None else ghosts_of(branches, t_ns),
         files=() if file is None else (file,),
-        warnings=result.warnings,
+        warnings=(*result.warnings, *(path_warnings(result.path) if result.path else ())),
         options=options,
     )
 

@@ -12,6 +12,7 @@ from urmpipe.inverse.wording import joint_number
 from urmpipe.printing.columns import Column, print_columns
 from urmpipe_models.chains.chain import Joint
 from urmpipe_pipeline import text
+from urmpipe_pipeline.inverse.verdict import in_words
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -38,7 +39,7 @@ def _lines(result: InverseResult, path: JointPath, nearest: int) -> Iterator[str
     yield f"branch: {'; '.join(_capped(list(_branches(result))))}"
     yield from _capped([_jump(result, one) for one in path.jumps])
     yield from _capped([
-        f"{one.joint} too fast: {_quantity(one.speed, one.unit)} of {_quantity(one.allowed, one.unit)}"
+        f"{one.joint} too fast: {in_words(one.speed, one.unit)} of {in_words(one.allowed, one.unit)}"
         f" allowed, {_at(result, one.first)} to row {result.row[one.last]}"
         for one in path.too_fast
     ])  # fmt: skip
@@ -69,7 +70,7 @@ def _rows(first: int, last: int) -> str:
 
 def _jump(result: InverseResult, jump: Jump) -> str:
     """Return a jump with its time, its place and what moves."""
-    steps = ", ".join(f"{one.joint} by {_quantity(one.step, one.unit)}" for one in jump.joints)
+    steps = ", ".join(f"{one.joint} by {in_words(one.step, one.unit)}" for one in jump.joints)
     ways = "" if jump.from_branch == jump.to_branch else f"{jump.from_branch} → {jump.to_branch}: "
     since = f", since row {result.row[jump.last]}" if jump.last < jump.sample - 1 else ""
     return f"jump {_at(result, jump.sample)}{since}, at ({text.point(jump.position)}) m: {ways}{steps}"
@@ -135,10 +136,3 @@ def _speeds(result: InverseResult, joints: tuple[Joint, ...], units: list[str]) 
             for joint, unit in zip(joints, units, strict=True)
         ]
         yield Column("allowed\n[1/s]", limits)
-
-
-def _quantity(value: float, unit: str) -> str:
-    """Return an angle, a length or a rate of one in [rad] or [m] with the unit that people read."""
-    base, slash, per = unit.partition("/")
-    shown, factor = text.SHOWN[base]
-    return f"{value * factor:.4g} {shown}{slash}{per}"

@@ -60,6 +60,11 @@ class Comparison(Shown):
         """Return the share of the reference's samples, 0..1, that lie within the time of a log."""
         return 1.0 - run.reference_left_out / len(self.reference.t_ns)
 
+    def warnings_of(self, run: Deviation) -> tuple[LogWarning, ...]:
+        """Return the warnings of a log: those from before, and what the comparison says of it by its name."""
+        told = (one for one in self.warnings if one.message.startswith(f"{run.name}: "))
+        return (*run.run.warnings, *told)
+
     @property
     def ranking(self) -> tuple[Deviation, ...]:
         """The logs from best to worst.

@@ -116,12 +116,14 @@ class Plots:
         if not run.log.joints:
             return
         unit, raw, after = run.joint_unit(), f"{place.prefix}joints/raw", f"{place.prefix}joints/repolarized"
-        before = self.array("Joints in the file", unit, raw, run.log.rows, worst_entity(place, "raw"))
         marks = mark_entity(place, "**"), worst_entity(place, "repolarized")
+        if run.goals is not None and not run.audit:
+            yield self.array("Joints, solved", unit, after, len(run.t_ns), *marks)
+            return
+        before = self.array("Joints in the file", unit, raw, run.log.rows, worst_entity(place, "raw"))
         if not run.audit:
-            name = "Joints, no repolarization needed" if run.goals is None else "Joints, solved"
-            same = self.array(name, unit, after, len(run.t_ns), *marks)
-            yield [*same, *before] if run.goals is None else same
+            same = self.array("Joints, no repolarization needed", unit, after, len(run.t_ns), *marks)
+            yield [*same, *before]
             return
         wraps, doubts = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
         found = f"{wraps} marked, {doubts} doubtful" if doubts else f"{wraps} marked"

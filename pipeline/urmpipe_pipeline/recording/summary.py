@@ -13,6 +13,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation
 from urmpipe_pipeline.comparison.symbols import used_words
 from urmpipe_pipeline.comparison.wording import alignment_words, excess, sync_words, tolerance_words
+from urmpipe_pipeline.inverse.verdict import reached, solved
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import ghost_colour_word, run_colour_word
 from urmpipe_pipeline.recording.entities import printable
@@ -40,12 +41,12 @@ def _of_run(run: Run) -> Iterator[str]:
     wraps, others = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
     marked = ", marked by triangles in the joint's colour" if wraps else ""
     doubts = f"; other findings: {others}, marked by crosses" if others else ""
-    yield f"### {shown(run.name)}"
+    yield f"### {_headline(run)}"
     rows = text.counted(run.log.rows, "row") + ("" if run.single_poses else f", {run.duration:.6g} s")
     yield f"{files}, {done} {shown(run.log.source)}: {rows}. {robot}"
     yield ""
     if run.single_poses:
-        yield f"Without times: the timeline counts rows, t = 0 s is row 1. Solved: {_reached(run)}."
+        yield "Without times: the timeline counts rows, t = 0 s is row 1."
     else:
         every = f", one in {1e3 * run.tsp:.6g} ms" if len(run.t_ns) > 1 else ""
         grid = f"Grid: {text.counted(len(run.t_ns), 'sample')}{every}."
@@ -54,11 +55,21 @@ def _of_run(run: Run) -> Iterator[str]:
     yield from warning_lines(run.warnings)
 
 
+def _headline(run: Run) -> str:
+    """Return the name, of solved targets behind the verdict and with how many have a solution."""
+    if run.goals is None:
+        return shown(run.name)
+    word = "SOLVED" if solved(run) else "FAIL"
+    return (
+        f"{word} {shown(run.name)}: {reached(run)} of {text.counted(run.log.rows, 'target')} with a solution"
+    )
+
+
 def _branches(run: Run) -> Iterator[str]:
     """Yield which ghost is which branch, and at how many rows it is another solution: two in a line."""
     if not run.ghosts:
         return
-    rows = _reached(run)
+    rows = reached(run)
     names = {name for name in run.goals.branches if name} if run.goals else set()
     chosen = f"chosen: {shown(names.pop())}" if len(names) == 1 else "chosen"
     cells = [(chosen, f"solid, its tip {run_colour_word(0)}", str(rows))]
@@ -73,11 +84,6 @@ def _branches(run: Run) -> Iterator[str]:
     if len(run.ghosts) > BRANCHES:
         yield ""
         yield f"and {len(run.ghosts) - BRANCHES} more branches"
-
-
-def _reached(run: Run) -> int:
-    """Return how many rows have every joint."""
-    return int(np.isfinite(run.log.q).all(axis=1).sum())
 
 
 def _of_comparison(result: Comparison) -> Iterator[str]:

@@ -5,12 +5,11 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
 from urmpipe_pipeline.comparison.symbols import size_of
 from urmpipe_pipeline.comparison.wording import of_allowed, tolerance_words
+from urmpipe_pipeline.inverse.verdict import faults, reached, solved
 from urmpipe_pipeline.report.facts import Fact
 from urmpipe_pipeline.runs.results import Run
 
@@ -113,10 +112,9 @@ def _against(comparisons: Sequence[Comparison]) -> tuple[Fact, ...]:
 def _ingested(runs: Sequence[Run]) -> Banner:
     """Say what was ingested, or solved if nothing else was."""
     warnings = text.counted(sum(len(run.warnings) for run in runs), "warning")
-    solved = [run for run in runs if run.goals is not None]
-    missed = any(_reached(run) < run.log.rows for run in solved)
-    if solved and (missed or len(solved) == len(runs)):
-        return _solved(solved, warnings, missed=missed)
+    aimed = [run for run in runs if run.goals is not None]
+    if aimed and (len(aimed) == len(runs) or not all(map(solved, aimed))):
+        return _solved(aimed, warnings)
     rows = sum(run.log.rows for run in runs)
     wraps = sum(len(run.repolarizations) for run in runs)
     subject = runs[0].name if len(runs) == 1 else text.counted(len(runs), "log")
@@ -125,15 +123,11 @@ def _ingested(runs: Sequence[Run]) -> Banner:
     return Banner("ingested", "INGESTED", headline, detail=detail)
 
 
-def _solved(runs: Sequence[Run], warnings: str, *, missed: bool) -> Banner:
-    """Say how many targets have a solution: the verdict is that of `urmpipe ik`, fail if one has none."""
-    reached, wanted = sum(map(_reached, runs)), sum(run.log.rows for run in runs)
+def _solved(runs: Sequence[Run], warnings: str) -> Banner:
+    """Say how many targets have a solution, and what keeps an arm from the path: the verdict of ik."""
+    found, wanted = sum(map(reached, runs)), sum(run.log.rows for run in runs)
     subject = runs[0].name if len(runs) == 1 else text.counted(len(runs), "file")
-    headline = f"{subject}: {reached} of {text.counted(wanted, 'target')} with a solution"
-    state = "fail" if missed else "pass"
-    return Banner(state, "FAIL" if missed else "SOLVED", headline, detail=f"{warnings}.")
-
-
-def _reached(run: Run) -> int:
-    """Return how many rows of a log have every joint."""
-    return int(np.isfinite(run.log.q).all(axis=1).sum())
+    headline = f"{subject}: {found} of {text.counted(wanted, 'target')} with a solution"
+    state, word = ("pass", "SOLVED") if all(map(solved, runs)) else ("fail", "FAIL")
+    said = [fault for run in runs for fault in faults(run)]
+    return Banner(state, word, headline, detail=". ".join([*said, warnings]) + ".")

@@ -43,13 +43,14 @@ class Card:
     facts: tuple[Fact, ...]
 
 
-def card(deviation: Deviation, href: str, covered: float) -> Card:
+def card(deviation: Deviation, href: str, covered: float, warnings: int) -> Card:
     """Return the card of a compared log.
 
     Args:
         deviation: The log.
         href: Where its part of the page is.
         covered: Share of the reference's samples within its time, 0..1.
+        warnings: How many there are of it.
     """
     decisive = deviation.decisive
     tolerance = decisive.tolerance
@@ -63,11 +64,11 @@ def card(deviation: Deviation, href: str, covered: float) -> Card:
         allowed="" if tolerance is None else f"{text.limit(tolerance, decisive.unit)} {shown}",
         share=None if decisive.used is None else min(decisive.used, 1.0),
         used=used_words(decisive),
-        facts=tuple(fact for fact in _facts(deviation, covered) if fact.value),
+        facts=tuple(fact for fact in _facts(deviation, covered, warnings) if fact.value),
     )
 
 
-def _facts(deviation: Deviation, covered: float) -> list[Fact]:
+def _facts(deviation: Deviation, covered: float, warnings: int) -> list[Fact]:
     decisive = deviation.decisive
     found = deviation.statistics
     angle = found.get("angle")
@@ -84,7 +85,7 @@ def _facts(deviation: Deviation, covered: float) -> list[Fact]:
         Fact("Clocks", sync_value(deviation.sync)),
         Fact("Alignment", alignment_value(deviation)),
         Fact("r(‖Δ‖, speed)", speed_correlation(deviation)),
-        Fact("Warnings", str(len(deviation.run.warnings))),
+        Fact("Warnings", str(warnings)),
     ]
 
 

@@ -11,6 +11,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison, Deviation, Stretch
 from urmpipe_pipeline.comparison.trajectory import Sync
 from urmpipe_pipeline.comparison.wording import correlation, tolerance_words, tool_option
+from urmpipe_pipeline.inverse.verdict import reached
 from urmpipe_pipeline.runs.results import Run
 
 
@@ -56,8 +57,7 @@ def _solved_facts(run: Run) -> Iterator[Fact]:
     """Yield how many targets were reached, and by which further branches; nothing of a log."""
     if run.goals is None:
         return
-    reached = int(np.isfinite(run.log.q).all(axis=1).sum())
-    yield Fact("Targets", f"{reached} of {run.log.rows} with a solution")
+    yield Fact("Targets", f"{reached(run)} of {run.log.rows} with a solution")
     branches = "; ".join(f"{ghost.name}: {len(ghost.t_ns)}" for ghost in run.ghosts)
     yield Fact("Rows of other branches", branches)
 

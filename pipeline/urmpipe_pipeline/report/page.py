@@ -204,7 +204,7 @@ def _summary(comparison: Comparison, links: Sequence[str]) -> Summary:
         f"Verdict{'s' if several else ''} against {comparison.reference.name}"
         f"{', best to worst' if several else ''}",
         tuple(
-            card(run, link, comparison.covered(run))
+            card(run, link, comparison.covered(run), len(comparison.warnings_of(run)))
             for run, link in zip(comparison.ranking, links, strict=True)
         ),
         verdict_tables.ranking_tables(comparison, links) if several else (),

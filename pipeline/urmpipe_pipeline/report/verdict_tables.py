@@ -93,12 +93,15 @@ def _when_and_where(comparison: Comparison, links: Sequence[str]) -> Table:
         *numbers("Sync offset [s]", "r(‖Δ‖, speed)", "Left out", "Warnings"),
         *words("Alignment"),
     )
-    rows = tuple(_when_and_where_row(run, link) for run, link in zip(comparison.ranking, links, strict=True))
+    rows = tuple(
+        _when_and_where_row(run, link, len(comparison.warnings_of(run)))
+        for run, link in zip(comparison.ranking, links, strict=True)
+    )
     note = "Left out: samples of the log without a counterpart or without a value."
     return without_empty_columns(Table("When, where and how compared", columns, rows, note=note))
 
 
-def _when_and_where_row(run: Deviation, link: str) -> tuple[Cell, ...]:
+def _when_and_where_row(run: Deviation, link: str, warnings: int) -> tuple[Cell, ...]:
     longest = run.longest_out
     stretch = (text.NOTHING,) * 2
     if longest is not None:
@@ -111,7 +114,7 @@ def _when_and_where_row(run: Deviation, link: str) -> tuple[Cell, ...]:
         Cell(text.seconds(run.sync.offset)),
         Cell(speed_correlation(run) or text.NOTHING),
         Cell(str(run.left_out)),
-        Cell(str(len(run.run.warnings))),
+        Cell(str(warnings)),
         Cell(alignment_value(run)),
     )
 

@@ -127,10 +127,9 @@ def test_an_axis_shows_more_numbers_than_0() -> None:
     assert span_with_numbers(0.0, 0.0, 8) is None
 
 
-def test_every_plot_shows_the_whole_time(make_run: MakeRun, tmp_path: Path) -> None:
-    """Else the viewer opens a long log on a minute of it; linked plots take the range of one known view."""
-    path = write_recording(make_run(rows=2001), tmp_path / "run.rrd")
-    reader = RrdReader(path)
+def time_axis(run: Run, path: Path) -> list[int]:
+    """Return from when to when in [ns] the one view that linked plots follow shows a run."""
+    reader = RrdReader(write_recording(run, path))
     (entry,) = reader.blueprints()
     (batch,) = (
         chunk.to_record_batch()
@@ -138,4 +137,10 @@ def test_every_plot_shows_the_whole_time(make_run: MakeRun, tmp_path: Path) -> N
         if chunk.entity_path == f"/view/{SHARED_AXIS}/TimeAxis"
     )
     (axis,) = batch.column("TimeAxis:view_range").to_pylist()
-    assert [axis[0][end] for end in ("start", "end")] == [-100_000_000, 12_400_000_000]
+    return [axis[0][end] for end in ("start", "end")]
+
+
+def test_every_plot_shows_the_whole_time(make_run: MakeRun, make_solved: MakeRun, tmp_path: Path) -> None:
+    """Else the viewer opens a long log on a minute of it; linked plots take the range of one known view."""
+    assert time_axis(make_run(rows=2001), tmp_path / "run.rrd") == [-100_000_000, 12_400_000_000]
+    assert time_axis(make_solved(rows=51), tmp_path / "solved.rrd") == [-10_000_000, 1_240_000_000]

@@ -7,7 +7,6 @@ from dataclasses import replace
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.report.banner import banner
 from urmpipe_pipeline.report.cards import card
 from urmpipe_pipeline.runs.results import Run
@@ -85,7 +84,7 @@ def test_a_banner_without_a_comparison(bare_run: Run) -> None:
 
 def test_a_card_holds_what_decides_and_the_rest(everything: Comparison) -> None:
     deviation = next(run for run in everything.runs if run.name == "joint-off")
-    decisive, found = deviation.decisive, card(deviation, "#x", 0.25)
+    decisive, found = deviation.decisive, card(deviation, "#x", 0.25, 2)
     assert (found.name, found.href, found.state) == ("joint-off", "#x", "fail")
     assert decisive.used is not None
     assert found.share == 1.0
@@ -101,7 +100,7 @@ def test_a_card_holds_what_decides_and_the_rest(everything: Comparison) -> None:
     assert facts["Largest joint"] == f"{text.quantity(deviation.joint_statistics['phi2'].max, 'rad')} (phi2)"
     assert facts["Out of tolerance"] == text.percent(deviation.share_out)
     assert facts["Covered"] == "25.0 % of the reference"
-    assert facts["Warnings"] == "0"
+    assert facts["Warnings"] == "2"
 
 
 def test_a_card_leaves_out_what_there_is_not(comparison: Comparison) -> None:
@@ -113,7 +112,7 @@ def test_a_card_leaves_out_what_there_is_not(comparison: Comparison) -> None:
         joint_statistics={},
         speed_correlation=None,
     )  # fmt: skip
-    found = card(deviation, "#x", 0.25)
+    found = card(deviation, "#x", 0.25, 2)
     assert [fact.name for fact in found.facts] == [
         "When",
         "Where (x, y, z)",
@@ -126,9 +125,3 @@ def test_a_card_leaves_out_what_there_is_not(comparison: Comparison) -> None:
         "Warnings",
     ]
     assert (found.allowed, found.used) == ("3.5 mm", "71.4 % of the tolerance")
-
-
-def test_a_card_counts_the_warnings_of_its_log(comparison: Comparison) -> None:
-    deviation = comparison.runs[0]
-    run = replace(deviation.run, warnings=(LogWarning("gap", "a gap", 7),) * 3)
-    assert card(replace(deviation, run=run), "#x", 1.0).facts[-1].value == "3"

@@ -9,8 +9,10 @@ import pytest
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.symbols import size_of
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.report.log_tables import audit_table
+from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.report.tables import Table
 from urmpipe_pipeline.report.verdict_tables import ranking_tables, statistics_tables
 from urmpipe_pipeline.runs.results import Run
@@ -70,9 +72,28 @@ def test_the_ranking_says_when_where_and_how(everything: Comparison) -> None:
         "Sync offset [s]": "0.500",
         "r(‖Δ‖, speed)": f"{off.speed_correlation:+.3f}",
         "Left out": str(off.left_out),
-        "Warnings": "0",
+        "Warnings": str(len(everything.warnings_of(off))),
         "Alignment": "none",
     }
+
+
+def test_what_a_comparison_says_of_a_log_counts_as_its_warning(everything: Comparison) -> None:
+    told = (
+        LogWarning("not-covered", "joint-off: it covers 1 s of the 4 s of path (25 %)"),
+        LogWarning("large-tolerance", "a tolerance of 500 mm (axis) lets anything pass"),
+    )
+    off = next(run for run in everything.runs if run.name == "joint-off")
+    gap = LogWarning("gap", "a gap", 7)
+    warned_off = replace(off, run=replace(off.run, warnings=(gap,)))
+    runs = tuple(warned_off if run is off else run for run in everything.runs)
+    warned = replace(everything, runs=runs, warnings=told)
+    assert warned.warnings_of(warned_off) == (gap, told[0])
+    links = [f"#{run.name}" for run in warned.ranking]
+    _, where = ranking_tables(warned, links)
+    assert row_of(where, "joint-off")["Warnings"] == "2"
+    (summary,) = lay_out([warned]).summaries
+    (facts,) = (one.facts for one in summary.cards if one.name == "joint-off")
+    assert [fact.value for fact in facts if fact.name == "Warnings"] == ["2"]
 
 
 def test_columns_without_a_value_are_not_there(comparison: Comparison) -> None:
