@@ -140,7 +140,8 @@ def _list(terminal: Terminal) -> int:
 
 
 def _write(system: str, path: Path, terminal: Terminal) -> int:
-    """Write the file of a shipped system, under a name that is new."""
+    """Write the file of a shipped system, under a name that is new; the logs that came along stay there."""
+    from urmpipe.api.simulate import own_logs
     from urmpipe.printing.terminal import say
     from urmpipe_fmus.cosim import system_text
     from urmpipe_pipeline.outputs import guarded_output
@@ -148,7 +149,8 @@ def _write(system: str, path: Path, terminal: Terminal) -> int:
     text = system_text(system)
     with guarded_output(path, [], "system") as part:
         part.write_text(text, encoding="utf-8")
-    said = f"System: {path}  (change it, then: urmpipe simulate {path})"
+    logs = "".join(f" --set {name}=FILE.csv" for name in own_logs(system))
+    said = f"System: {path}  (change it, then: urmpipe simulate {path}{logs})"
     terminal.answer(lambda: {"schema": 1, "system": str(path)}, lambda: say(said))
     return 0
 
