@@ -19,6 +19,7 @@ def stamps(rate: float, unit_ns: int, rows: int = 2000) -> IntArray:
 @pytest.mark.parametrize("unit_ns", [1, 1_000, 100_000, 1_000_000])
 def test_each_communication_point_of_a_regular_log_reads_its_own_row(rate: float, unit_ns: int) -> None:
     clock = clock_of(stamps(rate, unit_ns))
+    assert clock.period is not None
     assert clock.period == pytest.approx(1.0 / rate, rel=1e-5)  # by the ends of 2000 rows, to a digit
     times = on_points(clock.t_ns, clock.period)
     k = np.arange(len(times))
