@@ -195,6 +195,11 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
             "error: argument reference: found nothing where log is mine.csv, allowed: a file of the same"
             " motion (log-to-delta's own path.csv is of another one)",
         ),
+        (
+            ("one-drive", "--write-system", "mine.toml", "--step", "1ms", "--set", "C=2", "-o", "run.rrd"),
+            "error: --write-system: found with --output, --set, --step, allowed: alone, as nothing is run;"
+            " change the file",
+        ),
         (("log-to-delta", "--step", "nan"), "found 'nan', allowed: a positive time in s"),
         (("log-to-delta", "-o", "missing/run.rrd"), "found no folder missing, allowed: a folder that exists"),
     ],

@@ -85,11 +85,12 @@ def simulate(
         raise click.UsageError(f"found {found}, allowed: one of both")
     if listed or system is None:
         return _list(terminal)
+    asked = {"arguments": arguments, "step": step, "duration": duration, "backend": backend}
     if copy is not None:
+        _refuse_run_options({"output": output, "draw": draw, **asked})
         return _write(system, copy, terminal)
     tune_pyarrow()
     target = output or Path(default_name(system))
-    asked = {"arguments": arguments, "step": step, "duration": duration, "backend": backend}
     return _run(system, target, draw, terminal, asked)
 
 
@@ -137,6 +138,15 @@ def _list(terminal: Terminal) -> int:
     ]
     terminal.answer(lambda: {"schema": 1, "systems": rows}, lambda: print_systems(systems))
     return 0
+
+
+def _refuse_run_options(given: dict[str, Any]) -> None:
+    """Raise a usage error if a file is to be written with options that only a run follows."""
+    flags = {"arguments": "set"}
+    found = [f"--{flags.get(name, name)}" for name, value in given.items() if value]
+    if found:
+        allowed = "alone, as nothing is run; change the file"
+        raise click.UsageError(f"--write-system: found with {', '.join(found)}, allowed: {allowed}")
 
 
 def _write(system: str, path: Path, terminal: Terminal) -> int:
