@@ -94,7 +94,18 @@ GRAM = -3
 
 _PREFIXES = {"": 0, "G": 9, "M": 6, "k": 3, "h": 2, "d": -1, "c": -2, "m": -3, "u": -6, "n": -9, "p": -12}
 _ELSEWHERE = str.maketrans(
-    {"*": ".", "·": ".", " ": ".", "^": "", "²": "2", "³": "3", "°": "deg", "Ω": "Ohm", "µ": "u"}
+    {
+        "*": ".",
+        "·": ".",
+        " ": ".",
+        "^": "",
+        "²": "2",
+        "³": "3",
+        "°": "deg",
+        "Ω": "Ohm",
+        "µ": "u",
+        "\u03bc": "u",
+    }
 )
 """How others write what FMI writes in ASCII."""
 
@@ -193,8 +204,9 @@ def _unknown(spelling: str) -> UnitError:
 
 def _meant(spelling: str) -> str:
     """Return how FMI spells a unit that people write as Nm, kg*m^2 or N·m; empty if that is no unit."""
-    if "degC" in spelling:
-        return ""  # a temperature that has no multiple, and no degree times a coulomb
+    if "degC" in (celsius := spelling.strip().replace("°", "deg")):
+        # a temperature that has no multiple, and no degree times a coulomb
+        return "degC" if celsius == "degC" != spelling else ""
     text = re.sub(r" */ *", "/", spelling.replace("**", "").replace("rpm", "rev/min").strip())
     text = text.translate(_ELSEWHERE)
     text = re.sub(r"[A-Za-z]+", lambda word: ".".join(_factors(word[0])) or word[0], text)

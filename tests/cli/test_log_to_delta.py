@@ -10,6 +10,7 @@ import pytest
 import urmpipe
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.sources.tables.text import fingerprint
@@ -39,19 +40,19 @@ def test_log_to_delta_is_what_compare_says(log: str) -> None:
 @pytest.fixture
 def slow_motion(tmp_path: Path) -> dict[str, str]:
     """A log at 10 ms, twice the step of most systems, and the path of exactly its motion."""
-    t = np.arange(100) * 0.01
+    return write_motion(tmp_path, np.arange(100) * 0.01, "%.18e")
+
+
+def write_motion(tmp_path: Path, t: FloatArray, digits: str) -> dict[str, str]:
+    """Write a log with times in [s], shape (n,), and the path of exactly its motion."""
     q = 0.8 * np.sin(3.0 * t)[:, None] * np.linspace(0.3, 1.0, 6)
     x = point_over_log(load_robot("urm6"), q, np.zeros_like(q), np.zeros_like(q)).position
     files = {"log": tmp_path / "log.csv", "reference": tmp_path / "path.csv"}
-    header = ",".join(f"phi{i} [rad]" for i in range(1, 7))
-    np.savetxt(files["log"], np.column_stack([t, q]), delimiter=",", header=f"t [s],{header}", comments="")
-    np.savetxt(
-        files["reference"],
-        np.column_stack([t, x]),
-        delimiter=",",
-        header="t [s],x [m],y [m],z [m]",
-        comments="",
-    )
+    heads = {"log": [f"phi{i} [rad]" for i in range(1, 7)], "reference": [f"{axis} [m]" for axis in "xyz"]}
+    for name, values in (("log", q), ("reference", x)):
+        form = [digits, *["%.18e"] * values.shape[1]]
+        header = ",".join(["t [s]", *heads[name]])
+        np.savetxt(files[name], np.column_stack([t, values]), form, ",", header=header, comments="")
     return {name: str(path) for name, path in files.items()}
 
 
@@ -59,6 +60,17 @@ def test_a_log_of_another_period_is_judged_at_its_samples(slow_motion: dict[str,
     result = simulate("log-to-delta", arguments=slow_motion)
     assert (result.step, result.verdict, result.warnings) == (0.01, "pass", ())
     assert result.verdicts[0].worst < 1e-12  # the path is the log's own, but for rounding
+
+
+@pytest.mark.parametrize("digits", ["%.9f", "%.3f"])
+def test_a_log_whose_period_no_clock_writes_exactly_is_judged_at_its_samples(
+    tmp_path: Path, digits: str
+) -> None:
+    motion = write_motion(tmp_path, np.arange(100) / 30.0, digits)
+    result = simulate("log-to-delta", arguments=motion, backend="python")
+    assert (len(result.t_ns), result.verdict, result.warnings) == (100, "pass", ())
+    # The path is the log's own; its clock is up to half a unit of the last digit off the points, at 3.5 m/s.
+    assert result.verdicts[0].worst < 3.5 * 0.5 * 10.0 ** -int(digits[2])
 
 
 def test_a_step_between_the_samples_of_a_log_is_told(slow_motion: dict[str, str]) -> None:

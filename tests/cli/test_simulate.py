@@ -195,6 +195,11 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
             "error: argument reference: found nothing where log is mine.csv, allowed: a file of the same"
             " motion (log-to-delta's own path.csv is of another one)",
         ),
+        (
+            ("one-drive", "--write-system", "mine.toml", "--step", "1ms", "--set", "C=2", "-o", "run.rrd"),
+            "error: --write-system: found with --output, --set, --step, allowed: alone, as nothing is run;"
+            " change the file",
+        ),
         (("log-to-delta", "--step", "nan"), "found 'nan', allowed: a positive time in s"),
         (("log-to-delta", "-o", "missing/run.rrd"), "found no folder missing, allowed: a folder that exists"),
     ],
@@ -222,6 +227,26 @@ def test_a_shipped_system_is_written_to_be_changed(urmpipe: RunCommand, tmp_path
     ran = urmpipe("simulate", "one-drive", "--write-system", "mine.toml")
     assert (ran.code, ran.err) == (2, "error: mine.toml: found a file, allowed: a new name\n")
     assert (tmp_path / "mine.toml").read_text(encoding="utf-8") == changed
+
+
+def test_a_written_system_asks_for_the_logs_that_stay_with_the_shipped_one(
+    urmpipe: RunCommand, tmp_path: Path
+) -> None:
+    ran = urmpipe("simulate", "log-to-delta", "--write-system", "mine.toml")
+    told = "urmpipe simulate mine.toml --set log=FILE.csv --set reference=FILE.csv"
+    assert ran.out == f"System: mine.toml  (change it, then: {told})\n"
+    logs = {"log": str(LOGS / "coppeliasim.csv"), "reference": str(LOGS / "path.csv")}
+    assert simulate(tmp_path / "mine.toml", arguments=logs, duration=0.02).verdict == "pass"
+
+
+def test_a_bundled_log_is_not_held_against_a_file_that_is_called_as_another_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "path.csv").write_text("t,x,y,z\n0,0,0,9\n1,0,0,9\n")
+    monkeypatch.chdir(tmp_path)
+    named = {"log": "coppeliasim.csv", "reference": "path.csv"}
+    with pytest.raises(UrmpipeError, match=r"blocks\.log: coppeliasim\.csv: found no such file"):
+        simulate("log-to-delta", arguments=named, duration=0.02)
 
 
 def refusal(system: Path, **options: Any) -> list[str]:

@@ -99,11 +99,7 @@ def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:
     """
     if str(system) not in system_names():
         return set()
-    own = {
-        name: value
-        for name, value in load_system(system).arguments.items()
-        if isinstance(value, str) and value and (LOGS / value).is_file()
-    }
+    own = own_logs(str(system))
     given = {name: value for name, value in arguments.items() if name in own}
     if not given:
         return set(own.values())
@@ -116,7 +112,17 @@ def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:
     ]
     if missing:
         raise OptionError(*missing)
-    return {value for value in given.values() if value in own.values() and not Path(value).exists()}
+    named = given == own and not any(Path(value).exists() for value in own.values())
+    return set(own.values()) if named else set()
+
+
+def own_logs(system: str) -> dict[str, str]:
+    """Return the arguments of a shipped system that are logs which came with it, and their names."""
+    return {
+        name: value
+        for name, value in load_system(system).arguments.items()
+        if isinstance(value, str) and value and (LOGS / value).is_file()
+    }
 
 
 def _changed(system: System, step: float | None, duration: float | None) -> System:

@@ -85,11 +85,12 @@ def simulate(
         raise click.UsageError(f"found {found}, allowed: one of both")
     if listed or system is None:
         return _list(terminal)
+    asked = {"arguments": arguments, "step": step, "duration": duration, "backend": backend}
     if copy is not None:
+        _refuse_run_options({"output": output, "draw": draw, **asked})
         return _write(system, copy, terminal)
     tune_pyarrow()
     target = output or Path(default_name(system))
-    asked = {"arguments": arguments, "step": step, "duration": duration, "backend": backend}
     return _run(system, target, draw, terminal, asked)
 
 
@@ -139,8 +140,18 @@ def _list(terminal: Terminal) -> int:
     return 0
 
 
+def _refuse_run_options(given: dict[str, Any]) -> None:
+    """Raise a usage error if a file is to be written with options that only a run follows."""
+    flags = {"arguments": "set"}
+    found = [f"--{flags.get(name, name)}" for name, value in given.items() if value]
+    if found:
+        allowed = "alone, as nothing is run; change the file"
+        raise click.UsageError(f"--write-system: found with {', '.join(found)}, allowed: {allowed}")
+
+
 def _write(system: str, path: Path, terminal: Terminal) -> int:
-    """Write the file of a shipped system, under a name that is new."""
+    """Write the file of a shipped system, under a name that is new; the logs that came along stay there."""
+    from urmpipe.api.simulate import own_logs
     from urmpipe.printing.terminal import say
     from urmpipe_fmus.cosim import system_text
     from urmpipe_pipeline.outputs import guarded_output
@@ -148,7 +159,8 @@ def _write(system: str, path: Path, terminal: Terminal) -> int:
     text = system_text(system)
     with guarded_output(path, [], "system") as part:
         part.write_text(text, encoding="utf-8")
-    said = f"System: {path}  (change it, then: urmpipe simulate {path})"
+    logs = "".join(f" --set {name}=FILE.csv" for name in own_logs(system))
+    said = f"System: {path}  (change it, then: urmpipe simulate {path}{logs})"
     terminal.answer(lambda: {"schema": 1, "system": str(path)}, lambda: say(said))
     return 0
 

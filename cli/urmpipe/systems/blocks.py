@@ -3,31 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from urmpipe.guards import place_robot
+from urmpipe.systems.held_logs import between_samples, clock_of, on_points
 from urmpipe.systems.log_tables import LogTable, read_table
 from urmpipe.systems.units import Backend, column_names, unit_of
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.build import chosen_backend
 from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.cosim.plan import LogColumn
+from urmpipe_fmus.cosim.system import STEP
+from urmpipe_fmus.table import Table
 from urmpipe_models.errors import OptionError, UrmpipeError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources import ReadOptions, read_map
 
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
-    from urmpipe_fmus.table import Table
     from urmpipe_fmus.unit import Unit
+    from urmpipe_models.arrays import IntArray
     from urmpipe_models.chains.chain import Chain
-
-ON_TIME = 1e-6
-"""So far from a sample in [s] a communication point counts as on it: no clock of a log is finer."""
 
 ON_PYTHON = "on-python"
 """The kind of the warning that no native FMUs can be built; it is told before the first step, too."""
@@ -75,13 +74,14 @@ class Blocks:
         self.warnings: list[LogWarning] = []
         self.end: float | None = None
         self.period: float | None = None
-        self._held: dict[str, Table] = {}
+        self._held: dict[str, IntArray] = {}
         self._faults: dict[str, UrmpipeError] = {}
         self._columns: dict[Port, LogTable] = {}
         for block in system.blocks:
             self._try(block.name, partial(self._take, block))
         for one in system.inputs:
             self._try(str(one.destination), partial(self._follow, one))
+        self._meet(system.step or self.period or STEP)
         if self._slow and self.units:
             said = f"the units run on Python, a hundred times slower than native ones: {self._slow}"
             self.warnings.append(LogWarning(ON_PYTHON, said))
@@ -144,36 +144,37 @@ class Blocks:
             return unit_of(block.unit, robot=arm, options=options)
         names = column_names(options.pop("columns", None))
         table = self._table(log, names, arm, log_map)
-        if names is None and "q" in (one.name for one in table.columns) and not options.get("interpolate"):
-            self._hold(block.name, table.table)
+        motion = names is None and any(one.name in ("q", "s") for one in table.columns)
+        if motion and not options.get("interpolate"):
+            self._hold(block.name, table.table.t_ns)
         return unit_of(block.unit, robot=arm, log=table, options=options)
 
-    def _hold(self, block: str, table: Table) -> None:
-        """Remember joint values that are held between samples: they may wrap, so nothing is in between."""
-        self._held[block] = table
-        if len(table.t_ns) > 1:
-            period = float(np.median(np.diff(table.t_ns))) / 1e9
-            self.period = min(self.period or period, period)
+    def _hold(self, block: str, t_ns: IntArray) -> None:
+        """Remember the clock of joint values that are held between samples."""
+        clock = clock_of(t_ns)
+        self._held[block] = clock.t_ns
+        self.end = max(self.end or 0.0, float(clock.t_ns[-1]) / 1e9)
+        if clock.period is not None:
+            self.period = min(self.period or clock.period, clock.period)
+
+    def _meet(self, step: float) -> None:
+        """Let the samples of held logs that are on communication points be met by these."""
+        for block in self._held.keys() & self.units.keys():
+            self._held[block] = on_points(self._held[block], step)
+            unit = self.units[block]
+            if unit.table is not None:
+                self.units[block] = replace(unit, table=Table(self._held[block], unit.table.values))
 
     def between_samples(self, step: float, count: int) -> Iterator[LogWarning]:
         """Yield which joint logs are held at communication points that lie between two of their samples.
-
-        A deviation there is that of a sample before, held against a reference that has moved on.
 
         Args:
             step: Communication step in [s].
             count: Number of steps.
         """
-        for block, table in self._held.items():
-            times = np.arange(count + 1) * step
-            times = times[times * 1e9 <= table.t_ns[-1]]
-            rows = np.searchsorted(table.t_ns / 1e9, times + ON_TIME, side="right") - 1
-            late = times - table.t_ns[np.maximum(rows, 0)] / 1e9
-            if np.any(off := late > ON_TIME):
-                points = f"{off.sum()} of {len(times)} communication points lie between samples of the log"
-                held = f"where the one before is held, {1e3 * late.max():.4g} ms at most"
-                said = f"block {block}: {points}, {held}: a deviation there is none of the log's"
-                yield LogWarning("held", said)
+        for block, t_ns in self._held.items():
+            if said := between_samples(block, t_ns, step, count):
+                yield said
 
     def _fmu(self, block: str) -> Path:
         """Return the FMU of a block from the cache; tell if it is built."""

@@ -20,7 +20,9 @@ def placed(path: Path, name: str, faults: Iterable[Finding | str]) -> tuple[Find
         name: What the user called it.
         faults: A text begins with the name of what is wrong, such as `blocks.load: `; findings stay.
     """
-    lines = dict(_named_lines(path.read_text(encoding="utf-8-sig").splitlines()))
+    lines: dict[str, int] = {}
+    for full, number in _named_lines(path.read_text(encoding="utf-8-sig").splitlines()):
+        lines.setdefault(full, number)
     return tuple(
         one if isinstance(one, Finding) else Finding(one, file=name, line=_line_of(lines, one))
         for one in dict.fromkeys(faults)
@@ -35,8 +37,10 @@ def _named_lines(text: Iterable[str]) -> Iterator[tuple[str, int]]:
             table = _plain(header[1])
             yield table, number
         elif key := KEY.match(line):
-            name = _plain(key[1])
-            yield f"{table}.{name}" if table else name, number
+            name = table
+            for part in _plain(key[1]).split("."):  # a key `drive.start.C` is a table `drive`, too
+                name = f"{name}.{part}" if name else part
+                yield name, number
 
 
 def _plain(name: str) -> str:

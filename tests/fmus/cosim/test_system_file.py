@@ -228,6 +228,30 @@ a.v = 7
     assert {one.file for one in caught.value.findings} == {str(tmp_path / "bad.toml")}
 
 
+def test_dotted_keys_have_the_line_of_their_own(tmp_path: Path) -> None:
+    text = """system.step = 0
+[blocks]
+a = { unit = "x", fmu = "y" }
+b.unit = "x"
+b.start.k = 1
+c.start = 3
+[connections]
+a.u = 7
+"""
+    (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
+    with pytest.raises(CosimulationError) as caught:
+        load_system(tmp_path / "bad.toml")
+    places = [(one.message.partition(": ")[0], one.line) for one in caught.value.findings]
+    assert places == [
+        ("blocks.a", 3),
+        ("blocks.a.fmu", 3),
+        ("blocks.c", 6),
+        ("blocks.c.start", 6),
+        ("system.step", 1),
+        ("connections.a.u", 8),
+    ]
+
+
 def test_what_is_no_toml_or_no_file_is_told(tmp_path: Path) -> None:
     (found,) = said(tmp_path / "bad.toml", "[system\n")
     assert found.startswith("cannot be read as TOML: ")

@@ -1,0 +1,83 @@
+"""Joint logs that are held between samples: the step that they ask for, and their samples on it.
+
+Joint values may wrap, so nothing is in between: at a communication point that misses a sample the one before
+is held, against a reference that has moved on.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.runs.grid import REGULAR
+from urmpipe_pipeline.sources.clocks.quantised import behind_rounded
+
+
+class Clock(NamedTuple):
+    """The clock of a log, as `urmpipe.compare` takes it.
+
+    Attributes:
+        t_ns: Times in integer [ns], strictly rising, shape (n,): the log's own, or those of the regular clock
+            behind rounded ones.
+        period: Of a regular clock its mean, else the median, in [s]; None of a single row.
+    """
+
+    t_ns: IntArray
+    period: float | None
+
+
+def clock_of(t_ns: IntArray) -> Clock:
+    """Return the clock behind the times of a log.
+
+    Args:
+        t_ns: Times in integer [ns], strictly rising, shape (n,).
+    """
+    if len(t_ns) < 2:
+        return Clock(t_ns, None)
+    mean = float(t_ns[-1] - t_ns[0]) / (len(t_ns) - 1)
+    if np.abs(t_ns - t_ns[0] - np.arange(len(t_ns)) * mean).max() <= REGULAR * mean:
+        return Clock(t_ns, mean / 1e9)
+    if even := behind_rounded(t_ns):
+        return Clock(even.t_ns - even.t_ns[0] + t_ns[0], even.period / 1e9)
+    return Clock(t_ns, float(np.median(np.diff(t_ns))) / 1e9)
+
+
+def on_points(t_ns: IntArray, step: float) -> IntArray:
+    """Return times of which those on a communication point are exactly its time, not a rounding off it.
+
+    Args:
+        t_ns: Times in integer [ns], strictly rising, shape (n,).
+        step: Communication step in [s].
+    """
+    if len(t_ns) < 2:
+        return t_ns
+    points = _points(np.rint(t_ns / (step * 1e9)), step)
+    near = np.abs(points - t_ns) <= REGULAR * np.diff(t_ns).min()
+    return np.where(near, points, t_ns)
+
+
+def between_samples(block: str, t_ns: IntArray, step: float, count: int) -> LogWarning | None:
+    """Return that communication points lie between two samples of a log; None if none does.
+
+    Args:
+        block: The block that plays the log.
+        t_ns: Times of its samples in integer [ns], strictly rising, shape (n,).
+        step: Communication step in [s].
+        count: Number of steps.
+    """
+    points = _points(np.arange(count + 1), step)
+    points = points[(points >= t_ns[0]) & (points <= t_ns[-1])]
+    late = points - t_ns[np.searchsorted(t_ns, points, side="right") - 1]
+    if not np.any(late):
+        return None
+    found = f"{np.count_nonzero(late)} of {len(points)} communication points lie between samples of the log"
+    held = f"where the one before is held, {late.max() / 1e6:.4g} ms at most"
+    return LogWarning("held", f"block {block}: {found}, {held}: a deviation there is none of the log's")
+
+
+def _points(k: FloatArray | IntArray, step: float) -> IntArray:
+    """Return the times of communication points in integer [ns], as a table rounds them."""
+    return np.rint(k * step * 1e9).astype(np.int64)
