@@ -40,7 +40,7 @@ def test_log_to_delta_is_what_compare_says(log: str) -> None:
 @pytest.fixture
 def slow_motion(tmp_path: Path) -> dict[str, str]:
     """A log at 10 ms, twice the step of most systems, and the path of exactly its motion."""
-    return write_motion(tmp_path, np.arange(100) * 0.01, "%.18e")
+    return write_motion(tmp_path, np.arange(100, dtype=np.float64) / 100.0, "%.18e")
 
 
 def write_motion(tmp_path: Path, t: FloatArray, digits: str) -> dict[str, str]:

@@ -1,0 +1,132 @@
+"""compare on the command line against an earlier comparison: what got worse, what is gone."""
+
+from __future__ import annotations
+
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from four_logs import ALLOWED, Captured, compare, lay_logs, names, read_lines, recorded, said
+from urmpipe.main import run
+
+
+@pytest.fixture(autouse=True)
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """A folder with a reference and three logs: within tolerance, a little worse, and out of it."""
+    return lay_logs(tmp_path, monkeypatch)
+
+
+def test_a_log_of_the_baseline_that_is_missing_is_exit_code_1() -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    assert compare("good.csv", "slack.csv", "--baseline", "before.rrd", "-q", "-o", "now.rrd") == 0
+    assert compare("slack.csv", "--baseline", "before.rrd", "-q", "-o", "now.rrd") == 1
+    assert names() == {"before.rrd", "now.rrd"}
+
+
+def test_a_comparison_is_held_against_another(folder: Path, capsys: Captured) -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    (folder / "good.csv").write_bytes((folder / "slack.csv").read_bytes())
+    assert compare("good.csv", "-q", "-o", "now.rrd") == 0
+    capsys.readouterr()
+    assert run(["compare", "now.rrd", "--baseline", "before.rrd", "--json", "--junit", "v.xml"]) == 1
+    told = json.loads(capsys.readouterr().out)
+    assert (told["verdict"], told["recording"], told["baseline"]["verdict"]) == ("fail", "now.rrd", "fail")
+    assert told["baseline"]["recording"] == "before.rrd"
+    x = next(one for one in told["baseline"]["changes"] if one["quantity"] == "x")
+    before, now = (recorded(name).runs[0] for name in ("before.rrd", "now.rrd"))
+    assert x["max"] == {"before": before.statistics["x"].max, "now": now.statistics["x"].max}
+    assert x["largest_change"] == np.abs(now.delta[:, 0] - before.delta[:, 0]).max()
+    types = {one.get("type") for one in ET.parse("v.xml").iter("failure")}
+    assert types == {"worse-than-baseline"}
+    assert names() == {"before.rrd", "now.rrd", "v.xml"}
+
+    noise = ["--noise", "1mm,angle=1deg,joint=1deg"]
+    assert run(["compare", "now.rrd", "--baseline", "before.rrd", "-q", *noise]) == 0
+    assert run(["compare", "before.rrd", "--baseline", "now.rrd", "-q"]) == 0
+    none = ["--noise", "0,angle=0,joint=0"]
+    assert run(["compare", "before.rrd", "--baseline", "before.rrd", "-q", *none]) == 0
+    assert compare("good.csv", "--baseline", "before.rrd", "-q") == 1
+    assert recorded("good-against-wanted.rrd").baseline is None
+
+
+def test_what_changed_is_printed(folder: Path, capsys: Captured) -> None:
+    assert compare("good.csv", "bad.csv", "-q", "-o", "before.rrd") == 1
+    (folder / "good.csv").write_bytes((folder / "slack.csv").read_bytes())
+    assert compare("good.csv", "slack.csv", "-q", "-o", "now.rrd", "--tolerance", "4mm") == 0
+    capsys.readouterr()
+    assert run(["compare", "now.rrd", "--baseline", "before.rrd"]) == 1
+    lines = [line.strip() for line in capsys.readouterr().out.splitlines()]
+    begin = lines.index("FAIL  against the baseline against-wanted: 12 quantities worse, 1 gone")
+    assert lines[begin + 2] == "Changed since against-wanted by more than the noise"
+    before, now = (recorded(name).runs[0].statistics["x"] for name in ("before.rrd", "now.rrd"))
+    row = next(line for line in lines[begin:] if line.startswith("good") and "Δx" in line)
+    assert f"{before.max * 1e3:.4f} → {now.max * 1e3:.4f}" in row
+    assert f"{before.rms * 1e3:.4f} → {now.rms * 1e3:.4f}" in row
+    assert {
+        "noise: axis 0.001 mm, norm 0.001 mm, path 0.001 mm, angle 5.72958e-05 deg, joint 5.72958e-05 deg",
+        "new: slack",
+        "gone: bad",
+        'made otherwise: tolerance: {"axis": 0.0035} → {"axis": 0.004}',
+    } <= set(lines)
+
+
+def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -> None:
+    assert compare("good.csv", "-q", "-o", "a.rrd") == 0
+    given = ["--tolerance", "1mm", "--align", "none", "-o", "b.rrd"]
+    assert run(["compare", "a.rrd", "--baseline", "a.rrd", *given]) == 2
+    assert said(capsys) == (
+        "error: --output, --tolerance, --align: found with the recording of a comparison (a.rrd),"
+        " which stands as it was made, allowed: with the logs themselves"
+    )
+    assert run(["compare", "a.rrd"]) == 2
+    assert said(capsys) == (
+        "error: a.rrd: found the recording of a comparison, allowed: one that ingest wrote; to hold it"
+        " against another comparison, give it alone, with --baseline OTHER.rrd"
+    )
+
+
+def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
+    assert run(["ingest", "good.csv", "--robot", "ur5e", "-q"]) == 0
+    for baseline, found in (
+        ("good.rrd", "found the recording of one log, allowed: that of a comparison (--baseline)"),
+        ("good.csv", "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"),
+        ("missing.rrd", "found no such file, allowed: a recording (.rrd) that urmpipe wrote"),
+    ):
+        assert compare("good.csv", "--baseline", baseline, "-q") == 2
+        assert said(capsys) == f"error: {baseline}: {found}"
+    assert compare("good.csv", "--noise", "1um", "-q") == 2
+    assert said(capsys) == "error: --noise: found without --baseline, allowed: with an earlier comparison"
+    assert compare("good.csv", "--baseline", "good.rrd", "--noise", "-1", "-q") == 2
+    assert said(capsys) == f"error: --noise: found '-1', {ALLOWED}"
+
+
+def test_a_quiet_failure_against_a_baseline_says_what_is_worse(capsys: Captured) -> None:
+    assert compare("good.csv", "bad.csv", "-q", "-o", "before.rrd") == 1
+    capsys.readouterr()
+    noise = ["--noise", "50um,angle=1deg,joint=1deg"]
+    assert compare("slack.csv", "good.csv", "-q", "-o", "now.rrd", "--baseline", "before.rrd", *noise) == 1
+    verdict, decided, *against = capsys.readouterr().err.splitlines()
+    assert verdict.endswith("by the joints on both sides, but worse than the baseline against-wanted")
+    assert decided.startswith("      max |")
+    assert against == [
+        "FAIL  against the baseline against-wanted: 0 quantities worse, 1 gone",
+        "      gone: bad",
+    ]
+    good = read_lines("good.csv")
+    Path("good.csv").write_text("".join(good[:120]))
+    assert compare("good.csv", "bad.csv", "-q", "-o", "now.rrd", "--baseline", "before.rrd", *noise) == 1
+    *_, against_baseline, worse = capsys.readouterr().err.splitlines()
+    assert against_baseline == "FAIL  against the baseline against-wanted: 12 quantities worse"
+    assert worse.startswith("      worse: Δx of good (samples), Δy of good (samples), ")
+
+
+def test_a_baseline_is_never_replaced(capsys: Captured) -> None:
+    assert compare("good.csv", "-q") == 0
+    assert compare("good.csv", "--baseline", "good-against-wanted.rrd", "-q") == 2
+    assert said(capsys) == (
+        "error: good-against-wanted.rrd: found an input of this command,"
+        " allowed: any other name for the recording"
+    )

@@ -1,0 +1,66 @@
+"""A reference and three logs of one motion, and `urmpipe compare` on them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from urmpipe.main import run
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.recording import read_recording
+
+Captured = pytest.CaptureFixture[str]
+
+ALLOWED = (
+    "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"
+    " m of a joint that slides)"
+)
+
+
+def lay_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Lay a reference and three logs into a folder, within tolerance, a little worse and out of it; enter it."""
+    monkeypatch.chdir(tmp_path)
+    t = 0.005 * np.arange(200)
+    q = np.cos(np.outer(t, 0.5 + 0.1 * np.arange(6)))
+    for name, off in (("wanted", 0.0), ("good", 0.0005), ("slack", 0.0006), ("bad", 0.02)):
+        write_log(f"{name}.csv", t, q - off * np.sin(t)[:, np.newaxis])
+    return tmp_path
+
+
+def write_log(name: str, t: NDArray[Any], q: NDArray[Any]) -> None:
+    """Write a log of six joints."""
+    header = "t [s]," + ",".join(f"q{i} [rad]" for i in range(1, 7))
+    np.savetxt(name, np.column_stack([t, q]), fmt="%.9f", delimiter=",", header=header, comments="")
+
+
+def compare(*arguments: str) -> int:
+    """Run `urmpipe compare wanted.csv ...` with an arm."""
+    return run(["compare", "wanted.csv", *arguments, "--robot", "ur5e"])
+
+
+def recorded(name: str) -> Comparison:
+    """Return the comparison that a recording holds."""
+    result = read_recording(Path(name))
+    assert isinstance(result, Comparison)
+    return result
+
+
+def said(capsys: Captured) -> str:
+    """Return the last line on standard error."""
+    return capsys.readouterr().err.splitlines()[-1]
+
+
+def names() -> set[str]:
+    """Return what stands in the folder beside the logs."""
+    return {path.name for path in Path.cwd().iterdir()} - {
+        f"{n}.csv" for n in ("wanted", "good", "slack", "bad")
+    }
+
+
+def read_lines(name: str) -> list[str]:
+    """Return the lines of a file with their ends."""
+    return Path(name).read_text(encoding="utf-8").splitlines(keepends=True)
