@@ -22,7 +22,7 @@ ALLOWED = (
 
 
 def lay_logs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    """Lay a reference and three logs into a folder, within tolerance, a little worse and out of it; enter it."""
+    """Enter a folder with a reference and three logs: within tolerance, a little worse, out of it."""
     monkeypatch.chdir(tmp_path)
     t = 0.005 * np.arange(200)
     q = np.cos(np.outer(t, 0.5 + 0.1 * np.arange(6)))
