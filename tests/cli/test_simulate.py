@@ -144,7 +144,7 @@ def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> 
         "--set",
         f"log={log}",
         "--set",
-        "reference=path.csv",
+        f"reference={LOGS / 'path.csv'}",
         "--duration",
         "10s",
         "--json",

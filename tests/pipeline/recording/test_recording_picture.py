@@ -179,7 +179,7 @@ def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison
     picture = look(viewer, path, 12.0, right)
     assert complaints(viewer) == []
     assert_drawn(picture, left=[*JOINT_COLOURS[:5], REFERENCE_COLOUR], right=right)
-    assert "delta = asked for - a b/c.d [x] Ω [m]" in view_names(viewer)
+    assert "delta = asked for - a b/c.d [x] Ω [mm]" in view_names(viewer)
 
 
 def test_a_branch_in_the_viewer_is_there_only_where_there_is_such_a_solution(
