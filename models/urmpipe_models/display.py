@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from html import escape
 from typing import Any
@@ -15,14 +16,14 @@ HEAD = 8
 """Rows of the table in a notebook."""
 
 
-class Shown:
+class Shown(ABC):
     """A result that people look at: it has a headline, a table, and what a person should know."""
 
     __slots__ = ()
 
+    @abstractmethod
     def _headline(self) -> str:
         """Return its name and what it holds, in one line."""
-        raise NotImplementedError
 
     def _notes(self) -> Sequence[str]:
         """Return what a person should know, a line each."""

@@ -1,10 +1,8 @@
-"""The command line as a user runs it, in an empty folder: in this process, or in one of its own."""
+"""The command line as a user runs it, in an empty folder."""
 
 from __future__ import annotations
 
 import io
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -32,19 +30,5 @@ def urmpipe(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Callable[..., Ra
         with redirect_stdout(out), redirect_stderr(err):
             code = run_line([*map(str, arguments)])
         return Ran(code, out.getvalue(), err.getvalue())
-
-    return run
-
-
-@pytest.fixture
-def program(tmp_path: Path) -> Callable[..., Ran]:
-    """Run `urmpipe ARGUMENTS` in an empty folder, in a process of its own."""
-
-    def run(*arguments: str | Path) -> Ran:
-        command = [sys.executable, "-m", "urmpipe", *map(str, arguments)]
-        done = subprocess.run(
-            command, capture_output=True, text=True, cwd=tmp_path, encoding="utf-8", check=False
-        )
-        return Ran(done.returncode, done.stdout, done.stderr)
 
     return run

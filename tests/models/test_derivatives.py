@@ -31,7 +31,7 @@ def columns(chain: Chain, count: int, seed: int) -> FloatArray:
     return np.random.default_rng(seed).uniform(-2.0, 2.0, (len(chain.coordinates), count))
 
 
-def gradients(task: Task, q: FloatArray) -> None:
+def assert_gradients(task: Task, q: FloatArray) -> None:
     """Hold grad(|e|^2 / 2) = -J^T e of every joint, at any miss."""
     miss = task.miss(q)
     slope = -np.einsum("ijn,in->jn", miss.jacobian, miss.error)
@@ -46,7 +46,7 @@ def test_the_gradient_of_the_squared_miss_is_minus_j_transposed_e_at_any_target(
 ) -> None:
     chain = load_robot(robot)
     targets = targets_of(chain, columns(chain, 20, 1).T)
-    gradients(task_of(chain, targets if pose else Targets(targets.position)), columns(chain, 20, 2))
+    assert_gradients(task_of(chain, targets if pose else Targets(targets.position)), columns(chain, 20, 2))
 
 
 @settings(max_examples=20, deadline=None)
@@ -58,7 +58,7 @@ def test_so_it_is_of_any_chain(chains: SearchStrategy[Chain], data: st.DataObjec
     q = columns(chain, 3, 2)
     miss = task.miss(q)
     if np.sqrt(miss.turn2).max() < 3.0 * miss.length:  # at half a turn the axis leaps
-        gradients(task, q)
+        assert_gradients(task, q)
 
 
 @pytest.mark.parametrize("robot", ["urm6", "ur5e", "panda", "iiwa14"])

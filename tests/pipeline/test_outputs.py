@@ -137,6 +137,7 @@ def test_a_name_that_ends_as_those_of_another_kind_is_refused(
 @pytest.mark.parametrize("name", ["run", "run.2026", "run.RRD"])
 def test_a_name_that_no_other_kind_has_is_taken(tmp_path: Path, name: str) -> None:
     write(tmp_path / name, kind="recording")
+    assert [path.name for path in tmp_path.iterdir()] == [name]
 
 
 def test_a_folder_is_not_replaced(tmp_path: Path) -> None:

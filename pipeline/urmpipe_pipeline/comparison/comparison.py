@@ -74,6 +74,7 @@ class Comparison(Shown):
         """
 
         def place(run: Deviation) -> tuple[bool, bool, float, float]:
+            """Return what a log is ranked by, the least first."""
             partly = self.covered(run) < WHOLE
             return run.verdict == "fail", partly, run.decisive.used or 0.0, run.statistics["norm"].rms
 

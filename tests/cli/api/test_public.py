@@ -149,7 +149,9 @@ def test_a_warning_is_shown_once(tmp_path: Path) -> None:
         warnings.simplefilter("error")
         compared = urmpipe.compare(run, run, tolerance=0.01)
         urmpipe.compare(compared, baseline=compared)
-        urmpipe.report([compared, run], tmp_path / "report.html")
+        report = urmpipe.report([compared, run], tmp_path / "report.html")
+    assert {one.kind for one in run.warnings} == {"assumed-unit", "period-not-used"}
+    assert report.results == (compared, run)
 
 
 def test_robot_and_log_are_told_together() -> None:
