@@ -18,7 +18,7 @@ from urmpipe.systems.blocks import Blocks
 from urmpipe.systems.result import check_meters, simulation_of
 from urmpipe.systems.units import Backend
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.cosim import load_system, prepare, system_names, system_svg
+from urmpipe_fmus.cosim import load_system, prepare, system_name, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
 from urmpipe_fmus.cosim.process import Worker
 from urmpipe_models.errors import OptionError
@@ -97,7 +97,7 @@ def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:
     Raises:
         OptionError: If some of its logs are given and others are not: they would be of two motions.
     """
-    if str(system) not in system_names():
+    if system_name(str(system)) not in system_names():
         return set()
     own = own_logs(str(system))
     given = {name: value for name, value in arguments.items() if name in own}

@@ -10,7 +10,7 @@ from urmpipe.guards import PathLike, Robot, place_robot
 from urmpipe.systems.log_tables import LogTable, read_table
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit, unit_options
+from urmpipe_fmus.units import make_unit, unit_name, unit_options
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 
@@ -55,7 +55,7 @@ def unit_of(
     if isinstance(unit, Unit) or Path(unit).suffix == ".py":
         _refuse_options(unit, {"robot": robot, "log": log, **given})
         return unit if isinstance(unit, Unit) else _from_file(Path(unit))
-    name = str(unit)
+    name = unit_name(str(unit))
     known = unit_options(name)
     _refuse_missing(name, known, robot, log)
     arm = place_robot(robot)
@@ -74,7 +74,7 @@ def example_of(unit: str) -> Unit:
     Raises:
         UrmpipeError: If there is no such unit, or with all that is wrong with a file.
     """
-    return unit_of(unit, **EXAMPLES.get(unit, {}))
+    return unit_of(unit, **EXAMPLES.get(unit_name(unit), {}))
 
 
 def _from_file(path: Path) -> Unit:
