@@ -12,6 +12,7 @@ from typing import Any
 from urmpipe_fmus.cosim.arguments import beside, given, replaced, unknown
 from urmpipe_fmus.cosim.places import placed
 from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
+from urmpipe_fmus.units import unit_name
 from urmpipe_models.errors import CosimulationError, Finding
 from urmpipe_models.names import did_you_mean, not_among
 
@@ -33,6 +34,12 @@ TABLES: dict[str, tuple[str, ...] | None] = {
 """The tables of a file and their keys; None where the user names the keys."""
 
 
+def system_name(name: str) -> str:
+    """Return the name of a shipped system whose words are joined by - or _; any other name as it is."""
+    joined = name.replace("_", "-")
+    return joined if joined in system_names() else name
+
+
 def system_names() -> tuple[str, ...]:
     """Return the names of the shipped systems."""
     return tuple(sorted(path.stem for path in SYSTEMS.glob("*.toml")))
@@ -44,7 +51,7 @@ def system_text(name: str) -> str:
     Raises:
         CosimulationError: If there is no such system.
     """
-    if name not in system_names():
+    if system_name(name) not in system_names():
         found = f"found {name!r}{did_you_mean(name, system_names())}"
         raise CosimulationError(f"system: {found}, allowed: one of {', '.join(system_names())}")
     return _path_of(name).read_text(encoding="utf-8")
@@ -68,7 +75,8 @@ def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
     faults: list[str] = []
     defaults = _table(table, "arguments", faults)
     here = {key: beside(path.parent, table.get(key, {})) for key in ("arguments", "blocks", "inputs")}
-    values = given(here["arguments"] if defaults else {}, arguments or {}, faults)
+    shipped = path.stem if path.parent == SYSTEMS else ""
+    values = given(here["arguments"] if defaults else {}, arguments or {}, faults, shipped)
     rest = {key: value for key, value in {**table, **here}.items() if key != "arguments"}
     faults += unknown(rest, values)
     system = _System(path, replaced(rest, values), values, faults).read()
@@ -79,9 +87,8 @@ def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
 
 def _path_of(name_or_path: str | Path) -> Path:
     """Return the path of a system file."""
-    shipped = SYSTEMS / f"{name_or_path}.toml"
-    if isinstance(name_or_path, str) and name_or_path in system_names():
-        return shipped
+    if isinstance(name_or_path, str) and (name := system_name(name_or_path)) in system_names():
+        return SYSTEMS / f"{name}.toml"
     path = Path(name_or_path)
     if path.is_file():
         return path
@@ -176,7 +183,7 @@ class _System:
             start = {}
         return Block(
             name=name,
-            unit=self._text(table, where, "unit", ""),
+            unit=unit_name(self._text(table, where, "unit", "")),
             file=self._file(table, where, "file"),
             fmu=self._file(table, where, "fmu"),
             options=options,

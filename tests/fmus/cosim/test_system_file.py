@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe_fmus.cosim import LogInput, Port, System, load_system, system_names
+from urmpipe_fmus.cosim import LogInput, Port, System, load_system, system_names, system_text
 from urmpipe_models.errors import CosimulationError
 
 WHOLE = """
@@ -49,7 +49,7 @@ tolerance = 1e-6
 """
 
 
-ELSE = "; all else stands in the system's file; simulate writes a copy (docs/simulate.md)"
+ELSE = "; all else is changed in the system's file"
 
 
 @pytest.fixture
@@ -182,6 +182,20 @@ def test_arguments_must_be_of_their_defaults_type(folder: Path) -> None:
         f"{folder / 'two.toml'}: argument held: found 'maybe', allowed: true, false, like False",
         f"{folder / 'two.toml'}: argument lock: found 'lock', allowed: log, k, joints, held{ELSE}",
     ]
+
+
+def test_an_argument_that_a_shipped_system_lacks_is_told_with_how_to_change_its_file() -> None:
+    with pytest.raises(CosimulationError) as caught:
+        load_system("one-drive", {"u": "3"})
+    copied = ", of which urmpipe simulate --write-system FILE.toml one-drive makes a copy"
+    assert str(caught.value) == f"one-drive: argument u: found 'u', allowed: none{ELSE}{copied}"
+
+
+def test_words_of_a_system_and_of_its_units_are_joined_by_either_sign(tmp_path: Path) -> None:
+    assert load_system("one_drive") == load_system("one-drive")
+    assert system_text("one_drive") == system_text("one-drive")
+    (tmp_path / "a.toml").write_text('[blocks.a]\nunit = "dc-drive"\n', encoding="utf-8")
+    assert load_system(tmp_path / "a.toml").blocks[0].unit == "dc_drive"
 
 
 @pytest.mark.parametrize("value", ["inf", "nan", "true", '"1"', "-0.1"])
