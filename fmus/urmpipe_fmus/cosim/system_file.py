@@ -6,6 +6,7 @@ import math
 import re
 import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +16,9 @@ from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, Log
 from urmpipe_fmus.units import unit_name
 from urmpipe_models.errors import CosimulationError, Finding
 from urmpipe_models.names import did_you_mean, not_among
+
+NOWHERE = Port("", "")
+"""Stands for an end of a connection that the file does not tell rightly."""
 
 BLOCK_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
@@ -58,7 +62,20 @@ def system_text(name: str) -> str:
 
 
 def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = None) -> System:
-    """Read a system file.
+    """Return the system of a file with which nothing is wrong; see `read_system`.
+
+    Raises:
+        CosimulationError: With all that is wrong: no such file, no TOML, unknown keys, values of another
+            type or out of range, names of no block, arguments that the file does not have.
+    """
+    system = read_system(name_or_path, arguments)
+    if system.faults:
+        raise CosimulationError(*system.faults)
+    return system
+
+
+def read_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = None) -> System:
+    """Read a system file; what is wrong with it stands in `faults`, to be told with what is found later.
 
     Paths in the file are relative to its folder; those in `arguments` to the working folder.
 
@@ -67,8 +84,7 @@ def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
         arguments: Values for the file's `$name`s instead of its defaults.
 
     Raises:
-        CosimulationError: With all that is wrong: no such file, no TOML, unknown keys, values of another
-            type or out of range, names of no block, arguments that the file does not have.
+        CosimulationError: If there is no such file, or it is no TOML.
     """
     path = _path_of(name_or_path)
     table = _parsed(path)
@@ -80,9 +96,14 @@ def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
     rest = {key: value for key, value in {**table, **here}.items() if key != "arguments"}
     faults += unknown(rest, values)
     system = _System(path, replaced(rest, values), values, faults).read()
-    if faults:
-        raise CosimulationError(*placed(path, str(name_or_path), faults))
-    return system
+    unread = {name for name in system.by_name if any(_is_of(name, fault) for fault in faults)}
+    found = placed(path, str(name_or_path), faults) if faults else ()
+    return replace(system, faults=found, unread=frozenset(unread))
+
+
+def _is_of(block: str, fault: str) -> bool:
+    """Return whether a fault stands in a block."""
+    return fault.startswith((f"blocks.{block}.", f"blocks.{block}: "))
 
 
 def _path_of(name_or_path: str | Path) -> Path:
@@ -140,8 +161,8 @@ class _System:
             record_every=self._count(head, "record_every"),
             arguments=self.arguments,
             blocks=blocks,
-            connections=tuple(one for one in connections if one),
-            inputs=tuple(one for one in inputs if one),
+            connections=tuple(connections),
+            inputs=tuple(inputs),
             iterate=self._flag(loops, "loops", "iterate"),
             tolerance=self._positive(loops, "loops", "tolerance", TOLERANCE),
         )
@@ -190,21 +211,20 @@ class _System:
             start=start,
         )
 
-    def _connection(self, destination: str, source: Any) -> Connection | None:
-        """Return a connection, if both of its ends are told."""
+    def _connection(self, destination: str, source: Any) -> Connection:
+        """Return a connection."""
         where = f"connections.{destination}"
-        if not isinstance(source, str):
-            self.faults.append(f"{where}: found {source!r}, allowed: its source as 'block.variable'")
-            return None
-        ends = self._port(where, destination), self._port(where, source)
-        return Connection(ends[0], ends[1]) if ends[0] and ends[1] else None
+        if isinstance(source, str):
+            return Connection(self._port(where, destination), self._port(where, source))
+        self.faults.append(f"{where}: found {source!r}, allowed: its source as 'block.variable'")
+        return Connection(self._port(where, destination), NOWHERE)
 
-    def _input(self, destination: str, table: Any) -> LogInput | None:
+    def _input(self, destination: str, table: Any) -> LogInput:
         """Return an input from a log."""
         where = f"inputs.{destination}"
         if not isinstance(table, dict):
             self.faults.append(f"{where}: found {table!r}, allowed: {{ log = FILE, column = NAME }}")
-            return None
+            return LogInput(destination=self._port(where, destination), log="", column="")
         allowed = ("log", "column", "interpolate")
         self.faults += [f"{where}.{key}: {not_among(key, allowed)}" for key in table if key not in allowed]
         port = self._port(where, destination)
@@ -213,17 +233,18 @@ class _System:
                 self.faults.append(f"{where}.{key}: not found, allowed: a text")
         log, column = self._text(table, where, "log", ""), self._text(table, where, "column", "")
         interpolate = self._flag(table, where, "interpolate")
-        return LogInput(destination=port, log=log, column=column, interpolate=interpolate) if port else None
+        known = log if column else ""
+        return LogInput(destination=port, log=known, column=column, interpolate=interpolate)
 
-    def _port(self, where: str, text: str) -> Port | None:
-        """Return the port that a text `block.variable` names."""
+    def _port(self, where: str, text: str) -> Port:
+        """Return the port that a text `block.variable` names, `NOWHERE` if there is no such block."""
         block, dot, variable = text.partition(".")
         if not (block and dot and variable):
             self.faults.append(f"{where}: found {text!r}, allowed: block.variable")
-            return None
+            return NOWHERE
         if block not in self.names:
             self.faults.append(f"{where}: block {not_among(block, self.names)}")
-            return None
+            return NOWHERE
         return Port(block, variable)
 
     def _text(self, table: Mapping[str, Any], where: str, key: str, default: str) -> str:
