@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
@@ -15,6 +14,7 @@ from urmpipe_fmus.cosim.places import placed
 from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
 from urmpipe_fmus.units import unit_name
 from urmpipe_models.errors import CosimulationError, Finding
+from urmpipe_models.files.toml_text import parse_toml
 from urmpipe_models.names import did_you_mean, not_among
 
 NOWHERE = Port("", "")
@@ -119,10 +119,10 @@ def _path_of(name_or_path: str | Path) -> Path:
 
 def _parsed(path: Path) -> dict[str, Any]:
     """Return the tables of a TOML file."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise CosimulationError(Finding(f"cannot be read as TOML: {error}", file=str(path))) from error
+    if path.suffix.lower() == ".fmu":
+        said = f"found an FMU, allowed: a TOML file in which it is a block, [blocks.NAME] fmu = {path.name!r}"
+        raise CosimulationError(Finding(said, file=str(path)))
+    return parse_toml(path, CosimulationError)
 
 
 def _table(table: Mapping[str, Any], key: str, faults: list[str]) -> dict[str, Any]:

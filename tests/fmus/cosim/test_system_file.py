@@ -267,8 +267,27 @@ a.u = 7
 
 
 def test_what_is_no_toml_or_no_file_is_told(tmp_path: Path) -> None:
-    (found,) = said(tmp_path / "bad.toml", "[system\n")
-    assert found.startswith("cannot be read as TOML: ")
+    for text, line, told in (
+        ("[blocks.a]\n[system\n", 2, "not valid TOML: Expected ']' at the end of a table declaration"),
+        (
+            "[blocks.a]\nunit = dc_drive\n",
+            2,
+            'Invalid value (at line 2, column 8); a text needs quotes: unit = "dc_drive"',
+        ),
+    ):
+        (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(CosimulationError) as caught:
+            load_system(tmp_path / "bad.toml")
+        (found,) = caught.value.findings
+        assert (found.file, found.line) == (str(tmp_path / "bad.toml"), line)
+        assert told in found.message
+    (tmp_path / "drive.fmu").write_bytes(b"PK\xff")
+    with pytest.raises(CosimulationError) as caught:
+        load_system(tmp_path / "drive.fmu")
+    assert str(caught.value) == (
+        f"{tmp_path / 'drive.fmu'}: found an FMU, allowed: a TOML file in which it is a block,"
+        " [blocks.NAME] fmu = 'drive.fmu'"
+    )
     with pytest.raises(CosimulationError) as caught:
         load_system("no-such-system")
     assert str(caught.value) == (
