@@ -267,57 +267,6 @@ def test_all_that_is_wrong_with_the_parts_is_told_at_once(following: Path) -> No
     assert "blocks.meter: unit delta_meter: option joints: found, allowed: none, it has no options;" in told
 
 
-EVERY_KIND_OF_MISTAKE = """
-[system]
-stepp = 1
-duration = 1
-
-[blocks.lag]
-file = "follower.py"
-start = { gian = 2.0 }
-
-[blocks.second]
-file = "follower.py"
-
-[blocks.third]
-unit = "no_such_unit"
-
-[blocks.fourth]
-file = "missing.py"
-
-[blocks.arm]
-unit = "kinematic_chain"
-robot = "urm7"
-
-[connections]
-"second.u" = "lag.xx"
-"third.a" = "lagg.x"
-"fourth.a" = "lag.errror"
-
-[inputs]
-"lag.u" = { log = "missing.csv", column = "u" }
-"lag.v" = { log = "voltage.csv" }
-"""
-
-
-def test_what_is_wrong_with_file_parts_and_connections_is_told_at_once_by_line(following: Path) -> None:
-    following.write_text(EVERY_KIND_OF_MISTAKE, encoding="utf-8")
-    found = [one.removeprefix(f"{following}:") for one in refusal(following)]
-    assert [one.partition(", allowed: ")[0].partition("; allowed: ")[0] for one in found] == [
-        "3: system.stepp: found 'stepp' (did you mean step?)",
-        "8: blocks.lag.start.gian: found 'gian' (did you mean gain?)",
-        "13: blocks.third: unit: found 'no_such_unit'",
-        "17: blocks.fourth.file: found 'missing.py'",
-        "19: blocks.arm: unknown robot 'urm7' (did you mean urm8?)",
-        "24: connections.second.u: output of lag: found 'xx' (did you mean x?)",
-        "25: connections.third.a: block found 'lagg' (did you mean lag?)",
-        "26: connections.fourth.a: output of lag: found 'errror' (did you mean error?)",
-        "29: inputs.lag.u: missing.csv: found no such file",
-        "30: inputs.lag.v.column: not found",
-        "30: inputs.lag.v: input of lag: found 'v'",
-    ]
-
-
 def test_a_start_value_that_is_no_number_is_refused(following: Path) -> None:
     following.write_text(FOLLOWING.replace('gain = "$gain"', "gain = nan"), encoding="utf-8")
     assert refusal(following) == [
