@@ -254,6 +254,15 @@ def test_a_unit_that_is_none_is_told_with_those_that_are(urmpipe: RunCommand) ->
     assert (ran.code, ran.out, ran.err) == (2, "", f"error: {said}\n")
 
 
+def test_what_a_unit_does_not_have_is_told_before_it_is_read(urmpipe: RunCommand) -> None:
+    ran = urmpipe("fmu", "build", "dc-drive", "--robot", "urm7", "--log", "missing.csv")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.splitlines() == [
+        "error: unit dc_drive: found a robot (urm7), allowed: none, it has no such option",
+        "error: unit dc_drive: found a log (missing.csv), allowed: none, it has no such option",
+    ]
+
+
 def test_what_was_built_is_told_and_a_folder_gets_it(urmpipe: RunCommand, tmp_path: Path) -> None:
     (tmp_path / "blocks").mkdir()
     ran = urmpipe("fmu", "build", "delta_meter", "--backend", "python", "-o", "blocks")

@@ -56,8 +56,7 @@ def unit_of(
         _refuse_options(unit, {"robot": robot, "log": log, **given})
         return unit if isinstance(unit, Unit) else _from_file(Path(unit))
     name = unit_name(str(unit))
-    known = unit_options(name)
-    _refuse_missing(name, known, robot, log)
+    refuse_operands(name, robot, log)
     arm = place_robot(robot)
     if log is not None:
         names = column_names(given.pop("columns", None))
@@ -91,8 +90,15 @@ def column_names(columns: Any) -> list[str] | None:
     return [str(one) for one in (columns if isinstance(columns, (list, tuple)) else [columns])]
 
 
-def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, log: Any) -> None:
-    """Raise an `OptionError` if a unit lacks its robot or its log, or is given what it does not have."""
+def refuse_operands(name: str, robot: Robot | None, log: Any) -> None:
+    """Raise an error if a unit is not there, lacks its robot or its log, or is given what it does not have.
+
+    Raises:
+        UnitError: If there is no such unit.
+        OptionError: With all that it lacks and all that it does not have.
+    """
+    name = unit_name(name)
+    known = unit_options(name)
     takes = {"robot": "robot" in known, "log": FROM_LOG[0] in known}
     faults = []
     for option, value, metavar in (("robot", robot, "NAME|FILE"), ("log", log, "LOG")):
