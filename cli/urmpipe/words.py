@@ -89,8 +89,10 @@ SPELLINGS = {
 }
 """Every option that a message names (a test reads the sources)."""
 
-_FOREIGN = re.compile(r"\b(?:ros2|rosbag|libreoffice|rerun|xacro|apt-get|pip) [^;)]*")
-"""A command line of another program: its options stay."""
+_FOREIGN = re.compile(
+    r"\b(?:ros2|rosbag|libreoffice|rerun|xacro|apt-get|pip|urmpipe simulate --write-system) [^;)]*"
+)
+"""A command line that no public function stands for: its options stay."""
 
 _KEPT = re.compile(rf"(?P<option>--?[a-z-]+ '[^']*')|{_FOREIGN.pattern}|(?<!\w)'[^']*'(?!\w)")
 """What stays as it is: that, and what is quoted (names of files and columns) and no value of an option."""

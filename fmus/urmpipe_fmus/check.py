@@ -32,6 +32,9 @@ SECONDS = 60.0
 LINES = 5
 """So many of the last lines of its log are shown where an FMU fails."""
 
+AN_FMU = "an FMU, such as urmpipe fmu build makes of a unit"
+CO_SIMULATION = "FMI 2.0 for co-simulation, as most tools export it, too"
+
 PLATFORM_SUFFIXES = (".so", ".dll", ".dylib")
 
 
@@ -139,19 +142,23 @@ def _described(path: Path) -> Any:
     try:
         with zipfile.ZipFile(path) as archive:
             if "modelDescription.xml" not in archive.namelist():
-                raise _refused(path, "found no modelDescription.xml, allowed: an FMU")
+                raise _refused(path, f"found a zip without modelDescription.xml, allowed: {AN_FMU}")
             root = ET.fromstring(archive.read("modelDescription.xml"))
+    except (FileNotFoundError, IsADirectoryError) as error:
+        found = "a folder" if path.is_dir() else "no such file"
+        raise _refused(path, f"found {found}, allowed: {AN_FMU}") from error
     except OSError as error:
         raise _refused(path, f"cannot be read: {error.strerror or error}") from error
     except (zipfile.BadZipFile, zlib.error) as error:
-        raise _refused(path, f"found {_no_zip(path)} ({error}), allowed: an FMU") from error
+        raise _refused(path, f"found {_no_zip(path)}, allowed: {AN_FMU}") from error
     except (ET.ParseError, LookupError, ValueError) as error:
-        raise _refused(path, f"modelDescription.xml cannot be read: {error}") from error
+        said = f"modelDescription.xml cannot be read: {error}; allowed: XML as FMI 2.0 has it"
+        raise _refused(path, said) from error
     version = root.get("fmiVersion")
     if version != "2.0":
-        raise _refused(path, f"found FMI {version}, allowed: FMI 2.0 for co-simulation")
+        raise _refused(path, f"found FMI {version}, allowed: {CO_SIMULATION}")
     if root.find("CoSimulation") is None:
-        raise _refused(path, "found no FMU for co-simulation, allowed: FMI 2.0 for co-simulation")
+        raise _refused(path, f"found no FMU for co-simulation, allowed: {CO_SIMULATION}")
     try:
         return read_model_description(str(path), validate=False)
     except Exception as error:  # what FMPy raises for a description it does not expect is of any kind
@@ -160,12 +167,12 @@ def _described(path: Path) -> Any:
 
 
 def _no_zip(path: Path) -> str:
-    """Return what a file is that cannot be opened as a zip."""
+    """Return what a file is that cannot be opened as the zip that an FMU is."""
     with path.open("rb") as file:
         head = file.read(2)
     if not head:
         return "an empty file"
-    return "a zip that is cut off or damaged" if head == b"PK" else "no zip"
+    return "a zip that is cut off or damaged" if head == b"PK" else "no zip, as an FMU is one"
 
 
 def _refused(path: Path, said: str) -> FmuError:

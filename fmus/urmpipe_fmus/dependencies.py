@@ -15,7 +15,7 @@ from numpy.lib.mixins import NDArrayOperatorsMixin
 from urmpipe_fmus.equations import Equations
 from urmpipe_fmus.table import Rows
 from urmpipe_fmus.unit import Unit
-from urmpipe_models.errors import UnitError
+from urmpipe_models.errors import Finding, UnitError
 
 TIME = "time"
 """Stands for the independent variable."""
@@ -153,9 +153,20 @@ class Dependencies:
             columns = (Remembering([TIME]),) * unit.table.columns
             rows = Rows(columns, columns, Remembering([TIME]))
         equations = Equations(unit)
-        self.outputs = _by_name(unit.computed, equations.outputs(time, given, rows))
-        self.derivatives = _by_name(unit.states, equations.derivatives(time, given, rows))
-        self.update = _by_name(unit.memories, equations.update(time, given, rows))
+        found: list[dict[str, frozenset[str]]] = []
+        faults: list[Finding] = []
+        for variables, function in (
+            (unit.computed, equations.outputs),
+            (unit.states, equations.derivatives),
+            (unit.memories, equations.update),
+        ):
+            try:
+                found.append(_by_name(variables, function(time, given, rows)))
+            except UnitError as error:
+                faults += error.findings
+        if faults:
+            raise UnitError(*faults)
+        self.outputs, self.derivatives, self.update = found
 
 
 def _by_name(variables: Iterable[Any], elements: list[Any]) -> dict[str, frozenset[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 from importlib.metadata import version
 
 from urmpipe_fmus.description import markup_text
@@ -37,13 +38,19 @@ def documentation(unit: Unit) -> str:
     return markup_text(page)
 
 
-def variable_row(one: Variable) -> tuple[str, ...]:
-    """Return what the table says of a variable, in the order of `TITLES`."""
+def variable_row(one: Variable, digits: int | None = None) -> tuple[str, ...]:
+    """Return what a table says of a variable, in the order of `TITLES`.
+
+    Args:
+        one: The variable.
+        digits: So many significant digits of each number; None for all.
+    """
+    value = partial(_value, one, digits=digits)
     name = one.name if one.size is None else f"{one.name}[1]" + (f" .. [{one.size}]" if one.size > 1 else "")
     part = f"{one.causality}, {one.variability}"
     kind = one.type if one.type != "Real" else one.unit
-    start = "computed" if isinstance(one, Output) else ", ".join(_value(one, each) for each in _starts(one))
-    return name, part, kind, start, _value(one, one.minimum), _value(one, one.maximum), one.description
+    start = "computed" if isinstance(one, Output) else ", ".join(map(value, _starts(one)))
+    return name, part, kind, start, value(one.minimum), value(one.maximum), one.description
 
 
 def _starts(one: Variable) -> tuple[float, ...]:
@@ -51,17 +58,18 @@ def _starts(one: Variable) -> tuple[float, ...]:
     return one.starts[:1] if len(set(one.starts)) == 1 else one.starts
 
 
-def _value(one: Variable, value: float) -> str:
+def _value(one: Variable, value: float, digits: int | None) -> str:
     """Return a value, and what it is in the unit that people like to see; nothing for no bound."""
     if not math.isfinite(value):
         return ""
     if one.type == "Boolean":
         return "true" if value else "false"
-    said = f"{value:g}" if float(f"{value:g}") == value else repr(float(value))
+    short = f"{value:.{digits or 6}g}"
+    said = short if digits or float(short) == value else repr(float(value))
     if not one.display_unit or one.display_unit == one.unit:
         return said
     factor, offset = display_conversion(one.unit, one.display_unit)
-    return f"{said} ({factor * value + offset:.7g} {one.display_unit})"
+    return f"{said} ({factor * value + offset:.{digits or 7}g} {one.display_unit})"
 
 
 def _steps(unit: Unit) -> list[str]:

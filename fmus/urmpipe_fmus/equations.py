@@ -58,17 +58,17 @@ class Equations:
         try:
             with np.errstate(all="ignore"):  # 1/0 is inf, as in C; who uses it asks whether it is finite
                 result = function(values)
+            return flat(result, variables)
         except Exception as error:
             raise UnitError(*_told(where, function, error)) from error
-        return flat(where, result, variables)
 
 
 def _told(where: str, function: Function, error: Exception) -> Iterator[Finding]:
-    """Yield what went wrong in a unit's function, and in which line of its file."""
+    """Yield what went wrong in a unit's function, and in which line of its file; else where it begins."""
     code = getattr(function, "__code__", None)
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if code and frame.filename == code.co_filename]
-    place = {"file": code.co_filename, "line": lines[-1]} if code and lines else {}
+    place = {"file": code.co_filename, "line": [code.co_firstlineno, *lines][-1]} if code else {}
     said = (
         [one.message for one in error.findings]
         if isinstance(error, UrmpipeError)
@@ -83,7 +83,7 @@ def named(variables: Sequence[Variable], elements: Sequence[Element]) -> dict[st
     return {one.name: next(rest) if one.size is None else tuple(islice(rest, one.size)) for one in variables}
 
 
-def flat(where: str, result: Any, variables: Sequence[Variable]) -> list[Element]:
+def flat(result: Any, variables: Sequence[Variable]) -> list[Element]:
     """Return what a function gave by name as one element a scalar, in the order of the variables.
 
     Raises:
@@ -91,11 +91,11 @@ def flat(where: str, result: Any, variables: Sequence[Variable]) -> list[Element
     """
     if not isinstance(result, Mapping):
         raise UnitError(
-            f"{where}: returns {_kind(result)}, allowed: a dict of {', '.join(one.name for one in variables)}"
+            f"returns {_kind(result)}, allowed: a dict of {', '.join(one.name for one in variables)}"
         )
     faults = list(_faults(result, variables))
     if faults:
-        raise UnitError(*(f"{where}: {fault}" for fault in faults))
+        raise UnitError(*faults)
     return [
         element
         for one in variables

@@ -223,13 +223,13 @@ def rpy_of(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float, float
     """Return rx, ry, rz in [rad] such that `from_rpy` gives the constant R back to 1e-15.
 
     Unlike `euler_zyx` it needs no singular case: rx is taken from what rz leaves, so that the
-    product is R for whatever rz the rounding of a11 and a21 suggests.
+    product is R for whatever rz the rounding of a11 and a21 suggests. Half a turn is pi, not -pi.
     """
     (a11, a12, a13), (a21, a22, a23), (a31, _, _) = rotation
-    rz = float(np.arctan2(a21, a11))
+    rz = float(np.arctan2(a21 + 0.0, a11))  # + 0.0: see `euler_zyx`
     ry = float(np.arctan2(-a31, np.hypot(a11, a21)))
     s, c = np.sin(rz), np.cos(rz)
-    rx = float(np.arctan2(s * a13 - c * a23, c * a22 - s * a12))
+    rx = float(np.arctan2(s * a13 - c * a23 + 0.0, c * a22 - s * a12))
     return rx, ry, rz
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 import zipfile
 from collections.abc import Callable
@@ -17,6 +18,7 @@ from urmpipe.api.build_fmu import build_fmu
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.check import check_fmu
 from urmpipe_fmus.native import native_missing
+from urmpipe_fmus.units import unit_names
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.robots.catalogue import load_robot
@@ -73,7 +75,7 @@ def test_an_fmu_of_ours_is_replaced_and_another_never(urmpipe: RunCommand, meter
     before = meter.read_bytes()
     ran = urmpipe("fmu", "build", "delta_meter", "--backend", "python")
     assert (ran.code, meter.read_bytes()) == (0, before)
-    assert ran.out.startswith("FMU: delta_meter.fmu  (python, ")
+    assert ran.out.splitlines()[1].startswith("FMU: delta_meter.fmu  (python, ")
     foreign = meter.with_name("foreign.fmu")
     with zipfile.ZipFile(meter) as source, zipfile.ZipFile(foreign, "w") as target:
         for name in source.namelist():
@@ -173,9 +175,10 @@ def test_check_of_what_is_no_fmu_is_2(urmpipe: RunCommand, tmp_path: Path, conte
     (tmp_path / "file.fmu").write_bytes(content)
     ran = urmpipe("fmu", "check", "file.fmu")
     assert (ran.code, ran.out) == (2, "")
-    found = {b"": "an empty file", b"PK": "a zip that is cut off or damaged"}.get(content[:2], "no zip")
-    assert ran.err.startswith(f"error: file.fmu: found {found} (")
-    assert ran.err.endswith("allowed: an FMU\n")
+    damaged = {b"": "an empty file", b"PK": "a zip that is cut off or damaged"}
+    found = damaged.get(content[:2], "no zip, as an FMU is one")
+    allowed = "an FMU, such as urmpipe fmu build makes of a unit"
+    assert (ran.code, ran.err) == (2, f"error: file.fmu: found {found}, allowed: {allowed}\n")
 
 
 def test_check_of_a_missing_file_is_2(urmpipe: RunCommand) -> None:
@@ -193,7 +196,7 @@ def test_without_casadi_it_is_python_and_says_why(
     monkeypatch.setattr("urmpipe_fmus.native.native_missing", lambda platforms=(): "casadi is not installed")
     assert run(["fmu", "build", "delta_meter"]) == 0
     out, err = capsys.readouterr()
-    assert out.startswith("FMU: delta_meter.fmu  (python, ")
+    assert out.splitlines()[1].startswith("FMU: delta_meter.fmu  (python, ")
     assert err.startswith("note: delta_meter.fmu runs on Python, as no native one can be built here: casadi")
     said = "backend: found native, which cannot be built here: casadi is not installed; allowed: python"
     assert run(["fmu", "build", "delta_meter", "--backend", "native"]) == 2
@@ -221,11 +224,55 @@ def test_the_variables_of_a_unit_are_listed(urmpipe: RunCommand) -> None:
     ran = urmpipe("fmu", "list", "kinematic_chain")
     assert (ran.code, ran.err) == (0, "")
     assert "phi[1] .. [6]" in ran.out
-    ran = urmpipe("fmu", "list", "dc-drive")
-    assert (ran.code, ran.err.partition(",")[0]) == (
-        2,
-        "error: unit dc-drive: found (did you mean dc_drive?)",
+
+
+def test_start_values_have_six_digits_in_the_table_and_all_in_json(urmpipe: RunCommand) -> None:
+    printed = urmpipe("fmu", "list", "kinematic_chain").out
+    assert "3.14159 (180" in printed
+    assert "0.907571 (52" in printed
+    assert not re.search(r"\d\.\d{7}", printed)
+    variables = json.loads(urmpipe("fmu", "list", "kinematic_chain", "--json").out)["variables"]
+    (tilts,) = [one["start"] for one in variables if one["name"].startswith("tilts")]
+    assert tilts == "0.9075712110370514 (52 deg)"
+
+
+def test_words_of_a_unit_are_joined_by_either_sign(urmpipe: RunCommand, tmp_path: Path) -> None:
+    listed = urmpipe("fmu", "list", "dc_drive", "--json").out
+    assert urmpipe("fmu", "list", "dc-drive", "--json").out == listed
+    example = [urmpipe("fmu", "list", name).out for name in ("kinematic-chain", "kinematic_chain")]
+    assert example[0] == example[1]
+    ran = urmpipe("fmu", "build", "delta-meter", "--backend", "python")
+    assert (ran.code, [one.name for one in tmp_path.glob("*.fmu")]) == (0, ["delta_meter.fmu"])
+
+
+def test_a_unit_that_is_none_is_told_with_those_that_are(urmpipe: RunCommand) -> None:
+    ran = urmpipe("fmu", "list", "dc-driv")
+    names = ", ".join(unit_names())
+    said = (
+        f"unit: found 'dc-driv' (did you mean dc_drive?), allowed: {names}, or a .py file with a unit in it"
     )
+    assert (ran.code, ran.out, ran.err) == (2, "", f"error: {said}\n")
+
+
+def test_what_a_unit_does_not_have_is_told_before_it_is_read(urmpipe: RunCommand) -> None:
+    ran = urmpipe("fmu", "build", "dc-drive", "--robot", "urm7", "--log", "missing.csv")
+    assert (ran.code, ran.out) == (2, "")
+    assert ran.err.splitlines() == [
+        "error: unit dc_drive: found a robot (urm7), allowed: none, it has no such option",
+        "error: unit dc_drive: found a log (missing.csv), allowed: none, it has no such option",
+    ]
+
+
+def test_what_was_built_is_told_and_a_folder_gets_it(urmpipe: RunCommand, tmp_path: Path) -> None:
+    (tmp_path / "blocks").mkdir()
+    ran = urmpipe("fmu", "build", "delta_meter", "--backend", "python", "-o", "blocks")
+    built, file = ran.out.splitlines()
+    said = "Deviation of a point from where it should be, and whether it is tolerated"
+    assert built == f"Built delta_meter: {said}"
+    assert file.startswith(f"FMU: {Path('blocks', 'delta_meter.fmu')}  (python, linux64, win64, ")
+    ran = urmpipe("fmu", "build", "delta_meter", "--backend", "python", "-o", "none")
+    allowed = "a folder that exists, or a name that ends in .fmu"
+    assert (ran.code, ran.err) == (2, f"error: none: found no folder, allowed: {allowed}\n")
 
 
 def test_an_array_is_a_row_of_the_check(urmpipe: RunCommand, meter: Path) -> None:

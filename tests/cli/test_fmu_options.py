@@ -133,7 +133,7 @@ def test_a_chain_is_taken_as_a_robot() -> None:
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [
-        (("kinematic_chan",), "unit kinematic_chan: found (did you mean kinematic_chain?), allowed: kine"),
+        (("kinematic_chan",), "unit: found 'kinematic_chan' (did you mean kinematic_chain?), allowed: kine"),
         (("kinematic_chain", "--robot", "urm7"), "unknown robot 'urm7' (did you mean urm8?)"),
         (
             ("repolarizer", "-s", "joints=nan"),

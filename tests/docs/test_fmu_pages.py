@@ -57,6 +57,18 @@ def test_the_system_of_the_page_runs(tmp_path: Path) -> None:
     assert (result.name, result.verdict, len(result.t_ns)) == ("my-arm", "pass", 21)
 
 
+def test_the_system_of_the_page_goes_straight_between_the_points_of_a_coarse_path(tmp_path: Path) -> None:
+    system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
+    (tmp_path / "my-arm.toml").write_text(system, encoding="utf-8")
+    shutil.copy(LOGS / "matlab.csv", tmp_path / "log.csv")
+    head, *rows = (LOGS / "path.csv").read_text(encoding="utf-8").splitlines()
+    (tmp_path / "path.csv").write_text(
+        "\n".join([head, *rows[::20]]) + "\n", encoding="utf-8"
+    )  # every 100 ms
+    result = simulate(tmp_path / "my-arm.toml", duration=3.0)
+    assert result.verdict == "pass"  # held, the path is up to 100 ms behind
+
+
 def test_each_shipped_system_has_its_line() -> None:
     page = (DOCS / "simulate.md").read_text(encoding="utf-8")
     section = page.split("\n## The systems that come along\n")[1].split("\n## ")[0]

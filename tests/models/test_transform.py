@@ -245,6 +245,13 @@ def test_rpy_gives_the_rotation_back_everywhere(rx: float, ry: float, rz: float)
     np.testing.assert_allclose(matrix(from_rpy(*rpy_of(rotation)).rotation), matrix(rotation), atol=ROUNDING)
 
 
+@pytest.mark.parametrize("zero", [0.0, -0.0])
+def test_half_a_turn_is_pi_in_rpy(zero: float) -> None:
+    assert rpy_of(((-1.0, zero, zero), (zero, -1.0, zero), (zero, zero, 1.0))) == (0.0, 0.0, math.pi)
+    rx, ry, rz = rpy_of(((1.0, zero, zero), (zero, -1.0, zero), (zero, zero, -1.0)))
+    assert (rx, ry, rz) == (math.pi, 0.0, 0.0)
+
+
 @given(st.lists(units, min_size=6, max_size=6))
 def test_offsets_come_back(values: list[float]) -> None:
     frame = from_offset(values)

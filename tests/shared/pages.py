@@ -73,6 +73,8 @@ def lay_files(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for name in ("robot_data", "monday"):
         (folder / f"{name}.csv").write_text(rtde_log(), encoding="utf-8")
     (folder / "my_unit.py").write_bytes((DOCS / "examples" / "low_pass.py").read_bytes())
+    (folder / "arm.urdf").write_text("\n".join(snippets("docs/robots.md", "xml")), encoding="utf-8")
+    (folder / "my-arm.toml").write_text(snippets("docs/robots.md", "toml")[0], encoding="utf-8")
     system = next(one for one in snippets("docs/simulate.md", "toml") if one.startswith("[system]"))
     (folder / "my-system.toml").write_text(system, encoding="utf-8")
 

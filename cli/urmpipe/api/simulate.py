@@ -18,7 +18,7 @@ from urmpipe.systems.blocks import Blocks
 from urmpipe.systems.result import check_meters, simulation_of
 from urmpipe.systems.units import Backend
 from urmpipe_datasets import LOGS
-from urmpipe_fmus.cosim import load_system, prepare, system_names, system_svg
+from urmpipe_fmus.cosim import load_system, prepare, read_system, system_name, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
 from urmpipe_fmus.cosim.process import Worker
 from urmpipe_models.errors import OptionError
@@ -66,7 +66,7 @@ def simulate(
     Raises:
         UrmpipeError: With everything that is wrong with the system, before the first step, or with an output.
     """
-    loaded = _changed(load_system(system, arguments), step, duration)
+    loaded = _changed(read_system(system, arguments), step, duration)
     bundled = _bundled(system, arguments or {})
     kept = [loaded.path, *_files(loaded)]
     named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
@@ -97,7 +97,7 @@ def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:
     Raises:
         OptionError: If some of its logs are given and others are not: they would be of two motions.
     """
-    if str(system) not in system_names():
+    if system_name(str(system)) not in system_names():
         return set()
     own = own_logs(str(system))
     given = {name: value for name, value in arguments.items() if name in own}

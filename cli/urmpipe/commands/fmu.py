@@ -128,12 +128,14 @@ def build(
     from urmpipe.printing.fmu import print_built
     from urmpipe.printing.terminal import prints_apart
     from urmpipe.systems.log_tables import read_table
-    from urmpipe.systems.units import column_names
+    from urmpipe.systems.units import column_names, refuse_operands
     from urmpipe_pipeline.sources import read_map
 
     if log_map and not log:
         raise click.UsageError("--map: found without a log, allowed: with --log LOG")
     options = {name: option_value(text) for name, text in given.items()}
+    if Path(unit).suffix != ".py":
+        refuse_operands(unit, robot, log)
     arm = place_robot(robot)
     read = read_map(log_map).read if log_map else None
     table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm, read=read)

@@ -20,7 +20,8 @@ if TYPE_CHECKING:
 def robot() -> None:
     """List, show and export robots: those that urmpipe brings along, and your own files.
 
-    A robot is a name of the list, a URDF, or a TOML file of URM modules, DH parameters or frames.
+    A robot is a name of the list, a URDF, or a TOML file of URM modules, DH parameters or frames;
+    docs/robots.md has every key of it.
     """
 
 

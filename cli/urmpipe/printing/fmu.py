@@ -10,12 +10,15 @@ from urmpipe.systems.units import FROM_LOG, example_of
 from urmpipe_fmus.cosim.interface import ELEMENT
 from urmpipe_fmus.documentation import TITLES as VARIABLE_HEADS
 from urmpipe_fmus.documentation import variable_row
-from urmpipe_fmus.units import unit_help, unit_names, unit_options
+from urmpipe_fmus.units import unit_help, unit_name, unit_names, unit_options
 from urmpipe_pipeline import text
 
 if TYPE_CHECKING:
     from urmpipe_fmus.build import BuiltFmu
     from urmpipe_fmus.check import Checked, CheckedVariable
+
+FIGURES = 6
+"""Significant digits of a number in a table; --json has all."""
 
 LOG_HELP = "what it plays: a log (CSV), or a folder of plots"
 COLUMNS_HELP = "columns of the log by name, such as u or u,i (default: its joints, or the x, y, z of a path)"
@@ -60,7 +63,7 @@ def print_units() -> None:
 def unit_dict(name: str) -> dict[str, Any]:
     """Return the object that `urmpipe fmu list UNIT --json` prints."""
     unit = example_of(name)
-    options = options_of(name) if name in unit_names() else {}
+    options = options_of(name) if unit_name(name) in unit_names() else {}
     return {
         "schema": 1,
         "name": unit.name,
@@ -78,7 +81,8 @@ def print_unit(name: str) -> None:
     """Print the inputs, outputs and parameters of a unit, and its equations."""
     unit = example_of(name)
     table = new_table(*VARIABLE_HEADS, title=f"{unit.name}: {unit.description}")
-    for row in sorted(map(variable_row, unit.variables), key=lambda row: _part_order(row[1])):
+    rows = [variable_row(one, digits=FIGURES) for one in unit.variables]
+    for row in sorted(rows, key=lambda row: _part_order(row[1])):
         table.add_row(*row)
     new_console().print(table)
     for line in unit.equations:
@@ -94,7 +98,8 @@ def _part_order(part: str) -> int:
 
 
 def print_built(made: BuiltFmu) -> None:
-    """Print where an FMU is and what is inside."""
+    """Print what was built, where it is and what is inside."""
+    say(f"Built {made.unit.name}: {made.unit.description}")
     inside = f"{made.backend}, {', '.join(made.platforms)}"
     size = f"{made.path.stat().st_size / 1e3:.0f} kB"
     say(f"FMU: {made.path}  ({inside}, {size}, guid {made.guid})")
@@ -181,4 +186,4 @@ def _shown(value: Any) -> str:
     """Return a value of a variable, a number in six digits."""
     if value is None:
         return text.NOTHING
-    return f"{value + 0.0:.6g}" if isinstance(value, float) else str(value)  # + 0.0: no -0
+    return f"{value + 0.0:.{FIGURES}g}" if isinstance(value, float) else str(value)  # + 0.0: no -0

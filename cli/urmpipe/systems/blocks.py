@@ -77,9 +77,9 @@ class Blocks:
         self._held: dict[str, IntArray] = {}
         self._faults: dict[str, UrmpipeError] = {}
         self._columns: dict[Port, LogTable] = {}
-        for block in system.blocks:
+        for block in (one for one in system.blocks if one.name not in system.unread):
             self._try(block.name, partial(self._take, block))
-        for one in system.inputs:
+        for one in (each for each in system.inputs if each.log):
             self._try(str(one.destination), partial(self._follow, one))
         self._meet(system.step or self.period or STEP)
         if self._slow and self.units:

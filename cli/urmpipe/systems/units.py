@@ -10,7 +10,7 @@ from urmpipe.guards import PathLike, Robot, place_robot
 from urmpipe.systems.log_tables import LogTable, read_table
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit, unit_options
+from urmpipe_fmus.units import make_unit, unit_name, unit_options
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 
@@ -55,9 +55,8 @@ def unit_of(
     if isinstance(unit, Unit) or Path(unit).suffix == ".py":
         _refuse_options(unit, {"robot": robot, "log": log, **given})
         return unit if isinstance(unit, Unit) else _from_file(Path(unit))
-    name = str(unit)
-    known = unit_options(name)
-    _refuse_missing(name, known, robot, log)
+    name = unit_name(str(unit))
+    refuse_operands(name, robot, log)
     arm = place_robot(robot)
     if log is not None:
         names = column_names(given.pop("columns", None))
@@ -74,7 +73,7 @@ def example_of(unit: str) -> Unit:
     Raises:
         UrmpipeError: If there is no such unit, or with all that is wrong with a file.
     """
-    return unit_of(unit, **EXAMPLES.get(unit, {}))
+    return unit_of(unit, **EXAMPLES.get(unit_name(unit), {}))
 
 
 def _from_file(path: Path) -> Unit:
@@ -91,8 +90,15 @@ def column_names(columns: Any) -> list[str] | None:
     return [str(one) for one in (columns if isinstance(columns, (list, tuple)) else [columns])]
 
 
-def _refuse_missing(name: str, known: Mapping[str, str], robot: Robot | None, log: Any) -> None:
-    """Raise an `OptionError` if a unit lacks its robot or its log, or is given what it does not have."""
+def refuse_operands(name: str, robot: Robot | None, log: Any) -> None:
+    """Raise an error if a unit is not there, lacks its robot or its log, or is given what it does not have.
+
+    Raises:
+        UnitError: If there is no such unit.
+        OptionError: With all that it lacks and all that it does not have.
+    """
+    name = unit_name(name)
+    known = unit_options(name)
     takes = {"robot": "robot" in known, "log": FROM_LOG[0] in known}
     faults = []
     for option, value, metavar in (("robot", robot, "NAME|FILE"), ("log", log, "LOG")):

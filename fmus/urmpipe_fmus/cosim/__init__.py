@@ -24,6 +24,8 @@ if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import Port as Port
     from urmpipe_fmus.cosim.system import System as System
     from urmpipe_fmus.cosim.system_file import load_system as load_system
+    from urmpipe_fmus.cosim.system_file import read_system as read_system
+    from urmpipe_fmus.cosim.system_file import system_name as system_name
     from urmpipe_fmus.cosim.system_file import system_names as system_names
     from urmpipe_fmus.cosim.system_file import system_text as system_text
 
@@ -38,7 +40,9 @@ _HOME = {
     "System": "system",
     "load_system": "system_file",
     "prepare": "plan",
+    "read_system": "system_file",
     "simulate": "simulation",
+    "system_name": "system_file",
     "system_names": "system_file",
     "system_svg": "drawing",
     "system_text": "system_file",

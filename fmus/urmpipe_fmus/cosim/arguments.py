@@ -41,13 +41,23 @@ def unknown(value: Any, arguments: Mapping[str, Any], where: str = "") -> Iterat
             yield from unknown(one, arguments, where)
 
 
-def given(defaults: Mapping[str, Any], arguments: Mapping[str, str], faults: list[str]) -> dict[str, Any]:
-    """Return the arguments of a system: those given, each of its default's type, and the other defaults."""
+def given(
+    defaults: Mapping[str, Any], arguments: Mapping[str, str], faults: list[str], shipped: str = ""
+) -> dict[str, Any]:
+    """Return the arguments of a system: those given, each of its default's type, and the other defaults.
+
+    Args:
+        defaults: What the file's `[arguments]` says.
+        arguments: What is given instead, as texts.
+        faults: What is wrong is noted here.
+        shipped: Name of the system if it came along.
+    """
+    copied = f", of which urmpipe simulate --write-system FILE.toml {shipped} makes a copy" if shipped else ""
     values = dict(defaults)
     for name, text in arguments.items():
         if name not in defaults:
-            others = "; all else stands in the system's file; simulate writes a copy (docs/simulate.md)"
-            faults.append(f"argument {name}: {not_among(name, defaults)}{others}")
+            others = f"all else is changed in the system's file{copied}"
+            faults.append(f"argument {name}: {not_among(name, defaults)}; {others}")
             continue
         try:
             values[name] = _like(defaults[name], text)

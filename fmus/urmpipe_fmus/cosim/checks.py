@@ -42,10 +42,13 @@ class Start:
 class Wiring:
     """The connections and start values of a system.
 
+    What hangs on a block or a column that could not be read is taken as right: that is told already.
+
     Args:
         system: The system.
-        interfaces: What the FMU of each block shows.
-        units: Unit of the column that each input from a log follows; empty if it is not known.
+        interfaces: What the FMU of each block shows, of those that could be read.
+        units: Unit of the column that each input from a log follows, of those that could be read; empty if it
+            is not known.
 
     Attributes:
         links: The connections.
@@ -62,11 +65,13 @@ class Wiring:
         self.faults: list[str] = []
         self.notes: list[str] = []
         self._fed: dict[Port, str] = {}
+        self._named: set[Port] = set()  # inputs that are told a source, if only a wrong one
         links = (self._link(one) for one in system.connections)
         self.links = tuple(one for one in links if one)
         ports = [one.destination for one in system.inputs]
-        self.logged = tuple(port for port in ports if self._from_log(port, units[port]))
-        self.starts = {block.name: tuple(self._starts(block)) for block in system.blocks}
+        self.logged = tuple(port for port in ports if self._from_log(port, units.get(port)))
+        known = (block for block in system.blocks if block.name in interfaces)
+        self.starts = {block.name: tuple(self._starts(block)) for block in known}
         self._unconnected()
 
     def _link(self, connection: Connection) -> Link | None:
@@ -74,6 +79,7 @@ class Wiring:
         where = f"connections.{connection.destination}"
         inputs = self._found(where, connection.destination, "input")
         outputs = self._found(where, connection.source, "output")
+        self._named |= {Port(connection.destination.block, one.name) for one in inputs}
         if not inputs or not outputs:
             return None
         if len(inputs) != len(outputs):
@@ -92,6 +98,8 @@ class Wiring:
 
     def _found(self, where: str, port: Port, causality: str) -> Sequence[Variable]:
         """Return the scalars at a port, if they are there and of a causality."""
+        if port.block not in self.interfaces:
+            return ()
         shown = self.interfaces[port.block]
         found = shown.elements(port.variable)
         if not found:
@@ -128,8 +136,8 @@ class Wiring:
             self.faults.append(f"{port}: found two sources, {self._fed[port]} and {source}, allowed: one")
         self._fed[port] = source
 
-    def _from_log(self, port: Port, unit: str) -> bool:
-        """Return whether an input from a log is there, a number and of the log's unit."""
+    def _from_log(self, port: Port, unit: str | None) -> bool:
+        """Return whether an input from a log, None for one not read, is there, a number and of its unit."""
         where = f"inputs.{port}"
         found = self._found(where, port, "input")
         if not found:
@@ -140,6 +148,9 @@ class Wiring:
             return False
         if one.type == "String":
             self.faults.append(f"{where}: found a String, allowed: a number")
+            return False
+        self._named.add(port)
+        if unit is None:
             return False
         fault = unit_fault(unit, si_base(unit), one)
         if fault:
@@ -181,7 +192,7 @@ class Wiring:
         for name, shown in self.interfaces.items():
             given = {start.variable.name for start in self.starts[name]}
             left = [
-                v.name for v in shown.inputs if Port(name, v.name) not in self._fed and v.name not in given
+                v.name for v in shown.inputs if Port(name, v.name) not in self._named and v.name not in given
             ]
             if left:
                 self.faults.append(

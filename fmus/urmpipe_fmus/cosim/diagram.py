@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import NamedTuple
 
 from urmpipe_fmus.cosim.interface import ELEMENT, Interface
 from urmpipe_fmus.cosim.plan import Plan
+from urmpipe_fmus.cosim.system import Block
 
 CHARACTER = 7.3
 """Width of a character of the drawing's fixed-width letters (12 px, 0.6 em) in [px]."""
@@ -30,16 +32,19 @@ class Pin:
         name: Of the variable.
         size: Number of elements; 1 for a scalar.
         unit: Their unit; empty if they have none.
+        value: What an input has all the time that nothing is connected with; empty for any other port.
     """
 
     name: str
     size: int = 1
     unit: str = ""
+    value: str = ""
 
     @property
     def label(self) -> str:
-        """Name and size."""
-        return cut(self.name) + (f" ×{self.size}" if self.size > 1 else "")
+        """Name and size, and the value of an input that nothing changes."""
+        size, value = f" ×{self.size}" if self.size > 1 else "", f" = {self.value}" if self.value else ""
+        return cut(self.name) + size + value
 
     @property
     def length(self) -> int:
@@ -60,6 +65,7 @@ class Box:
         layer: Its column, from the left.
         x: Its left edge in [px].
         y: Its upper edge in [px].
+        log: Whether it is a log that inputs follow, no block.
     """
 
     name: str
@@ -70,6 +76,7 @@ class Box:
     layer: int = 0
     x: float = 0.0
     y: float = 0.0
+    log: bool = False
 
     @property
     def width(self) -> float:
@@ -101,6 +108,7 @@ class Wire:
         target: Box where it ends.
         input: Port where it ends.
         size: How many scalars go through.
+        held: Whether the source holds its value between two samples, or two rows of a log.
     """
 
     source: str
@@ -108,6 +116,7 @@ class Wire:
     target: str
     input: str
     size: int = 1
+    held: bool = False
 
 
 @dataclass(frozen=True, slots=True)
@@ -120,20 +129,30 @@ class Diagram:
 
 def diagram(plan: Plan) -> Diagram:
     """Return what a drawing of a plan shows: its blocks, the logs that inputs follow, its connections."""
+    paces = {block.name: _pace(plan, block) for block in plan.system.blocks}
     wires = [
-        Wire(*link.connection.source, *link.connection.destination, len(link.scalars)) for link in plan.links
+        Wire(
+            *link.connection.source,
+            *link.connection.destination,
+            len(link.scalars),
+            paces[link.connection.source.block].held,
+        )
+        for link in plan.links
     ]
-    logs = {one.log: Box(one.log, "log") for one in plan.system.inputs}
+    logs = {one.log: Box(one.log, "log", log=True) for one in plan.system.inputs}
     for one in plan.system.inputs:
         pins = logs[one.log].right
         if one.column not in [pin.name for pin in pins]:
             pins.append(Pin(one.column))
-        wires.append(Wire(one.log, one.column, *one.destination))
+        wires.append(Wire(one.log, one.column, *one.destination, held=not one.interpolate))
     ends = {(w.target, w.input) for w in wires} | {(w.source, w.output) for w in wires}
-    boxes = {block.name: Box(block.name, block.kind) for block in plan.system.blocks}
+    boxes = {block.name: Box(block.name, block.kind + paces[block.name].said) for block in plan.system.blocks}
     for name, box in boxes.items():
         shown, used = plan.interfaces[name], {port for block, port in ends if block == name}
-        box.left = [pin for pin in _pins(shown, "input", used) if pin.name in used]
+        box.left = [
+            pin if pin.name in used else replace(pin, value=_value(plan, name, pin))
+            for pin in _pins(shown, "input", used)
+        ]
         outputs = list(_pins(shown, "output", used))
         idle = [pin for pin in outputs if pin.name not in used][IDLE:]
         box.right, box.hidden = [pin for pin in outputs if pin not in idle], len(idle)
@@ -141,6 +160,40 @@ def diagram(plan: Plan) -> Diagram:
     sources = {renamed[name]: box for name, box in logs.items()}
     wires = [_renamed(wire, renamed) if i >= len(plan.links) else wire for i, wire in enumerate(wires)]
     return Diagram({**sources, **boxes}, tuple(wires))
+
+
+class _Pace(NamedTuple):
+    """How often the outputs of a block change.
+
+    Attributes:
+        said: What is added to what the block is.
+        held: Whether they are held between two samples, or two rows of a log.
+    """
+
+    said: str
+    held: bool
+
+
+def _pace(plan: Plan, block: Block) -> _Pace:
+    """Return how often a block changes its outputs: a log source by its rows, others by a `period` in s."""
+    if "log" in block.options:
+        held = block.options.get("interpolate") is not True
+        said = f", {'held' if held else 'interpolated'}: {Path(str(block.options['log'])).name}"
+        return _Pace(said, held)
+    period = plan.interfaces[block.name].variables.get("period")
+    if period is None or period.unit != "s":
+        return _Pace("", False)
+    given = {start.variable.name: start.value for start in plan.starts[block.name]}
+    return _Pace(f", every {1e3 * float(given.get('period', period.start or 0.0)):.6g} ms", True)
+
+
+def _value(plan: Plan, block: str, pin: Pin) -> str:
+    """Return what an input has all the time that nothing is connected with; of an array two elements."""
+    given = {start.variable.name: start.value for start in plan.starts[block]}
+    elements = plan.interfaces[block].elements(pin.name)
+    values = [given.get(one.name, one.start or 0.0) for one in elements]
+    shown = [f"{float(one):.6g}" if elements[0].type == "Real" else str(one) for one in values]
+    return shown[0] if len(set(shown)) == 1 else f"{shown[0]}, {shown[1]}{', …' * (len(shown) > 2)}"
 
 
 def _log_names(logs: Collection[str], blocks: Collection[str]) -> dict[str, str]:
@@ -151,7 +204,7 @@ def _log_names(logs: Collection[str], blocks: Collection[str]) -> dict[str, str]
 
 
 def _renamed(wire: Wire, names: dict[str, str]) -> Wire:
-    return Wire(names[wire.source], wire.output, wire.target, wire.input, wire.size)
+    return replace(wire, source=names[wire.source])
 
 
 def _pins(shown: Interface, causality: str, used: Iterable[str]) -> Iterable[Pin]:

@@ -25,7 +25,8 @@ NARROWEST = 420.0
 
 STYLE = """
 .paper{fill:#ffffff}.box{fill:#f5f7fa;stroke:#5b6b7d}.head{fill:#dfe7f0}.log .head{fill:#e8e0cf}
-.wire{fill:none;stroke:#3a6ea5;stroke-width:1.4;stroke-linejoin:round}.array{stroke-width:2.8}.back{stroke:#a55a3a}
+.wire{fill:none;stroke:#3a6ea5;stroke-width:1.4;stroke-linejoin:round}
+.array{stroke-width:2.8}.held{stroke-dasharray:7 4}.back{stroke:#a55a3a}
 .tip{fill:#3a6ea5}.back-tip{fill:#a55a3a}
 text{fill:#1c2733;font:12px ui-monospace,"DejaVu Sans Mono",monospace}
 .name{font-weight:bold}.quiet{fill:#5a6875}.title{font-size:16px;font-weight:bold}.many{font-size:10px}
@@ -48,7 +49,8 @@ def system_svg(plan: Plan) -> str:
     lines = wrap(plan.system.description, int(width / CHARACTER))
     below = MARGIN + TITLE * (len(titles) - 1)
     top = below + 2.0 * LINE + LINE * len(lines)
-    full = (width + 2.0 * MARGIN, top + routes.height + MARGIN)
+    key = [line for said in _key(layout) for line in wrap(said, int(width / CHARACTER))]
+    full = (width + 2.0 * MARGIN, top + routes.height + MARGIN + LINE * len(key))
     body = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{full[0]:.0f}" height="{full[1]:.0f}"'
         f' viewBox="0 0 {full[0]:.0f} {full[1]:.0f}" role="img">',
@@ -68,7 +70,23 @@ def system_svg(plan: Plan) -> str:
         body += _wire(wire, points, layout.back(wire))
     for name, box in shown.boxes.items():
         body += _box(name, box, _feeding(shown))
+    for i, line in enumerate(key):
+        body.append(
+            f'<text class="quiet" x="0" y="{routes.height + LINE * (i + 1):.1f}">{_text(line)}</text>'
+        )
     return "\n".join([*body, "</g></svg>", ""])
+
+
+def _key(layout: Layout) -> Iterator[str]:
+    """Yield what the lines mean, of those that are drawn."""
+    if any(wire.held for wire in layout.wires):
+        yield "Dashed: held between two samples, or two rows of a log."
+    if any(wire.size > 1 for wire in layout.wires):
+        yield "Thick: an array, with its size."
+    if any(map(layout.back, layout.wires)):
+        yield "Brown: back to a block further left."
+    if any(pin.value for box in layout.boxes.values() for pin in box.left):
+        yield "name = value: an input that nothing changes."
 
 
 def _text(text: str) -> str:
@@ -85,6 +103,7 @@ def _wire(wire: Wire, points: list[tuple[float, float]], back: bool) -> Iterator
     """Yield a wire with its tip, and how many scalars go through it."""
     way = " ".join(f"{'L' if i else 'M'}{x:.1f} {y:.1f}" for i, (x, y) in enumerate(points))
     kinds = " ".join(["wire", *(["array"] if wire.size > 1 else []), *(["back"] if back else [])])
+    kinds += " held" if wire.held else ""
     ends = f"{wire.source}.{wire.output} → {wire.target}.{wire.input}"
     yield f'<path class="{kinds}" d="{way}"><title>{_text(ends)}</title></path>'
     x, y = points[-1]
@@ -98,14 +117,14 @@ def _wire(wire: Wire, points: list[tuple[float, float]], back: bool) -> Iterator
 def _box(name: str, box: Box, feeding: set[tuple[str, str]]) -> Iterator[str]:
     """Yield a box with its name, its kind and its ports."""
     x, y, width, height = box.x, box.y, box.width, box.height
-    yield f"<g{' class=' + chr(34) + 'log' + chr(34) if box.kind == 'log' else ''}>"
+    yield '<g class="log">' if box.log else "<g>"
     yield f'<rect class="box" x="{x:.1f}" y="{y:.1f}" width="{width:.1f}" height="{height:.1f}" rx="4"/>'
     head = f'x="{x + 1:.1f}" y="{y + 1:.1f}" width="{width - 2:.1f}" height="{HEAD - 6:.1f}"'
     yield f'<rect class="head" {head} rx="3"/>'
     yield f'<text class="name" x="{x + PAD:.1f}" y="{y + 16:.1f}">{_text(cut(name))}</text>'
     yield f'<text class="quiet" x="{x + PAD:.1f}" y="{y + 31:.1f}">{_text(cut(box.kind))}</text>'
     for i, pin in enumerate(box.left):
-        yield _pin(pin, x + PAD, y + HEAD + ROW * (i + 0.5) + 4.0, "start", quiet=False)
+        yield _pin(pin, x + PAD, y + HEAD + ROW * (i + 0.5) + 4.0, "start", quiet=bool(pin.value))
     for i, pin in enumerate(box.right):
         quiet = (name, pin.name) not in feeding
         yield _pin(pin, x + width - PAD, y + HEAD + ROW * (i + 0.5) + 4.0, "end", quiet=quiet)

@@ -115,25 +115,27 @@ def prepare(
         period: Communication step in [s], of a system that names none: that of the logs that it plays.
 
     Raises:
-        CosimulationError: With all that is wrong: FMUs that cannot be read, unknown variables, a destination
-            that is no input, a source that is no output, sizes, types and units that differ, inputs
-            without a source, start values that are refused, algebraic loops that may not be iterated.
+        CosimulationError: With all that is wrong: the faults of the file, FMUs that cannot be read, unknown
+            variables, a destination that is no input, a source that is no output, sizes, types and units
+            that differ, inputs without a source, start values that are refused, algebraic loops that may not
+            be iterated.
     """
-    faults: list[Finding | str] = []
+    faults: list[Finding | str] = [*system.faults]
     step = system.step or period or STEP
     system = replace(system, step=step)
     columns: dict[Port, LogColumn] = {}
     interfaces, ends = _interfaces(system, make, faults)
-    for one in system.inputs:
+    for one in (each for each in system.inputs if each.log):
         try:
             columns[one.destination] = _column(one, column)
         except UrmpipeError as error:
-            faults += error.findings
-    _refuse(system, faults)
+            faults += [f"inputs.{one.destination}: {finding}" for finding in error.findings]
+    complete = not faults
     wiring = Wiring(system, interfaces, {port: one.unit for port, one in columns.items()})
     ends += [float(one.t_ns[-1]) * 1e-9 for one in columns.values() if len(one.t_ns)]
     faults += wiring.faults
-    count = _count(step, system.duration or duration or max(ends, default=0.0), faults)
+    length = system.duration or duration or max(ends, default=0.0)
+    count = _count(step, length, faults) if length or complete else 0
     wiring.notes += _cut_short(system.duration, step, count)
     times = np.arange(count + 1, dtype=np.float64) * step
     logged = tuple(_logged(system, one, columns, wiring, times, faults) for one in wiring.logged)
@@ -144,12 +146,11 @@ def prepare(
 
 
 def _refuse(system: System, faults: list[Finding | str]) -> None:
-    """Raise a `CosimulationError` if there are faults, with their lines if the system has a file."""
+    """Raise a `CosimulationError` if there are faults, by line if the system has a file."""
     if faults and system.path.is_file():
         shipped = system.path.parent == SYSTEMS
-        raise CosimulationError(
-            *placed(system.path, system.path.name if shipped else str(system.path), faults)
-        )
+        found = placed(system.path, system.path.name if shipped else str(system.path), faults)
+        raise CosimulationError(*sorted(found, key=lambda one: one.line or 0))
     if faults:
         raise CosimulationError(*dict.fromkeys(faults))
 
@@ -161,7 +162,7 @@ def _interfaces(
     interfaces: dict[str, Interface] = {}
     ends: list[float] = []
     read: dict[Path, Interface] = {}
-    for block in system.blocks:
+    for block in (one for one in system.blocks if one.name not in system.unread):
         try:
             made = make(block)
             if isinstance(made, Unit):

@@ -8,6 +8,8 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from urmpipe_models.errors import Finding
+
 SYSTEMS = Path(__file__).parents[1] / "systems"
 """Where the shipped systems are."""
 
@@ -74,7 +76,7 @@ class LogInput:
 
     Attributes:
         destination: The input.
-        log: The file.
+        log: The file; empty where the system file does not tell it rightly.
         column: Name of the column.
         interpolate: Linearly between rows; else each row is held until the next.
     """
@@ -102,6 +104,8 @@ class System:
         inputs: Inputs from logs.
         iterate: Whether algebraic loops are iterated; else they are errors.
         tolerance: What may be left of an iterated loop, relative to nominal + |value|.
+        faults: What is wrong with the file; `prepare` tells it with all else.
+        unread: Names of the blocks that are not what the file means, as something in them is wrong.
     """
 
     name: str
@@ -116,6 +120,8 @@ class System:
     inputs: tuple[LogInput, ...] = ()
     iterate: bool = False
     tolerance: float = TOLERANCE
+    faults: tuple[Finding, ...] = ()
+    unread: frozenset[str] = frozenset()
 
     @cached_property
     def by_name(self) -> dict[str, Block]:

@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import math
 import re
-import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from urmpipe_fmus.cosim.arguments import beside, given, replaced, unknown
 from urmpipe_fmus.cosim.places import placed
 from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
+from urmpipe_fmus.units import unit_name
 from urmpipe_models.errors import CosimulationError, Finding
+from urmpipe_models.files.toml_text import parse_toml
 from urmpipe_models.names import did_you_mean, not_among
+
+NOWHERE = Port("", "")
+"""Stands for an end of a connection that the file does not tell rightly."""
 
 BLOCK_NAME = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
 
@@ -33,6 +38,12 @@ TABLES: dict[str, tuple[str, ...] | None] = {
 """The tables of a file and their keys; None where the user names the keys."""
 
 
+def system_name(name: str) -> str:
+    """Return the name of a shipped system whose words are joined by - or _; any other name as it is."""
+    joined = name.replace("_", "-")
+    return joined if joined in system_names() else name
+
+
 def system_names() -> tuple[str, ...]:
     """Return the names of the shipped systems."""
     return tuple(sorted(path.stem for path in SYSTEMS.glob("*.toml")))
@@ -44,14 +55,27 @@ def system_text(name: str) -> str:
     Raises:
         CosimulationError: If there is no such system.
     """
-    if name not in system_names():
+    if system_name(name) not in system_names():
         found = f"found {name!r}{did_you_mean(name, system_names())}"
         raise CosimulationError(f"system: {found}, allowed: one of {', '.join(system_names())}")
     return _path_of(name).read_text(encoding="utf-8")
 
 
 def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = None) -> System:
-    """Read a system file.
+    """Return the system of a file with which nothing is wrong; see `read_system`.
+
+    Raises:
+        CosimulationError: With all that is wrong: no such file, no TOML, unknown keys, values of another
+            type or out of range, names of no block, arguments that the file does not have.
+    """
+    system = read_system(name_or_path, arguments)
+    if system.faults:
+        raise CosimulationError(*system.faults)
+    return system
+
+
+def read_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = None) -> System:
+    """Read a system file; what is wrong with it stands in `faults`, to be told with what is found later.
 
     Paths in the file are relative to its folder; those in `arguments` to the working folder.
 
@@ -60,28 +84,32 @@ def load_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
         arguments: Values for the file's `$name`s instead of its defaults.
 
     Raises:
-        CosimulationError: With all that is wrong: no such file, no TOML, unknown keys, values of another
-            type or out of range, names of no block, arguments that the file does not have.
+        CosimulationError: If there is no such file, or it is no TOML.
     """
     path = _path_of(name_or_path)
     table = _parsed(path)
     faults: list[str] = []
     defaults = _table(table, "arguments", faults)
     here = {key: beside(path.parent, table.get(key, {})) for key in ("arguments", "blocks", "inputs")}
-    values = given(here["arguments"] if defaults else {}, arguments or {}, faults)
+    shipped = path.stem if path.parent == SYSTEMS else ""
+    values = given(here["arguments"] if defaults else {}, arguments or {}, faults, shipped)
     rest = {key: value for key, value in {**table, **here}.items() if key != "arguments"}
     faults += unknown(rest, values)
     system = _System(path, replaced(rest, values), values, faults).read()
-    if faults:
-        raise CosimulationError(*placed(path, str(name_or_path), faults))
-    return system
+    unread = {name for name in system.by_name if any(_is_of(name, fault) for fault in faults)}
+    found = placed(path, str(name_or_path), faults) if faults else ()
+    return replace(system, faults=found, unread=frozenset(unread))
+
+
+def _is_of(block: str, fault: str) -> bool:
+    """Return whether a fault stands in a block."""
+    return fault.startswith((f"blocks.{block}.", f"blocks.{block}: "))
 
 
 def _path_of(name_or_path: str | Path) -> Path:
     """Return the path of a system file."""
-    shipped = SYSTEMS / f"{name_or_path}.toml"
-    if isinstance(name_or_path, str) and name_or_path in system_names():
-        return shipped
+    if isinstance(name_or_path, str) and (name := system_name(name_or_path)) in system_names():
+        return SYSTEMS / f"{name}.toml"
     path = Path(name_or_path)
     if path.is_file():
         return path
@@ -91,10 +119,10 @@ def _path_of(name_or_path: str | Path) -> Path:
 
 def _parsed(path: Path) -> dict[str, Any]:
     """Return the tables of a TOML file."""
-    try:
-        return tomllib.loads(path.read_text(encoding="utf-8-sig"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError, OSError) as error:
-        raise CosimulationError(Finding(f"cannot be read as TOML: {error}", file=str(path))) from error
+    if path.suffix.lower() == ".fmu":
+        said = f"found an FMU, allowed: a TOML file in which it is a block, [blocks.NAME] fmu = {path.name!r}"
+        raise CosimulationError(Finding(said, file=str(path)))
+    return parse_toml(path, CosimulationError)
 
 
 def _table(table: Mapping[str, Any], key: str, faults: list[str]) -> dict[str, Any]:
@@ -133,8 +161,8 @@ class _System:
             record_every=self._count(head, "record_every"),
             arguments=self.arguments,
             blocks=blocks,
-            connections=tuple(one for one in connections if one),
-            inputs=tuple(one for one in inputs if one),
+            connections=tuple(connections),
+            inputs=tuple(inputs),
             iterate=self._flag(loops, "loops", "iterate"),
             tolerance=self._positive(loops, "loops", "tolerance", TOLERANCE),
         )
@@ -176,28 +204,27 @@ class _System:
             start = {}
         return Block(
             name=name,
-            unit=self._text(table, where, "unit", ""),
+            unit=unit_name(self._text(table, where, "unit", "")),
             file=self._file(table, where, "file"),
             fmu=self._file(table, where, "fmu"),
             options=options,
             start=start,
         )
 
-    def _connection(self, destination: str, source: Any) -> Connection | None:
-        """Return a connection, if both of its ends are told."""
+    def _connection(self, destination: str, source: Any) -> Connection:
+        """Return a connection."""
         where = f"connections.{destination}"
-        if not isinstance(source, str):
-            self.faults.append(f"{where}: found {source!r}, allowed: its source as 'block.variable'")
-            return None
-        ends = self._port(where, destination), self._port(where, source)
-        return Connection(ends[0], ends[1]) if ends[0] and ends[1] else None
+        if isinstance(source, str):
+            return Connection(self._port(where, destination), self._port(where, source))
+        self.faults.append(f"{where}: found {source!r}, allowed: its source as 'block.variable'")
+        return Connection(self._port(where, destination), NOWHERE)
 
-    def _input(self, destination: str, table: Any) -> LogInput | None:
+    def _input(self, destination: str, table: Any) -> LogInput:
         """Return an input from a log."""
         where = f"inputs.{destination}"
         if not isinstance(table, dict):
             self.faults.append(f"{where}: found {table!r}, allowed: {{ log = FILE, column = NAME }}")
-            return None
+            return LogInput(destination=self._port(where, destination), log="", column="")
         allowed = ("log", "column", "interpolate")
         self.faults += [f"{where}.{key}: {not_among(key, allowed)}" for key in table if key not in allowed]
         port = self._port(where, destination)
@@ -206,17 +233,18 @@ class _System:
                 self.faults.append(f"{where}.{key}: not found, allowed: a text")
         log, column = self._text(table, where, "log", ""), self._text(table, where, "column", "")
         interpolate = self._flag(table, where, "interpolate")
-        return LogInput(destination=port, log=log, column=column, interpolate=interpolate) if port else None
+        known = log if column else ""
+        return LogInput(destination=port, log=known, column=column, interpolate=interpolate)
 
-    def _port(self, where: str, text: str) -> Port | None:
-        """Return the port that a text `block.variable` names."""
+    def _port(self, where: str, text: str) -> Port:
+        """Return the port that a text `block.variable` names, `NOWHERE` if there is no such block."""
         block, dot, variable = text.partition(".")
         if not (block and dot and variable):
             self.faults.append(f"{where}: found {text!r}, allowed: block.variable")
-            return None
+            return NOWHERE
         if block not in self.names:
             self.faults.append(f"{where}: block {not_among(block, self.names)}")
-            return None
+            return NOWHERE
         return Port(block, variable)
 
     def _text(self, table: Mapping[str, Any], where: str, key: str, default: str) -> str:

@@ -13,7 +13,7 @@ from typing import Any, cast
 
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.errors import UnitError
-from urmpipe_models.names import did_you_mean
+from urmpipe_models.names import did_you_mean, not_among
 
 _UNITS: dict[str, str] = {
     "kinematic_chain": "points of an arm, and velocities and angles of its sensors, from the joints",
@@ -33,14 +33,19 @@ def unit_names() -> tuple[str, ...]:
     return tuple(_UNITS)
 
 
+def unit_name(name: str) -> str:
+    """Return the name of a unit whose words are joined by - or _; what is no unit's name as it is."""
+    joined = name.replace("-", "_")
+    return joined if joined in _UNITS else name
+
+
 def unit_help(name: str) -> str:
     """Return what a unit does, in a line.
 
     Raises:
         UnitError: If there is no such unit.
     """
-    _check(name)
-    return _UNITS[name]
+    return _UNITS[_known(name)]
 
 
 def unit_options(name: str) -> Mapping[str, str]:
@@ -49,8 +54,7 @@ def unit_options(name: str) -> Mapping[str, str]:
     Raises:
         UnitError: If there is no such unit.
     """
-    _check(name)
-    return cast("Mapping[str, str]", import_module(f"{__name__}.{name}").OPTIONS)
+    return cast("Mapping[str, str]", import_module(f"{__name__}.{_known(name)}").OPTIONS)
 
 
 def make_unit(name: str, /, **options: Any) -> Unit:
@@ -63,6 +67,7 @@ def make_unit(name: str, /, **options: Any) -> Unit:
     Raises:
         UnitError: If there is no such unit, or with all that is wrong with its options.
     """
+    name = _known(name)
     known = unit_options(name)
     make = cast("Callable[..., Unit]", getattr(import_module(f"{__name__}.{name}"), name))
     needed = [one.name for one in signature(make).parameters.values() if one.default is Parameter.empty]
@@ -79,7 +84,8 @@ def make_unit(name: str, /, **options: Any) -> Unit:
     return make(**options)
 
 
-def _check(name: str) -> None:
-    if name not in _UNITS:
-        allowed = f"{', '.join(_UNITS)}, or a .py file with a unit in it"
-        raise UnitError(f"unit {name}: found{did_you_mean(name, _UNITS)}, allowed: {allowed}")
+def _known(name: str) -> str:
+    """Return the name of a unit; `UnitError` if there is none."""
+    if (found := unit_name(name)) not in _UNITS:
+        raise UnitError(f"unit: {not_among(name, _UNITS)}, or a .py file with a unit in it")
+    return found

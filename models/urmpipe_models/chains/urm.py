@@ -77,7 +77,7 @@ class UrmGeometry(NamedTuple):
 
     Attributes:
         lengths: r_1..r_{n+1} in [m].
-        tilts: theta_2..theta_{n+1} in [rad].
+        tilts: theta_2..theta_{n+1} in [rad], within (-pi, pi].
         directions: +1 or -1 a module.
     """
 
@@ -91,7 +91,7 @@ def urm_geometry(chain: Chain) -> UrmGeometry | None:
     modules, links = chain.joints[:-1], chain.joints[1:]
     found = UrmGeometry(
         (*(link.origin.translation[2] for link in links), chain.tip.translation[2]),
-        tuple(math.atan2(link.origin.rotation[0][2], link.origin.rotation[0][0]) for link in links),
+        tuple(_tilt(link.origin) for link in links),
         tuple(module.axis[2] for module in modules),
     )
     if not modules or any(direction not in (1.0, -1.0) for direction in found.directions):
@@ -104,6 +104,12 @@ def urm_geometry(chain: Chain) -> UrmGeometry | None:
         for joint, other in zip(chain.joints, again.joints, strict=True)
     )
     return found if same else None
+
+
+def _tilt(origin: Transform) -> float:
+    """Return by how much a frame is turned about y, in [rad]: half a turn is pi, whatever rounding left."""
+    tilt = math.atan2(origin.rotation[0][2], origin.rotation[0][0])
+    return math.pi if tilt == -math.pi else tilt
 
 
 def _near(one: Transform, other: Transform) -> bool:

@@ -92,6 +92,8 @@ def test_each_spelling_is_an_option_and_a_keyword() -> None:
         ("; --skip-bad leaves them out", "; read=ReadOptions(skip_bad=True) leaves them out"),
         ("is a --tool or a --base missing?", "is a tool or a base missing?"),
         ("1 mm with --tool 0.1,0,-0.2, which", "1 mm with tool=(0.1, 0, -0.2), which"),
+        ("urmpipe simulate --write-system FILE.toml one-drive makes a copy",
+         "urmpipe simulate --write-system FILE.toml one-drive makes a copy"),
         ("--sync SECONDS or start", "sync=SECONDS or start"),
         ("--align rigid: found", 'align="rigid": found'),
         ("ingest --audit FILE.csv lists all", "ingest(audit=FILE.csv) lists all"),

@@ -84,9 +84,13 @@ def test_elements_go_in_by_kind_and_come_out_in_order() -> None:
     ],
 )
 def test_what_a_function_may_not_return_is_told(returned: Any, said: list[str]) -> None:
+    def give(v: Any) -> Any:
+        return returned
+
     with pytest.raises(UnitError) as error:
-        Equations(unit_of(lambda v: returned)).outputs(0.0, [0.0])
-    assert str(error.value).splitlines() == [f"unit u: outputs: {one}" for one in said]
+        Equations(unit_of(give)).outputs(0.0, [0.0])
+    place = f"{__file__}:{give.__code__.co_firstlineno}"
+    assert str(error.value).splitlines() == [f"{place}: unit u: outputs: {one}" for one in said]
 
 
 def fails(v: Any) -> dict[str, Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 from itertools import combinations, pairwise
 from pathlib import Path
 
@@ -114,7 +115,7 @@ def test_arrays_are_one_port_and_one_wire_and_idle_outputs_are_counted() -> None
     assert shown.wires == (
         Wire("source", "q", "arm", "phi", 2),
         Wire("g", "y", "i", "u"),
-        Wire("a<b>&.csv", "u", "g", "u"),
+        Wire("a<b>&.csv", "u", "g", "u", held=True),
     )
     arm = shown.boxes["arm"]
     assert arm.left == [Pin("phi", 2, "rad")]
@@ -147,6 +148,72 @@ def test_a_drawing_holds_names_units_and_connections_and_nothing_from_elsewhere(
     ways = [one.text for one in ET.fromstring(svg).iter(f"{SVG}title")]
     assert ways == ["test", "source.q → arm.phi", "g.y → i.u", "a<b>&.csv.u → g.u"]
     assert svg.count("http") == 1  # the name space
+
+
+def held_plan(**period: float) -> Plan:
+    """Return a system in which a log is held and interpolated, a block samples, and an input stands still."""
+    sampled = Foreign(
+        name="sampled",
+        scalars=(
+            Scalar("e", 0, "input"),
+            Scalar("y", 1),
+            Scalar("period", 2, "parameter", start="0.005", unit="s"),
+        ),
+    )
+    turned = Foreign(
+        name="turned",
+        scalars=(
+            *(Scalar(f"a[{i}]", i, "input", unit="rad") for i in (1, 2, 3)),
+            Scalar("b", 4, "input", unit="m"),
+            Scalar("period", 5, "parameter", start="6.28", unit="rad"),  # no time
+            Scalar("z", 6),
+        ),
+    )
+    asks = [
+        LogInput(destination=Port("g", "u"), log="x.csv", column="u"),
+        LogInput(destination=Port("i", "u"), log="x.csv", column="v", interpolate=True),
+    ]
+    return planned(
+        {"g": gain(), "i": INTEGRATOR, "s": sampled, "t": turned, "h": gain()},
+        {"s.e": "g.y", "t.b": "s.y", "h.u": "t.z"},
+        {"t": {"a": [0.5, 1.0 / 3.0, 0.5]}, "s": period},
+        asks,
+        column=lambda one: LogColumn(np.array([0, 10**9]), np.zeros(2)),
+    )
+
+
+def test_what_is_held_is_dashed_and_what_never_changes_has_its_value() -> None:
+    shown = diagram(held_plan())
+    assert [(wire.source, wire.target) for wire in shown.wires if wire.held] == [("s", "t"), ("x.csv", "g")]
+    assert [(wire.source, wire.target) for wire in shown.wires if not wire.held] == [
+        ("g", "s"),
+        ("t", "h"),
+        ("x.csv", "i"),
+    ]
+    assert (shown.boxes["s"].kind, shown.boxes["t"].kind) == ("sampled.fmu, every 5 ms", "turned.fmu")
+    assert [pin.label for pin in shown.boxes["t"].left] == ["a ×3 = 0.5, 0.333333, …", "b"]
+    drawn = ET.fromstring(system_svg(held_plan(period=0.02)))
+    dashed = [one for one in drawn.iter(f"{SVG}path") if "held" in (one.get("class") or "").split()]
+    assert len(dashed) == 2
+    texts = ["".join(one.itertext()) for one in drawn.iter(f"{SVG}text")]
+    assert "sampled.fmu, every 20 ms" in texts
+    assert texts[-2:] == [
+        "Dashed: held between two samples, or two rows of a log.",
+        "name = value: an input that nothing changes.",
+    ]
+
+
+def test_the_log_of_a_source_is_named_with_how_it_is_read() -> None:
+    plan = planned({"a": INTEGRATOR, "b": gain()}, {"a.u": "b.y"}, {"b": {"u": 0.0}})
+    for options, said in (
+        ({"log": "far/run.csv"}, "gain.fmu, held: run.csv"),
+        ({"log": "far/run.csv", "interpolate": True}, "gain.fmu, interpolated: run.csv"),
+    ):
+        first, source = plan.system.blocks
+        played = replace(plan.system, blocks=(first, replace(source, options=options)))
+        shown = diagram(replace(plan, system=played))
+        assert shown.boxes["b"].kind == said
+        assert [wire.held for wire in shown.wires] == [said.count("held") == 1]
 
 
 def test_a_long_name_is_broken_into_lines_that_the_drawing_has_room_for() -> None:

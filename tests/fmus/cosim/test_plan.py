@@ -75,9 +75,7 @@ def test_every_wrong_connection_is_told() -> None:
         "connections.n.by: found i.y, Real, allowed: Integer (numbers only)",
         "connections.n.on: found n.n, Integer, allowed: Boolean (numbers only)",
         "connections.arm.phi[1]: found i.u, causality input, allowed: an output of i: y",
-        f"blocks.arm: found inputs without a source: phi[1]; {ALLOWED}",
-        f"blocks.i: found inputs without a source: u; {ALLOWED}",
-    ]
+    ]  # and no input is said to have no source as well
 
 
 def test_units_must_be_the_same_by_what_they_are_not_by_how_they_are_spelled() -> None:
@@ -109,9 +107,9 @@ def test_an_input_has_one_source() -> None:
     ) == ["b.u: found two sources, a.y and the log, allowed: one"]
     every = {f"arm.phi[{i}]": "i.y" for i in range(1, 12)}
     arms = {"arm": ARM, "other": ARM, "i": INTEGRATOR}
-    (first, *rest) = told(arms, {**every, "other.phi": "other.p", "i.u": "i.y"})
-    assert first == "connections.other.phi: found other.p of size 3, allowed: 11, as many as other.phi"
-    assert len(rest) == 1
+    assert told(arms, {**every, "other.phi": "other.p", "i.u": "i.y"}) == [
+        "connections.other.phi: found other.p of size 3, allowed: 11, as many as other.phi"
+    ]
 
 
 def test_start_values_that_are_refused_are_told() -> None:
@@ -260,7 +258,10 @@ def test_what_is_no_fmu_for_cosimulation_is_told(tmp_path: Path) -> None:
     blocks = system({"a": gain(), "b": gain()})
     with pytest.raises(CosimulationError) as caught:
         prepare(blocks, lambda block: broken if block.name == "a" else fmu(gain()))
-    assert str(caught.value) == f"blocks.a: {broken}: cannot be read as an FMU: File is not a zip file"
+    assert str(caught.value).splitlines() == [
+        f"blocks.a: {broken}: cannot be read as an FMU: File is not a zip file",
+        f"blocks.b: found inputs without a source: u; {ALLOWED}",
+    ]
 
 
 @pytest.mark.parametrize(

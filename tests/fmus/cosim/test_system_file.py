@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from urmpipe_fmus.cosim import LogInput, Port, System, load_system, system_names
+from urmpipe_fmus.cosim import LogInput, Port, System, load_system, system_names, system_text
 from urmpipe_models.errors import CosimulationError
 
 WHOLE = """
@@ -49,7 +49,7 @@ tolerance = 1e-6
 """
 
 
-ELSE = "; all else stands in the system's file; simulate writes a copy (docs/simulate.md)"
+ELSE = "; all else is changed in the system's file"
 
 
 @pytest.fixture
@@ -184,6 +184,20 @@ def test_arguments_must_be_of_their_defaults_type(folder: Path) -> None:
     ]
 
 
+def test_an_argument_that_a_shipped_system_lacks_is_told_with_how_to_change_its_file() -> None:
+    with pytest.raises(CosimulationError) as caught:
+        load_system("one-drive", {"u": "3"})
+    copied = ", of which urmpipe simulate --write-system FILE.toml one-drive makes a copy"
+    assert str(caught.value) == f"one-drive: argument u: found 'u', allowed: none{ELSE}{copied}"
+
+
+def test_words_of_a_system_and_of_its_units_are_joined_by_either_sign(tmp_path: Path) -> None:
+    assert load_system("one_drive") == load_system("one-drive")
+    assert system_text("one_drive") == system_text("one-drive")
+    (tmp_path / "a.toml").write_text('[blocks.a]\nunit = "dc-drive"\n', encoding="utf-8")
+    assert load_system(tmp_path / "a.toml").blocks[0].unit == "dc_drive"
+
+
 @pytest.mark.parametrize("value", ["inf", "nan", "true", '"1"', "-0.1"])
 def test_a_step_is_a_finite_number_above_zero(tmp_path: Path, value: str) -> None:
     text = f'[system]\nstep = {value}\n[blocks.a]\nunit = "x"\n'
@@ -253,8 +267,27 @@ a.u = 7
 
 
 def test_what_is_no_toml_or_no_file_is_told(tmp_path: Path) -> None:
-    (found,) = said(tmp_path / "bad.toml", "[system\n")
-    assert found.startswith("cannot be read as TOML: ")
+    for text, line, told in (
+        ("[blocks.a]\n[system\n", 2, "not valid TOML: Expected ']' at the end of a table declaration"),
+        (
+            "[blocks.a]\nunit = dc_drive\n",
+            2,
+            'Invalid value (at line 2, column 8); a text needs quotes: unit = "dc_drive"',
+        ),
+    ):
+        (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
+        with pytest.raises(CosimulationError) as caught:
+            load_system(tmp_path / "bad.toml")
+        (found,) = caught.value.findings
+        assert (found.file, found.line) == (str(tmp_path / "bad.toml"), line)
+        assert told in found.message
+    (tmp_path / "drive.fmu").write_bytes(b"PK\xff")
+    with pytest.raises(CosimulationError) as caught:
+        load_system(tmp_path / "drive.fmu")
+    assert str(caught.value) == (
+        f"{tmp_path / 'drive.fmu'}: found an FMU, allowed: a TOML file in which it is a block,"
+        " [blocks.NAME] fmu = 'drive.fmu'"
+    )
     with pytest.raises(CosimulationError) as caught:
         load_system("no-such-system")
     assert str(caught.value) == (

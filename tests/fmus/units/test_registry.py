@@ -10,7 +10,7 @@ import pytest
 
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.units import make_unit, unit_help, unit_names, unit_options
+from urmpipe_fmus.units import make_unit, unit_help, unit_name, unit_names, unit_options
 from urmpipe_fmus.variable import Output
 from urmpipe_models.errors import UnitError
 from urmpipe_models.robots.catalogue import load_robot
@@ -60,15 +60,22 @@ def test_an_unknown_unit_is_told_what_there_is() -> None:
     with pytest.raises(UnitError) as error:
         make_unit("gearbox")
     names = ", ".join(unit_names())
-    assert str(error.value) == f"unit gearbox: found, allowed: {names}, or a .py file with a unit in it"
+    assert str(error.value) == f"unit: found 'gearbox', allowed: {names}, or a .py file with a unit in it"
     for ask in (unit_help, unit_options):
-        with pytest.raises(UnitError, match="unit gearbox: found"):
+        with pytest.raises(UnitError, match="unit: found 'gearbox'"):
             ask("gearbox")
 
 
-@pytest.mark.parametrize("name", ["dc-drive", "DC_Drive", "dcdrive"])
+def test_hyphens_stand_for_underscores() -> None:
+    assert make_unit("dc-drive").variables == make_unit("dc_drive").variables
+    assert (unit_name("dc-drive"), unit_name("gear-box")) == ("dc_drive", "gear-box")
+    assert unit_help("log-source") == unit_help("log_source")
+    assert unit_options("log-source") == unit_options("log_source")
+
+
+@pytest.mark.parametrize("name", ["DC_Drive", "dcdrive"])
 def test_the_unit_that_was_meant_is_told(name: str) -> None:
-    with pytest.raises(UnitError, match=rf"^unit {name}: found \(did you mean dc_drive\?\), allowed: "):
+    with pytest.raises(UnitError, match=rf"^unit: found '{name}' \(did you mean dc_drive\?\), allowed: "):
         make_unit(name)
 
 

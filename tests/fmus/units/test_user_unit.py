@@ -164,11 +164,11 @@ def test_a_file_may_hold_dataclasses_and_private_units(tmp_path: Path) -> None:
         ),
         (
             UNIT.replace("OUT", "(v.u, v.u)"),
-            ["own.py: unit own: outputs: y: found tuple, allowed: one element"],
+            ["own.py:8: unit own: outputs: y: found tuple, allowed: one element"],
         ),
         (
             UNIT.replace('{"y": OUT}', "None"),
-            ["own.py: unit own: outputs: returns nothing (None), allowed: a dict of y"],
+            ["own.py:8: unit own: outputs: returns nothing (None), allowed: a dict of y"],
         ),
         (
             UNIT.replace("OUT", "np.random.default_rng().uniform() + v.u"),
@@ -181,6 +181,39 @@ def test_a_file_may_hold_dataclasses_and_private_units(tmp_path: Path) -> None:
 )
 def test_a_file_that_is_wrong_is_told_with_its_line(tmp_path: Path, text: str, expected: list[str]) -> None:
     assert said(written(tmp_path, text)) == expected
+
+
+THREE_FUNCTIONS = """from urmpipe_fmus.unit import Unit
+from urmpipe_fmus.variable import Input, Memory, Output, State
+
+def state(v):
+    \"\"\"The derivative.\"\"\"
+    return {"x": v.w}
+
+unit = Unit(
+    name="own",
+    description="Own",
+    variables=(
+        Input(name="u", description="u"),
+        Output(name="y", description="y"),
+        State(name="x", description="x"),
+        Memory(name="m", description="m"),
+    ),
+    outputs=lambda v: {"z": v.u},
+    derivatives=state,
+    update=lambda v: {"m": 1.0 if v.u else 0.0},
+)
+"""
+
+
+def test_what_is_wrong_with_each_function_is_told_at_once_with_its_line(tmp_path: Path) -> None:
+    found = said(written(tmp_path, THREE_FUNCTIONS))
+    assert [one.partition(", allowed: ")[0].partition(" (if")[0] for one in found] == [
+        "own.py:17: unit own: outputs: z: found in what it returns",
+        "own.py:17: unit own: outputs: y: not found in what it returns",
+        "own.py:6: unit own: derivatives: v.w: found in a unit's function",
+        "own.py:19: unit own: update: a branch on u: found in a unit's function",
+    ]
 
 
 def test_a_function_that_keeps_the_last_value_in_python_is_refused(tmp_path: Path) -> None:

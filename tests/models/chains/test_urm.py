@@ -15,7 +15,7 @@ from urmpipe_models.chains.urm import ROUNDING, urm_chain, urm_geometry
 from urmpipe_models.transform import Transform, from_offset, rotation_x, translation
 
 lengths = st.floats(-2.0, 2.0)
-tilts = st.floats(-3.14, 3.14) | st.sampled_from([0.0, math.pi / 2, -math.pi / 2, math.pi])
+tilts = st.floats(-3.14, 3.14) | st.sampled_from([0.0, math.pi / 2, -math.pi / 2, math.pi, -math.pi])
 modules = st.lists(st.tuples(lengths, tilts, st.sampled_from([1.0, -1.0])), min_size=1, max_size=6)
 
 ARM = urm_chain("two", (0.3, 0.2, 0.1), (0.5, -0.7), directions=(1, -1))
@@ -41,6 +41,18 @@ def test_an_arm_tells_what_it_was_made_from_wherever_it_stands(
     assert (found.lengths, found.directions) == ((*r, last), directions)
     turned = np.sin(np.subtract(found.tilts, theta) / 2.0)  # pi and -pi are one tilt
     np.testing.assert_allclose(turned, 0.0, rtol=0.0, atol=1e-15)  # of atan2 of a rounded sine and cosine
+
+
+@pytest.mark.parametrize("tilt", [math.pi, -math.pi, np.nextafter(math.pi, 4.0)])
+def test_a_tilt_of_half_a_turn_comes_back_as_pi(tilt: float) -> None:
+    made = urm_chain("two", (0.3, 0.2, 0.1), (tilt, 0.5))
+    found = urm_geometry(made)
+    assert found is not None
+    assert found.tilts == (math.pi, 0.5)
+    again = urm_chain("two", *found[:2])
+    assert urm_geometry(again) == found
+    for one, other in zip(made.joints, again.joints, strict=True):
+        np.testing.assert_allclose(one.origin.rotation, other.origin.rotation, rtol=0.0, atol=ROUNDING)
 
 
 def changed(k: int, **what: object) -> Chain:

@@ -309,38 +309,6 @@ def test_whole_messages(robot: Any, text: str, said: str) -> None:
     assert complaint(robot, text) == [said]
 
 
-def test_rows_that_make_no_arm_in_metres_and_radians_must_tell_their_units(robot: Any) -> None:
-    rows = 'kind = "dh"\njoints = [{ d = 118, alpha = 90 }, { a = 612 }]'
-    with pytest.raises(RobotError) as caught:
-        robot(rows)
-    assert str(caught.value).splitlines() == [
-        'arm.toml: key length_unit: found none, and links of 730 m, allowed: "mm", or "m" if so meant',
-        'arm.toml: key angle_unit: found none, and 90 rad, allowed: "deg", or "rad" if so meant',
-    ]
-    assert robot(f'length_unit = "mm"\nangle_unit = "deg"\n{rows}').joints[1].origin.translation[2] == 0.118
-    assert robot(f'length_unit = "m"\nangle_unit = "rad"\n{rows}').tip.translation[0] == 612.0
-
-
-@pytest.mark.parametrize(
-    ("rows", "told"),
-    [
-        ('kind = "dh"\njoints = [{ d = 100 }]', None),
-        ('kind = "dh"\njoints = [{ d = 101 }]', "key length_unit: found none, and links of 101 m"),
-        ('kind = "urm"\nlengths = [0.1, 0.1]\ntilts = [-45]', "key angle_unit: found none, and 45 rad"),
-        ('kind = "dh"\njoints = [{ theta = 6.283185307179586 }]', None),
-        ('kind = "modified_dh"\njoints = [{ theta = -6.3 }]', "key angle_unit: found none, and 6.3 rad"),
-    ],
-)
-def test_units_are_asked_for_beyond_a_hundred_metres_and_beyond_a_turn(
-    robot: Any, rows: str, told: str | None
-) -> None:
-    if told is None:
-        assert len(robot(rows).coordinates) == 1
-    else:
-        (said,) = complaint(robot, rows)
-        assert said.startswith(f"arm.toml: {told}, allowed: ")
-
-
 def test_a_text_without_quotes_is_told_how_to_be_written(robot: Any) -> None:
     with pytest.raises(RobotError) as caught:
         robot('kind = "urm"\nname = ur5e  # mine')
