@@ -24,7 +24,7 @@ import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import OptionError, shown
 from urmpipe_models.inverse.iterative.descent import (
     METHODS,
     STATIONARY,
@@ -124,7 +124,7 @@ def _starts(chain: Chain, targets: Targets, q: FloatArray, method: str) -> Float
     shape = (len(targets), len(chain.coordinates))
     faults = []
     if method not in METHODS:
-        faults.append(f"method: found {method!r}, allowed: {', '.join(METHODS)}")
+        faults.append(f"method: found {shown(method)}, allowed: {', '.join(METHODS)}")
     if np.shape(q) not in {shape, shape[1:]}:
         faults.append(f"starts: found an array of shape {np.shape(q)}, allowed: {shape[1:]} or {shape}")
     if faults:

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain, JointKind
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.orientation import RotationForm, angles
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
@@ -210,7 +210,7 @@ class UnitFinder:
         if column.number in self.given:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
-            message = f"found the unit {column.unit_text!r}, allowed: rad, deg, m, mm, cm"
+            message = f"found the unit {shown(column.unit_text)}, allowed: rad, deg, m, mm, cm"
             hint = f"say which with {option('--unit', f'{column.name}={likely}')}"
             raise LogError(Finding(f"{message}; {hint}", self.file, column=column.header))
         return column.unit
