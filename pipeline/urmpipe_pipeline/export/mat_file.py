@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.errors import Finding, OutputError
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.export.metadata import MARK, as_json
 from urmpipe_pipeline.export.tables import Table
 from urmpipe_pipeline.export.times import Times
