@@ -78,8 +78,8 @@ def compare(
             With a `baseline` alone: a comparison, which stands as it was made.
         logs: What to judge: logs, recordings and runs, or one of them.
         robot: The arm; a recording or a run that has another one is computed anew with it.
-        base: Where the arm stands in the world.
-        tool: The tool centre point in the frame of the arm's tip.
+        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of the arm's tip, likewise.
         read: How to read a log where it cannot tell by itself.
         tsp: Period of a log's grid in [s].
         derivative: How a log is differentiated: central or savgol.

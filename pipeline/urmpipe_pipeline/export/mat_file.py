@@ -144,10 +144,10 @@ def _deviation(run: Deviation) -> dict[str, Any]:
 
 
 def cells(items: Sequence[Any]) -> np.ndarray[tuple[int, int], np.dtype[np.object_]]:
-    """Return items as a row of MATLAB's cells.
+    """Return items as a row of MATLAB's cells [-], shape (1, n).
 
     Args:
-        items: n texts, numbers or structs; [-]; the cells have the shape (1, n).
+        items: n texts, numbers or structs.
     """
     row = np.empty((1, len(items)), dtype=object)
     for k, item in enumerate(items):

@@ -285,7 +285,7 @@ def extremes(values: FloatArray, t: FloatArray) -> dict[str, float | None]:
     """Return the first and the last value, the least and the largest, and when these first stand.
 
     Args:
-        values: Shape (n,); what is not finite is no value.
+        values: In any unit, shape (n,); what is not finite is no value.
         t: Times in [s], shape (n,).
 
     Returns:

@@ -91,7 +91,7 @@ def refine(
         chain: The arm.
         targets: n of them.
         q: Where each starts, in [rad] or [m], shape (joints,) or (n, joints); clipped to the limits.
-        home: Where least motion counts from, in [rad] or [m], as q; q by default.
+        home: Where least motion counts from, in [rad] or [m], shaped as q; q by default.
         method: lm (Levenberg-Marquardt), dls (damped least squares) or pinv (pseudoinverse).
         metres: The distance from the target that counts as none in [m].
         radians: The angle from the target that counts as none in [rad].

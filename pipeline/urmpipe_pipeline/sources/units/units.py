@@ -69,8 +69,8 @@ class UnitFinder:
 
         Args:
             columns: The joint columns.
-            values: Their values as the file has them, shape (n, joints).
-            t_ns: Recorded times in [ns], None if the log has none.
+            values: Their values in the file's own units, shape (n, joints).
+            t_ns: Recorded times in [ns], shape (n,); None if the log has none.
             robot: The arm, or None.
 
         Raises:
@@ -111,7 +111,7 @@ class UnitFinder:
 
         Args:
             columns: The three columns.
-            values: Their values as the file has them, shape (n, 3).
+            values: Their values in the file's own units, shape (n, 3).
         """
         found = [self._told(column, "prismatic") for column in columns]
         told = [unit for unit in found if unit is not None]
