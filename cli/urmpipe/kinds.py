@@ -158,7 +158,7 @@ KINDS = {
         "start, auto, or t_reference - t_log as a number, in s",
     ),
     "system": Kind(_is_path, "the name of a system, or a system file (TOML)"),
-    "targets": Kind(lambda value: value != "" if isinstance(value, str) else True, "a file, or an array"),
+    "targets": Kind(lambda value: _is_text(value) or not isinstance(value, str), "a file, or an array"),
     "tcp": _one_of("fk", "recorded"),
     "tip_link": LINK,
     "to": _one_of("csv", "parquet", "mat", "tum"),
