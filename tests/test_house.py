@@ -24,7 +24,7 @@ BOUNDS = [
     "functions over 60 lines without a reason",
     "medians over their bounds",
     "public definitions without a docstring",
-    "docstrings of arrays without unit or shape",
+    "arrays of which the docstring tells no unit or no shape",
     "functions without all annotations",
     "imports the wrong way",
     "rings of modules",

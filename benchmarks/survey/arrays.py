@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from survey.source import Function, Source
+from survey.stated import RESULT
 
 _ROOTS = {"NDArray", "ArrayLike", "ndarray"}
 _COUNTED = {
@@ -67,9 +68,10 @@ class Aliases:
         parts = (part for part in ast.iter_child_nodes(annotation) if isinstance(part, ast.expr))
         return _union(self.mentioned(module, part) for part in parts)
 
-    def passed(self, module: str, node: Function | ast.ClassDef) -> Arrays:
-        """Return which arrays a function takes or returns, or a class has as annotated fields."""
-        return _union(self.mentioned(module, annotation) for annotation in _annotations(node))
+    def passed(self, module: str, node: Function | ast.ClassDef) -> dict[str, Arrays]:
+        """Return which arguments and result, or fields of a class and what makes it, are arrays, by name."""
+        found = {name: self.mentioned(module, annotation) for name, annotation in _annotations(node)}
+        return {name: arrays for name, arrays in found.items() if arrays.any}
 
     def _named(self, module: str, name: str) -> Arrays:
         """Follow a name to what it was assigned, through imports."""
@@ -98,15 +100,18 @@ def _measured(entries: ast.expr) -> bool:
     return not (isinstance(entries, ast.Attribute) and entries.attr in _COUNTED)
 
 
-def _annotations(node: Function | ast.ClassDef) -> Iterator[ast.expr | None]:
+def _annotations(node: Function | ast.ClassDef) -> Iterator[tuple[str, ast.expr | None]]:
     if isinstance(node, ast.ClassDef):
         for statement in node.body:
             if isinstance(statement, ast.AnnAssign) and not ast.unparse(statement.target).startswith("_"):
-                yield statement.annotation
+                yield ast.unparse(statement.target), statement.annotation
+            elif isinstance(statement, ast.FunctionDef) and statement.name == "__init__":
+                yield from ((name, kind) for name, kind in _annotations(statement) if name != RESULT)
         return
-    for parameter in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs):
-        yield parameter.annotation
-    yield node.returns
+    rest = [one for one in (node.args.vararg, node.args.kwarg) if one]
+    for parameter in (*node.args.posonlyargs, *node.args.args, *node.args.kwonlyargs, *rest):
+        yield parameter.arg, parameter.annotation
+    yield RESULT, node.returns
 
 
 def _top(tree: ast.Module) -> Iterator[ast.stmt]:

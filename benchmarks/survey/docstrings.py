@@ -9,12 +9,14 @@ from dataclasses import dataclass
 
 from survey.arrays import Aliases
 from survey.source import Definition, Source
+from survey.stated import stated
 
 _SYMBOL = r"(?:[numkM]?(?:m|s|g|A|V|W|N|J|H|Hz|B)|Nm|kg|Ohm|rad|deg|px|turns?|-|%)"
 UNIT = re.compile(
     rf"\[(?:\d+ )?{_SYMBOL}\d?(?:[ */^]*{_SYMBOL}\d?)*\]"  # [m/s2], [kg m2], [-]
     r"|\b(?:rad|dimensionless|SI|radians?|degrees?|seconds|pixels|nanoseconds)\b"
-    r"|\bunits? (?:of|as|vectors?|quaternions?)\b|\b(?:own|same|its|any|their|whose) units?\b"
+    r"|\bunits? (?:of|as|vectors?|quaternions?)\b|\b(?:own|same|its|any|that|their|whose) units?\b"
+    r"|\b[Ii]n (?:one unit\b|`units?`)"
 )
 """A unit as a docstring states it: in brackets, in words, or as that of something else."""
 
@@ -39,11 +41,11 @@ class Documented:
 
 @dataclass(frozen=True, slots=True)
 class ArraysDocumented:
-    """Public functions that arrays pass through, and public classes that hold some."""
+    """Arrays that public functions take and give, and that public classes hold."""
 
     passing: int
     incomplete: tuple[str, ...]
-    """Those that leave a unit or a shape open, and which."""
+    """Those whose unit or shape the docstring leaves open."""
 
 
 def documented(sources: Sequence[Source]) -> Documented:
@@ -63,23 +65,22 @@ def documented(sources: Sequence[Source]) -> Documented:
 
 
 def arrays_documented(sources: Sequence[Source], aliases: Aliases) -> ArraysDocumented:
-    """Return the public definitions that arrays pass through, and what they leave open."""
+    """Return the arrays of public definitions, and what their docstrings leave open of each."""
     count, incomplete = 0, []
     for source in sources:
         for made in _public(source):
-            found = aliases.passed(source.module, made.node)
-            if not found.any:
-                continue
-            count += 1
-            lacking = open_questions(ast.get_docstring(made.node) or "", measured=found.measured)
-            if lacking:
-                incomplete.append(f"{made.place}: no {' and no '.join(lacking)}")
+            said = stated(made.node)
+            for name, array in aliases.passed(source.module, made.node).items():
+                count += 1
+                lacking = open_questions(said.of(name), measured=array.measured)
+                if lacking:
+                    incomplete.append(f"{made.place}: {name}: no {' and no '.join(lacking)}")
     return ArraysDocumented(count, tuple(incomplete))
 
 
-def open_questions(docstring: str, *, measured: bool) -> list[str]:
-    """Return what a docstring of arrays does not state: a unit (of measured ones), a shape."""
-    text = " ".join(docstring.split())
+def open_questions(said: str, *, measured: bool) -> list[str]:
+    """Return what is not said of an array: a unit (of a measured one), a shape."""
+    text = " ".join(said.split())
     unit = not measured or UNIT.search(text)
     return [*([] if unit else ["unit"]), *([] if SHAPE.search(text) else ["shape"])]
 

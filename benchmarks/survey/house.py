@@ -90,7 +90,7 @@ class House:
             f"functions over {FUNCTION_MOST} lines without a reason": self.functions.faults,
             "medians over their bounds": tuple(_high_medians(self.areas)),
             "public definitions without a docstring": tuple(p for area in held for p in area.documented.bare),
-            "docstrings of arrays without unit or shape": tuple(
+            "arrays of which the docstring tells no unit or no shape": tuple(
                 place for area in held if area.name in PACKAGES for place in area.arrays.incomplete
             ),
             "functions without all annotations": tuple(p for area in self.areas for p in area.unannotated),

@@ -1,4 +1,7 @@
-"""Which way imports run: between areas, and in rings between modules of one area."""
+"""Which way imports run: between areas, and in rings between modules of one area.
+
+What `import_module` loads by a text counts too; of f"a.b.{name}" the part before what is filled in.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,9 @@ def area_of(module: str) -> str | None:
 
 def imported(source: Source) -> set[str]:
     """Return the dotted names that a file imports anywhere: of `from a import b`, a and a.b."""
-    return {name for node in source.statements for name in _names(source, node)}
+    named = {name for node in source.statements for name in _names(source, node)}
+    by_text = source.statements if source.imports_by_text else ()
+    return named | {name for node in by_text for name in _by_text(node)}
 
 
 def top_level(sources: Sequence[Source]) -> set[str]:
@@ -130,6 +135,7 @@ def rings(graph: Mapping[str, set[str]]) -> list[tuple[str, ...]]:
 
 def _known(source: Source, packaged: Mapping[str, Source]) -> Iterator[str]:
     """Yield the modules that a file loads with it: of `from a import b`, a.b if that is one, else a."""
+    by_text = source.imports_by_text
     for statement in _loaded(source.tree):
         if isinstance(statement, ast.Import):
             yield from (alias.name for alias in statement.names if alias.name in packaged)
@@ -141,6 +147,8 @@ def _known(source: Source, packaged: Mapping[str, Source]) -> Iterator[str]:
                     yield inner
                 elif origin in packaged:
                     yield origin
+        elif by_text:
+            yield from (name for name in _by_text(statement) if name in packaged)
 
 
 def _loaded(node: ast.AST) -> Iterator[ast.AST]:
@@ -162,6 +170,27 @@ def _names(source: Source, node: ast.AST) -> Iterator[str]:
         origin = _origin(source, node)
         yield origin
         yield from (f"{origin}.{alias.name}" for alias in node.names)
+
+
+def _by_text(statement: ast.AST) -> Iterator[str]:
+    """Yield what a statement itself, without those nested in it, imports by `import_module("a.b")`."""
+    for child in ast.iter_child_nodes(statement):
+        if isinstance(child, ast.expr | ast.withitem):
+            yield from filter(None, map(_module_text, ast.walk(child)))
+
+
+def _module_text(node: ast.AST) -> str:
+    """Return the module that a call of `import_module` names, as far as it is written out; else nothing."""
+    match node:
+        case ast.Call(
+            func=ast.Name(id="import_module") | ast.Attribute(attr="import_module"), args=[named, *_]
+        ):
+            match named:
+                case ast.Constant(value=str(text)):
+                    return text
+                case ast.JoinedStr(values=[ast.Constant(value=str(text)), *_]):
+                    return text.rpartition(".")[0]
+    return ""
 
 
 def _origin(source: Source, node: ast.ImportFrom) -> str:

@@ -88,6 +88,11 @@ class Source:
         """Whether no part of its path begins with an underscore; `__init__` stands for its package."""
         return not any(_hidden(part) for part in self.module.split("."))
 
+    @property
+    def imports_by_text(self) -> bool:
+        """Whether it loads modules by a text."""
+        return any("import_module" in line for line in self.lines)
+
     def functions(self) -> list[tuple[Definition, Function]]:
         """Return the functions and methods, nested ones too."""
         return [(made, made.node) for made in self.definitions if not isinstance(made.node, ast.ClassDef)]

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from urmpipe.api.export import export as export
     from urmpipe.api.ik import ik as ik
     from urmpipe.api.ingest import ingest as ingest
+    from urmpipe.api.load_robot import load_robot as load_robot
     from urmpipe.api.read_map import read_map as read_map
     from urmpipe.api.recordings import read_recording as read_recording
     from urmpipe.api.recordings import write_recording as write_recording
@@ -45,7 +46,6 @@ if TYPE_CHECKING:
     from urmpipe_models.errors import UrmpipeError as UrmpipeError
     from urmpipe_models.errors import ViewerError as ViewerError
     from urmpipe_models.inverse.targets import Targets as Targets
-    from urmpipe_models.robots.catalogue import load_robot as load_robot
     from urmpipe_models.robots.catalogue import robot_names as robot_names
     from urmpipe_models.transform import Transform as Transform
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
@@ -90,7 +90,7 @@ _HOME = {
     "export": "urmpipe.api.export",
     "ik": "urmpipe.api.ik",
     "ingest": "urmpipe.api.ingest",
-    "load_robot": "urmpipe_models.robots.catalogue",
+    "load_robot": "urmpipe.api.load_robot",
     "read_map": "urmpipe.api.read_map",
     "read_recording": "urmpipe.api.recordings",
     "report": "urmpipe.api.report",

@@ -5,15 +5,12 @@ from __future__ import annotations
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from functools import wraps
-from inspect import Signature, signature
-from numbers import Real
-from pathlib import Path
-from typing import Any, NamedTuple, ParamSpec, TypeVar, get_args
+from inspect import signature
+from typing import Any, ParamSpec, TypeVar
 
-import numpy as np
-
+from urmpipe.kinds import kind_of
 from urmpipe.words import by_command_line, error_in_keywords, result_in_keywords
-from urmpipe_models.errors import OptionError, UrmpipeError
+from urmpipe_models.errors import OptionError, UrmpipeError, shown
 from urmpipe_pipeline.joint_log import LogWarning
 
 Parameters = ParamSpec("Parameters")
@@ -24,82 +21,6 @@ class UrmpipeWarning(UserWarning):
     """What a person should know about a result; the result's `warnings` hold the same."""
 
 
-class Kind(NamedTuple):
-    """What a keyword takes.
-
-    Attributes:
-        fits: Tells whether a value is of the kind.
-        allowed: What to say if it is not.
-    """
-
-    fits: Callable[[Any], bool]
-    allowed: str
-
-
-def _is_path(value: Any) -> bool:
-    """Return whether a value names a file: the empty text is the working folder, which nobody means."""
-    return isinstance(value, Path) or (isinstance(value, str) and value != "")
-
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, Real) and not isinstance(value, bool)
-
-
-def _is_robot(value: Any) -> bool:
-    from urmpipe_models.chains.chain import Chain
-
-    return isinstance(value, Chain) or _is_path(value)
-
-
-def _is_read(value: Any) -> bool:
-    from urmpipe_pipeline.sources import ReadOptions
-
-    return isinstance(value, ReadOptions)
-
-
-def _is_backend(value: Any) -> bool:
-    from urmpipe.systems.units import Backend
-
-    return value in get_args(Backend)
-
-
-PATH = Kind(_is_path, "a path: text or a Path, not empty")
-SECONDS = Kind(_is_number, "a number, in s")
-FLAG = Kind(lambda value: isinstance(value, (bool, np.bool_)), "True or False")
-KIND_OF_LIMIT = Kind(
-    lambda value: _is_number(value) or isinstance(value, Mapping),
-    'a number in m, or a mapping of kinds to m or rad, such as {"axis": 0.0035, "angle": 0.01}',
-)
-NAMES = Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"log": "log.csv"}')
-TOLD = Kind(callable, "a function of the share that is done, 0 to 1, such as print")
-
-KINDS = {
-    "arguments": NAMES,
-    "audit": PATH,
-    "backend": Kind(_is_backend, "native, python"),
-    "draw": PATH,
-    "duration": SECONDS,
-    "every": FLAG,
-    "figures": PATH,
-    "junit": PATH,
-    "noise": KIND_OF_LIMIT,
-    "options": NAMES,
-    "output": PATH,
-    "progress": TOLD,
-    "read": Kind(_is_read, "ReadOptions, such as urmpipe.read_map(FILE).read"),
-    "robot": Kind(_is_robot, "a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)"),
-    "statistics": PATH,
-    "step": SECONDS,
-    "strict": FLAG,
-    "told": Kind(callable, "a function of a text, such as print"),
-    "tolerance": KIND_OF_LIMIT,
-    "tsp": SECONDS,
-    "within_pi": FLAG,
-    "write_map": PATH,
-}
-"""What each keyword takes, wherever it stands; the others are checked by what they mean."""
-
-
 def public(function: Callable[Parameters, Made]) -> Callable[Parameters, Made]:
     """Return a public function that checks its keywords and speaks to whom calls it.
 
@@ -107,38 +28,32 @@ def public(function: Callable[Parameters, Made]) -> Callable[Parameters, Made]:
     `UrmpipeWarning`s. A command has checked its options itself, and prints its warnings.
     """
     known = signature(function)
+    defaults = {name: one.default for name, one in known.parameters.items()}
 
     @wraps(function)
     def called(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Made:
         if by_command_line():
             return function(*args, **kwargs)
+        given = known.bind(*args, **kwargs).arguments
+        if wrong := list(_wrong(function.__name__, given, defaults)):
+            raise OptionError(*wrong)
         try:
-            given = _checked(known, args, kwargs)
             made = result_in_keywords(function(*args, **kwargs))
         except UrmpipeError as error:
             raise error_in_keywords(error) from error.__cause__
-        for message in dict.fromkeys(_doubts(made, given)):
+        for message in dict.fromkeys(_doubts(made, given.values())):
             warnings.warn(message, UrmpipeWarning, stacklevel=2)
         return made
 
     return called
 
 
-def _checked(known: Signature, args: tuple[Any, ...], kwargs: Mapping[str, Any]) -> list[Any]:
-    """Return all that a function is given.
-
-    Raises:
-        OptionError: With every keyword that is not of its kind.
-    """
-    given = known.bind(*args, **kwargs).arguments
-    wrong = [
-        f"{name}: found {value!r}, allowed: {KINDS[name].allowed}"
-        for name, value in given.items()
-        if name in KINDS and value is not known.parameters[name].default and not KINDS[name].fits(value)
-    ]
-    if wrong:
-        raise OptionError(*wrong)
-    return list(given.values())
+def _wrong(function: str, given: Mapping[str, Any], defaults: Mapping[str, Any]) -> Iterator[str]:
+    """Yield which of the keywords that a function is given are not of their kinds."""
+    for name, value in given.items():
+        kind = kind_of(function, name)
+        if kind is not None and value is not defaults[name] and not kind.fits(value):
+            yield f"{name}: found {shown(value)}, allowed: {kind.allowed}"
 
 
 def _doubts(made: Any, given: Iterable[Any]) -> Iterator[str]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError
+from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, shown
 from urmpipe_models.inverse.checks import ROTATION_TOLERANCE
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform, from_offset, rpy_of
@@ -76,7 +76,7 @@ def frame_of(name: str, given: Frame | None) -> Transform | None:
     """
     if given is None or isinstance(given, Transform):
         return given
-    found = f"found {given!r}" if isinstance(given, str) else f"found a {type(given).__name__}"
+    found = f"found {shown(given)}"
     try:
         values = np.asarray(given, dtype=float)
     except (TypeError, ValueError):
@@ -115,11 +115,7 @@ def refuse_others(name: str, given: Sequence[object], kinds: tuple[type, ...], a
         kinds: Classes that are allowed besides paths.
         allowed: What is allowed, in words.
     """
-    found = [
-        repr(one) if isinstance(one, str) else f"a {type(one).__name__}"
-        for one in given
-        if not isinstance(one, (str, Path, *kinds)) or one == ""
-    ]
+    found = [shown(one) for one in given if not isinstance(one, (str, Path, *kinds)) or one == ""]
     if found or not given:
         raise OptionError(f"{name}: found {', '.join(found) or 'none'}, allowed: {allowed}")
 

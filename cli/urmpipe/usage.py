@@ -52,11 +52,12 @@ class Group(click.Group):
         name = args[0]
         if name.startswith("-") or ctx.resilient_parsing or self.get_command(ctx, name):
             return super().resolve_command(ctx, args)
+        from urmpipe_models.errors import shown
         from urmpipe_models.names import not_among
 
         names = self.list_commands(ctx)
         deeper = next(self._deeper(ctx, name), None)
-        meant = f"found {name!r} (did you mean {deeper}?), allowed: {', '.join(names)}"
+        meant = f"found {shown(name)} (did you mean {deeper}?), allowed: {', '.join(names)}"
         raise click.UsageError(meant if deeper else not_among(name, names), ctx)
 
     def _deeper(self, ctx: click.Context, name: str) -> Iterator[str]:

@@ -32,7 +32,8 @@ def run(
         start: Parameters and start values of states by variable name; a sequence for one with a size.
 
     Returns:
-        Every output, and every state or memory that is one, by variable name: shape (n,), or (n, size).
+        Every output, and every state or memory that is one, by variable name, in its own unit:
+        shape (n,), or (n, size).
 
     Raises:
         UnitError: If times do not rise, a name is unknown, a shape does not fit, a value is refused, or an

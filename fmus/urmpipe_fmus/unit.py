@@ -17,7 +17,7 @@ from urmpipe_fmus.table import Table
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Memory, Output, Parameter, State, ValueType, Variable
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError
+from urmpipe_models.errors import UnitError, shown
 
 Function = Callable[[Values], Mapping[str, Element | Sequence[Element]]]
 
@@ -132,18 +132,19 @@ class Unit:
         """Yield what is of a kind that Python takes and FMI does not know."""
         for one in self.variables:
             if not isinstance(one, (Parameter, Input, Output, State, Memory)):
-                yield f"found {one!r} as a variable, allowed: a Parameter, Input, Output, State or Memory"
+                allowed = "a Parameter, Input, Output, State or Memory"
+                yield f"found {shown(one)} as a variable, allowed: {allowed}"
                 continue
             for key in ("name", "description", "unit", "display_unit"):
                 yield from _no_text(f"{one.name}: {key}", getattr(one, key))
             if one.type not in get_args(ValueType):
-                yield f"{one.name}: found type {one.type!r}, allowed: {', '.join(get_args(ValueType))}"
+                yield f"{one.name}: found type {shown(one.type)}, allowed: {', '.join(get_args(ValueType))}"
             if one.size is not None and type(one.size) is not int:
-                yield f"{one.name}: found size {one.size!r}, allowed: an integer; None for a scalar"
+                yield f"{one.name}: found size {shown(one.size)}, allowed: an integer; None for a scalar"
         for key in ("name", "description", "source"):
             yield from _no_text(key, getattr(self, key))
         if isinstance(self.equations, str):
-            yield f"equations: found {self.equations!r}, allowed: a tuple of texts, a line each"
+            yield f"equations: found {shown(self.equations)}, allowed: a tuple of texts, a line each"
 
     def _faults(self) -> Iterator[str]:
         wrong = list(self._wrong_kinds())
@@ -151,7 +152,7 @@ class Unit:
             yield from wrong
             return
         if not self.name.isidentifier() or not self.name.isascii():
-            yield f"found {self.name!r} as its name, allowed: a letter, then letters, digits and _"
+            yield f"found {shown(self.name)} as its name, allowed: a letter, then letters, digits and _"
         if not self.variables:
             yield "found no variables, allowed: one or more (FMI has no FMU without them)"
         names = [one.name for one in self.variables]
@@ -179,4 +180,4 @@ def _is_internal_step(one: Variable) -> bool:
 
 def _no_text(what: str, value: Any) -> Iterator[str]:
     if not isinstance(value, str):
-        yield f"{what}: found {value!r}, allowed: a text"
+        yield f"{what}: found {shown(value)}, allowed: a text"

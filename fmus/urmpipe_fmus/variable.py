@@ -10,7 +10,7 @@ from numbers import Real
 from typing import Literal
 
 from urmpipe_fmus.si_units import display_conversion
-from urmpipe_models.errors import UnitError
+from urmpipe_models.errors import UnitError, shown
 
 Causality = Literal["parameter", "input", "output", "local"]
 Variability = Literal["fixed", "tunable", "discrete", "continuous"]
@@ -78,10 +78,10 @@ class Variable(ABC):
     def faults(self) -> Iterator[str]:
         """Yield what is wrong with the variable."""
         if not (self.name.isidentifier() and self.name.isascii()) or self.name.startswith("_"):
-            yield f"{self.name!r}: found as a name, allowed: a letter, then letters, digits and _"
+            yield f"{shown(self.name)}: found as a name, allowed: a letter, then letters, digits and _"
         starts = self.start if isinstance(self.start, tuple) else (self.start,)
         if not all(isinstance(one, Real) for one in starts):
-            yield f"{self.name}: start value {self.start!r}, allowed: a number, or a tuple of numbers"
+            yield f"{self.name}: start value {shown(self.start)}, allowed: a number, or a tuple of numbers"
             return
         if self.size is not None and self.size < 1:
             yield f"{self.name}: size {self.size}, allowed: 1 or more"
@@ -97,7 +97,7 @@ class Variable(ABC):
         if self.type != "Real" and (self.unit or self.display_unit):
             yield f"found {self.type} with a unit, allowed: a unit of a Real"
         elif self.display_unit and not self.unit:
-            yield f"found display unit {self.display_unit!r} without a unit, allowed: both or none"
+            yield f"found display unit {shown(self.display_unit)} without a unit, allowed: both or none"
         try:
             if self.unit:
                 display_conversion(self.unit, self.display_unit or self.unit)

@@ -23,6 +23,9 @@ def continuous_quaternions(quat_xyzw: FloatArray) -> FloatArray:
 
     Args:
         quat_xyzw: Shape (n, 4) [-]; NaN where a sample is missing.
+
+    Returns:
+        Quaternions [-], shape (n, 4).
     """
     return _of_present(quat_xyzw, lambda q: q * _signs(q)[:, np.newaxis])
 
@@ -35,6 +38,9 @@ def continuous_vectors(vectors: FloatArray) -> FloatArray:
 
     Args:
         vectors: Axis times angle in [rad], shape (n, 3); NaN where a sample is missing.
+
+    Returns:
+        Axis times angle in [rad], shape (n, 3).
     """
     return _of_present(vectors, _vectors)
 
@@ -45,6 +51,9 @@ def continuous_euler(angles: FloatArray, *, proper: bool = False) -> FloatArray:
     Args:
         angles: Three angles about axes in turn in [rad], shape (n, 3); NaN where a sample is missing.
         proper: Whether the first and the last axis are the same, as in Z-Y-Z; else all three differ.
+
+    Returns:
+        Angles in [rad], shape (n, 3).
     """
     middle = 0.0 if proper else np.pi
     return _of_present(angles, lambda present: _euler(present, np.array([np.pi, middle, np.pi])))
@@ -56,6 +65,9 @@ def continuous_rotations(rotation: FloatArray, form: RotationForm) -> FloatArray
     Args:
         rotation: As recorded, in [rad] or [-], shape (n, width); NaN where a sample is missing.
         form: What its columns are. A matrix is the only name of its rotation and stays.
+
+    Returns:
+        In [rad] or [-], shape (n, width).
     """
     if form == "matrix":
         return rotation

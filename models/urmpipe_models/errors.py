@@ -11,6 +11,9 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass
 from typing import TypeVar
 
+SHOWN = 60
+"""So many letters of a value stand in a message."""
+
 Given = TypeVar("Given")
 Made = TypeVar("Made")
 
@@ -50,6 +53,17 @@ def one_line(text: str) -> str:
     if text.isprintable():
         return text
     return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
+
+
+def shown(value: object) -> str:
+    """Return a value as a message shows it: cut where it is long, its type alone where it is an object."""
+    text = repr(value)
+    if len(text) <= SHOWN and text.isprintable() and not text.startswith("<"):
+        return text
+    if isinstance(value, (str, bytes, int, float, list, tuple, dict)):
+        return one_line(f"{text[: SHOWN - 3]}...")
+    name = type(value).__name__
+    return f"{'an' if name[0] in 'AEIOUaeiou' else 'a'} {name}"
 
 
 class UrmpipeError(Exception):

@@ -80,7 +80,7 @@ def repair(x: FloatArray, t: FloatArray, in_between: IntArray) -> FloatArray:
         in_between: Row and joint index of each in-between sample, shape (b, 2).
 
     Returns:
-        A new array in the unit and shape of x; every other value is the same bit for bit.
+        A new array in the unit of x, shape (n, joints); every other value is the same bit for bit.
     """
     repaired = x.copy()
     for j in np.unique(in_between[:, 1]):

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from decimal import Decimal
 
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import OptionError, shown
 
 DEGREE = Decimal("0.01745329251994329576923690768488612713443")
 """pi / 180."""
@@ -44,5 +44,5 @@ def factor(unit: str, to: str) -> float:
     known = next((units for units in MEASURES.values() if unit in units), None)
     if known is None:
         every = ", ".join(one for units in MEASURES.values() for one in units)
-        raise OptionError(f"unit: found {unit!r}, allowed: {every}")
-    raise OptionError(f"unit: found {to!r} for {unit!r}, allowed: {', '.join(known)}")
+        raise OptionError(f"unit: found {shown(unit)}, allowed: {every}")
+    raise OptionError(f"unit: found {shown(to)} for {shown(unit)}, allowed: {', '.join(known)}")

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Iterable
 from difflib import SequenceMatcher
 
+from urmpipe_models.errors import shown
+
 MOST_LISTED = 12
 """So many names are listed; of more, those most like the one that was given."""
 LEAST_LIKE = 0.6
@@ -23,7 +25,7 @@ def did_you_mean(name: str, allowed: Iterable[str]) -> str:
 def not_among(name: str, allowed: Iterable[str]) -> str:
     """Return `found NAME (did you mean ONE?), allowed: ONE, ...` for a name that is not among others."""
     names = list(dict.fromkeys(allowed))
-    return f"found {name!r}{did_you_mean(name, names)}, allowed: {listed(name, names)}"
+    return f"found {shown(name)}{did_you_mean(name, names)}, allowed: {listed(name, names)}"
 
 
 def listed(name: str, allowed: Iterable[str]) -> str:
@@ -31,8 +33,8 @@ def listed(name: str, allowed: Iterable[str]) -> str:
     names = list(dict.fromkeys(allowed))
     if len(names) <= MOST_LISTED:
         return ", ".join(names) or "none"
-    shown = _nearest_first(name, names, 0.0)[:MOST_LISTED]
-    return f"{', '.join(shown)} and {len(names) - len(shown)} others"
+    first = _nearest_first(name, names, 0.0)[:MOST_LISTED]
+    return f"{', '.join(first)} and {len(names) - len(first)} others"
 
 
 def _nearest_first(name: str, allowed: Iterable[str], least: float) -> list[str]:

@@ -211,7 +211,7 @@ def repolarize(
         q: Joint values in the unit of the period, shape (n, joints); NaN where a sample is missing.
         dt: Time from the row before in [s], shape (n,); the first is not used.
         period: P, 2 pi for [rad], 360 for [deg], shape (joints,) or one for all.
-        max_speed: Largest speeds in the period's unit per second, shape (joints,) or one for all.
+        max_speed: Largest speeds in the unit of the period per second, shape (joints,) or one for all.
     """
     joints = q.shape[1]
     periods, speeds = (

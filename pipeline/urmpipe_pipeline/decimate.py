@@ -25,7 +25,7 @@ def decimate(values: FloatArray, points: int = POINTS, t: FloatArray | None = No
     Args:
         values: What is drawn, shape (n,) or (n, k), any unit; NaN where there is no value.
         points: How many samples may stay (a column of a bucket counts for two, its ends for two).
-        t: Times of samples that are not evenly spaced, increasing, shape (n,).
+        t: Times of samples that are not evenly spaced in [s], increasing, shape (n,).
 
     Returns:
         Indices into `values`, sorted and unique, shape (at most `points` + 2 k a bucket with a gap,).

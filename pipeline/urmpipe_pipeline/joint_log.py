@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def seconds(nanoseconds: IntArray) -> FloatArray:
-    """Return integer [ns] as [s], each rounded once, of the same shape."""
+    """Return integer `nanoseconds` as [s], each rounded once, of the same shape."""
     return np.true_divide(nanoseconds, 1e9, dtype=np.float64)
 
 

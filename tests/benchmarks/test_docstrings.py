@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 from textwrap import dedent
 
@@ -50,30 +51,147 @@ ARRAYS = """
     """
 
 
+BOTH = "no unit and no shape"
+
+
 @pytest.mark.parametrize(
     ("signature", "docstring", "lacking"),
     [
-        ("(q: FloatArray) -> None", "Joint values.", "no unit and no shape"),
-        ("(q: FloatArray) -> None", "Joint values in [rad].", "no shape"),
-        ("(q: FloatArray) -> None", "Joint values, shape (n, 6).", "no unit"),
-        ("(q: FloatArray) -> None", "Joint values in [rad], shape (n, 6).", None),
-        ("() -> dict[str, Line] | None", "Lines.", "no unit and no shape"),
-        ("(*, q: 'NDArray[np.float32]') -> None", "Joint values.", "no unit and no shape"),
-        ("(rows: NDArray[np.intp]) -> None", "Rows.", "no shape"),
-        ("(rows: NDArray[np.intp]) -> None", "Rows, shape (m,).", None),
-        ("(f: Callable[[FloatArray], FloatArray]) -> None", "A function.", None),
-        ("(name: str) -> int", "No arrays.", None),
+        ("(q: FloatArray) -> None", "Take joint values q.", {"q": BOTH}),
+        ("(q: FloatArray) -> None", "Take joint values q in [rad].", {"q": "no shape"}),
+        ("(q: FloatArray) -> None", "Take joint values q, shape (n, 6).", {"q": "no unit"}),
+        ("(q: FloatArray) -> None", "Take joint values q in [rad], shape (n, 6).", {}),
+        ("() -> dict[str, Line] | None", "Return lines.", {"the result": BOTH}),
+        ("() -> dict[str, Line] | None", "Lines.\n\n    In [m], shape (n, 3).", {}),
+        ("(*, q: 'NDArray[np.float32]') -> None", "Take q.", {"q": BOTH}),
+        ("(*q: FloatArray) -> None", "Take them.", {"q": BOTH}),
+        ("(rows: NDArray[np.intp]) -> None", "Take rows.", {"rows": "no shape"}),
+        ("(rows: NDArray[np.intp]) -> None", "Take rows, shape (m,).", {}),
+        ("(f: Callable[[FloatArray], FloatArray]) -> None", "Take a function.", {}),
+        ("(name: str) -> int", "Return no arrays.", {}),
     ],
 )
 def test_units_and_shapes_are_asked_where_arrays_pass(
-    tmp_path: Path, signature: str, docstring: str, lacking: str | None
+    tmp_path: Path, signature: str, docstring: str, lacking: dict[str, str]
 ) -> None:
-    text = dedent(ARRAYS) + f'def turn{signature}:\n    """{docstring}"""\n'
-    place = "models/arm.py:6 turn"
-    expected = (f"{place}: {lacking}",) if lacking else ()
-    assert faults(measured(tmp_path, models__arm=text)) == (
-        {"docstrings of arrays without unit or shape": expected} if expected else {}
-    )
+    assert_lacking(tmp_path, f'def turn{signature}:\n    """{docstring}"""\n', lacking)
+
+
+def assert_lacking(tmp_path: Path, text: str, lacking: dict[str, str]) -> None:
+    """Assert what is open of the arrays of the one definition of a text, by name."""
+    name = re.split(r"\W", text)[1]
+    found = tuple(f"models/arm.py:6 {name}: {array}: {what}" for array, what in lacking.items())
+    told = faults(measured(tmp_path, models__arm=dedent(ARRAYS) + text))
+    assert told.get("arrays of which the docstring tells no unit or no shape", ()) == found
+
+
+@pytest.mark.parametrize(
+    ("docstring", "lacking"),
+    [
+        ("Return rates in [rad/s], shape (n, 6).", {"q": BOTH, "t": BOTH}),
+        ("Return rates in [rad/s], shape (n, 6), of q at t in [s], shape (n,).", {}),
+        ("Return rates of q.\n\n    All arrays in [rad], all of shape (n,).", {}),
+        ("Return rates.\n\n    Arguments and rates are all of shape (n,), each in [rad].", {}),
+        ("Turn an arm.\n\n    In [rad], shape (n,).", {"q": BOTH, "t": BOTH, "the result": BOTH}),
+        (
+            """Return rates.
+
+            Args:
+                q: Joint values in [rad], shape (n, 6).
+                t: Times.
+
+            Returns:
+                In [rad/s].
+            """,
+            {"t": BOTH, "the result": "no shape"},
+        ),
+        (
+            """Return rates.
+
+            Args:
+                q: Joint values in [rad],
+                    shape (n, 6).
+                t: Likewise.
+
+            Returns:
+                In [rad/s], shape (n, 6).
+            """,
+            {},
+        ),
+        (
+            """Return rates in [rad/s], shape (n, 6). What q is at t follows.
+
+            Args:
+                q, t: In [rad] and [s], shape (n, 6) and (n,).
+            """,
+            {},
+        ),
+        (
+            """Return rates in [rad/s], shape (n, 6).
+
+            Args:
+                q: Joint values in [rad], shape (n, 6).
+
+            Raises:
+                ValueError: If t is not in [s], shape (n,).
+            """,
+            {"t": BOTH},
+        ),
+    ],
+)
+def test_each_argument_and_the_result_is_told_by_itself(
+    tmp_path: Path, docstring: str, lacking: dict[str, str]
+) -> None:
+    signature = "def turn(q: FloatArray, t: FloatArray) -> FloatArray:"
+    assert_lacking(tmp_path, f'{signature}\n    """{dedent("            " + docstring)}"""\n', lacking)
+
+
+@pytest.mark.parametrize(
+    ("body", "lacking"),
+    [
+        ('"""A path, t in [s], shape (n,)."""\n    t: FloatArray\n    q: FloatArray', {"q": BOTH}),
+        (
+            '"""A path.\n\n    Attributes:\n        t: In [s], shape (n,).\n    """\n'
+            "    t: FloatArray\n    q: FloatArray",
+            {"q": BOTH},
+        ),
+        (
+            '"""A path."""\n    t: FloatArray\n    """In [s], shape (n,)."""\n'
+            '    q: FloatArray\n    """In [rad]."""',
+            {"q": "no shape"},
+        ),
+        (
+            '"""A path.\n\n    All of shape (n,), each in [rad].\n    """\n'
+            "    t: FloatArray\n    q: FloatArray",
+            {},
+        ),
+        (
+            '"""A path.\n\n    Args:\n        t: In [s], shape (n,).\n    """\n'
+            "    def __init__(self, t: FloatArray, q: FloatArray) -> None: ...",
+            {"q": BOTH},
+        ),
+    ],
+)
+def test_each_field_of_a_class_is_told_by_itself(tmp_path: Path, body: str, lacking: dict[str, str]) -> None:
+    assert_lacking(tmp_path, f"class Path:\n    {body}\n", lacking)
+
+
+def test_the_docstring_of_a_property_tells_of_its_value(tmp_path: Path) -> None:
+    text = """
+        class Arm:
+            \"\"\"An arm.\"\"\"
+            @property
+            def q(self) -> NDArray[np.float64]:
+                \"\"\"Joint values in [rad], shape (n,).\"\"\"
+            @property
+            def t(self) -> NDArray[np.float64]:
+                \"\"\"Times in [s].\"\"\"
+        """
+    assert faults(measured(tmp_path, models__arm=text)) == {
+        "arrays of which the docstring tells no unit or no shape": (
+            "models/arm.py:9 Arm.t: the result: no shape",
+        )
+    }
 
 
 def test_an_alias_is_followed_through_imports_and_into_the_fields_of_a_class(tmp_path: Path) -> None:
@@ -86,13 +204,25 @@ def test_an_alias_is_followed_through_imports_and_into_the_fields_of_a_class(tmp
         '''
     house = measured(tmp_path, models__urmpipe_models__arm=ARRAYS, cli__urmpipe__track=user)
     assert faults(house) == {
-        "docstrings of arrays without unit or shape": ("cli/urmpipe/track.py:4 Track: no unit and no shape",)
+        "arrays of which the docstring tells no unit or no shape": (
+            "cli/urmpipe/track.py:4 Track: line: no unit and no shape",
+        )
     }
 
 
 @pytest.mark.parametrize(
     "unit",
-    ["in [m]", "in [rad] or [m]", "[m/s2]", "[-]", "in rad", "[kg m2]", "in the unit of q", "its own unit"],
+    [
+        "in [m]",
+        "in [rad] or [m]",
+        "[m/s2]",
+        "[-]",
+        "in rad",
+        "[kg m2]",
+        "in the unit of q",
+        "its own unit",
+        "in `unit`",
+    ],
 )
 def test_a_unit_may_be_written(unit: str) -> None:
     assert open_questions(f"Values {unit}, shape (n,).", measured=True) == []
@@ -150,7 +280,9 @@ def test_an_alias_for_type_checkers_is_followed(tmp_path: Path) -> None:
             '''Turn.'''
         """
     assert faults(measured(tmp_path, models__arm=text)) == {
-        "docstrings of arrays without unit or shape": ("models/arm.py:5 turn: no unit and no shape",)
+        "arrays of which the docstring tells no unit or no shape": (
+            "models/arm.py:5 turn: row: no unit and no shape",
+        )
     }
 
 

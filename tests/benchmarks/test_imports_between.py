@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from survey.imports import rings
+import pytest
+from survey.imports import rings, top_level
+from survey.source import read_source
 from survey.tables import full
 
 from measured_tree import faults, measured
@@ -18,6 +20,50 @@ def test_imports_the_wrong_way_are_told_wherever_they_stand(tmp_path: Path) -> N
     )
     assert faults(house) == {"imports the wrong way": ("models/urmpipe_models/arm.py imports cli",)}
     assert house.imports == {("models", "cli"): 1, ("pipeline", "models"): 1}
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        'import_module("urmpipe.main")',
+        'importlib.import_module("urmpipe.main")',
+        'getattr(import_module(f"urmpipe.commands.{name}"), name)',
+    ],
+)
+def test_what_is_imported_by_a_text_is_told_too(tmp_path: Path, call: str) -> None:
+    house = measured(
+        tmp_path, models__urmpipe_models__arm=f"def _f(name: str) -> None:\n    found = {call}\n"
+    )
+    assert faults(house) == {"imports the wrong way": ("models/urmpipe_models/arm.py imports cli",)}
+    assert house.imports == {("models", "cli"): 1}
+
+
+def test_a_text_that_is_not_written_out_or_not_imported_is_none(tmp_path: Path) -> None:
+    text = """
+        def _f(name: str) -> None:
+            import_module(name)
+            import_module(f"{name}.main")
+            load("urmpipe.main")
+        """
+    assert measured(tmp_path, models__urmpipe_models__arm=text).imports == {}
+
+
+def test_a_library_that_is_imported_by_a_text_counts_as_imported(tmp_path: Path) -> None:
+    path = tmp_path / "models" / "arm.py"
+    path.parent.mkdir()
+    path.write_text('with import_module("rerun.blueprint") as a:\n    pass\n', encoding="utf-8")
+    assert top_level([read_source(path, tmp_path)]) == {"rerun"}
+
+
+def test_a_ring_may_be_closed_by_a_text(tmp_path: Path) -> None:
+    house = measured(
+        tmp_path,
+        models__urmpipe_models__a="from urmpipe_models import b\n",
+        models__urmpipe_models__b='if True:\n    a = import_module("urmpipe_models.a")\n',
+        models__urmpipe_models__c='def _f() -> None:\n    import_module("urmpipe_models.d")\n',
+        models__urmpipe_models__d='import_module("urmpipe_models.c")\n',
+    )
+    assert house.module_rings == ("urmpipe_models.a ~ urmpipe_models.b",)
 
 
 def test_a_ring_counts_when_modules_are_loaded_and_not_in_functions_or_for_type_checkers(

@@ -20,7 +20,7 @@ from four_logs import ALLOWED, Captured, compare, lay_logs, names, recorded, sai
 from urmpipe.commands.compare import SYNC
 from urmpipe.main import cli, run
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.comparison.comparison import Statistics
+from urmpipe_pipeline.comparison.deviation import Statistics
 
 
 @pytest.fixture(autouse=True)

@@ -16,7 +16,8 @@ from urmpipe.printing.comparison import print_comparison
 from urmpipe.printing.terminal import new_console
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.transform import from_rpy
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.text import limit, number
 

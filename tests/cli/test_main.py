@@ -189,3 +189,37 @@ def test_outputs_that_are_closed_are_no_fault() -> None:
             ["sh", "-c", f'"$@" {closed}', "sh", *command], capture_output=True, check=False
         )
         assert (done.returncode, done.stderr) == (0, b""), closed
+
+
+LONG = "x" * 100
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        [LONG],
+        ["ingest", "log.csv", "--tsp", LONG],
+        ["ingest", "log.csv", "--interval", LONG],
+        ["ingest", "log.csv", "--tool", LONG],
+        ["ingest", "log.csv", "--robot", LONG],
+        ["ingest", "log.csv", "--delimiter", LONG],
+        ["compare", "path.csv", "log.csv", "--sync", LONG],
+        ["compare", "path.csv", "log.csv", "--tolerance", LONG],
+        ["compare", "path.csv", "log.csv", "--align", LONG],
+        ["ik", "targets.csv", "--start", LONG],
+        ["ik", "targets.csv", "--seed", LONG],
+        ["ik", "targets.csv", "--tolerance", LONG],
+        ["simulate", LONG],
+        ["simulate", "log-to-delta", "--set", LONG],
+        ["robot", "show", LONG],
+    ],
+)
+def test_a_long_value_is_cut_where_an_error_shows_it(
+    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "log.csv").write_text("t [s],q1 [rad]\n0,0\n0.1,0.1\n", encoding="utf-8")
+    assert run(arguments) == 2
+    told = capsys.readouterr().err
+    assert "x" * 20 in told
+    assert "x" * 61 not in told

@@ -3,14 +3,21 @@
 from __future__ import annotations
 
 import re
+import shlex
 from importlib.util import module_from_spec, spec_from_file_location
+from pathlib import Path
 from typing import Any
 
 import click
 import pytest
 
-from pages import DOCS, command_lines, pages, text_of
+from pages import DOCS, command_lines, commands_in_text, pages, text_of
 from urmpipe.defaults import EACH_TIME
+from urmpipe.main import cli
+from urmpipe_fmus.cosim import system_names
+from urmpipe_fmus.units import unit_names
+from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.robots.catalogue import robot_names
 
 OF_OTHERS = {"--start-values", "--debug-logging", "--no-arr", "--truncate-length"}
 """Options of fmpy and ros2 that pages name."""
@@ -43,15 +50,74 @@ def test_what_has_no_default_is_named(writer: Any) -> None:
     assert all(f"`{name.removeprefix('--')}`" in defaults for name in EACH_TIME)
 
 
-def test_every_command_that_a_page_shows_is_one_with_these_options(writer: Any) -> None:
-    known = dict(writer.commands())
-    for page in pages():
-        for line in command_lines(page):
-            words = line.split()[1:]
-            name = " ".join(words[:2]) if " ".join(words[:2]) in known else words[0]
-            options = {opt for param in known[name].command.params for opt in param.opts} | {"--help"}
-            given = {word.partition("=")[0] for word in words if word.startswith("--")}
-            assert given <= options, f"{page}: {line}"
+@pytest.mark.parametrize("page", pages())
+def test_every_command_of_a_page_is_one_with_these_options_and_values(page: str, tmp_path: Path) -> None:
+    for line in dict.fromkeys([*command_lines(page), *commands_in_text(page)]):
+        try:
+            given = parsed(line)
+        except (click.UsageError, UrmpipeError) as error:
+            pytest.fail(f"{page}: {line}: {error}")
+        assert unknown_names(given) == [], f"{page}: {line}"
+
+
+def parsed(line: str) -> click.Context:
+    """Return what a command is given; a command that is named without its operands is only looked up."""
+    command: click.Command = cli
+    words = shlex.split(line.replace(" ... ", " "))[1:]
+    while isinstance(command, click.Group) and words:
+        found = command.get_command(click.Context(command), words[0])
+        if found is None:
+            raise click.UsageError(f"no command {words[0]}")
+        command, words = found, words[1:]
+    return command.make_context(command.name, words, resilient_parsing=not words)
+
+
+def unknown_names(given: click.Context) -> list[str]:
+    """Return the robots, units and systems that a command is given and that urmpipe does not bring along.
+
+    A name in capitals stands for any, and one with a suffix is a file.
+    """
+    shipped = {"robot": robot_names(), "unit": unit_names(), "system": system_names()}
+    shipped["name"] = shipped["robot"]
+    named = [(key, given.params.get(key)) for key in shipped]
+    return [
+        f"{key} {name}"
+        for key, name in named
+        if isinstance(name, str) and not name.isupper() and not Path(name).suffix and name not in shipped[key]
+    ]
+
+
+@pytest.mark.parametrize(
+    ("line", "told"),
+    [
+        ("urmpipe ingset log.csv", "no command ingset"),
+        ("urmpipe robot lst", "no command lst"),
+        ("urmpipe ingest log.csv --robto urm6", "No such option '--robto'"),
+        ("urmpipe ingest log.csv -x run.rrd", "No such option '-x'"),
+        ("urmpipe ik log.csv --derivative savgol", "No such option '--derivative'"),
+        ("urmpipe export log.rrd --to xlsx", "found 'xlsx', allowed: csv"),
+        ("urmpipe ingest log.csv --tsp 5mm", "found '5mm'"),
+    ],
+)
+def test_a_command_that_is_none_is_found(line: str, told: str) -> None:
+    with pytest.raises(click.UsageError) as error:
+        parsed(line)
+    assert told in error.value.message
+
+
+@pytest.mark.parametrize(
+    ("line", "unknown"),
+    [
+        ("urmpipe ingest log.csv --robot urm66", ["robot urm66"]),
+        ("urmpipe ingest log.csv --robot my-arm.toml", []),
+        ("urmpipe compare PATH LOG --robot R", []),
+        ("urmpipe robot show urm66", ["name urm66"]),
+        ("urmpipe fmu list dc_drvie", ["unit dc_drvie"]),
+        ("urmpipe simulate two-drives", ["system two-drives"]),
+    ],
+)
+def test_a_name_that_is_none_is_found(line: str, unknown: list[str]) -> None:
+    assert unknown_names(parsed(line)) == unknown
 
 
 def test_every_option_that_a_page_names_in_its_text_is_one_of_a_command(writer: Any) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from pages import ROOT, command_lines, lay_files, pages, run_in_process, text_of
+from pages import ROOT, command_lines, files_told, lay_files, pages, run_in_process, text_of
 
 ELSEWHERE = {
     "urmpipe view ": "needs a display: tests/cli/test_view.py",
@@ -51,6 +51,24 @@ def test_the_commands_of_a_page_run(
     if any(line.startswith("urmpipe fmu check") for line in lines):
         lines = ["urmpipe fmu build kinematic_chain --robot urm6 --backend python", *lines]
     assert {line: run_in_process(line) for line in lines} == dict.fromkeys(lines, 0)
+    told = {name for line in lines for name in files_told(page, line)}
+    assert {
+        name for name in told | (viewed(page) if not heavy else set()) if not Path(name).exists()
+    } == set()
+
+
+def viewed(page: str) -> set[str]:
+    """Return the recordings that a page opens in the viewer."""
+    lines = [line for line in command_lines(page) if line.startswith("urmpipe view ")]
+    return {word for line in lines for word in line.split()[2:]}
+
+
+def test_files_are_told_and_viewed() -> None:
+    assert files_told("README.md", "urmpipe ingest log.csv --robot urm6") == {"log.rrd"}
+    assert files_told("docs/fmu.md", "urmpipe fmu build kinematic_chain --robot urm6") == {
+        "kinematic_chain.fmu"
+    }
+    assert viewed("README.md") == {"log-against-path.rrd"}
 
 
 def test_every_link_of_a_page_leads_somewhere() -> None:

@@ -7,7 +7,7 @@ import math
 import pytest
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Statistics
+from urmpipe_pipeline.comparison.deviation import Statistics
 from urmpipe_pipeline.comparison.symbols import allowed_words, used_words
 from urmpipe_pipeline.json_values import plain
 

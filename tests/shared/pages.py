@@ -41,6 +41,17 @@ def command_lines(page: str) -> list[str]:
     ] + [line for block in snippets(page, "sh") for line in block.splitlines() if line.startswith("urmpipe ")]
 
 
+def commands_in_text(page: str) -> list[str]:
+    """Return the commands that a page names in its sentences and tables, each on one line."""
+    return [" ".join(one.split()) for one in re.findall(r"`(urmpipe [a-z][^`]*)`", text_of(page))]
+
+
+def files_told(page: str, line: str) -> set[str]:
+    """Return the files that a page tells behind a command that it shows, as what it writes."""
+    behind = re.findall(rf"^ {{4}}{re.escape(line)} +(.*)$", text_of(page), re.MULTILINE)
+    return {name for one in behind for name in re.findall(r"\b[\w-]+\.(?:rrd|html|fmu|csv|svg)\b", one)}
+
+
 def snippets(page: str, language: str) -> list[str]:
     """Return the fenced code of a language in a page."""
     found = re.findall(rf"^ *```{language}\n(.*?)^ *```$", text_of(page), re.DOTALL | re.MULTILINE)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 from urmpipe.edge import public
 from urmpipe.guards import (
@@ -22,7 +23,7 @@ from urmpipe.guards import (
 )
 from urmpipe.words import by_command_line
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, OptionError, RecordingError
+from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -77,8 +78,8 @@ def compare(
             With a `baseline` alone: a comparison, which stands as it was made.
         logs: What to judge: logs, recordings and runs, or one of them.
         robot: The arm; a recording or a run that has another one is computed anew with it.
-        base: Where the arm stands in the world.
-        tool: The tool centre point in the frame of the arm's tip.
+        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of the arm's tip, likewise.
         read: How to read a log where it cannot tell by itself.
         tsp: Period of a log's grid in [s].
         derivative: How a log is differentiated: central or savgol.
@@ -100,8 +101,7 @@ def compare(
 
     Source: [UrmArm2021]_ eq. 19-23.
     """
-    operands = [reference, *one_or_many(logs)]
-    refuse_others("operands", operands, (Run, Comparison), OPERANDS)
+    operands = _operands(reference, one_or_many(logs))
     kept = [*_files([*operands, baseline]), *paths(inputs)]
     outputs: dict[OutputKind, PathLike | None] = {
         "recording": output, "junit": junit, "statistics": statistics,
@@ -123,6 +123,13 @@ def compare(
         if statistics is not None:
             write_statistics(result, parts["statistics"], Path(statistics))
         return result if output is None else record(lambda early: result, Path(output), kept, progress)
+
+
+def _operands(reference: Operand | Comparison, logs: Sequence[Operand]) -> list[Any]:
+    """Return all that is compared; raise an `OptionError` with everything that is no operand."""
+    given = {"reference": [reference]} | ({"logs": logs} if logs else {})
+    for_each(lambda named: refuse_others(*named, (Run, Comparison), OPERANDS), given.items())
+    return [reference, *logs]
 
 
 @dataclass(frozen=True)

@@ -63,8 +63,8 @@ def ik(
     Args:
         targets: A file; positions in [m], shape (n, 3); poses as matrices, shape (n, 4, 4); or `Targets`.
         robot: The arm.
-        base: Where the arm stands in the world.
-        tool: The tool centre point in the frame of the arm's tip.
+        base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of the arm's tip, likewise.
         read: How to read the file where it cannot tell by itself.
         t: Times of arrays in [s], shape (n,).
         tsp: Time from target to target in [s] where none is told.

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from urmpipe.edge import public
 from urmpipe.guards import PathLike, paths
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import OptionError, shown
 from urmpipe_pipeline import recording
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.runs.results import Run
@@ -52,5 +52,5 @@ def write_recording(
     """
     if not isinstance(result, (Run, Comparison, Simulation)):
         allowed = "a Run, a Comparison or a Simulation; `ik` writes its own (output=FILE.rrd)"
-        raise OptionError(f"result: found a {type(result).__name__}, allowed: {allowed}")
+        raise OptionError(f"result: found {shown(result)}, allowed: {allowed}")
     return recording.write_recording(result, Path(output), paths(inputs), progress)

@@ -35,7 +35,7 @@ if TYPE_CHECKING:
 def simulate(
     system: PathLike,
     *,
-    arguments: Mapping[str, str] | None = None,
+    arguments: Mapping[str, str | Path | float] | None = None,
     step: float | None = None,
     duration: float | None = None,
     backend: Backend | None = None,
@@ -66,8 +66,9 @@ def simulate(
     Raises:
         UrmpipeError: With everything that is wrong with the system, before the first step, or with an output.
     """
-    loaded = _changed(read_system(system, arguments), step, duration)
-    bundled = _bundled(system, arguments or {})
+    texts = {name: str(value) for name, value in (arguments or {}).items()}
+    loaded = _changed(read_system(system, texts), step, duration)
+    bundled = _bundled(system, texts)
     kept = [loaded.path, *_files(loaded)]
     named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
     refuse_shared({kind: Path(path) for kind, path in named.items() if path is not None})

@@ -31,11 +31,12 @@ def _sync(text: str) -> str | float:
     Raises:
         OptionError: If it is none of them.
     """
-    from urmpipe_models.errors import OptionError
+    from urmpipe_models.errors import OptionError, shown
 
     offset = quantity(text, TIMES)
     if text not in ("start", "auto") and not math.isfinite(offset):
-        raise OptionError(f"found {text!r}, allowed: start, auto, or a time in s, such as -0.2 or 200ms")
+        allowed = "start, auto, or a time in s, such as -0.2 or 200ms"
+        raise OptionError(f"found {shown(text)}, allowed: {allowed}")
     return text if text in ("start", "auto") else offset
 
 

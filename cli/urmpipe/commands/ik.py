@@ -22,10 +22,10 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
     """Return a tolerance on each axis in [m]; of one of several kinds in urmpipe.toml that on an axis."""
     if value is None:
         return None
-    from urmpipe_models.errors import OptionError
+    from urmpipe_models.errors import OptionError, shown
     from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
-    said = f"found {value!r}, allowed: a length on each axis, such as 0.0035 or 3.5mm"
+    said = f"found {shown(value)}, allowed: a length on each axis, such as 0.0035 or 3.5mm"
     by_file = ctx.get_parameter_source("tolerance") == ParameterSource.DEFAULT_MAP
     try:
         kinds = parse_tolerance(value)

@@ -105,7 +105,7 @@ def export(name: str, output: Path | None, placing: PlacingOptions, terminal: Te
       urmpipe robot export urm8 -o urm8.toml
     """
     from urmpipe.printing.terminal import say
-    from urmpipe_models.errors import OptionError
+    from urmpipe_models.errors import OptionError, shown
     from urmpipe_models.robots.robot_file import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
     from urmpipe_models.robots.written import write_export
@@ -113,7 +113,9 @@ def export(name: str, output: Path | None, placing: PlacingOptions, terminal: Te
     target = output or Path(f"{Path(name).stem}.urdf")
     writers = {".urdf": urdf_text, ".toml": robot_toml}
     if target.suffix.lower() not in writers:
-        raise OptionError(f"--output: found {str(target)!r}, allowed: a name that ends in .urdf or .toml")
+        raise OptionError(
+            f"--output: found {shown(str(target))}, allowed: a name that ends in .urdf or .toml"
+        )
     chain = _placed(name, placing)
     write_export(target, writers[target.suffix.lower()](chain), Path(name))
     made = {"schema": 1, "robot": chain.name, "file": target}

@@ -14,7 +14,7 @@ from urmpipe.inverse.output import Written
 from urmpipe.inverse.targets import GivenTargets
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import OptionError, shown
 from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import METHODS, Method
@@ -86,7 +86,7 @@ def refuse_unsolvable(asked: Asked, kind: Written | None) -> None:
 def _bad_values(asked: Asked) -> Iterator[str]:
     """Yield which values make no sense."""
     if asked.method not in METHODS:
-        yield f"--method: found {asked.method!r}, allowed: {', '.join(METHODS)}"
+        yield f"--method: found {shown(asked.method)}, allowed: {', '.join(METHODS)}"
     yield from (f"--{fault}" for fault in asked.search.faults())
 
 
@@ -124,7 +124,7 @@ def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArr
     try:
         values = np.asarray(start, dtype=float)
     except (TypeError, ValueError):
-        raise OptionError(f"--start: found {start!r}, {allowed}, in rad and m") from None
+        raise OptionError(f"--start: found {shown(start)}, {allowed}, in rad and m") from None
     if values.shape != (len(arm.coordinates),):
         raise OptionError(f"--start: found {values.size} values, {allowed}")
     if not np.isfinite(values).all():

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from urmpipe.inverse.result import InverseResult
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import OptionError, shown
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_pipeline.inverse.joint_file import write_joint_log
 from urmpipe_pipeline.inverse.solved import row_times, solved_run
@@ -34,7 +34,7 @@ def output_kind(output: Path | None) -> Written | None:
     kind = KINDS.get(output.suffix.lower())
     if kind is None:
         allowed = "a name that ends in .csv (a joint log) or .rrd (a recording)"
-        raise OptionError(f"-o: found {str(output)!r}, allowed: {allowed}")
+        raise OptionError(f"-o: found {shown(str(output))}, allowed: {allowed}")
     return kind
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.inverse.checks import ROTATION_TOLERANCE
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
@@ -71,7 +71,7 @@ def given_targets(
         OptionError: If an array has another shape, or times do not fit.
     """
     if tsp is not None and not (isinstance(tsp, Real) and 0.0 < tsp < math.inf):
-        raise OptionError(f"tsp: found {tsp!r}, allowed: a positive time in s")
+        raise OptionError(f"tsp: found {shown(tsp)}, allowed: a positive time in s")
     if isinstance(given, (str, Path)):
         if t is not None:
             raise OptionError("t: found times beside a file, allowed: with arrays; a file has its own")

@@ -9,6 +9,8 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+from urmpipe_models.errors import shown
+
 
 class NamedType(click.ParamType[str]):
     """NAME=VALUE; the names complete in the shell.
@@ -74,6 +76,6 @@ def named_values(ctx: click.Context, param: click.Parameter, values: tuple[str, 
     for value in values:
         name, sign, text = value.partition("=")
         if not sign or not name.strip() or name.strip() in found:
-            raise click.BadParameter(f"found {value!r}, allowed: NAME=VALUE, each name once")
+            raise click.BadParameter(f"found {shown(value)}, allowed: NAME=VALUE, each name once")
         found[name.strip()] = text
     return found

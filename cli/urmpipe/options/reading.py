@@ -10,6 +10,7 @@ import click
 
 from urmpipe.options.grouped import Command, grouped, names_of, with_options
 from urmpipe.options.types import DURATION, ROBOT, NamesType, OffsetType, OneOf
+from urmpipe_models.errors import shown
 
 if TYPE_CHECKING:
     from urmpipe_models.chains.chain import Chain
@@ -144,7 +145,7 @@ def _intervals(
         try:
             low, high = map(float, ends.split(":"))
         except ValueError:
-            raise click.BadParameter(f"found {value!r}, allowed: LOW:HIGH or JOINT=LOW:HIGH") from None
+            raise click.BadParameter(f"found {shown(value)}, allowed: LOW:HIGH or JOINT=LOW:HIGH") from None
         intervals[joint] = low, high
     return intervals or None
 

@@ -10,6 +10,8 @@ from typing import Any
 import click
 from click.shell_completion import CompletionItem
 
+from urmpipe_models.errors import shown
+
 TIMES = {"": 1.0, "s": 1.0, "ms": 1e-3, "us": 1e-6}
 LENGTHS = {"": 1.0, "m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 ANGLES = {"": 1.0, "rad": 1.0, "mrad": 1e-3, "deg": math.pi / 180.0}
@@ -140,7 +142,7 @@ class OffsetType(click.ParamType[Any]):
         values += [quantity(part, ANGLES) for part in parts[3:]]
         if len(values) not in (3, 6) or not all(map(math.isfinite, values)):
             allowed = "X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0,150mm,0,0,90deg"
-            self.fail(f"found {value!r}, allowed: {allowed}", param, ctx)
+            self.fail(f"found {shown(value)}, allowed: {allowed}", param, ctx)
         return from_offset(values)
 
 
@@ -152,7 +154,7 @@ class WholeType(click.ParamType[int]):
     def convert(self, value: Any, param: click.Parameter | None, ctx: click.Context | None) -> int:
         """Return the number."""
         if not isinstance(value, int) and not re.fullmatch("[0-9]+", value):
-            self.fail(f"found {value!r}, allowed: a whole number, 0 or more", param, ctx)
+            self.fail(f"found {shown(value)}, allowed: a whole number, 0 or more", param, ctx)
         return int(value)
 
 
@@ -182,7 +184,7 @@ class JointValuesType(click.ParamType[tuple[float, ...]]):
         except ValueError:
             values = ()
         if not values or not all(map(math.isfinite, values)):
-            self.fail(f"found {value!r}, allowed: numbers in rad and m, such as 0,3.14,0.5", param, ctx)
+            self.fail(f"found {shown(value)}, allowed: numbers in rad and m, such as 0,3.14,0.5", param, ctx)
         return values
 
 
@@ -197,7 +199,8 @@ class DurationType(click.ParamType[float]):
             return value
         seconds = quantity(str(value), TIMES)
         if not 0.0 < seconds < math.inf:
-            self.fail(f"found {value!r}, allowed: a positive time in s, such as 0.005 or 5ms", param, ctx)
+            allowed = "a positive time in s, such as 0.005 or 5ms"
+            self.fail(f"found {shown(value)}, allowed: {allowed}", param, ctx)
         return seconds
 
 

@@ -18,7 +18,7 @@ from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.cosim.plan import LogColumn
 from urmpipe_fmus.cosim.system import STEP
 from urmpipe_fmus.table import Table
-from urmpipe_models.errors import OptionError, UrmpipeError
+from urmpipe_models.errors import OptionError, UrmpipeError, shown
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources import ReadOptions, read_map
 
@@ -201,5 +201,5 @@ class Blocks:
 def _text(name: str, value: Any) -> str | None:
     """Return an option that names a robot or a file."""
     if value is not None and not isinstance(value, str):
-        raise OptionError(f"{name}: found {value!r}, allowed: a name or a file")
+        raise OptionError(f"{name}: found {shown(value)}, allowed: a name or a file")
     return value

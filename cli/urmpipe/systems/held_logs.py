@@ -51,6 +51,9 @@ def on_points(t_ns: IntArray, step: float) -> IntArray:
     Args:
         t_ns: Times in integer [ns], strictly rising, shape (n,).
         step: Communication step in [s].
+
+    Returns:
+        The times in integer [ns], shape (n,).
     """
     if len(t_ns) < 2:
         return t_ns

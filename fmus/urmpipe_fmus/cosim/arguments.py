@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
+from urmpipe_models.errors import shown
 from urmpipe_models.names import not_among
 
 NAMES = ("unit", "column")
@@ -63,7 +64,9 @@ def given(
             values[name] = _like(defaults[name], text)
         except ValueError:
             allowed = "true, false" if isinstance(defaults[name], bool) else "a number"
-            faults.append(f"argument {name}: found {text!r}, allowed: {allowed}, like {defaults[name]!r}")
+            faults.append(
+                f"argument {name}: found {shown(text)}, allowed: {allowed}, like {shown(defaults[name])}"
+            )
     return values
 
 

@@ -109,8 +109,8 @@ class LoopJob:
         exchanges: One sweep.
         torn: Places of the torn inputs.
         sources: Places of their sources.
-        minimum: The least value that an input of the loop may have, in that input's unit, at the place that
-            it follows, shape (places,).
+        minimum: The least value that an input of the loop may have, in its own unit, at the place that it
+            follows, shape (places,).
         maximum: The largest, likewise.
         nominal: The size of the values of each torn input, in its unit, shape (torn,).
         ring: The loop, for people.
@@ -159,9 +159,10 @@ class Job:
         tolerance: Of iterated loops.
         blocks: The blocks.
         order: The exchanges of a communication point.
-        logged: Values from logs at the points by type, shape (count + 1, inputs of the type).
+        logged: Values from logs at the points by type, each in its own unit, shape (count + 1,
+            inputs of the type).
         recorded: How many places of each type are recorded, from the first.
-        start: The values at the start by type, shape (places,).
+        start: The values at the start by type, each in its own unit, shape (places,).
     """
 
     step: float

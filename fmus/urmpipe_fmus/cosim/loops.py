@@ -41,7 +41,7 @@ class LoopSolver:
 
     Args:
         loop: The loop.
-        values: The vector of the Reals.
+        values: The vector of the Reals, each in its own unit, shape (reals,).
         sweeps: The exchanges of a sweep.
         tolerance: What may be left of the residual, relative to nominal + |x|.
     """

@@ -42,7 +42,7 @@ class Master:
     Args:
         job: What is run.
         progress: How far it is, shared with the parent.
-        recorded: Where it is recorded, shape (rows, columns).
+        recorded: Where it is recorded, each column in its own unit, shape (rows, columns).
         callbacks: What the FMUs are given: logger and memory.
 
     Attributes:

@@ -31,7 +31,7 @@ class LogColumn:
 
     Attributes:
         t_ns: Times from the log's start in [ns], strictly rising, shape (n,).
-        values: Finite, shape (n,).
+        values: In `unit`, finite, shape (n,).
         unit: Spelled as FMI does; empty if it is not known.
     """
 

@@ -93,7 +93,7 @@ class Moved(NamedTuple):
         places: Where the inputs that the loop moves stand in it, shape (moved,).
         minimum: The least values that they may have, each in its own unit, shape (moved,).
         maximum: The largest, likewise.
-        read: The outputs that may follow them.
+        read: The outputs that may follow them, each in its own unit, shape (outputs of a type,) by type.
     """
 
     values: NDArray[np.float64]

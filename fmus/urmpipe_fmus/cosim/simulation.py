@@ -52,7 +52,7 @@ class Recorded:
         names: Block and variable of each column: every output, every input from a log.
         units: Of each column as the FMU spells it; empty if it has none.
         types: Of each column: Real, Integer or Boolean.
-        values: shape (n, columns); Integers as they are, Booleans 0 or 1.
+        values: In `units`, shape (n, columns); Integers as they are, Booleans 0 or 1.
         failed: Why it ended before its time, one line; None if it did not fail.
         notes: What is allowed but should be seen.
     """

@@ -13,7 +13,7 @@ from urmpipe_fmus.cosim.arguments import beside, given, replaced, unknown
 from urmpipe_fmus.cosim.places import placed
 from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
 from urmpipe_fmus.units import unit_name
-from urmpipe_models.errors import CosimulationError, Finding
+from urmpipe_models.errors import CosimulationError, Finding, shown
 from urmpipe_models.files.toml_text import parse_toml
 from urmpipe_models.names import did_you_mean, not_among
 
@@ -56,7 +56,7 @@ def system_text(name: str) -> str:
         CosimulationError: If there is no such system.
     """
     if system_name(name) not in system_names():
-        found = f"found {name!r}{did_you_mean(name, system_names())}"
+        found = f"found {shown(name)}{did_you_mean(name, system_names())}"
         raise CosimulationError(f"system: {found}, allowed: one of {', '.join(system_names())}")
     return _path_of(name).read_text(encoding="utf-8")
 
@@ -113,7 +113,7 @@ def _path_of(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.is_file():
         return path
-    found = f"found {str(name_or_path)!r}{did_you_mean(str(name_or_path), system_names())}"
+    found = f"found {shown(str(name_or_path))}{did_you_mean(str(name_or_path), system_names())}"
     raise CosimulationError(f"system: {found}, allowed: a TOML file, or one of {', '.join(system_names())}")
 
 
@@ -130,7 +130,7 @@ def _table(table: Mapping[str, Any], key: str, faults: list[str]) -> dict[str, A
     value = table.get(key, {})
     if isinstance(value, dict):
         return value
-    faults.append(f"{key}: found {value!r}, allowed: a table")
+    faults.append(f"{key}: found {shown(value)}, allowed: a table")
     return {}
 
 
@@ -182,14 +182,14 @@ class _System:
             if isinstance(value, dict):
                 yield key, value
             else:
-                self.faults.append(f"{name}.{key}: found {value!r}, allowed: a table [{name}.{key}]")
+                self.faults.append(f"{name}.{key}: found {shown(value)}, allowed: a table [{name}.{key}]")
 
     def _block(self, name: str, table: dict[str, Any]) -> Block:
         """Return a block."""
         where = f"blocks.{name}"
         if not BLOCK_NAME.fullmatch(name):
             self.faults.append(
-                f"{where}: found {name!r} as a name, allowed: a letter, then letters, digits, _, -"
+                f"{where}: found {shown(name)} as a name, allowed: a letter, then letters, digits, _, -"
             )
         kinds = [key for key in ("unit", "file", "fmu") if key in table]
         if len(kinds) != 1:
@@ -200,7 +200,7 @@ class _System:
             self.faults += [f"{where}.{key}: {not_among(key, ('fmu', 'start'))}" for key in options]
         start = table.get("start", {})
         if not isinstance(start, dict):
-            self.faults.append(f"{where}.start: found {start!r}, allowed: a table of names and values")
+            self.faults.append(f"{where}.start: found {shown(start)}, allowed: a table of names and values")
             start = {}
         return Block(
             name=name,
@@ -216,14 +216,14 @@ class _System:
         where = f"connections.{destination}"
         if isinstance(source, str):
             return Connection(self._port(where, destination), self._port(where, source))
-        self.faults.append(f"{where}: found {source!r}, allowed: its source as 'block.variable'")
+        self.faults.append(f"{where}: found {shown(source)}, allowed: its source as 'block.variable'")
         return Connection(self._port(where, destination), NOWHERE)
 
     def _input(self, destination: str, table: Any) -> LogInput:
         """Return an input from a log."""
         where = f"inputs.{destination}"
         if not isinstance(table, dict):
-            self.faults.append(f"{where}: found {table!r}, allowed: {{ log = FILE, column = NAME }}")
+            self.faults.append(f"{where}: found {shown(table)}, allowed: {{ log = FILE, column = NAME }}")
             return LogInput(destination=self._port(where, destination), log="", column="")
         allowed = ("log", "column", "interpolate")
         self.faults += [f"{where}.{key}: {not_among(key, allowed)}" for key in table if key not in allowed]
@@ -240,7 +240,7 @@ class _System:
         """Return the port that a text `block.variable` names, `NOWHERE` if there is no such block."""
         block, dot, variable = text.partition(".")
         if not (block and dot and variable):
-            self.faults.append(f"{where}: found {text!r}, allowed: block.variable")
+            self.faults.append(f"{where}: found {shown(text)}, allowed: block.variable")
             return NOWHERE
         if block not in self.names:
             self.faults.append(f"{where}: block {not_among(block, self.names)}")
@@ -251,7 +251,7 @@ class _System:
         value = table.get(key, default)
         if isinstance(value, str):
             return value
-        self.faults.append(f"{where}.{key}: found {value!r}, allowed: a text")
+        self.faults.append(f"{where}.{key}: found {shown(value)}, allowed: a text")
         return default
 
     def _file(self, table: Mapping[str, Any], where: str, key: str) -> Path | None:
@@ -260,19 +260,19 @@ class _System:
         if not text:
             return None
         if "\0" in text or not Path(text).is_file():
-            self.faults.append(f"{where}.{key}: found {text!r}, allowed: a file that is there")
+            self.faults.append(f"{where}.{key}: found {shown(text)}, allowed: a file that is there")
         return Path(text)
 
     def _flag(self, table: Mapping[str, Any], where: str, key: str) -> bool:
         value = table.get(key, False)
         if not isinstance(value, bool):
-            self.faults.append(f"{where}.{key}: found {value!r}, allowed: true, false")
+            self.faults.append(f"{where}.{key}: found {shown(value)}, allowed: true, false")
         return value is True
 
     def _positive(self, table: Mapping[str, Any], where: str, key: str, default: float) -> float:
         value = table.get(key, default)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
-            self.faults.append(f"{where}.{key}: found {value!r}, allowed: a number above 0")
+            self.faults.append(f"{where}.{key}: found {shown(value)}, allowed: a number above 0")
             return default
         return float(value)
 
@@ -285,14 +285,14 @@ class _System:
             value = float(told[1]) * TIME_UNITS[told[2]]
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
             allowed = 'a time above 0 in s, or with its unit as in "1ms"'
-            self.faults.append(f"system.{key}: found {value!r}, allowed: {allowed}")
+            self.faults.append(f"system.{key}: found {shown(value)}, allowed: {allowed}")
             return None
         return float(value)
 
     def _count(self, table: Mapping[str, Any], key: str) -> int:
         value = table.get(key, 1)
         if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-            self.faults.append(f"system.{key}: found {value!r}, allowed: an integer from 1")
+            self.faults.append(f"system.{key}: found {shown(value)}, allowed: an integer from 1")
             return 1
         return value
 

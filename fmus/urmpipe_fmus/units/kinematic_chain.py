@@ -14,7 +14,7 @@ from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Variable
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError
+from urmpipe_models.errors import UnitError, shown
 from urmpipe_models.kinematics.forward import forward
 from urmpipe_models.kinematics.motion import Motion, each_motion
 from urmpipe_models.robots.robot_file import chain_from_dict, robot_toml
@@ -54,12 +54,12 @@ def kinematic_chain(
     Source: [UrmArm2021]_ eq. 1-14; v and a by the outward recursion (see `each_motion`).
     """
     if not isinstance(robot, Chain):
-        raise UnitError(f"unit kinematic_chain: option robot: found {robot!r}, allowed: a robot (Chain)")
+        raise UnitError(f"unit kinematic_chain: option robot: found {shown(robot)}, allowed: a robot (Chain)")
     names = robot.point_names
-    shown = some_of("kinematic_chain", "points", names if points is None else points, names)
+    chosen = some_of("kinematic_chain", "points", names if points is None else points, names)
     sensed = some_of("kinematic_chain", "sensors", names[-1:] if sensors is None else sensors, names)
     yes_or_no("kinematic_chain", "rates", rates)
-    if not (shown or sensed):
+    if not (chosen or sensed):
         raise UnitError("unit kinematic_chain: options points, sensors: found none, allowed: one of either")
     geometry = geometry_of(robot)
 
@@ -68,7 +68,7 @@ def kinematic_chain(
         arm = geometry.chain_at(v)
         poses, motions = _moved(arm, v, rates)
         places = dict(zip(names, poses, strict=True))
-        found = {name: places[name].translation for name in shown}
+        found = {name: places[name].translation for name in chosen}
         for name in sensed:
             found |= _sensed(name[1:], places[name], motions[names.index(name)] if rates else None)
         return found
@@ -79,13 +79,13 @@ def kinematic_chain(
         variables=(
             *geometry.parameters,
             *_inputs(robot, rates),
-            *(_output(name, f"Place of point {name}: x, y, z", "m", 3) for name in shown),
+            *(_output(name, f"Place of point {name}: x, y, z", "m", 3) for name in chosen),
             *(variable for name in sensed for variable in _sensor_outputs(name, rates)),
         ),
         outputs=outputs,
         equations=_equations(rates),
         source="UrmArm2021, eq. 1-14, with atan2 in eq. 10 and 13",
-        recipe=_recipe(robot, points=list(shown), sensors=list(sensed), rates=rates),
+        recipe=_recipe(robot, points=list(chosen), sensors=list(sensed), rates=rates),
     )
 
 
@@ -129,7 +129,7 @@ def _sensed(number: str, pose: Transform, motion: Motion | None) -> dict[str, An
 
 def _inputs(robot: Chain, rates: bool) -> Iterator[Input]:
     """Yield the joints' angles and ways, and their rates."""
-    for name, kind, unit, shown, quantity in (
+    for name, kind, unit, seen_in, quantity in (
         ("phi", "revolute", "rad", "deg", "Angles"),
         ("s", "prismatic", "m", "mm", "Ways"),
     ):
@@ -142,7 +142,7 @@ def _inputs(robot: Chain, rates: bool) -> Iterator[Input]:
             name=name,
             description=f"{quantity} {of}",
             unit=unit,
-            display_unit=shown,
+            display_unit=seen_in,
             start=start,
             size=len(at),
         )
@@ -151,7 +151,7 @@ def _inputs(robot: Chain, rates: bool) -> Iterator[Input]:
                 name=f"{name}{dots}",
                 description=f"{'Velocities' if dots == 'd' else 'Accelerations'} {of}",
                 unit=f"{unit}{rate}",
-                display_unit=f"{shown}{rate}",
+                display_unit=f"{seen_in}{rate}",
                 size=len(at),
             )
 

@@ -12,7 +12,7 @@ from urmpipe_fmus.units.options import whole_number, yes_or_no
 from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Output
 from urmpipe_models.elementwise import Element
-from urmpipe_models.errors import UnitError
+from urmpipe_models.errors import UnitError, shown
 
 OPTIONS: Mapping[str, str] = {
     "table": "the rows of a log: its times from its start, and the columns of its values",
@@ -99,9 +99,8 @@ def _column(given: Column | Sequence[Any]) -> Column:
     parts = () if isinstance(given, str) or not isinstance(given, Sequence) else tuple(given)
     texts = (*parts[:2], *parts[3:])
     if not 1 <= len(parts) <= len(Column._fields) or not all(isinstance(one, str) for one in texts):
-        raise UnitError(
-            f"unit log_source: option columns: found {given!r}, allowed: name, unit, size and description"
-        )
+        allowed = "name, unit, size and description"
+        raise UnitError(f"unit log_source: option columns: found {shown(given)}, allowed: {allowed}")
     column = Column(*parts)
     if column.size is not None:
         whole_number("log_source", f"columns: {column.name}: size", column.size)

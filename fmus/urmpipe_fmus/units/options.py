@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from urmpipe_models.errors import UnitError
+from urmpipe_models.errors import UnitError, shown
 
 
 def whole_number(unit: str, option: str, value: Any) -> int:
@@ -14,7 +14,7 @@ def whole_number(unit: str, option: str, value: Any) -> int:
         UnitError: If it is no integer of 1 or more.
     """
     if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-        raise UnitError(f"unit {unit}: option {option}: found {value!r}, allowed: an integer, 1 or more")
+        raise UnitError(f"unit {unit}: option {option}: found {shown(value)}, allowed: an integer, 1 or more")
     return value
 
 
@@ -25,7 +25,7 @@ def yes_or_no(unit: str, option: str, value: Any) -> bool:
         UnitError: If it is neither.
     """
     if not isinstance(value, bool):
-        raise UnitError(f"unit {unit}: option {option}: found {value!r}, allowed: true or false")
+        raise UnitError(f"unit {unit}: option {option}: found {shown(value)}, allowed: true or false")
     return value
 
 
@@ -39,11 +39,14 @@ def some_of(unit: str, option: str, value: Any, allowed: tuple[str, ...]) -> tup
         value = [value]
     if not isinstance(value, (list, tuple)):
         raise UnitError(
-            f"unit {unit}: option {option}: found {value!r}, allowed: a list of {', '.join(allowed)}"
+            f"unit {unit}: option {option}: found {shown(value)}, allowed: a list of {', '.join(allowed)}"
         )
     wrong = [one for one in value if one not in allowed]
     if wrong:
         raise UnitError(
-            *(f"unit {unit}: option {option}: found {one!r}, allowed: {', '.join(allowed)}" for one in wrong)
+            *(
+                f"unit {unit}: option {option}: found {shown(one)}, allowed: {', '.join(allowed)}"
+                for one in wrong
+            )
         )
     return tuple(one for one in allowed if one in value)

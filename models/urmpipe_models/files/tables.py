@@ -6,7 +6,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any, TypeAlias
 
-from urmpipe_models.errors import Finding
+from urmpipe_models.errors import Finding, shown
 from urmpipe_models.names import did_you_mean
 
 Rows3: TypeAlias = tuple[tuple[float, ...], ...]
@@ -162,12 +162,6 @@ class Table:
 
 class _Missing:
     """Stands for a required key that is not there."""
-
-
-def shown(value: Any) -> str:
-    """Return a value as an error message shows it, cut where it is long."""
-    text = repr(value)
-    return text if len(text) <= 60 else f"{text[:57]}..."
 
 
 def _is_number(value: Any, infinite: bool = False) -> bool:

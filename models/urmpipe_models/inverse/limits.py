@@ -19,7 +19,7 @@ TURN = 2.0 * math.pi
 
 
 def periods(chain: Chain) -> FloatArray:
-    """Return 2 pi of each joint that may turn without end, infinity of any other, shape (joints,).
+    """Return 2 pi of each joint that may turn without end, infinity of any other, in [rad], shape (joints,).
 
     Without end turns a revolute joint without limits. One that may turn by several turns but has limits, as
     those of a UR arm, has none: from 6.2 rad to 0.1 rad it is not 0.18 rad if it ends at 2 pi. Which of its
@@ -62,7 +62,10 @@ def within_pi(q: FloatArray, period: FloatArray) -> FloatArray:
 
     Args:
         q: In [rad] or [m], shape (..., joints).
-        period: Of each joint, shape (joints,): see `periods`.
+        period: Of each joint in [rad], shape (joints,): see `periods`.
+
+    Returns:
+        In [rad] or [m], shape (..., joints).
     """
     turning = np.isfinite(period)
     values = q.copy()
@@ -71,7 +74,7 @@ def within_pi(q: FloatArray, period: FloatArray) -> FloatArray:
 
 
 def nearest_to_limits(chain: Chain, q: FloatArray) -> FloatArray:
-    """Return joint values in [rad] or [m], shape (n, joints), each in the turn nearest to its limits."""
+    """Return q with each joint in the turn nearest to its limits, both in [rad] or [m], shape (n, joints)."""
     lower, upper = limits_of(chain)
     limited = turning(chain) & np.isfinite(lower) & np.isfinite(upper)
     middle = np.where(limited, 0.5 * (lower + upper), 0.0)

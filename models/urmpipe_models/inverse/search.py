@@ -7,6 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from numbers import Integral, Real
 
+from urmpipe_models.errors import shown
+
 
 @dataclass(frozen=True, slots=True)
 class Search:
@@ -27,12 +29,12 @@ class Search:
     def faults(self) -> Iterator[str]:
         """Yield which of the values make no sense."""
         if self.tolerance is not None and not isinstance(self.tolerance, Real):
-            yield f"tolerance: found {self.tolerance!r}, allowed: a number of m, more than 0"
+            yield f"tolerance: found {shown(self.tolerance)}, allowed: a number of m, more than 0"
         elif self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
             yield f"tolerance: found {self.tolerance:g} m, allowed: more than 0, finite"
         for name, value in (("restarts", self.restarts), ("seed", self.seed)):
             if not isinstance(value, Integral) or value < 0:
-                yield f"{name}: found {value!r}, allowed: a whole number, 0 or more"
+                yield f"{name}: found {shown(value)}, allowed: a whole number, 0 or more"
 
 
 USUAL_SEARCH = Search()

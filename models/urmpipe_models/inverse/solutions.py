@@ -106,6 +106,11 @@ class Solutions:
         """Return of each target the solution nearest to a start, in [rad] or [m], shape (n, joints), or NaN.
 
         It is returned in the turn nearest to the start; see `nearest_column` for what near means.
+
+        Args:
+            start: Joint values in [rad] or [m], shape (joints,) or (n, joints).
+            period: 2 pi of a joint that may turn without end, infinity of any other, in [rad], shape
+                (joints,).
         """
         column = self.nearest_column(start, period)[:, None, None]
         near = np.take_along_axis(self._away(start, period), column, axis=1)[:, 0] + np.atleast_2d(start)
@@ -120,7 +125,8 @@ class Solutions:
 
         Args:
             start: Joint values in [rad] or [m], shape (joints,) or (n, joints).
-            period: 2 pi of a joint that may turn without end, infinity of any other, shape (joints,).
+            period: 2 pi of a joint that may turn without end, infinity of any other, in [rad], shape
+                (joints,).
         """
         distance = np.square(self._away(start, period)).sum(axis=2)
         return np.asarray(np.argmin(np.where(self.reached, distance, np.inf), axis=1))

@@ -29,7 +29,7 @@ class Targets:
         return len(self.position)
 
     def rows(self, chosen: slice | NDArray[np.bool_] | NDArray[np.intp]) -> Targets:
-        """Return some of the targets: a slice, a mask of shape (n,) or indices."""
+        """Return the chosen targets: a slice, a mask of shape (n,), or indices of shape (m,), as `chosen`."""
         return Targets(self.position[chosen], None if self.rotation is None else self.rotation[chosen])
 
 

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from urmpipe_datasets import ROBOTS
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError, RobotError
-from urmpipe_models.files.tables import shown
+from urmpipe_models.errors import OptionError, RobotError, shown
 from urmpipe_models.names import did_you_mean
 from urmpipe_models.robots.robot_file import read_robot_file
 from urmpipe_models.robots.urdf_reader import read_urdf
@@ -48,7 +47,8 @@ def load_robot(
         return read_robot_file(ROBOTS / f"{name_or_path}.toml")
     hint = did_you_mean(str(name_or_path), names)
     raise RobotError(
-        f"unknown robot {str(name_or_path)!r}{hint}; allowed: {', '.join(names)}, or a .toml or .urdf file"
+        f"unknown robot {shown(str(name_or_path))}{hint};"
+        f" allowed: {', '.join(names)}, or a .toml or .urdf file"
     )
 
 

@@ -8,7 +8,7 @@ from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.visual import Visual
-from urmpipe_models.errors import RobotError
+from urmpipe_models.errors import RobotError, shown
 from urmpipe_models.names import did_you_mean
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
@@ -79,7 +79,7 @@ def _is_link(tree: UrdfTree, role: str, link: str) -> bool:
     if link in tree.links:
         return True
     hint = did_you_mean(link, tree.links)
-    tree.fault(f"{role} link {link!r} is not in the file{hint}; allowed: {_listed(tree.links)}")
+    tree.fault(f"{role} link {shown(link)} is not in the file{hint}; allowed: {_listed(tree.links)}")
     return False
 
 

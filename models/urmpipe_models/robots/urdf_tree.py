@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Literal
 
 from urmpipe_models.chains.chain import Joint, JointKind, Mimic
-from urmpipe_models.errors import Finding, RobotError
+from urmpipe_models.errors import Finding, RobotError, shown
 from urmpipe_models.files.xml_tree import Node, read_xml
 from urmpipe_models.names import did_you_mean
 from urmpipe_models.transform import Transform, from_rpy
@@ -128,7 +128,7 @@ def _add_joint(tree: UrdfTree, node: Node) -> None:
         tree.fault(f"joint {name}: name stands already in line {tree.edges[name].line}", node.line)
         return
     if type_ not in KINDS and type_ not in OTHER_TYPES:
-        tree.fault(f"joint {name}: found type {type_!r}; allowed: {', '.join(KINDS)}", node.line)
+        tree.fault(f"joint {name}: found type {shown(type_)}; allowed: {', '.join(KINDS)}", node.line)
     parent, child = (_link_of(tree, node, name, end) for end in ("parent", "child"))
     kind = KINDS.get(type_, "fixed")
     lower, upper, velocity = _limits(tree, node, name, type_)
@@ -155,7 +155,7 @@ def _link_of(tree: UrdfTree, node: Node, joint: str, end: Literal["parent", "chi
         return ""
     if link not in tree.links:
         hint = did_you_mean(link, tree.links)
-        tree.fault(f"joint {joint}: {end} {link!r}; allowed: a link of the file{hint}", node.line)
+        tree.fault(f"joint {joint}: {end} {shown(link)}; allowed: a link of the file{hint}", node.line)
         tree.sound = False
     return link
 
@@ -242,7 +242,7 @@ def numbers_of(
         values = ()
     finite = node.tag == "limit" or all(math.isfinite(value) for value in values)
     if len(values) != len(default) or any(math.isnan(value) for value in values) or not finite:
-        tree.fault(f"{place} {attribute}: found {text!r}, expected {COUNTS[len(default)]}", node.line)
+        tree.fault(f"{place} {attribute}: found {shown(text)}, expected {COUNTS[len(default)]}", node.line)
         return tuple(default)
     return values
 
@@ -281,5 +281,6 @@ def _check_mimics(tree: UrdfTree) -> None:
         mimic = edge.joint.mimic
         if mimic is not None and mimic.joint not in tree.edges:
             tree.fault(
-                f"joint {edge.joint.name}: mimics {mimic.joint!r}; allowed: a joint of the file", edge.line
+                f"joint {edge.joint.name}: mimics {shown(mimic.joint)}; allowed: a joint of the file",
+                edge.line,
             )

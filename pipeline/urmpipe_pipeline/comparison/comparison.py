@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import Shown, line_of
 from urmpipe_pipeline.comparison.change import BaselineComparison
-from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation, Kind, Statistics, Stretch, Verdict
+from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import Provenance
@@ -17,8 +17,6 @@ from urmpipe_pipeline.runs.results import SCHEMA
 
 if TYPE_CHECKING:
     import pandas as pd
-
-__all__ = ["AXES", "Comparison", "Deviation", "Kind", "Statistics", "Stretch", "Verdict"]
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)

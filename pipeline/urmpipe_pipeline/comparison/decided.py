@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation
 
 
 def decided_row(one: Deviation) -> int:

@@ -5,7 +5,8 @@ from __future__ import annotations
 from dataclasses import fields
 from pathlib import Path
 
-from urmpipe_pipeline.comparison.comparison import Comparison, Statistics
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Statistics
 from urmpipe_pipeline.csv_rows import write_rows
 from urmpipe_pipeline.text import exact
 

@@ -125,7 +125,7 @@ def similarity(reference: FloatArray, log: FloatArray, turned: bool) -> float:
 
     Args:
         reference: Rates a in [rad/s] or [m/s], shape (n, k).
-        log: Rates b in the same, shape (n, k).
+        log: Rates b in the same unit, shape (n, k).
         turned: Whether b is turned first, as is best for the similarity.
 
     Returns:

@@ -22,9 +22,9 @@ class View:
         reference_ns: Times of the reference in integer [ns], shape (n,).
         reference: Its channels in [rad] or [m], shape (n, k).
         log_ns: Times of the log in integer [ns], shape (m,).
-        log: Its channels, shape (m, k).
-        tool_axes: Axes of the log's tool as the columns of rotation matrices, shape (m, 3, 3), where a tool
-            between the two sides is not known; else None.
+        log: Its channels in [rad] or [m], shape (m, k).
+        tool_axes: Axes of the log's tool as the columns of rotation matrices [-], shape (m, 3, 3), where a
+            tool between the two sides is not known; else None.
     """
 
     by: Literal["joints", "position"]

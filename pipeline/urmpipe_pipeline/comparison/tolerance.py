@@ -8,7 +8,7 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from numbers import Real
 
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import OptionError, shown
 from urmpipe_models.measure_units import units_of
 
 DEFAULT_TOLERANCE = 0.0035
@@ -58,7 +58,7 @@ def parse_tolerance(
     """
     if DECIMAL_COMMA.fullmatch(text):
         point = text.strip().replace(",", ".")
-        raise OptionError(f"{option}: found {text!r}, allowed: a point before the decimals, {point}")
+        raise OptionError(f"{option}: found {shown(text)}, allowed: a point before the decimals, {point}")
     found: dict[str, float] = {}
     named: set[str] = set()
     faults = []
@@ -70,7 +70,7 @@ def parse_tolerance(
         if number is None or twice:
             angle = not sign and _number(value, ANGLES, zero) is not None and not twice
             hint = f"; here angle={part.strip()} or joint={part.strip()}" if angle else ""
-            faults.append(f"{option}: found {part.strip()!r}{twice}, allowed: {ALLOWED}{hint}")
+            faults.append(f"{option}: found {shown(part.strip())}{twice}, allowed: {ALLOWED}{hint}")
             continue
         named.update(kinds)
         found |= dict.fromkeys(kinds, number)

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.errors import Finding, OutputError
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.export.metadata import MARK, as_json
 from urmpipe_pipeline.export.tables import Table
 from urmpipe_pipeline.export.times import Times
@@ -143,10 +144,10 @@ def _deviation(run: Deviation) -> dict[str, Any]:
 
 
 def cells(items: Sequence[Any]) -> np.ndarray[tuple[int, int], np.dtype[np.object_]]:
-    """Return items as a row of MATLAB's cells.
+    """Return items as a row of MATLAB's cells [-], shape (1, n).
 
     Args:
-        items: n texts, numbers or structs; [-]; the cells have the shape (1, n).
+        items: n texts, numbers or structs.
     """
     row = np.empty((1, len(items)), dtype=object)
     for k, item in enumerate(items):

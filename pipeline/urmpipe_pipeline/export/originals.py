@@ -19,7 +19,7 @@ roundings moves it by half a unit in the last place of a number that may be twic
 
 
 def to_si(numbers: FloatArray, column: LogColumn) -> FloatArray:
-    """Return factor (sign value + offset) as the reader computes it.
+    """Return factor (sign value + offset) as the reader computes it, in SI, shape (n,).
 
     Args:
         numbers: In the unit of the column, shape (n,).
@@ -31,7 +31,7 @@ def to_si(numbers: FloatArray, column: LogColumn) -> FloatArray:
 
 
 def originals(values: FloatArray, column: LogColumn) -> FloatArray:
-    """Return the numbers of a column as the file has them.
+    """Return the numbers of a column as the file has them, in its unit, shape (n,).
 
     Of the doubles whose conversion gives the SI value bit by bit, the one with the shortest decimal text
     is taken: of a file with up to 15 digits that is its own number, else one next to it at most. Where an

@@ -13,7 +13,7 @@ from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_pipeline.comparison.compare import Tcp
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.export.options import ExportOptions, Rows
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.results import Run

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, RecordingError
-from urmpipe_pipeline.comparison.comparison import AXES, Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import AXES
 from urmpipe_pipeline.export.originals import originals
 from urmpipe_pipeline.export.times import DATE, DAY, TIME_OF_DAY, Times, shares
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role

@@ -34,7 +34,7 @@ def write_joint_log(
         path: The name it is to have, for messages.
         joints: Names of the joints, in the robot's order.
         units: Of each: rad or m.
-        q: In these units, shape (n, joints); NaN in a row that has none.
+        q: In `units`, shape (n, joints); NaN in a row that has none.
         row: Data row of each target in its own file, shape (n,).
         t_ns: Times in integer [ns], shape (n,); None writes no time.
 

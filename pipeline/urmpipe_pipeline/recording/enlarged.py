@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from urmpipe_pipeline.comparison.comparison import Deviation
 from urmpipe_pipeline.comparison.decided import decided_row
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.palette import DEVIATION_COLOUR
 from urmpipe_pipeline.recording.entities import entity_path
 from urmpipe_pipeline.recording.ways import Way, lines_of, track_of

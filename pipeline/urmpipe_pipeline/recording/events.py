@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.arrays import IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.wording import alignment_words, excess, sync_words
 from urmpipe_pipeline.recording.columns import time_columns
 from urmpipe_pipeline.recording.entities import Place, printable

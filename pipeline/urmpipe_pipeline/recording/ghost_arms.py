@@ -38,7 +38,7 @@ class GhostArm:
         t_ns: Time of each pose drawn in integer [ns], shape (m,).
         sample: The grid sample at each, shape (m,).
         start: Where each bone starts in [m], shape (m, bones, 3): the links, then the axes of the joints.
-        end: Where it ends.
+        end: Where it ends, likewise.
         links: How many of the bones are links.
         named: Where the name stands in each pose, shape (m,): which of `name_places`.
         thin: True of every second branch. Two that differ in the turn of the wrist alone have all their links

@@ -16,7 +16,7 @@ def name_places(start: FloatArray, end: FloatArray) -> FloatArray:
 
     Args:
         start: Where each bone starts in [m], shape (..., bones, 3).
-        end: Where it ends.
+        end: Where it ends, likewise.
 
     Returns:
         In [m], shape (..., 2 bones, 3).

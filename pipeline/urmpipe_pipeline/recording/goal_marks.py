@@ -25,7 +25,7 @@ class GoalMarks:
         origin: Where targets with an orientation are, in [m], shape (m, 3).
         axes: Their x, y and z axes [-], shape (m, 3, 3), an axis a column.
         points: Targets drawn as points, in [m], shape (k, 3).
-        strips: The way through targets with times, dashed, in [m].
+        strips: The way through targets with times, dashed, in [m], shape (any, 3) each.
         reached: Every target that the arm has a pose for, in [m], shape (r, 3).
         missed: Targets that it has none for, in [m], shape (u, 3).
         reasons: Why it has none, a line each, with the row; of several reasons the first.

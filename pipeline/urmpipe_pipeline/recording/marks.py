@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.comparison.comparison import Deviation
 from urmpipe_pipeline.comparison.decided import decided_row
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, joint_colour, rgb
 from urmpipe_pipeline.recording.columns import scalar_column, time_columns
 from urmpipe_pipeline.recording.entities import Place, printable

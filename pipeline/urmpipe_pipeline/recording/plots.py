@@ -9,7 +9,7 @@ from uuid import UUID
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.recording.marks import mark_entity, worst_entity
 from urmpipe_pipeline.recording.overview import LONG, overview_entity, speed_entity

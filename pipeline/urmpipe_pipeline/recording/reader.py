@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import CosimulationError, RecordingError
 from urmpipe_models.kinematics.forward import PointLog
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.recording import metadata

@@ -14,8 +14,9 @@ from urmpipe_models.elementwise import Vector
 from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
 from urmpipe_models.transform import Transform, translation
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.decided import decided_row
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.wording import excess
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour

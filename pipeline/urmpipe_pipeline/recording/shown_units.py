@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.recording.entities import Place
 from urmpipe_pipeline.text import SHOWN
 

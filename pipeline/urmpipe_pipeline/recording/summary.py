@@ -10,7 +10,8 @@ from itertools import zip_longest
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.symbols import used_words
 from urmpipe_pipeline.comparison.wording import alignment_words, excess, sync_words, tolerance_words
 from urmpipe_pipeline.inverse.verdict import reached, solved

@@ -109,6 +109,9 @@ def thinned(t_ns: IntArray, values: FloatArray, worst: int | None) -> IntArray:
         t_ns: Times in integer [ns], shape (n,).
         values: In any unit, shape (n, k); NaN where there is none.
         worst: Row that is drawn in any case.
+
+    Returns:
+        Row indices, shape (drawn,).
     """
     count = len(t_ns)
     if not count:
@@ -130,6 +133,9 @@ def lines_of(
         position: In [m], shape (n, 3).
         sample: Their grid samples, shape (n,); default: one after the other.
         worst: Row that is a vertex in any case.
+
+    Returns:
+        Each in [m], shape (vertices, 3).
     """
     missing: NDArray[np.bool_] = np.asarray(~np.isfinite(position).all(axis=1))
     broken = missing[1:] | missing[:-1]
@@ -155,6 +161,9 @@ def dashed(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
 
     Args:
         strips: In [m], shape (any, 3) each.
+
+    Returns:
+        In [m], shape (any, 3) each.
     """
     if not strips:
         return ()

@@ -27,9 +27,10 @@ class JointMotion:
         q: Joint values, repolarized, in [rad] or [m], shape (n, joints), n > 1; NaN where one is missing.
         t_ns: Times in [ns], shape (n,), strictly increasing.
         period: Median time between rows in [s].
-        inner: Largest step of each joint between rows other than the first and the last, shape (joints,);
-            NaN where a value is missing.
-        fineness: How far apart the file's number format lets two values of each joint be, shape (joints,).
+        inner: Largest step of each joint between rows other than the first and the last, in [rad] or [m],
+            shape (joints,); NaN where a value is missing.
+        fineness: How far apart the file's number format lets two values of each joint be, in [rad] or [m],
+            shape (joints,).
     """
 
     names: tuple[str, ...]
@@ -61,7 +62,10 @@ class JointMotion:
 
 
 def largest_steps(q: FloatArray) -> FloatArray:
-    """Return the largest step of each column from row to row, shape (joints,); NaN if a value is missing.
+    """Return the largest step of each column from row to row; NaN if a value is missing.
+
+    Returns:
+        In [rad] or [m], shape (joints,).
 
     Args:
         q: In [rad] or [m], shape (n, joints), n > 1.
@@ -105,10 +109,10 @@ def over_rows(fold: np.ufunc, values: FloatArray) -> FloatArray:
 
     Args:
         fold: Of two values the one, such as `np.maximum`.
-        values: In any unit, which the result has, too, shape (n, columns).
+        values: In any unit, shape (n, columns).
 
     Returns:
-        Shape (columns,).
+        In the same unit, shape (columns,).
     """
     count, joints = values.shape
     whole = count - count % _SIDE_BY_SIDE

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.symbols import size_of
 from urmpipe_pipeline.comparison.wording import of_allowed, tolerance_words
 from urmpipe_pipeline.inverse.verdict import faults, reached, solved

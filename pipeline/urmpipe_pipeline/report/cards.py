@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Deviation, Statistics
+from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
 from urmpipe_pipeline.comparison.symbols import size_of, used_words
 from urmpipe_pipeline.report.facts import (
     Fact,

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation, Stretch
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation, Stretch
 from urmpipe_pipeline.comparison.trajectory import Sync
 from urmpipe_pipeline.comparison.wording import correlation, tolerance_words, tool_option
 from urmpipe_pipeline.inverse.verdict import reached

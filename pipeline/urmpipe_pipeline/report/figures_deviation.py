@@ -8,7 +8,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import AXES, Deviation, Statistics
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
 from urmpipe_pipeline.comparison.symbols import SYMBOLS
 from urmpipe_pipeline.comparison.wording import correlation
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR, joint_colour

@@ -100,7 +100,7 @@ def coordinates(
 
     Args:
         t: Times in [s], shape (n,).
-        values: Shape (n, 3).
+        values: In `unit`, shape (n, 3).
         symbol: Its letter.
         unit: Its unit.
         legend: Whether the legend stands at these lines; it switches an axis in all panels.

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.palette import RUN_COLOURS, run_colour
 from urmpipe_pipeline.report.spec import Figure, Panel, Spec, stacked
 from urmpipe_pipeline.report.traces import DASHES, level, line, stroke

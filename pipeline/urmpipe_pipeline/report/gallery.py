@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.report.figures_deviation import deviation_figure, pose_figure, speed_figure
 from urmpipe_pipeline.report.figures_motion import motion_figure, pose_by_row_figure
 from urmpipe_pipeline.report.figures_overview import overview_figure

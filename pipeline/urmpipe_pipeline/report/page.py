@@ -8,7 +8,8 @@ from itertools import groupby
 from typing import TypeAlias
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.wording import tolerance_words
 from urmpipe_pipeline.report import (
     gallery,

@@ -7,7 +7,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.wording import excess
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour

@@ -51,7 +51,7 @@ def line(
 
     Args:
         t: Times in [s], shape (n,).
-        values: Shape (n,), in `unit`.
+        values: In `unit`, shape (n,).
         name: What the legend and the pointer call it.
         colour: As CSS writes it.
         unit: Unit of the values; empty without one.

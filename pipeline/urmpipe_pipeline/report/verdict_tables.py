@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import AXES, Comparison, Deviation, Statistics
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
 from urmpipe_pipeline.comparison.symbols import SYMBOLS, size_of, symbol
 from urmpipe_pipeline.report.facts import alignment_value, speed_correlation
 from urmpipe_pipeline.report.tables import (

@@ -111,7 +111,7 @@ def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
 
     Args:
         recorded: Rates as the file has them, in [rad/s] or [m/s], shape (g, joints).
-        computed: Rates from differences, same shape.
+        computed: Rates from differences, in the same unit, same shape.
     """
     both = np.isfinite(recorded) & np.isfinite(computed)
     if not both.any():
@@ -126,7 +126,7 @@ def other_unit(recorded: FloatArray, computed: FloatArray, order: int) -> str:
 
     Args:
         recorded: Derivatives as the file has them, in [rad/s^order] or [m/s^order], shape (g, joints).
-        computed: From differences, same shape.
+        computed: From differences, in [rad/s^order] or [m/s^order], same shape.
         order: 1 for rates, 2 for accelerations.
     """
     both = np.isfinite(recorded) & np.isfinite(computed)

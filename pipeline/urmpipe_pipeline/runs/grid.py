@@ -50,9 +50,10 @@ class Grid:
     warnings: tuple[LogWarning, ...]
 
     def resample(self, values: FloatArray) -> FloatArray:
-        """Return values of the rows, shape (n, k), on the grid, shape (g, k): linear, NaN inside gaps.
+        """Return values of the rows on the grid, in their unit, shape (g, k): linear, NaN inside gaps.
 
-        They may be in any unit, which does not change.
+        Args:
+            values: In any unit, shape (n, k).
         """
         if self.own:
             return values
@@ -68,7 +69,7 @@ class Grid:
             unresolved: Row before, row after and joint index of steps that no motion explains, shape (u, 3).
 
         Returns:
-            The values, shape (g, joints), and a warning that counts what was left open.
+            The values in [rad] or [m], shape (g, joints), and a warning that counts what was left open.
         """
         if self.own or not len(unresolved):
             return self.resample(values), ()
@@ -107,10 +108,10 @@ def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> Floa
     Args:
         at_ns: Times wanted in integer [ns], shape (m,).
         known_ns: Times known in integer [ns], strictly increasing, shape (n,).
-        values: Values at the known times, shape (n, k).
+        values: Values at the known times, in any unit, shape (n, k).
 
     Returns:
-        Values at the times wanted, shape (m, k).
+        Values at the times wanted, in the same unit, shape (m, k).
     """
     x, known = at_ns.astype(np.float64), known_ns.astype(np.float64)
     within = np.clip(x, known[0], known[-1])
@@ -125,7 +126,7 @@ def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> Floa
 def inside_spans(
     first: IntArray, end: IntArray, columns: IntArray, shape: tuple[int, ...]
 ) -> NDArray[np.bool_]:
-    """Return a mask of a table that is true in some spans of rows.
+    """Return a mask of a table, shaped as it, that is true in some spans of rows.
 
     Args:
         first: First row of each span, shape (m,).
@@ -140,7 +141,7 @@ def inside_spans(
 
 
 def apart(known_ns: IntArray) -> NDArray[np.bool_]:
-    """Tell which times are more than 3 median periods from the next, shape (n - 1,)."""
+    """Return which of `known_ns`, shape (n,), are over 3 median periods from the next, shape (n - 1,)."""
     step = np.diff(known_ns)
     return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
 

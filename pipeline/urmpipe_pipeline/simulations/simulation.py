@@ -15,8 +15,9 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import CosimulationError
-from urmpipe_pipeline.comparison.comparison import Comparison, Verdict
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.results import SCHEMA, Run
@@ -284,7 +285,7 @@ def extremes(values: FloatArray, t: FloatArray) -> dict[str, float | None]:
     """Return the first and the last value, the least and the largest, and when these first stand.
 
     Args:
-        values: Shape (n,); what is not finite is no value.
+        values: In any unit, shape (n,); what is not finite is no value.
         t: Times in [s], shape (n,).
 
     Returns:

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, fields, replace
+from numbers import Real
 from typing import Any
 
-from urmpipe_models.errors import OptionError
-from urmpipe_models.orientation import RotationForm
+from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.orientation import FORMS, RotationForm
 
 COLUMNS = "columns by name or number, such as ['q1', 'q2'] or [2, 3]"
 UNITS = "a mapping, such as {'q1': 'deg'}, or {'': 'deg'} for all joints that turn"
@@ -57,25 +58,86 @@ class ReadOptions:
     repair: bool = False
 
     def __post_init__(self) -> None:
-        """Take numbers of columns as text; refuse what is no list of names or no mapping.
+        """Take lists as tuples and numbers of columns as text; refuse what is of a wrong kind.
 
         Raises:
             OptionError: With everything that is of a wrong kind.
         """
-        wrong = []
-        for name in ("joints", "names", "position", "orientation"):
-            value = getattr(self, name)
-            if isinstance(value, str) or not isinstance(value, Iterable):
-                wrong.append(f"{name}: found {value!r}, allowed: {COLUMNS}")
-            else:
-                object.__setattr__(self, name, tuple(map(str, value)))
-        for name, allowed in (("units", UNITS), ("interval", INTERVALS)):
-            if not isinstance(getattr(self, name), Mapping):
-                wrong.append(f"{name}: found {getattr(self, name)!r}, allowed: {allowed}")
+        wrong = [
+            f"{one.name}: found {shown(value)}, allowed: {allowed}"
+            for one in fields(self)
+            for value, (fits, allowed) in [(getattr(self, one.name), _KINDS[one.name])]
+            if not ((value is None and one.default is None) or fits(value))
+        ]
         if wrong:
             raise OptionError(*wrong)
+        for name in ("joints", "names", "position", "orientation"):
+            object.__setattr__(self, name, tuple(map(str, getattr(self, name))))
+        for name in ("signs", "offsets"):
+            object.__setattr__(self, name, tuple(getattr(self, name)))
         object.__setattr__(self, "time", None if self.time is None else str(self.time))
         object.__setattr__(self, "units", {str(column): unit for column, unit in self.units.items()})
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str)
+
+
+def _is_flag(value: Any) -> bool:
+    return isinstance(value, bool)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _is_column(value: Any) -> bool:
+    return _is_text(value) or (isinstance(value, Real) and not isinstance(value, bool))
+
+
+def _are(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    """Return what tells whether a value is a list of such; a text and a table are none."""
+
+    def fit(value: Any) -> bool:
+        alone = isinstance(value, (str, Mapping)) or hasattr(value, "columns")
+        return not alone and isinstance(value, Iterable) and all(map(fits, value))
+
+    return fit
+
+
+def _are_units(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(map(_is_text, value.values()))
+
+
+def _are_intervals(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(
+        _are(_is_number)(limits) and len(limits) == 2 for limits in value.values()
+    )
+
+
+_TEXT = (_is_text, "a text")
+_COLUMNS = (_are(_is_column), COLUMNS)
+_FLAG = (_is_flag, "True or False")
+
+_KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
+    "source": _TEXT,
+    "delimiter": _TEXT,
+    "decimal": _TEXT,
+    "time": (_is_column, "a column by name or number"),
+    "joints": _COLUMNS,
+    "names": (_are(_is_column), "a list of names, such as ['q1', 'q2']"),
+    "signs": (_are(_is_number), "a list of 1 or -1, such as [1, -1]"),
+    "offsets": (_are(_is_number), "a list of numbers, such as [0.0, 90.0]"),
+    "position": _COLUMNS,
+    "orientation": _COLUMNS,
+    "rotation": (lambda value: _is_text(value) and value in FORMS, ", ".join(FORMS)),
+    "units": (_are_units, UNITS),
+    "period": (_is_number, "a number, in s"),
+    "skip_bad": _FLAG,
+    "interval": (_are_intervals, INTERVALS),
+    "repair": _FLAG,
+}
+"""What each field takes, and what to say of anything else."""
 
 
 def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None) -> ReadOptions:

@@ -84,7 +84,7 @@ def test_an_input_alone_is_never_replaced(folder: Path, run: urmpipe.Run, tmp_pa
 def test_arrays_and_tables_are_told_the_way() -> None:
     frame = pd.DataFrame({"t": [0.0], "q1": [1.0]})
     way = 'arrays and tables are written first, such as table.to_csv("log.csv", index=False)'
-    tables = {"a DataFrame": frame, "a ndarray": np.array(3.0), "a dict": {"t": []}, "''": ""}
+    tables = {"a DataFrame": frame, "a ndarray": np.zeros((9, 2)), "{'t': []}": {"t": []}, "''": ""}
     for found, given in tables.items():
         with pytest.raises(urmpipe.OptionError) as error:
             urmpipe.ingest(given)  # type: ignore[arg-type]
@@ -93,7 +93,7 @@ def test_arrays_and_tables_are_told_the_way() -> None:
         with pytest.raises(urmpipe.OptionError) as error:
             urmpipe.compare("path.csv", given)  # type: ignore[arg-type]
         allowed = "a log, a path, a recording or a Run"
-        assert str(error.value) == f"operands: found {found}, allowed: {allowed}; {way}"
+        assert str(error.value) == f"logs: found {found}, allowed: {allowed}; {way}"
 
 
 @pytest.mark.parametrize(
@@ -110,9 +110,9 @@ def test_a_frame_is_numbers_a_matrix_or_a_transform(given: Any) -> None:
     ("given", "found"),
     [
         ("0,0,0.15", "found '0,0,0.15'"),
-        ([0.0, 0.0], "found a list of shape (2,)"),
+        ([0.0, 0.0], "found [0.0, 0.0] of shape (2,)"),
         (2.0 * np.eye(4), "found a matrix that is no rigid motion"),
-        ([0.0, 0.0, float("nan")], "found a list of shape (3,)"),
+        ([0.0, 0.0, float("nan")], "found [0.0, 0.0, nan] of shape (3,)"),
     ],
 )
 def test_what_is_no_frame_is_refused(given: Any, found: str) -> None:
@@ -127,7 +127,7 @@ def test_all_keywords_of_a_wrong_kind_are_told_at_once() -> None:
         urmpipe.ingest("log.csv", progress=True, **wrong)  # type: ignore[arg-type]
     assert str(error.value).splitlines() == [
         "robot: found 6, allowed: a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)",
-        "read: found {}, allowed: ReadOptions, such as urmpipe.read_map(FILE).read",
+        "read: found {}, allowed: ReadOptions, such as the `read` of a map: urmpipe.read_map(FILE).read",
         "tsp: found '5ms', allowed: a number, in s",
         "strict: found 1, allowed: True or False",
         "output: found '', allowed: a path: text or a Path, not empty",
@@ -159,7 +159,7 @@ def test_robot_and_log_are_told_together() -> None:
         urmpipe.ingest(3, "urm66")  # type: ignore[arg-type]
     assert [str(one).split(";")[0].split(",")[0] for one in error.value.findings] == [
         "unknown robot 'urm66' (did you mean urm6?)",
-        "log: found a int",
+        "log: found 3",
     ]
 
 
@@ -170,9 +170,9 @@ def test_an_unknown_backend_is_refused() -> None:
 
 def test_a_result_without_a_page_is_refused(tmp_path: Path) -> None:
     solved = urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e")
-    with pytest.raises(urmpipe.OptionError, match=r"^results: found a InverseResult, allowed: a rec"):
+    with pytest.raises(urmpipe.OptionError, match=r"^results: found an InverseResult, allowed: a rec"):
         urmpipe.report([solved], tmp_path / "report.html")  # type: ignore[list-item]
-    with pytest.raises(urmpipe.OptionError, match=r"^result: found a InverseResult, allowed: a Run"):
+    with pytest.raises(urmpipe.OptionError, match=r"^result: found an InverseResult, allowed: a Run"):
         urmpipe.write_recording(solved, tmp_path / "solved.rrd")  # type: ignore[arg-type]
 
 

@@ -18,7 +18,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform, from_offset, from_rpy
 from urmpipe_pipeline.comparison.alignment import RESOLVED, tool_with
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.provenance import Provenance

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.delta import delta as model_delta
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.comparison.comparison import AXES
 from urmpipe_pipeline.comparison.delta_verdict import delta_verdict
+from urmpipe_pipeline.comparison.deviation import AXES
 from urmpipe_pipeline.comparison.measure import KINDS
 from urmpipe_pipeline.comparison.statistics import Measured, describe, overall
 from urmpipe_pipeline.comparison.wording import meter_words

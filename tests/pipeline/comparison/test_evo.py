@@ -16,7 +16,7 @@ from scipy.spatial.transform import Rotation
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.comparison.comparison import Deviation
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.export import ExportOptions, export_result
 from urmpipe_pipeline.joint_log import JointLog, SourceFile

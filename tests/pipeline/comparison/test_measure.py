@@ -19,7 +19,8 @@ from urmpipe_models.orientation import RotationForm
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.statistics import UNCHANGING, correlation
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.operands import log_files

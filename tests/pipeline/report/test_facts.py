@@ -9,7 +9,8 @@ import pytest
 
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.robots.catalogue import load_robot, parse_offset
-from urmpipe_pipeline.comparison.comparison import Comparison, Stretch
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Stretch
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.comparison.wording import tool_option
 from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run

@@ -13,7 +13,8 @@ import pytest
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, run_colour
 from urmpipe_pipeline.report import gallery
 from urmpipe_pipeline.report.figures_deviation import deviation_figure, pose_figure, speed_figure

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import fields, replace
+from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 
 from urmpipe_models.arrays import FloatArray
@@ -255,3 +258,20 @@ def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None
         "interval: found 2.0, allowed: a mapping, such as {'q1': (-180.0, 180.0)}, or with '' for all joints"
         " that turn",
     ]
+
+
+@pytest.mark.parametrize("name", [one.name for one in fields(ReadOptions)])
+def test_each_option_of_reading_refuses_what_is_of_a_wrong_kind(name: str) -> None:
+    default = getattr(ReadOptions(), name)
+    odd_ones: list[Any] = [None, object(), 3j, {"q1": 3}, [None], pd.DataFrame({"q1": [1.0]})]
+    for odd in odd_ones:
+        if odd is default:
+            continue
+        with pytest.raises(OptionError) as caught:
+            ReadOptions(**{name: odd})
+        assert re.fullmatch(rf"{name}: found .{{1,60}}, allowed: .+", str(caught.value))
+
+
+def test_lists_of_signs_and_offsets_are_taken(read: Read) -> None:
+    log = read("t [s],a [rad],b [rad]\n0,1,2\n0.1,1,2\n", joints=[2, 3], signs=[1, -1], offsets=[0.5, 0])
+    np.testing.assert_array_equal(log.q[0], [1.5, -2.0])

@@ -18,9 +18,9 @@ class Choices:
 
     Attributes:
         q: In [rad], shape (n, k, joints); 0 where there is none.
-        lost: Infinity where there is none, 0 elsewhere, shape (n, k).
-        least: Whole turns that a joint may turn less, shape (n, k, joints).
-        most: Whole turns that a joint may turn more, shape (n, k, joints).
+        lost: Infinity where there is none, 0 elsewhere [-], shape (n, k).
+        least: Whole turns that a joint may turn less [-], shape (n, k, joints).
+        most: Whole turns that a joint may turn more [-], shape (n, k, joints).
     """
 
     q: FloatArray
@@ -54,6 +54,9 @@ class Choices:
             sample: Its index.
             last: Joint values before in [rad] or [m], shape (joints,).
             column: Taken whatever its distance, if it has a solution; None to take the nearest.
+
+        Returns:
+            The column, and joint values in [rad] or [m], shape (joints,).
         """
         turns = np.rint((last - self.q[sample]) / TURN)
         near = self.q[sample] + TURN * np.minimum(np.maximum(turns, self.least[sample]), self.most[sample])

@@ -29,7 +29,8 @@ def change(
         upper: Limits in [rad] or [m], shape (joints,).
 
     Returns:
-        The index of the sample, m if there is none, and where joints are held from it on.
+        The index of the sample, m if there is none, and where joints are held from it on in [rad] or [m],
+        shape (joints,).
     """
     free = np.isnan(held)
     beyond = np.where(free, np.maximum(lower - q, q - upper), -np.inf)

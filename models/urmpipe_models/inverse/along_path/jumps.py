@@ -62,7 +62,7 @@ class Jump:
 
 
 def jump_samples(chain: Chain, q: FloatArray, position_only: bool) -> IndexArray:
-    """Return the samples that a jump leads to, ascending.
+    """Return the samples that a jump leads to, ascending, shape (jumps,).
 
     A step of `SMALL_STEP` or more is a jump if half of it leads off the path: the tool at the mean of the
     two joint values is farther from both samples than they are from one another, in

@@ -17,6 +17,9 @@ def in_nearest_turns(chain: Chain, q: FloatArray, last: FloatArray) -> FloatArra
         chain: The arm.
         q: Joint values in [rad] or [m], within limits, shape (m, joints); NaN where there are none.
         last: Those of the sample before them, in [rad] or [m], shape (joints,).
+
+    Returns:
+        Joint values in [rad] or [m], shape (m, joints).
     """
     turned = q.copy()
     none = np.array([[""]], dtype=np.object_)

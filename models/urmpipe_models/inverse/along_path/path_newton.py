@@ -93,7 +93,7 @@ def _in_turn(null: FloatArray, before: FloatArray, towards: FloatArray) -> Float
 
 
 def recurrence(matrices: FloatArray, offsets: FloatArray) -> FloatArray:
-    """Return c_k = M_k c_{k-1} + a_k with c before the first 0, shape (w, m).
+    """Return c_k = M_k c_{k-1} + a_k with c before the first 0, in any unit, shape (w, m).
 
     The samples are cut into sections. Side by side each section becomes one map from what it begins with:
     the product of its matrices and what its offsets come to. Only from section to section one waits for the

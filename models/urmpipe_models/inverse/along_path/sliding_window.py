@@ -63,7 +63,7 @@ class SlidingWindow:
         rescue: Given the index of a sample at the front that does not converge and the joint values before
             it, returns those of this sample and of as many more as it likes, shape (m, joints); NaN where
             there are none.
-        q: Joint values found, shape (n, joints); NaN where there are none.
+        q: Joint values found in [rad] or [m], shape (n, joints); NaN where there are none.
     """
 
     chain: Chain

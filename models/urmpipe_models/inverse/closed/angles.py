@@ -10,13 +10,18 @@ from urmpipe_models.inverse.closed.trigonometric import wrapped
 
 
 def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
-    """Return the angle by which a vector must turn about an axis to point as another, in (-pi, pi] [rad].
+    """Return the angle by which a vector must turn about an axis to point as another, in (-pi, pi].
+
+    What both have along the axis does not count. It is taken off first, so that vectors that are almost along
+    the axis lose no digit.
 
     Args:
         axis: Unit vector [-], shape (3,).
         start: In any unit, shape (3, ...), or (3,) for all.
-        end: See start; what both have along the axis does not count. It is taken off first, so that vectors
-            that are almost along the axis lose no digit.
+        end: In its own unit, shape (3, ...), or (3,) for all.
+
+    Returns:
+        In [rad], shape (...).
     """
     x, y, z = (float(one) for one in axis)
     u, v = cross((x, y, z), tuple(start)), cross((x, y, z), tuple(end))
@@ -24,7 +29,12 @@ def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatAr
 
 
 def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
-    """Return the angle in [0, pi] between a vector, shape (3,), and others, shape (3, ...), in [rad]."""
+    """Return the angle in [0, pi] between vectors, in [rad], shape (...).
+
+    Args:
+        first: In any unit, shape (3,).
+        second: In any unit, shape (3, ...).
+    """
     x, y, z = cross(tuple(first.tolist()), tuple(second))
     cosine = sum(a * b for a, b in zip(first.tolist(), second, strict=True))
     return np.asarray(np.arctan2(np.sqrt(x * x + y * y + z * z), cosine))

@@ -20,7 +20,8 @@ class Track:
         axis: Its unit vector k [-], shape (3,).
         revolute: Its kind.
         directions: U [-], shape (3, 2); the second column of a prismatic joint is 0.
-        coefficients: A of the two equations A1 u1 + b1 = A3 u3 + b3, shape (2, 2).
+        coefficients: A of the two equations A1 u1 + b1 = A3 u3 + b3, in the unit of b over
+            that of u, shape (2, 2).
     """
 
     axis: FloatArray
@@ -31,14 +32,15 @@ class Track:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Seen:
-    """A wrist centre w as joint 1 sees it, one column a target; lengths in units of the arm's size.
+    """A wrist centre w as joint 1 sees it, one column a target; lengths are in units of the arm's size.
 
     Attributes:
-        start: X0, relative to o2, shape (3, n).
-        constant: b1, shape (2, n).
-        radius: Distance from axis 1; 0 if joint 1 is prismatic, shape (n,).
-        zero: What q1 is at the angle or the way 0 of u1: q1 = zero - angle, or zero + s, shape (n,).
-        height: Way along axis 1 from the point nearest to axis 2, shape (n,).
+        start: X0, relative to o2, in that unit, shape (3, n).
+        constant: b1, in that unit or its square, shape (2, n).
+        radius: Distance from axis 1 in that unit; 0 if joint 1 is prismatic, shape (n,).
+        zero: What q1 is at the angle or the way 0 of u1: q1 = zero - angle, or zero + s, in [rad] or
+            that unit, shape (n,).
+        height: Way along axis 1 from the point nearest to axis 2, in that unit, shape (n,).
     """
 
     start: FloatArray
@@ -63,12 +65,13 @@ class LoopEquations:
         axis: Of joint 2 [-], shape (3,).
         revolute: Kind of joint 2.
         across: Two unit vectors across joint 2, shape (2, 3).
-        origin: o2, a point of axis 2, shape (3,); the nearest one to axis 1 where these are not parallel.
-        base: A point of axis 1, shape (3,).
+        origin: o2, a point of axis 2, in that unit, shape (3,); the nearest one to axis 1 where these are not
+            parallel.
+        base: A point of axis 1, in that unit, shape (3,).
         first: Joint 1.
         third: Joint 3.
-        start: Y0 of joint 3, relative to o2, shape (3,).
-        constant: b3, shape (2,).
+        start: Y0 of joint 3, relative to o2, in that unit, shape (3,).
+        constant: b3, in that unit or its square, shape (2,).
         radius: Of the circle of the wrist about axis 3; 0 of a prismatic joint.
         shift: What is added to s of a prismatic joint 3 to make it q3.
 
@@ -88,9 +91,11 @@ class LoopEquations:
     shift: float
 
     def invariants(self, start: FloatArray, radius: FloatArray | float) -> FloatArray:
-        """Return b of X0, shape (3, n), and the radius of the circle about it, shape (n,): shape (2, n).
+        """Return b, in units of the arm's size or in its square, shape (2, n).
 
-        All are in units of the arm's size, squares in its square.
+        Args:
+            start: X0, in units of the arm's size, shape (3, n).
+            radius: Of the circle about it, in the same unit, shape (n,) or one for all.
         """
         if self.revolute:
             return np.stack((self.axis @ start, (start * start).sum(axis=0) + np.square(radius)))
@@ -142,7 +147,7 @@ def loop_equations(screws: Screws, wrist: FloatArray) -> LoopEquations:
 
 
 def perpendicular(axis: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Return two unit vectors [-] of a right-handed frame whose third one, of shape (3,), is given."""
+    """Return two unit vectors [-], shape (3,) each, of the right-handed frame whose third one is `axis`."""
     helper = np.eye(3)[np.argmin(np.abs(axis))]
     first = np.cross(helper, axis)
     first /= np.linalg.norm(first)
@@ -180,7 +185,9 @@ def _foot(point: FloatArray, origin: FloatArray, axis: FloatArray) -> FloatArray
 
 
 def nearest_point(origin: FloatArray, axis: FloatArray, other: FloatArray, along: FloatArray) -> FloatArray:
-    """Return the point of a line that is nearest to another line; to the other's point where parallel.
+    """Return the point of a line that is nearest to another line, in their unit, shape (3,).
+
+    Where they are parallel it is the one nearest to the other's point.
 
     Args:
         origin: A point of the line, in any unit, shape (3,).

@@ -43,7 +43,7 @@ class OuterJoints:
     Attributes:
         q1: In [rad], shape (a, 1, n); NaN where there is none.
         q5: In [rad], shape (a, b, n); NaN where there is none.
-        side: 1 where the wrist is on that side of axis 1 that k1 x z points to, -1 else, shape (a, 1, n).
+        side: 1 where the wrist is on that side of axis 1 that k1 x z points to, -1 else [-], shape (a, 1, n).
         flip: False of the first, true of the second wrist, shape (b,).
         reasons: Why there is none, shape (a, b, n).
         free: Where the wrist is on axis 1, which leaves q1 free, shape (n,).
@@ -302,12 +302,12 @@ def _everywhere(where: BoolArray, like: FloatArray) -> BoolArray:
 
 
 def texts_where(where: BoolArray, text: str, found: FloatArray, *allowed: FloatArray | float) -> TextArray:
-    """Return a text with what was found and is allowed where it holds, empty elsewhere.
+    """Return a text with what was found and is allowed where it holds, empty elsewhere, shape (..., n).
 
     Args:
         where: Where it holds, shape (..., n).
         text: With a place for each figure (see `figures`).
-        found: What was found, in [m] or [rad], of a shape that broadcasts to that of `where`.
+        found: What was found, in [m] or [rad], shape (..., n) or one that broadcasts to it.
         allowed: What is allowed, likewise.
     """
     texts = np.full(where.shape, "", dtype=np.object_)

@@ -46,12 +46,12 @@ class PositionArm:
 
     Attributes:
         screws: Of the arm, in units of its size.
-        wrist: The wrist centre at q = 0, in the same units.
+        wrist: The wrist centre at q = 0, in the same units, shape (3,).
         size: In [m].
         equations: Its loop equations.
         order: Which joint comes first.
-        single: The combination of the equations that holds this joint alone, shape (2,).
-        other: The one across it, shape (2,).
+        single: The combination of the equations that holds this joint alone [-], shape (2,).
+        other: The one across it [-], shape (2,).
         exact: Whether `single` really holds it alone, or up to `RANK`.
 
     Source: [Pieper1968]_.
@@ -109,8 +109,8 @@ class PositionArm:
 
         Args:
             position: In [m], shape (3, n).
-            near: q1 to q3, shape (3, n), for a joint that the pose leaves free; 0 (and pi of q1 of the left
-                arm) without it.
+            near: q1 to q3 in [rad] or [m], shape (3, n), for a joint that the pose leaves free; 0 (and pi
+                of q1 of the left arm) without it.
         """
         target = position / self.size
         seen = self.equations.seen(target)

@@ -47,12 +47,12 @@ def leave_out_equal(
     """Make NaN of every posture that an earlier one equals, and tell that they meet.
 
     Args:
-        q: Joints 1 to 3, shape (3, k, n); written.
+        q: Joints 1 to 3 in [rad] or [m], shape (3, k, n); written.
         turning: Which of them are revolute, shape (3,).
         size: Of the arm in [m].
         branches: What the postures are called.
         reasons: Shape (k, n); written.
-        meeting: Written.
+        meeting: Where they do, by what they meet in, shape (k, n); written.
     """
     meet = np.zeros(q.shape[1:], dtype=bool)
     for first, second in combinations(range(q.shape[1]), 2):
@@ -73,7 +73,7 @@ def leave_out_second(
 
     Args:
         u1: In units of the arm's size, shape (2, sides, elbows, n); written.
-        u3: See u1.
+        u3: Likewise.
         reasons: Shape (sides, elbows, n); written.
         meet: Where both are one, of the shape of reasons.
         names: Of the postures, shape (sides, elbows).

@@ -38,8 +38,8 @@ class Reach:
         """Tell where joint 1 has no root of alpha . u1 = needed: the wrist centre is too near to axis 1.
 
         Args:
-            reasons: Written where `missed`.
-            missed: Of the shape of reasons, (..., n).
+            reasons: Shape (..., n); written where `missed`.
+            missed: Of the shape of reasons.
             seen: The wrist centres.
             alpha: Of the equations, in units of the arm's size, shape (2,).
             needed: In the same unit as alpha . u1, of the shape of reasons.
@@ -58,7 +58,7 @@ class Reach:
         """Tell where joint 3 has no root: the wrist centre is too near or too far.
 
         Args:
-            reasons: Written where `missed`.
+            reasons: Shape (..., n); written where `missed`.
             missed: Of the shape of reasons.
             share: The combination of the equations that joint 3 is solved from [-], shape (2,).
             value: What it must give, less its constant, in units of the arm's size, of the shape of reasons.
@@ -72,8 +72,8 @@ class Reach:
         """Tell where a wrist centre is that no further posture reaches, by its cylinder coordinates.
 
         Args:
-            reasons: Written where `missed`.
-            missed: Of the shape of reasons, (..., n).
+            reasons: Shape (..., n); written where `missed`.
+            missed: Of the shape of reasons.
             seen: The wrist centres.
         """
         radius = np.broadcast_to(seen.radius, missed.shape)[missed] * self.size

@@ -198,11 +198,11 @@ def spherical_wrist(screws: Screws, names: tuple[str, ...]) -> SphericalWrist | 
 
 
 def meeting_point(axes: FloatArray, points: FloatArray) -> FloatArray:
-    """Return the point nearest to lines: the least squares of its distances from them, shape (3,).
+    """Return the point nearest to lines, in their unit, shape (3,): the least squares of its distances.
 
     Args:
         axes: Unit vectors [-], shape (k, 3).
-        points: Of the lines, in any unit, shape (k, 3); what is returned is in the same unit.
+        points: Of the lines, in any unit, shape (k, 3).
     """
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     return np.asarray(np.linalg.solve(across.sum(axis=0), np.einsum("kij,kj->i", across, points)))

@@ -41,11 +41,12 @@ def linear_roots(a: FloatArray, b: FloatArray, c: FloatArray) -> tuple[FloatArra
 
     Args:
         a: Any real numbers, of the same shape as b and c, in the same unit.
-        b: See a.
-        c: See a.
+        b: Likewise.
+        c: Likewise.
 
     Returns:
-        Angles in (-pi, pi], in [rad]; NaN where |c| > r, or where a = b = 0 and every x or none is a root.
+        Angles in (-pi, pi], in [rad], of the same shape; NaN where |c| > r, or where a = b = 0 and every x
+        or none is a root.
     """
     r = np.hypot(a, b)
     none = ~(np.abs(c) <= r * (1.0 + BOUNDARY)) | (r == 0.0)
@@ -63,7 +64,7 @@ def quadric_roots(coefficients: Sequence[FloatArray] | FloatArray) -> FloatArray
     the extremum between both.
 
     Args:
-        coefficients: A, B, C, D, E, F, each of shape (n,).
+        coefficients: A, B, C, D, E, F, each of shape (n,), in one unit, whichever.
 
     Returns:
         Angles in (-pi, pi], in [rad], ascending, shape (4, n); NaN where there is none, as last ones, and

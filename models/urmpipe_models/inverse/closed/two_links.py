@@ -43,7 +43,7 @@ def two_links(
     Args:
         arm: The arm.
         place: Where p4 shall be in the plane in [m], two arrays of the same shape (..., n).
-        side: 1 or -1 [-]: the sign of the first elbow's bend, of a shape that broadcasts to that of place.
+        side: 1 or -1 [-]: the sign of the first elbow's bend, shape (..., n) or one that broadcasts to it.
         near: What q2 takes where it is free, in [rad], likewise.
     """
     upper, fore = link_lengths(arm)

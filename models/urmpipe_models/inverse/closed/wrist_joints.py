@@ -79,7 +79,7 @@ class Wrist:
         R5 k6 to Q k6, and q6 what is left.
 
         Args:
-            tool_axis: Q k6, shape (3, m).
+            tool_axis: Q k6 [-], shape (3, m).
             across: Q p of the unit vector p of `across_tool`, shape (3, m).
             chosen: q4 where it is free, of the wrist that is not flipped, in [rad], shape (m,).
         """

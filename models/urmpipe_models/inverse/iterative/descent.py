@@ -71,7 +71,7 @@ class Settings:
         return bool(np.isfinite(self.lower).any() or np.isfinite(self.upper).any())
 
     def within(self, q: FloatArray) -> FloatArray:
-        """Return joint values in [rad] or [m], shape (joints, n), clipped to their limits."""
+        """Return joint values q clipped to their limits, both in [rad] or [m], shape (joints, n)."""
         return np.clip(q, self.lower[:, None], self.upper[:, None]) if self.limited else q
 
 
@@ -81,7 +81,7 @@ class Progress:
 
     Attributes:
         q: Joint values in [rad] or [m], shape (joints, n).
-        gain: mu / |e|^2 of Levenberg-Marquardt, shape (n,).
+        gain: mu / |e|^2 of Levenberg-Marquardt, in the unit of J squared over [m2], shape (n,).
         steps: Taken so far, shape (n,).
         distance: |target - tool| in [m], shape (n,).
         angle: Between tool and target in [rad], shape (n,).
@@ -248,6 +248,9 @@ def damped_step(J: FloatArray, error: FloatArray, damping: FloatArray | float) -
         J: Metres a unit of each joint, [m/rad] or [-], shape (m, joints, n).
         error: e in [m], shape (m, n).
         damping: mu, in the unit of J squared, shape (n,) or one for all.
+
+    Returns:
+        dq in [rad] or [m], shape (joints, n).
     """
     if J.shape[0] <= J.shape[1]:
         return transposed_product(J, factor(gram(J), damping).solve(error))
@@ -260,6 +263,9 @@ def pseudoinverse_step(J: FloatArray, error: FloatArray) -> FloatArray:
     Args:
         J: Metres a unit of each joint, [m/rad] or [-], shape (m, joints, n).
         error: e in [m], shape (m, n).
+
+    Returns:
+        dq in [rad] or [m], shape (joints, n).
     """
     inverse = np.linalg.pinv(J.transpose(2, 0, 1), rcond=RANK_CUTOFF).transpose(1, 2, 0)
     return product(np.asarray(inverse, dtype=np.float64), error)

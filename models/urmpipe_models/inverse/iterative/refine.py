@@ -24,7 +24,7 @@ import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import OptionError, shown
 from urmpipe_models.inverse.iterative.descent import (
     METHODS,
     STATIONARY,
@@ -91,7 +91,7 @@ def refine(
         chain: The arm.
         targets: n of them.
         q: Where each starts, in [rad] or [m], shape (joints,) or (n, joints); clipped to the limits.
-        home: Where least motion counts from, in [rad] or [m], as q; q by default.
+        home: Where least motion counts from, in [rad] or [m], shaped as q; q by default.
         method: lm (Levenberg-Marquardt), dls (damped least squares) or pinv (pseudoinverse).
         metres: The distance from the target that counts as none in [m].
         radians: The angle from the target that counts as none in [rad].
@@ -124,7 +124,7 @@ def _starts(chain: Chain, targets: Targets, q: FloatArray, method: str) -> Float
     shape = (len(targets), len(chain.coordinates))
     faults = []
     if method not in METHODS:
-        faults.append(f"method: found {method!r}, allowed: {', '.join(METHODS)}")
+        faults.append(f"method: found {shown(method)}, allowed: {', '.join(METHODS)}")
     if np.shape(q) not in {shape, shape[1:]}:
         faults.append(f"starts: found an array of shape {np.shape(q)}, allowed: {shape[1:]} or {shape}")
     if faults:

@@ -80,12 +80,12 @@ def dot_product(a: FloatArray, b: FloatArray) -> FloatArray:
 
 
 def column_squares(M: FloatArray) -> FloatArray:
-    """Return the squared lengths of columns, shape (p, n), of matrices of shape (k, p, n) in any unit."""
+    """Return the squared lengths, shape (p, n), of the columns of M, shape (k, p, n), in any unit."""
     return _sum("kpn,kpn->pn", M, M)
 
 
 def outer_sum(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Return sum_k a_k b_k^T, shape (p, r, n), of shapes (k, p, n) and (k, r, n), in any unit."""
+    """Return sum_k a_k b_k^T, shape (p, r, n), of a, shape (k, p, n), and b, (k, r, n), in any units."""
     return _sum("kpn,krn->prn", a, b)
 
 

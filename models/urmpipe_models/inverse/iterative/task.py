@@ -52,7 +52,8 @@ class Miss:
     Attributes:
         error: e, shape (3, n) or, of poses, (6, n): target minus tool along x, y, z in [m], then the rotation
             vector that turns the tool into its target, in the world, in [rad], times l in [m].
-        jacobian: J of the tool's velocity and, times l, of its angular velocity, shape (3 or 6, joints, n).
+        jacobian: J of the tool's velocity and, times l, of its angular velocity, in [m/rad] or [-],
+            shape (3 or 6, joints, n).
         distance2: |target - tool|^2 in [m2], shape (n,).
         turn2: The square of l times the angle in [m2], shape (n,); 0 where any orientation will do.
         length: l in [m].
@@ -97,7 +98,7 @@ class Task:
         arm: The arm.
         length: l in [m]: see `turn_length`.
         position: x, y, z in [m], shape (3, n).
-        columns: The axes that the tool shall take, shape (3, 3, n), first index: which; None if any
+        columns: The axes that the tool shall take [-], shape (3, 3, n), first index: which; None if any
             orientation will do.
     """
 

@@ -38,7 +38,7 @@ class ToolMotion(NamedTuple):
     Attributes:
         position: In [m], shape (3, n).
         columns: The axes x, y, z of the tool [-], shape (3, 3, n), first index: which.
-        jacobian: As `kinematics.jacobian` has it, shape (6, joints, n).
+        jacobian: As `kinematics.jacobian` has it, in [m/rad] or [-], shape (6, joints, n).
     """
 
     position: FloatArray

@@ -10,7 +10,7 @@ from decimal import Decimal
 import numpy as np
 
 from urmpipe_models.arrays import IntArray
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
 from urmpipe_pipeline.sources.cells.text_clock import DATE, SECOND_NS, TIME_OF_DAY
@@ -150,13 +150,13 @@ def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> Clo
     cells, given = layout.cells(column.index), units.get(column.number)
     forms = known_forms(cells)
     if not forms:
-        message = f"found {cells[0]!r}, allowed: {FORMS_TOLD}"
+        message = f"found {shown(cells[0])}, allowed: {FORMS_TOLD}"
         raise LogError(Finding(message, str(layout.segment.path), layout.first_line, 1, column.header))
     wanted = given or column.unit
     asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
     if given is not None and not asked:
         keys = ", ".join(dict.fromkeys(key for form in forms for key in form.keys)) or "none"
-        raise OptionError(f"--unit: found {given.name} for the time {column.name!r}, allowed: {keys}")
+        raise OptionError(f"--unit: found {given.name} for the time {shown(column.name)}, allowed: {keys}")
     return ClockColumn(column.index, forms=asked or forms)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock_columns import steps_of, times_of
 from urmpipe_pipeline.sources.columns.columns import Column
@@ -45,13 +45,15 @@ def unit_of(time: Column, layout: Layout, source: KnownSource | None, units: Map
     given = units.get(time.number)
     if given is not None:
         if given.name not in EXPONENTS:
-            raise OptionError(f"--unit: found {given.name} for the time {time.name!r}, allowed: {_UNITS}")
+            raise OptionError(
+                f"--unit: found {given.name} for the time {shown(time.name)}, allowed: {_UNITS}"
+            )
         return given.name, "given as an option", ()
     if time.unit is not None and time.unit.name in EXPONENTS:
         return time.unit.name, "its name", ()
     if time.unit_text is not None and time.unit_text.lower() in vocabulary().long_times:
         hint = "convert the times, or --time none with --period SECONDS"
-        raise _error(f"found the unit {time.unit_text!r}, allowed: {_UNITS}; {hint}", time, layout)
+        raise _error(f"found the unit {shown(time.unit_text)}, allowed: {_UNITS}; {hint}", time, layout)
     if source is not None and "time" in source.units:
         return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()
     return _by_values(time, layout)
@@ -98,7 +100,7 @@ def _short(time: Column, layout: Layout, step: float) -> Found:
 
 
 def _assumed(time: Column, step: float) -> LogWarning:
-    return LogWarning("assumed-unit", f"the time {time.name!r} steps by {step:.6g}: taken as s")
+    return LogWarning("assumed-unit", f"the time {shown(time.name)} steps by {step:.6g}: taken as s")
 
 
 def _question(time: Column, layout: Layout, found: str, units: list[str]) -> LogError:

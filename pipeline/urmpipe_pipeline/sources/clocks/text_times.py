@@ -9,7 +9,7 @@ from itertools import product
 import numpy as np
 
 from urmpipe_models.arrays import IntArray
-from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.errors import Finding, LogError, shown
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.cells.text_clock import DAY_NS, TIME_OF_DAY, Form
@@ -141,8 +141,8 @@ def _add_nights(times: IntArray) -> int:
 
 def _said(reading: Reading, columns: Sequence[TextCells], evidence: Sequence[str]) -> tuple[Inference, ...]:
     """Return what was found out about a text clock."""
-    shown = " ".join(cells.text(0).strip() for cells in columns)
-    reasons = [f"its cells, such as {shown!r}", *evidence]
+    text = " ".join(cells.text(0).strip() for cells in columns)
+    reasons = [f"its cells, such as {shown(text)}", *evidence]
     if any(form.dated for form in reading.forms) and not reading.forms[-1].has_zone(columns[-1].text(0)):
         reasons.append("without a time zone: taken as UTC")
     said = [Inference("form of the time", reading.name, "; ".join(reasons))]
@@ -160,7 +160,7 @@ def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[R
     shared = set.intersection(*(set(form.keys) for form in choices[place]))
     keys = dict.fromkeys(key for form in choices[place] for key in form.keys if key not in shared)
     column = layout.names[parts[place].column]
-    shown = layout.cells(parts[place].column)[0]
+    cell = layout.cells(parts[place].column)[0]
     options = " or ".join(option("--unit", f"{column}={key}") for key in keys)
-    message = f"found {shown!r}, which may be {names}: say which with {options}"
+    message = f"found {shown(cell)}, which may be {names}: say which with {options}"
     return Finding(message, str(layout.segment.path), layout.first_line, 1, column)

@@ -6,7 +6,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_pipeline.sources.cells.cell import is_missing, is_text
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -119,11 +119,11 @@ def find_column(columns: Sequence[Column], text: str, option: str) -> Column:
         return found[0]
     if found:
         numbers = ", ".join(str(column.number) for column in found)
-        raise LogError(f"{option}: found {text!r} as columns {numbers}, allowed: one; give its number")
+        raise LogError(f"{option}: found {shown(text)} as columns {numbers}, allowed: one; give its number")
     for column in columns:
         if text == str(column.number):
             return column
-    raise LogError(f"{option}: found no column {text!r}, allowed: {listed(columns)}")
+    raise LogError(f"{option}: found no column {shown(text)}, allowed: {listed(columns)}")
 
 
 def called(columns: Sequence[Column], text: str) -> list[Column]:
@@ -145,7 +145,7 @@ def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Un
         quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
         if unit is None or unit.quantity not in quantities:
             allowed = [name for quantity in quantities for name in vocabulary().spelled(quantity)]
-            raise OptionError(f"--unit: found {unit_text!r}, allowed: {', '.join(allowed)}")
+            raise OptionError(f"--unit: found {shown(unit_text)}, allowed: {', '.join(allowed)}")
         given[find_column(columns, text, "--unit").number if text else 0] = unit
     return given
 

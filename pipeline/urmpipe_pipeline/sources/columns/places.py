@@ -8,7 +8,7 @@ from dataclasses import replace
 from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.errors import Finding, LogError, shown
 from urmpipe_models.orientation import width
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
@@ -55,8 +55,8 @@ def without_header(
         return _by_place(joints, columns, robot, GIVEN, pose)
     for column in () if path else columns:  # of a path they are wrong rows
         if column.text:
-            shown = layout.cells(column.index)[0]
-            message = f"found {shown!r} in a table without a header, allowed: numbers; {OPTION}"
+            cell = layout.cells(column.index)[0]
+            message = f"found {shown(cell)} in a table without a header, allowed: numbers; {OPTION}"
             raise LogError(Finding(message, file, layout.first_line, 1, column.name))
     if path:
         return _path_by_place(columns, layout, options, pose)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from urmpipe_models.errors import OptionError, for_each
+from urmpipe_models.errors import OptionError, for_each, shown
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import coppeliasim
@@ -70,7 +70,7 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
     if not files:
         raise OptionError("found no log file, allowed: one, or several if a source writes one a plot")
     if options.source is not None and options.source not in source_names():
-        raise OptionError(f"--source: found {options.source!r}, allowed: {', '.join(source_names())}")
+        raise OptionError(f"--source: found {shown(options.source)}, allowed: {', '.join(source_names())}")
     segments = for_each(lambda path: open_text(path, any_suffix=options.source is not None), files)
     titled = [(file.stem, segment) for file, segment in zip(files, segments, strict=True)]
     forced = options.source == COPPELIASIM

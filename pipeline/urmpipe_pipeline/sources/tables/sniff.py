@@ -7,7 +7,7 @@ from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import (
     DECIMALS,
@@ -169,7 +169,7 @@ def _choices(what: str, given: str | None, allowed: Sequence[str]) -> Sequence[s
     sign = _SIGNS.get(given.lower(), given)
     if sign not in allowed:
         names = ", ".join(_NAMES[sign] for sign in allowed)
-        raise OptionError(f"{what}: found {given!r}, allowed: {names}, or the sign itself")
+        raise OptionError(f"{what}: found {shown(given)}, allowed: {names}, or the sign itself")
     return (sign,)
 
 
@@ -316,8 +316,8 @@ def _names(
 def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[int], width: int) -> None:
     """Raise if most lines below the first with numbers are no rows of the same width."""
     if 2 * widths.count(width) < len(widths):
-        shown = lines[0].text.strip()[:60]
-        message = f"found {shown!r} and lines of {min(widths)} to {max(widths)} cells, allowed: a table"
+        text = lines[0].text.strip()[:60]
+        message = f"found {text!r} and lines of {min(widths)} to {max(widths)} cells, allowed: a table"
         raise LogError(Finding(message, file=str(segment.path), line=lines[0].number))
 
 
@@ -329,9 +329,9 @@ def _no_rows(segment: Segment, body: Sequence[HeadLine]) -> Finding:
     cells = [cell for line in body for cell in split_line(line.text, ",")]
     if len(body) <= 2 and all(is_text(cell, ".") for cell in cells if cell):
         return Finding("found a header and no rows, allowed: a row a sample", file=file, line=body[0].number)
-    shown = body[0].text.strip()[:60]
+    text = body[0].text.strip()[:60]
     return Finding(
-        f"found {shown!r} and no row of numbers below it, allowed: a table with a row a sample",
+        f"found {text!r} and no row of numbers below it, allowed: a table with a row a sample",
         file=file,
         line=body[0].number,
     )

@@ -56,14 +56,14 @@ class Numbers:
 
     Attributes:
         values: Numbers in the file's own units, shape (n, columns); NaN where a sample is missing.
-        clock: Time of each row in [ns] on the file's clock, or NO_TIME, REPORTED or UNREADABLE; None without
-            a clock; without meaning while the texts of the clock are not read.
+        clock: Time of each row in [ns] on the file's clock, shape (n,), or NO_TIME, REPORTED or UNREADABLE;
+            None without a clock; without meaning while the texts of the clock are not read.
         findings: What is wrong with rows and cells, the first of them.
         wrong: How many such findings there are.
         lasting: Those of the findings that leaving out rows does not mend.
         unread: Rows that could not be read, by their index, with what is wrong with each.
         left_out: Lines among labelled rows that are none.
-        rows: Data row of the file of each row, from 1, where some were left out.
+        rows: Data row of the file of each row, from 1, shape (n,), where some were left out.
         texts: The cells of the clock's columns, if they are text.
         inferences: What the clock's rows told about it.
         warnings: What a person should know about it.

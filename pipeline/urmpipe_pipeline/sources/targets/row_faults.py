@@ -35,7 +35,8 @@ class Rows:
     """The rows of a table, in the file's own units.
 
     Attributes:
-        values: Of the columns of the plan, shape (n, columns); in a row with a fault without meaning.
+        values: Of the columns of the plan, in the file's own units, shape (n, columns); in a row with a fault
+            without meaning.
         clock: Times in [ns] on the file's clock, shape (n,); None without one. A row whose own time is
             not known stands between its neighbours.
         faults: Data row from 1, and what is wrong with it in one line.

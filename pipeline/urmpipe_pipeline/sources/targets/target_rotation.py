@@ -81,7 +81,7 @@ def rotation_units(
     Args:
         columns: The columns.
         form: Their form.
-        values: Their finite rows as the file has them, shape (n, columns).
+        values: Their finite rows in the file's own units, shape (n, columns).
         told: The unit that each tells, if it does.
     """
     if not angles(form):
@@ -110,7 +110,7 @@ def target_rotations(
         values: In [rad] or [-], shape (n, columns); a row with NaN stays NaN and is not told of.
 
     Returns:
-        Shape (n, 3, 3), NaN where there is none, and the reasons by index.
+        [-], shape (n, 3, 3), NaN where there is none, and the reasons by index.
     """
     names = f"columns {listed(columns)}"
     faults = {row: f"{names}: {said}" for row, said in _no_rotations(values, form)}

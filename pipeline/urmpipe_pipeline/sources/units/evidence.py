@@ -113,7 +113,7 @@ def turned_apart(computed: FloatArray, recorded: FloatArray, *, tool: bool) -> f
 
     Args:
         computed: Orientation of the tip as unit quaternions x, y, z, w [-], shape (n, 4).
-        recorded: The recorded ones.
+        recorded: The recorded ones, likewise.
         tool: Whether a tool may turn the recorded ones.
     """
     if not tool:

@@ -69,7 +69,7 @@ def settle_rotation(
     Args:
         columns: The columns.
         forms: The forms that their names allow.
-        values: Their values as the file has them, shape (n, columns).
+        values: Their values in the file's own units, shape (n, columns).
         told: The unit that each column tells, if it does.
         arm: The robot and the joint values in SI, shape (n, joints); None without a robot.
         given: Whether the user told the units.

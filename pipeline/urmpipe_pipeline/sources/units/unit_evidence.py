@@ -53,7 +53,7 @@ def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds |
     never doubted.
 
     Args:
-        values: Joint values, shape (n, joints).
+        values: Joint values in the file's own units, shape (n, joints).
         t_ns: Recorded times in [ns], shape (n,), or None.
         bounds: What the robot's joints can do, or None.
     """
@@ -83,7 +83,7 @@ def radians_evidence(values: FloatArray) -> str | None:
     the same six degrees.
 
     Args:
-        values: Joint values, shape (n, joints).
+        values: Joint values in the file's own units, shape (n, joints).
     """
     if peak(values) > math.tau:
         return None

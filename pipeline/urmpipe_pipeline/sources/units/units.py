@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain, JointKind
-from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.orientation import RotationForm, angles
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
@@ -69,8 +69,8 @@ class UnitFinder:
 
         Args:
             columns: The joint columns.
-            values: Their values as the file has them, shape (n, joints).
-            t_ns: Recorded times in [ns], None if the log has none.
+            values: Their values in the file's own units, shape (n, joints).
+            t_ns: Recorded times in [ns], shape (n,); None if the log has none.
             robot: The arm, or None.
 
         Raises:
@@ -111,7 +111,7 @@ class UnitFinder:
 
         Args:
             columns: The three columns.
-            values: Their values as the file has them, shape (n, 3).
+            values: Their values in the file's own units, shape (n, 3).
         """
         found = [self._told(column, "prismatic") for column in columns]
         told = [unit for unit in found if unit is not None]
@@ -210,7 +210,7 @@ class UnitFinder:
         if column.number in self.given:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
-            message = f"found the unit {column.unit_text!r}, allowed: rad, deg, m, mm, cm"
+            message = f"found the unit {shown(column.unit_text)}, allowed: rad, deg, m, mm, cm"
             hint = f"say which with {option('--unit', f'{column.name}={likely}')}"
             raise LogError(Finding(f"{message}; {hint}", self.file, column=column.header))
         return column.unit

@@ -1,0 +1,173 @@
+"""What each keyword of the public functions takes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from numbers import Integral, Real
+from pathlib import Path
+from typing import Any, NamedTuple
+
+import numpy as np
+
+
+class Kind(NamedTuple):
+    """What a keyword takes.
+
+    Attributes:
+        fits: Tells whether a value is of the kind.
+        allowed: What to say if it is not.
+    """
+
+    fits: Callable[[Any], bool]
+    allowed: str
+
+
+def kind_of(function: str, keyword: str) -> Kind | None:
+    """Return what a keyword of a function takes; None of one that is checked by what it means."""
+    return KINDS.get(f"{function}.{keyword}", KINDS.get(keyword))
+
+
+def _is_text(value: Any) -> bool:
+    return isinstance(value, str) and value != ""
+
+
+def _is_path(value: Any) -> bool:
+    """Return whether a value names a file: the empty text is the working folder, which nobody means."""
+    return isinstance(value, Path) or _is_text(value)
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, Real) and not isinstance(value, bool)
+
+
+def _is_count(value: Any) -> bool:
+    return isinstance(value, Integral) and not isinstance(value, bool) and int(value) >= 0
+
+
+def _is_limit(value: Any) -> bool:
+    return _is_number(value) or isinstance(value, Mapping)
+
+
+def _are_arguments(value: Any) -> bool:
+    return isinstance(value, Mapping) and all(_is_text(name) for name in value) and all(
+        isinstance(one, (str, Path)) or _is_number(one) for one in value.values()
+    )  # fmt: skip
+
+
+def _is_robot(value: Any) -> bool:
+    from urmpipe_models.chains.chain import Chain
+
+    return isinstance(value, Chain) or _is_path(value)
+
+
+def _is_read(value: Any) -> bool:
+    from urmpipe_pipeline.sources import ReadOptions
+
+    return isinstance(value, ReadOptions)
+
+
+def _is_run(value: Any) -> bool:
+    from urmpipe_pipeline.runs.results import Run
+
+    return isinstance(value, Run)
+
+
+def _is_baseline(value: Any) -> bool:
+    from urmpipe_pipeline.comparison.comparison import Comparison
+
+    return isinstance(value, Comparison) or _is_path(value)
+
+
+def _is_unit(value: Any) -> bool:
+    from urmpipe_fmus.unit import Unit
+
+    return isinstance(value, Unit) or _is_path(value)
+
+
+def _is_table(value: Any) -> bool:
+    from urmpipe.systems.log_tables import LogTable
+
+    return isinstance(value, LogTable) or _is_path(value)
+
+
+def _one_or_many(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    """Return what tells whether a value is of a kind, or a list of such; a table or a mapping is no list."""
+
+    def fit(value: Any) -> bool:
+        return fits(value) or (isinstance(value, (list, tuple, set)) and all(map(fits, value)))
+
+    return fit
+
+
+def _one_of(*names: str) -> Kind:
+    return Kind(lambda value: isinstance(value, str) and value in names, ", ".join(names))
+
+
+PATH = Kind(_is_path, "a path: text or a Path, not empty")
+PATHS = Kind(_one_or_many(_is_path), "a path or a list of paths: text or a Path, not empty")
+SECONDS = Kind(_is_number, "a number, in s")
+COUNT = Kind(_is_count, "a whole number, 0 or more")
+FLAG = Kind(lambda value: isinstance(value, (bool, np.bool_)), "True or False")
+KIND_OF_LIMIT = Kind(
+    _is_limit,
+    'a number in m, or a mapping of kinds to m or rad, such as {"axis": 0.0035, "angle": 0.01}',
+)
+TOLD = Kind(callable, "a function of the share that is done, 0 to 1, such as print")
+LINK = Kind(_is_text, "the name of a link of the URDF")
+ROBOT_FILE = Kind(_is_path, "a name, or a TOML or URDF file")
+
+KINDS = {
+    "align": _one_of("none", "start", "rigid", "tool"),
+    "arguments": Kind(_are_arguments, 'a mapping of names to texts or numbers, such as {"log": "log.csv"}'),
+    "audit": PATH,
+    "backend": _one_of("native", "python"),
+    "base_link": LINK,
+    "baseline": Kind(_is_baseline, "a recording, or what `compare` returned"),
+    "build_fmu.log": Kind(_is_table, "a log: CSV, or a folder of plots"),
+    "derivative": _one_of("central", "savgol"),
+    "draw": PATH,
+    "duration": SECONDS,
+    "every": FLAG,
+    "figures": PATH,
+    "formats": Kind(
+        _one_or_many(lambda one: isinstance(one, str) and one in ("svg", "png")), "svg, png or a list of both"
+    ),
+    "ik.tolerance": Kind(_is_number, "a number, in m"),
+    "inputs": PATHS,
+    "junit": PATH,
+    "map_robot": ROBOT_FILE,
+    "method": _one_of("auto", "closed", "iterative"),
+    "name_or_path": ROBOT_FILE,
+    "noise": KIND_OF_LIMIT,
+    "options": Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"joints": 6}'),
+    "output": PATH,
+    "path": PATH,
+    "platforms": Kind(_one_or_many(_is_text), "linux64, win64 or a list of both"),
+    "progress": TOLD,
+    "read": Kind(_is_read, "ReadOptions, such as the `read` of a map: urmpipe.read_map(FILE).read"),
+    "restarts": COUNT,
+    "robot": Kind(_is_robot, "a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)"),
+    "rows": _one_of("grid", "file"),
+    "run": Kind(_is_run, "a Run, such as urmpipe.ingest(LOG)"),
+    "seed": COUNT,
+    "statistics": PATH,
+    "step": SECONDS,
+    "strict": FLAG,
+    "sync": Kind(
+        lambda value: _is_number(value) or (isinstance(value, str) and value in ("start", "auto")),
+        "start, auto, or t_reference - t_log as a number, in s",
+    ),
+    "system": Kind(_is_path, "the name of a system, or a system file (TOML)"),
+    "targets": Kind(lambda value: _is_text(value) or not isinstance(value, str), "a file, or an array"),
+    "tcp": _one_of("fk", "recorded"),
+    "tip_link": LINK,
+    "to": _one_of("csv", "parquet", "mat", "tum"),
+    "told": Kind(callable, "a function of a text, such as print"),
+    "tolerance": KIND_OF_LIMIT,
+    "tsp": SECONDS,
+    "unit": Kind(_is_unit, "the name of a unit, a Python file with one, or a Unit"),
+    "within_pi": FLAG,
+    "write_map": PATH,
+    "write_map.robot": ROBOT_FILE,
+}
+"""What each keyword takes, anywhere or in one function; the others are checked by what they mean."""
