@@ -238,9 +238,9 @@ def _factors(word: str, prefixes: Collection[str] = _PREFIXES) -> list[str]:
 
 
 def _capitals(word: str, prefixes: Collection[str]) -> str:
-    """Return the prefixed symbol that was written without its capitals, such as mpa and khz; empty for none."""
+    """Return the symbol with a prefix that was written without its capitals, as mpa, khz; empty for none."""
     for prefix in (word[:1].upper(), word[:1]):
         for symbol in _SYMBOLS if prefix in prefixes else ():
-            if 1 < len(symbol) and symbol != word[1:] and symbol.lower() == word[1:].lower():
+            if len(symbol) > 1 and symbol != word[1:] and symbol.lower() == word[1:].lower():
                 return prefix + symbol
     return ""

@@ -142,7 +142,7 @@ class Vocabulary:
         return base.per_second(2 if rate["power"] else 1)
 
     def about_gon(self, text: str) -> tuple[str, str]:
-        """Return what is said of a unit that is or may be the gon, after its name and at the end; else nothing."""
+        """Return what is said behind a unit that may be the gon, and what at the end; nothing of others."""
         word = _PER_SECOND.sub("", text.strip().lower())
         if word not in self.gon.words | self.gon.or_degrees:
             return "", ""

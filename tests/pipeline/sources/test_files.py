@@ -109,10 +109,20 @@ def test_unknown_source_and_no_file(tmp_path: Path) -> None:
 
 def test_signs_that_are_none(wrong: Wrong) -> None:
     assert wrong("t,q1\n0,1\n", delimiter="x") == [
-        "delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the sign itself"
+        "--delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the sign itself"
     ]
     assert wrong("t,q1\n0,1\n", decimal=";") == [
-        "decimal sign: found ';', allowed: point, comma, or the sign itself"
+        "--decimal: found ';', allowed: point, comma, or the sign itself"
+    ]
+
+
+def test_signs_that_the_file_does_not_have(wrong: Wrong) -> None:
+    found = "log.csv:1: found 't,q1,q2' and no row of numbers below it"
+    allowed = "a table with a row a sample"
+    text = "t,q1,q2\n0,1,2\n1,1,2\n"
+    assert wrong(text, delimiter=";") == [f"{found} with --delimiter semicolon, allowed: {allowed}"]
+    assert wrong(text, delimiter="Tab", decimal="comma") == [
+        f"{found} with --delimiter tab and --decimal comma, allowed: {allowed}"
     ]
 
 

@@ -111,8 +111,8 @@ def sniff(
     """
     lines = head_lines(segment) if lines is None else lines
     told, lines = _told_delimiter(lines)
-    delimiters = _choices("delimiter", delimiter or told, DELIMITERS)
-    decimals = _choices("decimal sign", decimal, DECIMALS)
+    delimiters = _choices("--delimiter", delimiter or told, DELIMITERS)
+    decimals = _choices("--decimal", decimal, DECIMALS)
     body = [line for line in lines if not line.text.lstrip().startswith(COMMENTS)][:SAMPLED_LINES]
     style = _best_style([line.text for line in body[:SCORED_LINES]], delimiters, decimals)
     rows = [split_line(line.text, style.delimiter) for line in body]
@@ -120,7 +120,7 @@ def sniff(
     numeric = _numeric_columns(rows, width, style.decimal)
     first = next((i for i in range(len(rows)) if _is_data(rows, i, numeric, style.decimal)), None)
     if first is None:
-        raise LogError(_no_rows(segment, body))
+        raise LogError(_no_rows(segment, body, _options(delimiter, decimal)))
     _refuse_prose(segment, body[first:], [len(row) for row in rows[first:]], width)
     before = [line for line in lines if line.number < body[first].number]
     header, units = _header(before, style.delimiter, width)
@@ -321,8 +321,15 @@ def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[
         raise LogError(Finding(message, file=str(segment.path), line=lines[0].number))
 
 
-def _no_rows(segment: Segment, body: Sequence[HeadLine]) -> Finding:
-    """Say why no row of numbers was found."""
+def _options(delimiter: str | None, decimal: str | None) -> str:
+    """Return the signs that were given, as options, behind " with"; empty without any."""
+    given = {"--delimiter": delimiter, "--decimal": decimal}
+    named = {name: _NAMES[_SIGNS.get(sign.lower(), sign)] for name, sign in given.items() if sign is not None}
+    return f" with {' and '.join(f'{name} {word}' for name, word in named.items())}" if named else ""
+
+
+def _no_rows(segment: Segment, body: Sequence[HeadLine], given: str) -> Finding:
+    """Say why no row of numbers was found with the signs that were given."""
     file = str(segment.path)
     if not body:
         return Finding("found no line with content, allowed: a table with a row a sample", file=file)
@@ -331,7 +338,7 @@ def _no_rows(segment: Segment, body: Sequence[HeadLine]) -> Finding:
         return Finding("found a header and no rows, allowed: a row a sample", file=file, line=body[0].number)
     shown = body[0].text.strip()[:60]
     return Finding(
-        f"found {shown!r} and no row of numbers below it, allowed: a table with a row a sample",
+        f"found {shown!r} and no row of numbers below it{given}, allowed: a table with a row a sample",
         file=file,
         line=body[0].number,
     )

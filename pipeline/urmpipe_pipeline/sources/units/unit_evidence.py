@@ -54,7 +54,8 @@ def steps_of(turn: float, values: FloatArray) -> str:
         values: Joint values in that unit, shape (n, joints).
     """
     wraps = sum(int((np.abs(np.abs(np.diff(one)) - turn) <= WRAP_SLACK_DEG).sum()) for one in values.T)
-    return f"{wraps} step{'s' if wraps > 1 else ''} of about {turn:g} from one row to the next" if wraps else ""
+    several = "s" if wraps > 1 else ""
+    return f"{wraps} step{several} of about {turn:g} from one row to the next" if wraps else ""
 
 
 @np.errstate(over="ignore", invalid="ignore")
