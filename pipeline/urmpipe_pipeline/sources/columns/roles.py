@@ -12,6 +12,7 @@ from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import families, measured
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
+from urmpipe_pipeline.sources.columns.tcp_like import about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import key, vocabulary
@@ -350,4 +351,5 @@ def _with_rest(roles: Roles, said: list[Inference], numeric: Sequence[Column]) -
     rest = [column for column in numeric if column not in roles.columns]
     if rest:
         said.append(Inference("columns not used", listed(rest, most=8), "no role is known for them"))
-    return replace(roles, inferences=tuple(said))
+    noticed = [] if roles.position else about_tcp(rest)
+    return replace(roles, inferences=tuple(said), warnings=(*roles.warnings, *noticed))
