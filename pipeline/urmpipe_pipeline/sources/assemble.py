@@ -109,6 +109,7 @@ def assemble(
             *_about_digits(digits),
         ),
         warnings=(
+            *_not_used(plan, options, (*clock.inferences, *measured.inferences)),
             *content.warnings,
             *clock.warnings,
             *noticed,
@@ -118,6 +119,23 @@ def assemble(
             *gaps(t_ns),
         ),
     )
+
+
+def _not_used(plan: Plan, options: ReadOptions, units: Sequence[Inference]) -> Iterator[LogWarning]:
+    """Yield the options that say what the log does not have.
+
+    Args:
+        plan: What was read.
+        options: What the user says.
+        units: Why its units are what they are: a source tells them where names do not.
+    """
+    told = any(one.evidence.startswith(f"{options.source} writes") for one in units)
+    if plan.tables.foreign and not told:
+        said = f"--source {options.source} changes nothing: the log has none of its columns or graphs"
+        yield LogWarning("source-not-used", said)
+    if options.rotation and not plan.roles.rotation:
+        said = f"--rotation {options.rotation} changes nothing, since no orientation was found in the log"
+        yield LogWarning("rotation-not-used", said)
 
 
 def _measured(

@@ -59,6 +59,10 @@ class KnownSource:
         """Return whether a file with these column names comes from this source."""
         return bool(self.columns) and all(any(p.search(n) for n in names) for p in self.columns)
 
+    def is_foreign(self, names: Sequence[str]) -> bool:
+        """Return whether this source would have given a file other column names than these."""
+        return bool(self.columns) and not self.wrote(names)
+
 
 @dataclass(frozen=True, slots=True)
 class Container:

@@ -107,6 +107,33 @@ def test_unknown_source_and_no_file(tmp_path: Path) -> None:
         read_log([])
 
 
+@pytest.mark.parametrize(
+    ("options", "kind", "said"),
+    [
+        ({"source": "coppeliasim"}, "source-not-used", "--source coppeliasim changes nothing: {none}"),
+        ({"source": "abb"}, "source-not-used", "--source abb changes nothing: {none}"),
+        (
+            {"rotation": "zyx"},
+            "rotation-not-used",
+            "--rotation zyx changes nothing, since no orientation was found in the log",
+        ),
+    ],
+)
+def test_an_option_that_changes_nothing_is_said(
+    read: Read, options: dict[str, str], kind: str, said: str
+) -> None:
+    log = read("t [s],q1 [rad]\n0,1\n0.1,2\n", **options)
+    none = "the log has none of its columns or graphs"
+    assert [(one.kind, one.message) for one in log.warnings] == [(kind, said.format(none=none))]
+
+
+@pytest.mark.parametrize("source", ["table", "matlab", "ur-rtde", "abb"])
+def test_a_source_that_tells_a_unit_or_nothing_else_is_not_doubted(read: Read, source: str) -> None:
+    log = read("t,q1\n0,1\n0.1,2\n", source=source)
+    assert [one.kind for one in log.warnings if one.kind != "assumed-unit"] == []
+    assert log.source == source
+
+
 def test_signs_that_are_none(wrong: Wrong) -> None:
     assert wrong("t,q1\n0,1\n", delimiter="x") == [
         "--delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the sign itself"
