@@ -33,8 +33,8 @@ from urmpipe_pipeline.sources.columns.tcp_like import TCP_NOT_READ
 Tcp = Literal["fk", "recorded"]
 
 RECORDED_APART = 1e-3
-"""Distance in [m] between kinematics and recorded tool centre point that is told where neither is judged: the
-kinematics of a data sheet, without the calibration of the arm, come as near."""
+"""Distance in [m] between kinematics and recorded tool centre point that is told where neither is judged: a
+third of the default tolerance."""
 
 ONE_CLOCK = "its joints and its recorded tool centre point stand in the same rows"
 
