@@ -58,6 +58,8 @@ def test_every_command_has_help_with_examples_and_every_option_says_what_it_does
     for parameter in command.params:
         if isinstance(parameter, click.Option):
             assert parameter.help, f"{parameter.name} has no help"
+    narrow = CliRunner().invoke(cli, [*words, "--help"], terminal_width=80).output
+    assert [line for line in narrow.splitlines() if len(line) > 80] == []
 
 
 def test_version(urmpipe: RunCommand) -> None:
