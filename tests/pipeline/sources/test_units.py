@@ -157,6 +157,15 @@ def test_a_unit_that_is_not_known(wrong: Wrong, read: Read) -> None:
     assert read(text, units={"J1": "deg"}).q[0, 0] == 30 * DEG
 
 
+def test_a_line_of_units_that_are_not_known(read: Read, wrong: Wrong) -> None:
+    text = "t,J1,J2\n[s],[counts],[counts]\n0,30,1\n0.1,31,1\n"
+    said = "found the unit 'counts', allowed: rad, deg, m, mm, cm; say which with --unit J1=deg"
+    assert wrong(text) == [f"log.csv, column J1: {said}"]
+    assert read(text, units={"": "deg"}).units == {"t": "s", "J1": "deg", "J2": "deg"}
+    named = read("of today\n[t],[q],[p]\n0,30,1\n0.1,31,1\n", joints=("2", "3"), units={"": "deg"})
+    assert named.joints == ("[q]", "[p]")
+
+
 def test_radians_are_assumed_and_said(read: Read) -> None:
     log = read(csv_of(np.linspace(-3, 3, 50)[:, np.newaxis]))
     assert log.units["q1"] == "rad"
