@@ -115,10 +115,14 @@ def assemble(
             *noticed,
             *roles.warnings,
             *measured.warnings,
-            *missing_samples(measured.named),
-            *gaps(t_ns),
+            *_lacking(t_ns, measured),
         ),
     )
+
+
+def _lacking(t_ns: IntArray, measured: _Measured) -> list[LogWarning]:
+    """Return what is missing in rows, and between them at times t_ns in [ns], shape (n,)."""
+    return [*missing_samples(measured.named), *gaps(t_ns)]
 
 
 def _not_used(plan: Plan, options: ReadOptions, units: Sequence[Inference]) -> Iterator[LogWarning]:

@@ -234,8 +234,8 @@ def _units(data: Mapping[Quantity, Mapping[str, Any]]) -> Iterator[tuple[str, Un
 
 
 def _gon_words(data: Mapping[str, Any]) -> GonWords:
-    sets = (frozenset(data[name]) for name in ("words", "or_degrees", "degrees"))
-    return GonWords(*sets, re.compile(data["beside"]))
+    words, or_degrees, degrees = (frozenset(data[name]) for name in ("words", "or_degrees", "degrees"))
+    return GonWords(words, or_degrees, degrees, re.compile(data["beside"]))
 
 
 def _source(entry: Mapping[str, Any], units: Mapping[str, Unit]) -> KnownSource:

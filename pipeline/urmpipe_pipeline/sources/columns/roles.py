@@ -330,8 +330,8 @@ def _path(
     if found:
         spare = [column for column in numeric if column not in found]
         hint = _cure(len(missing), spare, len(robot.coordinates) if robot else None)
-        said = f"found joint columns {listed(found)} and none for {', '.join(missing)}, allowed: {need}"
-        raise LogError(Finding(f"{said}; {hint}", file=file))
+        lacking = f"found joint columns {listed(found)} and none for {', '.join(missing)}, allowed: {need}"
+        raise LogError(Finding(f"{lacking}; {hint}", file=file))
     message = f"found no joint columns in {listed(columns)}, allowed: {need}; {OPTION}"
     raise LogError(Finding(message, file=file))
 
