@@ -41,6 +41,16 @@ def _shown(value: Any) -> str:
 class Group(click.Group):
     """A group of commands that knows what a wrong name may have meant."""
 
+    def invoke(self, ctx: click.Context) -> Any:
+        """Run the command that is named; click tells of an option without its value by no command."""
+        try:
+            return super().invoke(ctx)
+        except click.BadOptionUsage as error:
+            command = self.get_command(ctx, ctx.invoked_subcommand or "")
+            if error.ctx is None and command is not None:
+                error.ctx = click.Context(command, ctx, command.name)
+            raise
+
     def resolve_command(
         self, ctx: click.Context, args: list[str]
     ) -> tuple[str | None, click.Command | None, list[str]]:
@@ -80,7 +90,7 @@ def usage_finding(error: click.UsageError) -> Finding:
             said = f"{error.option_name}: no such option{did_you_mean(error.option_name, options)}"
         case click.BadOptionUsage(option_name=name):
             lacks = "requires" in error.message  # click tells the two apart by its words alone
-            found, allowed = ("no value", "VALUE") if lacks else ("a value", "alone")
+            found, allowed = ("no value", _value(ctx, name)) if lacks else ("a value", "alone")
             said = f"{name}: found {found}, allowed: {name} {allowed}"
         case click.MissingParameter(param=click.Parameter() as param):
             said = f"found no {_told(param)}, allowed: {_usage(ctx)}"
@@ -109,6 +119,14 @@ def _long(param: click.Parameter) -> str:
 def _told(param: click.Parameter) -> str:
     """Return the name of a parameter as a person writes it."""
     return f"--{_long(param)}" if isinstance(param, click.Option) else str(param.human_readable_name)
+
+
+def _value(ctx: click.Context | None, name: str) -> str:
+    """Return what the help calls the value of an option."""
+    params = ctx.command.params if ctx else []
+    option = next((one for one in params if name in one.opts), None)
+    told = option.make_metavar(ctx) if ctx and option else "VALUE"
+    return told[1:-1] if told[0] == "[" and told[-1] == "]" else told  # of a choice
 
 
 def _usage(ctx: click.Context | None) -> str:

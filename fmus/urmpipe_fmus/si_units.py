@@ -219,7 +219,7 @@ def _meant(spelling: str) -> str:
 def _factors(word: str, prefixes: Collection[str] = _PREFIXES) -> list[str]:
     """Return the symbols that letters are written of, as few as can be; none if there is no such way.
 
-    Only the first may have a prefix: Nms is N.m.s, not N.ms.
+    Only the first may have a prefix: Nms is N.m.s, not N.ms; and mpa is MPa, not m.Pa.
     """
     known = {*_PLAIN, *_SYMBOLS}
     if word in known or (word[:1] in prefixes and word[1:] in _SYMBOLS):
@@ -228,8 +228,19 @@ def _factors(word: str, prefixes: Collection[str] = _PREFIXES) -> list[str]:
         return []  # mdeg is no metre times a degree
     if named := [one for one in known if len(one) > 1 and one.lower() == word.lower()]:
         return named[:1]
+    if in_capitals := _capitals(word, prefixes):
+        return [in_capitals]
     for k in range(len(word) - 1, 0, -1):
         first = _factors(word[:k], prefixes)
         if len(first) == 1 and (rest := _factors(word[k:], ())):
             return [*first, *rest]
     return []
+
+
+def _capitals(word: str, prefixes: Collection[str]) -> str:
+    """Return the symbol with a prefix that was written without its capitals, as mpa, khz; empty for none."""
+    for prefix in (word[:1].upper(), word[:1]):
+        for symbol in _SYMBOLS if prefix in prefixes else ():
+            if len(symbol) > 1 and symbol != word[1:] and symbol.lower() == word[1:].lower():
+                return prefix + symbol
+    return ""

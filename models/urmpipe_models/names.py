@@ -18,8 +18,14 @@ def did_you_mean(name: str, allowed: Iterable[str]) -> str:
 
     Small and capital letters count as the same, hyphens, underscores and spaces for nothing.
     """
+    near = nearest(name, allowed)
+    return f" (did you mean {near}?)" if near else ""
+
+
+def nearest(name: str, allowed: Iterable[str]) -> str | None:
+    """Return the allowed name most like another; None if none is."""
     near = _nearest_first(name, allowed, LEAST_LIKE)
-    return f" (did you mean {near[0]}?)" if near else ""
+    return near[0] if near else None
 
 
 def not_among(name: str, allowed: Iterable[str]) -> str:

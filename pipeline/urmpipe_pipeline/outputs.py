@@ -54,6 +54,9 @@ SUFFIXES: dict[OutputKind, tuple[str, ...]] = {
 }
 """How a file of a kind is called; exports and figures say it by their formats."""
 
+OPENED: tuple[OutputKind, ...] = ("recording", "report")
+"""What viewer and browser open by its suffix; of the other kinds a name without one will do."""
+
 OTHERS = {".parquet", ".mat", ".tum", ".txt", ".xlsx", ".json", ".png", ".pdf", ".jpg", ".webp"}
 """Suffixes of what urmpipe writes as exports and figures, or not at all."""
 
@@ -182,7 +185,7 @@ def _trouble(path: Path, inputs: Sequence[Path], kind: OutputKind) -> str | None
     if _is_of_another_kind(path, kind):
         tables = kind == "recording" and path.suffix.lower() in TABLES
         hint = "; urmpipe export writes tables" if tables else ""
-        return f"found a name that is none of a {noun}, allowed: {path.stem}{SUFFIXES[kind][0]}{hint}"
+        return f"found a name that is none of a {noun}, allowed: {_own_name(path, kind)}{hint}"
     if not path.parent.is_dir():
         return f"found no folder {path.parent}, allowed: a folder that exists"
     return _taken(path, kind, noun) if path.exists() else None
@@ -199,9 +202,18 @@ def _taken(path: Path, kind: OutputKind, noun: str) -> str | None:
 
 
 def _is_of_another_kind(path: Path, kind: OutputKind) -> bool:
-    """Tell whether a name ends as those of other files do: what opens it would go by that."""
+    """Tell whether a name ends as those of other files do, or not as one must that is opened by it."""
+    suffix = path.suffix.lower()
+    if kind in OPENED and (path.is_file() or not path.exists()):
+        return suffix not in SUFFIXES[kind]
     known = OTHERS.union(*SUFFIXES.values())
-    return kind in SUFFIXES and path.suffix.lower() in known.difference(SUFFIXES[kind])
+    return kind in SUFFIXES and suffix in known.difference(SUFFIXES[kind])
+
+
+def _own_name(path: Path, kind: OutputKind) -> str:
+    """Return a name with the suffix of its kind, by which it is opened: run.rrd of run.csv or run."""
+    known = path.suffix.lower() in OTHERS.union(*SUFFIXES.values())
+    return f"{path.stem if known else path.name}{SUFFIXES[kind][0]}"
 
 
 def _is_text(path: Path) -> bool:

@@ -58,6 +58,8 @@ def test_every_command_has_help_with_examples_and_every_option_says_what_it_does
     for parameter in command.params:
         if isinstance(parameter, click.Option):
             assert parameter.help, f"{parameter.name} has no help"
+    narrow = CliRunner().invoke(cli, [*words, "--help"], terminal_width=80).output
+    assert [line for line in narrow.splitlines() if len(line) > 80] == []
 
 
 def test_version(urmpipe: RunCommand) -> None:
@@ -81,7 +83,15 @@ FRAMES = "allowed: X,Y,Z or X,Y,Z,RX,RY,RZ in m and rad, such as 0,0,0.15 or 0,0
         ("robot lst", "found 'lst' (did you mean list?), allowed: export, list, show"),
         ("ingest", "found no LOG..., allowed: urmpipe ingest [OPTIONS] LOG..."),
         ("ingest x --robt a", "--robt: no such option (did you mean --robot?); see urmpipe ingest --help"),
-        ("ingest x --tsp", "--tsp: found no value, allowed: --tsp VALUE"),
+        ("ingest x --tsp", "--tsp: found no value, allowed: --tsp SECONDS"),
+        (
+            "ingest x --delimiter",  # as from a shell that ended the line at ;
+            "--delimiter: found no value, allowed: --delimiter comma|semicolon|tab|spaces|bar",
+        ),
+        ("ingest x --joints", "--joints: found no value, allowed: --joints A,B,C"),
+        ("ingest x --unit", "--unit: found no value, allowed: --unit [COLUMN=]UNIT"),
+        ("ingest x --decimal", "--decimal: found no value, allowed: --decimal point|comma|.|,"),
+        ("ingest x -o", "-o: found no value, allowed: -o RUN.rrd"),
         ("ingest x --json=1", "--json: found a value, allowed: --json alone"),
         ("ik x --restarts -1", "--restarts: found '-1', allowed: a whole number, 0 or more"),
         ("ingest x --tsp never", f"--tsp: found 'never', {DURATIONS}"),

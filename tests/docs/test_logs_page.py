@@ -74,7 +74,8 @@ def texts(kind: ast.expr) -> Iterator[str]:
             raise AssertionError(f"line {kind.lineno}: the kind of a warning stands where it is made")
 
 
-MADE = {kind for path in sorted((ROOT / "pipeline").rglob("*.py")) for kind in kinds(path)}
+MAKERS = [path for area in ("pipeline", "cli", "fmus") for path in sorted((ROOT / area).rglob("*.py"))]
+MADE = {kind for path in MAKERS for kind in kinds(path)}
 
 
 def test_each_kind_of_warning_has_its_row() -> None:

@@ -106,6 +106,7 @@ def test_what_is_no_spelling_is_refused_with_what_is_allowed(spelling: str) -> N
         *[("Nm", "N.m"), ("N*m", "N.m"), ("N·m", "N.m"), ("kNm", "kN.m"), ("Nms/rad", "N.m.s/rad")],
         *[("m^2", "m2"), ("m**2", "m2"), ("m²", "m2"), ("kg*m^2", "kg.m2"), ("kgm2", "kg.m2")],
         *[("ohm", "Ohm"), ("Ω", "Ohm"), ("°", "deg"), ("deg / s", "deg/s"), ("rpm", "rev/min"), (" m", "m")],
+        *[("mpa", "MPa"), ("kpa", "kPa"), ("khz", "kHz"), ("mpa*s", "MPa.s"), ("Nrad", "N.rad")],
         *[("°C", "degC"), (" degC", "degC"), ("\u00b5m", "um"), ("\u03bcm", "um")],  # micro sign, Greek mu
     ],
 )

@@ -91,8 +91,21 @@ def test_a_form_of_orientation_holds_for_the_log_that_has_one(load: Load) -> Non
     ]
     pose = [("x", TURN), ("y", TURN), ("z", TURN)]
     turned = table(("t [s]", TIMES), *pose, ("rx", TURN), ("ry", TURN), ("rz", TURN))
-    runs = load(table(("t [s]", TIMES), *pose, *quaternion), turned, rotation="vector")
-    assert [run.log.rotation_form for run in runs] == ["quat_xyzw", "vector"]
+    runs = load(table(("t [s]", TIMES), *pose, *quaternion), turned, LOG, rotation="vector")
+    assert [run.log.rotation_form for run in runs] == ["quat_xyzw", "vector", None]
+    assert "rotation-not-used" not in {warning.kind for run in runs for warning in run.warnings}
+    none = load(PATH, LOG, rotation="vector")
+    assert [("rotation-not-used" in {one.kind for one in run.warnings}) for run in none] == [True, True]
+
+
+def test_a_source_holds_for_the_log_that_it_wrote(load: Load) -> None:
+    plots = [(f"Angular Displacement{k}", np.degrees(TURN)) for k in (1, 2)]
+    path, log = load(PATH, table(("Time (s)", TIMES), *plots), source="solidworks")
+    assert path.log.units == {"t": "s", "x": "m", "y": "m", "z": "m"}  # not mm, as SolidWorks writes
+    assert (path.log.source, log.log.source) == ("path", "solidworks")
+    assert log.log.units["Angular Displacement1"] == "deg"
+    foreign = load(PATH, table(("t [s]", TIMES), ("q1", TURN), ("q2", TURN)), source="solidworks")
+    assert [run.log.units.get("x", run.log.units.get("q1")) for run in foreign] == ["mm", "deg"]
 
 
 def test_a_period_for_a_log_without_times_is_no_doubt_about_the_others(load: Load) -> None:
@@ -139,7 +152,8 @@ def test_that_there_is_no_time_holds_for_the_log_without_one(load: Load) -> None
 def test_how_a_table_is_written_is_an_error_if_none_is(load: Load, tmp_path: Path) -> None:
     with pytest.raises(UrmpipeError) as caught:
         load(PATH, LOG, delimiter="semicolon")
-    allowed = "and no row of numbers below it, allowed: a table with a row a sample"
+    given = "with --delimiter semicolon"
+    allowed = f"and no row of numbers below it {given}, allowed: a table with a row a sample"
     assert str(caught.value).replace(f"{tmp_path}/", "").split("\n") == [
         f"log0.csv:1: found 't [s],x,y,z' {allowed}",
         f"log1.csv:1: found 't [s],a [rad],b [rad]' {allowed}",

@@ -86,7 +86,7 @@ def test_a_file_that_is_no_report_of_ours_is_not_replaced(tmp_path: Path, text: 
 
 
 def test_an_output_of_the_other_kind_is_not_replaced(tmp_path: Path) -> None:
-    path = tmp_path / "report"
+    path = tmp_path / "report.rrd"
     path.write_text(REPORT)
     wanted = (
         "found a file that is no recording of urmpipe's, allowed: a new name, or such a recording to replace"
@@ -123,7 +123,14 @@ def test_a_recording_has_a_name_that_rerun_can_open(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("name", "kind", "meant"),
-    [("run.csv", "recording", "run.rrd"), ("a.html", "recording", "a.rrd"), ("a.PNG", "drawing", "a.svg")],
+    [
+        *[
+            ("run.csv", "recording", "run.rrd"),
+            ("a.html", "recording", "a.rrd"),
+            ("a.PNG", "drawing", "a.svg"),
+        ],
+        *[("run", "recording", "run.rrd"), ("v1.2", "recording", "v1.2.rrd"), ("run", "report", "run.html")],
+    ],
 )
 def test_a_name_that_ends_as_those_of_another_kind_is_refused(
     tmp_path: Path, name: str, kind: OutputKind, meant: str
@@ -134,9 +141,12 @@ def test_a_name_that_ends_as_those_of_another_kind_is_refused(
     assert list(tmp_path.iterdir()) == []
 
 
-@pytest.mark.parametrize("name", ["run", "run.2026", "run.RRD"])
-def test_a_name_that_no_other_kind_has_is_taken(tmp_path: Path, name: str) -> None:
-    write(tmp_path / name, kind="recording")
+@pytest.mark.parametrize(
+    ("name", "kind"),
+    [("run.RRD", "recording"), ("run.htm", "report"), ("verdict", "junit"), ("log.2", "audit")],
+)
+def test_a_name_that_no_other_kind_has_is_taken(tmp_path: Path, name: str, kind: OutputKind) -> None:
+    write(tmp_path / name, kind=kind)
     assert [path.name for path in tmp_path.iterdir()] == [name]
 
 

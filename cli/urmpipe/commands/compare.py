@@ -140,9 +140,9 @@ def compare(
     \b
     Examples:
       urmpipe compare path.csv log.csv --robot urm6
-      urmpipe compare path.csv coppelia.csv matlab.csv solidworks/ --robot urm6 --json
-      urmpipe compare robot_data.csv --robot ur5e --tolerance axis=2mm,norm=3mm,angle=0.5deg
-      urmpipe compare path.csv log.csv --robot urm6 --junit verdict.xml --csv verdict.csv
+      urmpipe compare path.csv coppelia.csv matlab.csv plots/ --robot urm6 --json
+      urmpipe compare log.csv --robot ur5e --tolerance axis=2mm,angle=0.5deg
+      urmpipe compare path.csv log.csv --robot urm6 --junit v.xml --csv v.csv
       urmpipe compare today.rrd --baseline released.rrd --noise 5um
 
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.

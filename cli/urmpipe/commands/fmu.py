@@ -119,7 +119,7 @@ def build(
     \b
     Examples:
       urmpipe fmu build kinematic_chain --robot urm6
-      urmpipe fmu build kinematic_chain --robot arm.urdf -s rates=true -s points=p6,p7
+      urmpipe fmu build kinematic_chain --robot arm.urdf -s points=p6,p7
       urmpipe fmu build repolarizer -s joints=6 --platforms linux64,win64
       urmpipe fmu build log_source --log log.csv -o log.fmu
       urmpipe fmu build my_unit.py

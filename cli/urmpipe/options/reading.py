@@ -171,8 +171,12 @@ PLACING = (
 TABLE = (
     MAP_OPTION,
     click.option("--rotation", type=OneOf(FORMS), help="Form of the recorded orientation, if it is open."),
-    click.option("--delimiter", metavar="CHAR", help="What parts the columns: , ; tab space."),
-    click.option("--decimal", type=OneOf([".", ","]), help="The decimal sign."),
+    click.option(
+        "--delimiter",
+        metavar="comma|semicolon|tab|spaces|bar",
+        help="What parts the columns, or the sign itself in quotes.",
+    ),
+    click.option("--decimal", type=OneOf(["point", "comma", ".", ","]), help="The decimal sign."),
     click.option("--time", metavar="COLUMN", help="The time column."),
     click.option(
         "--unit",

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from urmpipe_models.errors import Finding, UrmpipeError
+from urmpipe_models.files.missing import meant_by
 
 
 def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
@@ -29,7 +30,8 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
     except UnicodeDecodeError as fault:
         raise error(Finding(f"byte {fault.start} is no UTF-8; allowed: TOML in UTF-8", str(path))) from fault
     except OSError as fault:
-        raise error(Finding(f"cannot be read: {fault.strerror}", str(path))) from fault
+        meant = meant_by(path, (".toml",)) if isinstance(fault, FileNotFoundError) else ""
+        raise error(Finding(f"cannot be read: {fault.strerror}{meant}", str(path))) from fault
     except tomllib.TOMLDecodeError as fault:
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(fault))
         line = int(place[1]) if place else None

@@ -8,6 +8,7 @@ from pathlib import Path
 from xml.parsers import expat
 
 from urmpipe_models.errors import Finding, RobotError
+from urmpipe_models.files.missing import meant_by
 
 
 @dataclass(slots=True)
@@ -55,7 +56,8 @@ def read_xml(path: Path) -> Node:
     try:
         content = path.read_bytes()
     except OSError as error:
-        raise RobotError(Finding(f"cannot be read: {error.strerror}", str(path))) from error
+        meant = meant_by(path, (".urdf",)) if isinstance(error, FileNotFoundError) else ""
+        raise RobotError(Finding(f"cannot be read: {error.strerror}{meant}", str(path))) from error
     parser = expat.ParserCreate()
     document = Node("", {}, 0)
     ancestors = [document]

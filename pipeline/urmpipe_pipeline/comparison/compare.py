@@ -28,12 +28,13 @@ from urmpipe_pipeline.repolarization.audit import audit_log
 from urmpipe_pipeline.runs.meshes import missing_visuals
 from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.sources.columns.tcp_like import TCP_NOT_READ
 
 Tcp = Literal["fk", "recorded"]
 
 RECORDED_APART = 1e-3
-"""Distance in [m] between kinematics and recorded tool centre point that is told where neither is judged: the
-kinematics of a data sheet, without the calibration of the arm, come as near."""
+"""Distance in [m] between kinematics and recorded tool centre point that is told where neither is judged: a
+third of the default tolerance."""
 
 ONE_CLOCK = "its joints and its recorded tool centre point stand in the same rows"
 
@@ -157,9 +158,9 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     if run.robot is None:
         raise LogError(lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
     if log.tcp_position is None:
-        raise LogError(
-            lacking(run, "one log, which recorded no tool centre point; allowed: a reference before the log")
-        )
+        said = "one log, which recorded no tool centre point; allowed: a reference before the log"
+        alike = next((f"; {one.message}" for one in log.warnings if one.kind == TCP_NOT_READ), "")
+        raise LogError(lacking(run, f"{said}{alike}"))
     recorded = Trajectory(
         f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files, quat_xyzw=log.tcp_quat_xyzw
     )

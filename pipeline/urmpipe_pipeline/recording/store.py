@@ -11,6 +11,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, RecordingError
+from urmpipe_models.files.missing import meant_by
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, is_recording, open_reader, our_entries
 
 if TYPE_CHECKING:
@@ -99,7 +100,8 @@ class Store:
     def _open(self) -> LazyStore:
         """Return the store of the recording that urmpipe wrote."""
         if not self.path.is_file():
-            raise self.error("found no such file, allowed: a recording (.rrd) that urmpipe wrote")
+            meant = meant_by(self.path, (".rrd",))
+            raise self.error(f"found no such file{meant}, allowed: a recording (.rrd) that urmpipe wrote")
         if not is_recording(self.path):
             raise self.error("found no Rerun recording, allowed: a recording (.rrd) that urmpipe wrote")
         try:

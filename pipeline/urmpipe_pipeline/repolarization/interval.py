@@ -138,6 +138,7 @@ def said_intervals(
     """
     groups: dict[tuple[str, bool], list[int]] = {}
     warnings = []
+    broken: dict[tuple[str, float], list[str]] = {}
     ends: dict[int, Interval] = {}
     least = most = np.empty(0)
     if len(fixed.rows):
@@ -148,7 +149,7 @@ def said_intervals(
         if interval is not None:
             groups.setdefault((_shown(interval, column), True), []).append(j)
             if periods[j] != _turns(periods[j]) * FULL_TURN:
-                warnings.append(_no_turns(column, interval, float(periods[j])))
+                broken.setdefault((_shown(interval, column), float(periods[j])), []).append(column.name)
         elif (fixed.joints == j).any():
             if np.isnan(least[j]):  # slower, but deaf to NaN
                 least[j], most[j] = np.nanmin(log.q[:, j]), np.nanmax(log.q[:, j])
@@ -169,7 +170,7 @@ def said_intervals(
         )
         for (value, is_given), joints in groups.items()
     ]
-    return said, warnings
+    return said, [*(_no_turns(names, *one) for one, names in broken.items()), *warnings]
 
 
 def _column(log: JointLog, joint: int) -> LogColumn:
@@ -189,8 +190,8 @@ def _whole_turns(width: float) -> float:
     return whole if whole and abs(width - whole) <= ROUNDED * whole else width
 
 
-def _no_turns(column: LogColumn, interval: Interval, period: float) -> LogWarning:
-    said = f"{column.name}: the interval {_shown(interval, column)} is {period / FULL_TURN:.6g} turns wide"
+def _no_turns(names: Sequence[str], interval: str, period: float) -> LogWarning:
+    said = f"{', '.join(names)}: the interval {interval} is {period / FULL_TURN:.6g} turns wide"
     return LogWarning("interval", f"{said}: angles wrap by whole turns; check the unit and --interval")
 
 

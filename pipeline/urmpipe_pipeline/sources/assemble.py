@@ -109,15 +109,37 @@ def assemble(
             *_about_digits(digits),
         ),
         warnings=(
+            *_not_used(plan, options, (*clock.inferences, *measured.inferences)),
             *content.warnings,
             *clock.warnings,
             *noticed,
             *roles.warnings,
             *measured.warnings,
-            *missing_samples(measured.named),
-            *gaps(t_ns),
+            *_lacking(t_ns, measured),
         ),
     )
+
+
+def _lacking(t_ns: IntArray, measured: _Measured) -> list[LogWarning]:
+    """Return what is missing in rows, and between them at times t_ns in [ns], shape (n,)."""
+    return [*missing_samples(measured.named), *gaps(t_ns)]
+
+
+def _not_used(plan: Plan, options: ReadOptions, units: Sequence[Inference]) -> Iterator[LogWarning]:
+    """Yield the options that say what the log does not have.
+
+    Args:
+        plan: What was read.
+        options: What the user says.
+        units: Why its units are what they are: a source tells them where names do not.
+    """
+    told = any(one.evidence.startswith(f"{options.source} writes") for one in units)
+    if plan.tables.foreign and not told:
+        said = f"--source {options.source} changes nothing: the log has none of its columns or graphs"
+        yield LogWarning("source-not-used", said)
+    if options.rotation and not plan.roles.rotation:
+        said = f"--rotation {options.rotation} changes nothing, since no orientation was found in the log"
+        yield LogWarning("rotation-not-used", said)
 
 
 def _measured(

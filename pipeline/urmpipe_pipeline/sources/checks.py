@@ -36,7 +36,7 @@ MANY_REPEATS = 0.1
 """More repeats than these few, and than this share of the rows, are one finding: the clock is too coarse."""
 
 SHOWN_GAPS = 10
-"""Gaps that are told one by one; the others are counted."""
+"""Gaps that are told with their rows; the others are counted."""
 
 
 def trimmed(numbers: Numbers) -> Numbers:
@@ -274,7 +274,7 @@ def _unusual(values: FloatArray) -> list[int]:
 
 
 def gaps(t_ns: IntArray) -> list[LogWarning]:
-    """Return a warning for each place where more than `GAP` median periods pass between two rows.
+    """Return a warning with each place where more than `GAP` median periods pass between two rows.
 
     Args:
         t_ns: Times in [ns], shape (n,).
@@ -284,16 +284,18 @@ def gaps(t_ns: IntArray) -> list[LogWarning]:
         return []
     period = float(np.median(steps))
     places = np.flatnonzero(steps > GAP * period).tolist()
-    warnings = [
-        LogWarning(
-            "gap",
-            f"{steps[k] / 1e9:.6g} s pass before this row, the median period is {period / 1e9:.6g} s",
-            k + 2,
-        )
-        for k in places[:SHOWN_GAPS]
-    ]
+    if not places:
+        return []
+    found = [f"{_passed(steps, k)} before row {k + 2}" for k in places[1:SHOWN_GAPS]]
     if len(places) > SHOWN_GAPS:
         longest = max(places, key=lambda k: steps[k])
-        more = f"{len(places) - SHOWN_GAPS} more gaps; the longest of all is {steps[longest] / 1e9:.6g} s"
-        warnings.append(LogWarning("gap", f"{more}, before this row", longest + 2))
-    return warnings
+        more = f"{len(places) - SHOWN_GAPS} more"
+        found.append(f"{more}, the longest of all of {_passed(steps, longest)} before row {longest + 2}")
+    said = ", ".join([f"{_passed(steps, places[0])} pass before this row", *found])
+    counted = f"{len(places)} gaps: " if found else ""
+    return [LogWarning("gap", f"{counted}{said}; the median period is {period / 1e9:.6g} s", places[0] + 2)]
+
+
+def _passed(steps: IntArray, k: int) -> str:
+    """Return a step in [s] as text."""
+    return f"{steps[k] / 1e9:.6g} s"

@@ -81,6 +81,7 @@ class _Fitted:
         plan: What is read of it; None if that cannot be told.
         has_names: Whether it has a header.
         names_time: Whether its names tell a time, where an option says that there is none.
+        foreign: Whether a source was given that has columns of its own, and they are not those.
     """
 
     file: Path
@@ -90,6 +91,7 @@ class _Fitted:
     plan: Plan | None = None
     has_names: bool = True
     names_time: bool = False
+    foreign: bool = False
 
     @property
     def joints(self) -> tuple[Column, ...]:
@@ -212,6 +214,7 @@ def _fitted(
         plan=_plan(tables, options, robot),
         has_names=any(layout.header is not None for layout in tables.layouts),
         names_time=_names_time(tables, options),
+        foreign=tables.foreign,
     )
 
 
@@ -254,8 +257,9 @@ def _of_joints(log: _Fitted, logs: Sequence[_Fitted], options: ReadOptions) -> d
 def _for_all(log: _Fitted, logs: Sequence[_Fitted], options: ReadOptions) -> dict[str, Any]:
     """Return what holds for one log in view of the others.
 
-    That is the time that its names tell, if another log has none; and how a table is written, if that fits
-    none, so that reading it tells why.
+    That is the time that its names tell, if another log has none; no source and no form of an orientation
+    that it does not have, if another log has it; and how a table is written, if that fits none, so that
+    reading it tells why.
     """
     told = {name: getattr(options, name) for name in WRITTEN}
     lost = {
@@ -264,7 +268,12 @@ def _for_all(log: _Fitted, logs: Sequence[_Fitted], options: ReadOptions) -> dic
         if all(getattr(other.options, name) != value for other in logs)
     }
     timed = log.names_time and not all(other.names_time for other in logs)
-    return {**lost, **({"time": None} if timed else {})}
+    turned = any(other.plan and other.plan.roles.rotation for other in logs)
+    written = any(other.options.source and not other.foreign for other in logs)
+    no_time = {"time": None} if timed else {}
+    no_form = {"rotation": None} if turned and log.plan and not log.plan.roles.rotation else {}
+    no_source = {"source": None} if written and log.foreign else {}
+    return {**lost, **no_time, **no_form, **no_source}
 
 
 def _nowhere(named: _Named, logs: Sequence[_Fitted]) -> Finding:

@@ -59,6 +59,10 @@ class KnownSource:
         """Return whether a file with these column names comes from this source."""
         return bool(self.columns) and all(any(p.search(n) for n in names) for p in self.columns)
 
+    def is_foreign(self, names: Sequence[str]) -> bool:
+        """Return whether this source would have given a file other column names than these."""
+        return bool(self.columns) and not self.wrote(names)
+
 
 @dataclass(frozen=True, slots=True)
 class Container:
@@ -76,6 +80,34 @@ class RotationWords:
 
     patterns: Patterns
     forms: tuple[RotationForm, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class GonWords:
+    """Words for the gon, 0.9 deg, and what tells them from the German word for degrees.
+
+    Attributes:
+        words: What means nothing else.
+        or_degrees: What may mean degrees, too, in lower case.
+        degrees: How degrees are written alone.
+        beside: What stands in the name of a German column.
+    """
+
+    words: frozenset[str]
+    or_degrees: frozenset[str]
+    degrees: frozenset[str]
+    beside: re.Pattern[str]
+
+    def doubted(self, unit: str, name: str) -> bool:
+        """Return whether a unit that was taken as degrees may be the gon.
+
+        Args:
+            unit: The unit as the file has it.
+            name: The name of its column for comparison.
+        """
+        word = _PER_SECOND.sub("", unit.strip())
+        german = word in self.degrees or self.beside.search(name)
+        return word.lower() in self.or_degrees and not german
 
 
 @dataclass(frozen=True, slots=True)
@@ -102,6 +134,7 @@ class Vocabulary:
     missing: frozenset[str]
     sources: tuple[KnownSource, ...]
     containers: tuple[Container, ...]
+    gon: GonWords
 
     def unit(self, text: str) -> Unit | None:
         """Return the unit that a text means, such as deg, "°", mm or rad/s^2; None if it means none."""
@@ -111,6 +144,14 @@ class Vocabulary:
         if base is None or rate is None:
             return base
         return base.per_second(2 if rate["power"] else 1)
+
+    def about_gon(self, text: str) -> tuple[str, str]:
+        """Return what is said behind a unit that may be the gon, and what at the end; nothing of others."""
+        word = _PER_SECOND.sub("", text.strip().lower())
+        if word not in self.gon.words | self.gon.or_degrees:
+            return "", ""
+        either = ", which is deg in German and gon elsewhere" if word in self.gon.or_degrees else ""
+        return either, "; 1 gon is 0.9 deg: multiply values in gon by 0.9"
 
     def spelled(self, quantity: Quantity) -> list[str]:
         """Return the names of the units of a quantity."""
@@ -155,6 +196,7 @@ def vocabulary() -> Vocabulary:
         missing=frozenset(data["missing"]["words"]),
         sources=tuple(_source(entry, units) for entry in data["source"]),
         containers=tuple(_container(entry) for entry in data["container"]),
+        gon=_gon_words(data["gon"]),
     )
 
 
@@ -170,8 +212,8 @@ def split_unit(name: str) -> tuple[str, str | None]:
     match = _BRACKETS.match(name)
     if match and not match["inside"].strip().isdigit():
         return match["label"].strip(), match["inside"].strip()
-    word = re.split(r"[\s_./]+", name.strip())[-1].lower()
-    known = word in vocabulary().units and word != name.strip().lower()
+    word = re.split(r"[\s_./]+", name.strip())[-1]
+    known = word.lower() in vocabulary().units and word != name.strip()
     return name.strip(), word if known else None
 
 
@@ -189,6 +231,11 @@ def _units(data: Mapping[Quantity, Mapping[str, Any]]) -> Iterator[tuple[str, Un
         for name, entry in of_quantity.items():
             for word in entry["words"]:
                 yield word, Unit(name, quantity, entry["factor"])
+
+
+def _gon_words(data: Mapping[str, Any]) -> GonWords:
+    words, or_degrees, degrees = (frozenset(data[name]) for name in ("words", "or_degrees", "degrees"))
+    return GonWords(words, or_degrees, degrees, re.compile(data["beside"]))
 
 
 def _source(entry: Mapping[str, Any], units: Mapping[str, Unit]) -> KnownSource:

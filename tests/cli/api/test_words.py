@@ -80,6 +80,8 @@ def test_each_spelling_is_an_option_and_a_keyword() -> None:
 @pytest.mark.parametrize(
     ("told", "wanted"),
     [
+        ("none with --delimiter tab and --decimal comma",
+         'none with read=ReadOptions(delimiter="tab", decimal="comma")'),
         ("--unit says otherwise", "read=ReadOptions(units=...) says otherwise"),
         ("say which with --unit my col=deg or --unit my col=rad",
          'say which with read=ReadOptions(units={"my col": "deg"}) or'

@@ -200,6 +200,11 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     assert str(error.value) == (
         "log.csv: one log, which recorded no tool centre point; allowed: a reference before the log"
     )
+    doubt = LogWarning("tcp-not-read", "tcp_xx, tcp_yy look like a recorded TCP")
+    with pytest.raises(
+        LogError, match=r"a reference before the log; tcp_xx, tcp_yy look like a recorded TCP$"
+    ):
+        compare_recorded(replace(run := arm_run(q), log=replace(run.log, warnings=(doubt,))))
     with pytest.raises(LogError) as error:
         compare_runs(wanted, [arm_run(q)], CompareOptions(sync=99.0))
     assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"

@@ -291,3 +291,10 @@ def test_an_interval_that_is_no_whole_turns_is_told() -> None:
             " and --interval",
         )
     ]
+    both = log_of(np.column_stack([wrap(moving())] * 3))
+    said = "turns wide: angles wrap by whole turns; check the unit and --interval"
+    told = audit_log(both, interval={"": (-180.0, 180.0), "q2": (-90.0, 90.0)}).warnings
+    assert [warning.message for warning in told] == [
+        f"q1, q3: the interval -180..180 rad is 57.2958 {said}",
+        f"q2: the interval -90..90 rad is 28.6479 {said}",
+    ]

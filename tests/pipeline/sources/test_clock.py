@@ -148,19 +148,27 @@ def test_gaps(read: Read) -> None:
     times = np.cumsum([0, *[0.01] * 10, 0.031, *[0.01] * 5, 5.0, *[0.01] * 3])
     log = read(clocked("t", *(f"{time:.3f}" for time in times)))
     assert [(w.kind, w.row, w.message) for w in log.warnings if w.kind == "gap"] == [
-        ("gap", 12, "0.031 s pass before this row, the median period is 0.01 s"),
-        ("gap", 18, "5 s pass before this row, the median period is 0.01 s"),
+        (
+            "gap",
+            12,
+            "2 gaps: 0.031 s pass before this row, 5 s before row 18; the median period is 0.01 s",
+        ),
     ]
+    one = next(w for w in read(clocked("t", "0", "0.1", "0.2", "0.9", "1.0")).warnings if w.kind == "gap")
+    assert (one.row, one.message) == (4, "0.7 s pass before this row; the median period is 0.1 s")
 
 
 def test_many_gaps_are_counted(read: Read) -> None:
     times = np.cumsum(np.where(np.arange(200) % 4 == 3, 0.05, 0.01))
     times[150:] += 1.0
     log = read(clocked("t", *(f"{time:.3f}" for time in times)))
-    gaps = [warning for warning in log.warnings if warning.kind == "gap"]
-    assert len(gaps) == 11
-    assert gaps[-1].message == "41 more gaps; the longest of all is 1.01 s, before this row"
-    assert gaps[-1].row == 151
+    (gaps,) = (warning for warning in log.warnings if warning.kind == "gap")
+    told = ", ".join(f"0.05 s before row {row}" for row in range(8, 41, 4))
+    assert gaps.message == (
+        f"51 gaps: 0.05 s pass before this row, {told}, 41 more, the longest of all of 1.01 s before row 151;"
+        " the median period is 0.01 s"
+    )
+    assert gaps.row == 4
 
 
 def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:

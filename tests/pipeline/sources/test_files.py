@@ -107,12 +107,49 @@ def test_unknown_source_and_no_file(tmp_path: Path) -> None:
         read_log([])
 
 
+@pytest.mark.parametrize(
+    ("options", "kind", "said"),
+    [
+        ({"source": "coppeliasim"}, "source-not-used", "--source coppeliasim changes nothing: {none}"),
+        ({"source": "abb"}, "source-not-used", "--source abb changes nothing: {none}"),
+        (
+            {"rotation": "zyx"},
+            "rotation-not-used",
+            "--rotation zyx changes nothing, since no orientation was found in the log",
+        ),
+    ],
+)
+def test_an_option_that_changes_nothing_is_said(
+    read: Read, options: dict[str, str], kind: str, said: str
+) -> None:
+    log = read("t [s],q1 [rad]\n0,1\n0.1,2\n", **options)
+    none = "the log has none of its columns or graphs"
+    assert [(one.kind, one.message) for one in log.warnings] == [(kind, said.format(none=none))]
+
+
+@pytest.mark.parametrize("source", ["table", "matlab", "ur-rtde", "abb"])
+def test_a_source_that_tells_a_unit_or_nothing_else_is_not_doubted(read: Read, source: str) -> None:
+    log = read("t,q1\n0,1\n0.1,2\n", source=source)
+    assert [one.kind for one in log.warnings if one.kind != "assumed-unit"] == []
+    assert log.source == source
+
+
 def test_signs_that_are_none(wrong: Wrong) -> None:
     assert wrong("t,q1\n0,1\n", delimiter="x") == [
-        "delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the sign itself"
+        "--delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the sign itself"
     ]
     assert wrong("t,q1\n0,1\n", decimal=";") == [
-        "decimal sign: found ';', allowed: point, comma, or the sign itself"
+        "--decimal: found ';', allowed: point, comma, or the sign itself"
+    ]
+
+
+def test_signs_that_the_file_does_not_have(wrong: Wrong) -> None:
+    found = "log.csv:1: found 't,q1,q2' and no row of numbers below it"
+    allowed = "a table with a row a sample"
+    text = "t,q1,q2\n0,1,2\n1,1,2\n"
+    assert wrong(text, delimiter=";") == [f"{found} with --delimiter semicolon, allowed: {allowed}"]
+    assert wrong(text, delimiter="Tab", decimal="comma") == [
+        f"{found} with --delimiter tab and --decimal comma, allowed: {allowed}"
     ]
 
 

@@ -276,3 +276,50 @@ def test_an_orientation_without_a_whole_sample_is_not_used(read: Read) -> None:
     gappy[::2, 0], gappy[1::2, 1] = np.nan, np.nan
     log = read(text([*JOINTS_RAD, *XYZ, "qx", "qy", "qz", "qw"], Q, POSITION * 1e3, gappy))
     assert (log.rotation_form, log.tcp_rotation) == (None, None)
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("tcp_xx", "tcp_yy", "tcp_zz"),
+        ("tpc_x", "tpc_y", "tpc_z"),
+        ("TCP1", "TCP2", "TCP3"),
+        ("tool x1", "tool y1", "tool z1"),
+        ("tcp_x [mm]", "tcp_y [mm]", "tcp_y2 [mm]"),
+    ],
+)
+def test_what_looks_like_a_recorded_tcp_and_is_none_is_said(read: Read, names: tuple[str, ...]) -> None:
+    log = read(f"t,q1 [rad],{','.join(names)}\n0,0.1,1,2,3\n0.1,0.2,1,2,3\n")
+    assert log.tcp_position is None
+    quoted = ", ".join(f'"{name}"' for name in names)
+    assert [(one.kind, one.message) for one in log.warnings] == [
+        (
+            "tcp-not-read",
+            f"{', '.join(names)} look like a recorded TCP and are not read as one; name its columns tcp_x,"
+            f" tcp_y, tcp_z, or say which in a map (--map): [tcp] position = [{quoted}]",
+        )
+    ]
+
+
+def test_two_recorded_tcps_are_said(read: Read) -> None:
+    names = ["tcp_x", "tcp_y", "tcp_z", "tool_x", "tool_y", "tool_z"]
+    log = read(f"t,q1 [rad],{','.join(names)}\n0,0.1,1,2,3,4,5,6\n0.1,0.2,1,2,3,4,5,6\n")
+    assert [one.message for one in log.warnings] == [
+        f"{', '.join(names)} look like a recorded TCP and are not read as one; name its columns tcp_x, tcp_y,"
+        ' tcp_z, or say which in a map (--map): [tcp] position = ["A", "B", "C"]'
+    ]
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ("actual_TCP_force_0", "actual_TCP_force_1", "actual_TCP_force_2"),
+        ("TCP_speed_x", "TCP_speed_y", "TCP_speed_z"),
+        ("tool_analog_input0", "tool_analog_input1", "tool_output_current_2"),
+        ("fx", "tx", "ty"),
+        ("tcp_x [deg]", "tcp_y [deg]", "tcp_a"),
+        ("tcp_x", "load", "power"),
+    ],
+)
+def test_what_a_tool_has_besides_its_place_is_no_tcp(read: Read, names: tuple[str, ...]) -> None:
+    assert not read(f"t,q1 [rad],{','.join(names)}\n0,0.1,1,2,3\n0.1,0.2,1,2,3\n").warnings

@@ -167,7 +167,8 @@ def test_without_a_word_for_joints_the_user_must_say(wrong: Wrong, arm: Arm) -> 
 def test_too_few_and_too_many_for_the_robot(wrong: Wrong, arm: Arm) -> None:
     text = table(["t", "q1", "q2", "q3"])
     assert wrong(text, arm(6)) == [
-        f"log.csv: found 3 joint columns (q1, q2, q3), allowed: 6, as robot arm has; {RECORD}"
+        "log.csv: found 3 joint columns (q1, q2, q3) and none with number 4, 5, 6, allowed: 6, as robot arm"
+        f" has; {RECORD}"
     ]
     assert wrong(text, arm(2)) == [
         f"log.csv: found 3 joint columns (q1, q2, q3), allowed: 2, as robot arm has; {OPTION}"
@@ -187,7 +188,30 @@ def test_a_missing_number_is_named(wrong: Wrong, arm: Arm) -> None:
     ]
     assert wrong(table(["t", "J1", "J2", "J4"]), arm(4)) == [
         "log.csv: found joint columns J1, J2, J4 and none with number 3, allowed: the 4 joints of the robot;"
+        " record the missing one, or give another --robot"
+    ]
+    assert wrong(table(["t", "J1", "J2", "Jthree", "J4"]), arm(4)) == [
+        "log.csv: found joint columns J1, J2, J4 and none with number 3, allowed: the 4 joints of the robot;"
         f" record the missing one, or {OPTION}"
+    ]
+
+
+def test_a_missing_name_is_named(wrong: Wrong, arm: Arm) -> None:
+    names = ["shoulder_pan", "shoulder_lift", "wrist_1", "wrist_2", "wrist_3"]
+    found = f"log.csv: found joint columns {', '.join(names)} and none for elbow, allowed:"
+    assert wrong(table(["t", *names]), arm(6)) == [
+        f"{found} 6 for robot arm; record the missing one, or give another --robot"
+    ]
+    assert wrong(table(["t", *names, "forearm", "other"]), arm(6)) == [
+        f"{found} 6 for robot arm; record the missing one, or {OPTION}"
+    ]
+    assert wrong(table(["t", *names])) == [
+        f"{found} such as q1, q2, ... or J1, J2, ...; record the missing one, or {OPTION}"
+    ]
+    own = ["base_yaw", "lower_arm", "upper_arm", "hand"]
+    assert wrong(table(["t", *own[:3]]), arm(4, names=tuple(own))) == [
+        "log.csv: found joint columns base_yaw, lower_arm, upper_arm and none for hand, allowed: 4 for robot"
+        " arm; record the missing one, or give another --robot"
     ]
 
 

@@ -61,7 +61,7 @@ def test_rostopic_echo(arm: Arm) -> None:
     assert log.q[-1].tolist() == [0.576058272031] * 6
     assert log.qd is not None
     assert not log.qd.any()
-    assert kinds(log.warnings) == ["gap", "gap"]
+    assert kinds(log.warnings) == ["gap"]
 
 
 def test_plotjuggler_with_empty_cells() -> None:
@@ -102,7 +102,8 @@ def test_epoch_in_seconds(arm: Arm) -> None:
     assert log.q[0].tolist() == [0.7116998434066772, 0.006745942402631044]
     assert kinds(log.warnings) == ["assumed-unit"]
     with pytest.raises(
-        LogError, match=r"found 2 joint columns \(joint1, joint2\), allowed: 6, as robot arm has; record"
+        LogError,
+        match=r"found 2 joint columns \(joint1, joint2\) and none with number 3, 4, 5, 6, ",
     ):
         read_log([path], robot=arm(6))
 

@@ -68,6 +68,12 @@ def test_encodings(tmp_path: Path, encoding: str) -> None:
     assert log.units == {"t": "s", "q1": "deg", "q2": "deg"}
 
 
+def test_words_with_spaces_between_tabs(read: Read) -> None:
+    log = read("t\tq1\tq2\tnote\n0.0\t0.1\t0.2\tall is well\n0.1\t0.2\t0.3\tstill so\n")
+    assert log.joints == ("q1", "q2")
+    assert log.q.tolist() == [[0.1, 0.2], [0.2, 0.3]]
+
+
 def test_pandas_row_index_is_no_joint(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     frame().to_csv(path)

@@ -12,11 +12,13 @@ from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import families, measured
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
+from urmpipe_pipeline.sources.columns.tcp_like import about_tcp
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import key, vocabulary
 
 OPTION = "name them in the robot's order with --joints A,B,C"
+RECORD = "record the missing one"
 
 
 @dataclass(frozen=True, slots=True)
@@ -241,10 +243,18 @@ def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints |
         missing = ", ".join(map(str, gaps))
         said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
         allowed = "numbers without a gap" if count is None else f"the {count} joints of the robot"
-        raise LogError(Finding(f"{said}, allowed: {allowed}; record the missing one, or {OPTION}", file=file))
+        spare = [c for c in still if c not in family.columns.values() and not c.words & words.other]
+        raise LogError(Finding(f"{said}, allowed: {allowed}; {_cure(len(gaps), spare, count)}", file=file))
     return _Joints(
         family.ordered(), "their names, in the order of their numbers", tuple(sorted(family.columns))
     )
+
+
+def _cure(missing: int, spare: Sequence[Column], count: int | None) -> str:
+    """Return what helps where joints are missing: --joints only where columns are left for a robot's."""
+    if count is not None and len(spare) < missing:
+        return f"{RECORD}, or give another --robot"
+    return f"{RECORD}, or {OPTION}"
 
 
 def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> None:
@@ -258,8 +268,12 @@ def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> Non
     if robot is None or len(joints) == len(robot.coordinates):
         return
     need = f"allowed: {len(robot.coordinates)}, as robot {robot.name} has"
-    message = f"found {len(joints)} joint columns ({listed(joints)}), {need}"
     more = len(joints) > len(robot.coordinates)
+    numbers = () if all(column.header.isdigit() for column in joints) else _family_of(joints)[0]
+    first = min((1, *numbers))
+    missing = [n for n in range(first, first + len(robot.coordinates)) if n not in numbers]
+    none = f" and none with number {', '.join(map(str, missing))}" if numbers and not more else ""
+    message = f"found {len(joints)} joint columns ({listed(joints)}){none}, {need}"
     hint = OPTION if more else "record every joint, or give another --robot"
     raise LogError(Finding(f"{message}; {hint}", file=file))
 
@@ -312,12 +326,30 @@ def _path(
     need = (
         f"{len(robot.coordinates)} for robot {robot.name}" if robot else "such as q1, q2, ... or J1, J2, ..."
     )
+    found, missing = _some_named(numeric, robot)
+    if found:
+        spare = [column for column in numeric if column not in found]
+        hint = _cure(len(missing), spare, len(robot.coordinates) if robot else None)
+        lacking = f"found joint columns {listed(found)} and none for {', '.join(missing)}, allowed: {need}"
+        raise LogError(Finding(f"{lacking}; {hint}", file=file))
     message = f"found no joint columns in {listed(columns)}, allowed: {need}; {OPTION}"
     raise LogError(Finding(message, file=file))
+
+
+def _some_named(numeric: Sequence[Column], robot: Chain | None) -> tuple[tuple[Column, ...], list[str]]:
+    """Return the columns of most joints with known names, and the names that have none; nothing of fewer."""
+    for names in [*((robot.coordinates,) if robot else ()), *vocabulary().orders]:
+        own = {name: named_after(numeric, [name], "position") for name in names}
+        found = tuple(dict.fromkeys(column for columns in own.values() for column in columns))
+        missing = [name for name, columns in own.items() if not columns]
+        if len(names) / 2 < len(found) == len(names) - len(missing) < len(names):
+            return found, missing
+    return (), []
 
 
 def _with_rest(roles: Roles, said: list[Inference], numeric: Sequence[Column]) -> Roles:
     rest = [column for column in numeric if column not in roles.columns]
     if rest:
         said.append(Inference("columns not used", listed(rest, most=8), "no role is known for them"))
-    return replace(roles, inferences=tuple(said))
+    noticed = [] if roles.position else about_tcp(rest)
+    return replace(roles, inferences=tuple(said), warnings=(*roles.warnings, *noticed))

@@ -37,6 +37,7 @@ class Tables:
         titles: Title of each table: the file's stem, or the graph's path.
         paths: The file of each table.
         inferences: What was found out.
+        foreign: Whether its source was given, and has columns or graphs of its own, which are not there.
     """
 
     source: str
@@ -44,6 +45,7 @@ class Tables:
     layouts: tuple[Layout, ...]
     titles: tuple[str, ...]
     inferences: tuple[Inference, ...]
+    foreign: bool = False
 
     @property
     def paths(self) -> list[Path]:
@@ -73,10 +75,10 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
         raise OptionError(f"--source: found {shown(options.source)}, allowed: {', '.join(source_names())}")
     segments = for_each(lambda path: open_text(path, any_suffix=options.source is not None), files)
     titled = [(file.stem, segment) for file, segment in zip(files, segments, strict=True)]
-    forced = options.source == COPPELIASIM
+    forced, graphs = options.source == COPPELIASIM, []
     if len(files) == 1 and (forced or (options.source is None and coppeliasim.is_export(segments[0]))):
-        titled = coppeliasim.graphs(segments[0]) or titled
-        forced = True
+        graphs = coppeliasim.graphs(segments[0])
+        titled, forced = graphs or titled, True
     layouts = for_each(lambda item: _layout(item[1], options, sniff_plain), titled)
     if len(files) > 1:
         layouts = [across(layout) for layout in layouts]
@@ -91,6 +93,7 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
         layouts=tuple(layouts),
         titles=tuple(title for title, _ in titled),
         inferences=(encoding, said),
+        foreign=_is_foreign(options.source, bool(graphs), _names(layouts)),
     )
 
 
@@ -105,13 +108,23 @@ def _known(layouts: Sequence[Layout], options: ReadOptions) -> tuple[KnownSource
     """Return the source that the columns give away."""
     if options.source is not None:
         return vocabulary().source(options.source), Inference("source", options.source, "given as an option")
-    names = [
-        name for layout in layouts for name in (*layout.names, *(layout.form.labels if layout.form else ()))
-    ]
+    names = _names(layouts)
     for source in vocabulary().sources:
         if source.wrote(names):
             return source, Inference("source", source.name, "the names of its columns")
     return None, Inference("source", TABLE, "no source is known by these columns")
+
+
+def _is_foreign(given: str | None, graphs: bool, names: Sequence[str]) -> bool:
+    """Return whether a source was given that would have written other columns, or graphs."""
+    known = vocabulary().source(given)
+    return not graphs if given == COPPELIASIM else known is not None and known.is_foreign(names)
+
+
+def _names(layouts: Sequence[Layout]) -> list[str]:
+    """Return the names of all columns and the labels of rows."""
+    labels = (layout.form.labels if layout.form else () for layout in layouts)
+    return [name for layout, more in zip(layouts, labels, strict=True) for name in (*layout.names, *more)]
 
 
 def _coppeliasim(titled: Sequence[tuple[str, Segment]], options: ReadOptions) -> Inference:

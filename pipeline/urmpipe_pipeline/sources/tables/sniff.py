@@ -38,6 +38,9 @@ SAMPLED_LINES = 250
 _NAMES = {",": "comma", ";": "semicolon", "\t": "tab", SPACE: "spaces", "|": "bar", ".": "point"}
 _SIGNS = {name: sign for sign, name in _NAMES.items()} | {"\\t": "\t", "space": SPACE, "pipe": "|"}
 
+_BRACKETED = re.compile(r"\[[^\]\d]*\]|\([^)\d]*\)")
+"""A unit in brackets; one with a number is an index."""
+
 _TOLD = re.compile(r'"?sep=([,;|\t])"?', re.IGNORECASE)
 
 Row = list[str]
@@ -111,8 +114,8 @@ def sniff(
     """
     lines = head_lines(segment) if lines is None else lines
     told, lines = _told_delimiter(lines)
-    delimiters = _choices("delimiter", delimiter or told, DELIMITERS)
-    decimals = _choices("decimal sign", decimal, DECIMALS)
+    delimiters = _choices("--delimiter", delimiter or told, DELIMITERS)
+    decimals = _choices("--decimal", decimal, DECIMALS)
     body = [line for line in lines if not line.text.lstrip().startswith(COMMENTS)][:SAMPLED_LINES]
     style = _best_style([line.text for line in body[:SCORED_LINES]], delimiters, decimals)
     rows = [split_line(line.text, style.delimiter) for line in body]
@@ -120,7 +123,7 @@ def sniff(
     numeric = _numeric_columns(rows, width, style.decimal)
     first = next((i for i in range(len(rows)) if _is_data(rows, i, numeric, style.decimal)), None)
     if first is None:
-        raise LogError(_no_rows(segment, body))
+        raise LogError(_no_rows(segment, body, _options(delimiter, decimal)))
     _refuse_prose(segment, body[first:], [len(row) for row in rows[first:]], width)
     before = [line for line in lines if line.number < body[first].number]
     header, units = _header(before, style.delimiter, width)
@@ -184,11 +187,22 @@ def _best_style(lines: Sequence[str], delimiters: Sequence[str], decimals: Seque
         for decimal in decimals:
             width = _common_width(rows, decimal)
             style = _Style(delimiter, decimal, width, _fit(rows, width, decimal))
-            if _credit(style) > _credit(best):
+            if _credit(style) > _credit(best) and not _parts_words(lines, best, style):
                 best = style
         if best.width > 1 and best.fit == 1.0:
             break
     return best
+
+
+def _parts_words(lines: Sequence[str], best: _Style, style: _Style) -> bool:
+    """Return whether spaces, in place of tabs, only part texts: they make no more numbers."""
+    if (best.delimiter, style.delimiter) != ("\t", SPACE) or not _credit(best)[0]:
+        return False
+    with_tabs, with_spaces = (
+        sum(is_number(cell, one.decimal) for line in lines for cell in split_line(line, one.delimiter))
+        for one in (best, style)
+    )
+    return with_spaces <= with_tabs
 
 
 def _fit(rows: Sequence[Row], width: int, decimal: str) -> float:
@@ -260,12 +274,13 @@ def _is_numbered_header(rows: Sequence[Row], i: int, numbers: Sequence[str]) -> 
 def _header(before: Sequence[HeadLine], delimiter: str, width: int) -> tuple[tuple[int, Row] | None, Row]:
     """Return line and cells of the header, and the cells of a line of units between it and the data."""
     units: Row = []
-    for line in reversed(before):
-        cells = _header_cells(line.text, delimiter, width)
+    split = [_header_cells(line.text, delimiter, width) for line in before]
+    for at in reversed(range(len(before))):
+        line, cells = before[at], split[at]
         comment = line.text.lstrip().startswith(COMMENTS)
         if abs(len(cells) - width) > 1 and (comment or len(cells) == 1):
             continue  # a comment or a title
-        if not units and line is not before[0] and _all_units(cells):
+        if not units and at > 0 and _all_units(cells, split[:at]):
             units = cells
             continue
         return (line.number, [printable(cell) for cell in cells]), units
@@ -281,9 +296,12 @@ def _header_cells(text: str, delimiter: str, width: int) -> Row:
     return next((cells for cells in tried if len(cells) == width), tried[0])
 
 
-def _all_units(cells: Row) -> bool:
+def _all_units(cells: Row, above: Sequence[Row]) -> bool:
+    """Return whether a line holds units alone: known ones, or any in brackets below a line of names."""
     words = [cell.strip("[]() ") for cell in cells]
-    return any(words) and all(not word or vocabulary().unit(word) for word in words)
+    bracketed = all(_BRACKETED.fullmatch(cell.strip()) for cell in cells if cell.strip())
+    named = bracketed and any(len(row) == len(cells) for row in above)
+    return any(words) and (named or all(not word or vocabulary().unit(word) for word in words))
 
 
 def _names(
@@ -321,8 +339,15 @@ def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[
         raise LogError(Finding(message, file=str(segment.path), line=lines[0].number))
 
 
-def _no_rows(segment: Segment, body: Sequence[HeadLine]) -> Finding:
-    """Say why no row of numbers was found."""
+def _options(delimiter: str | None, decimal: str | None) -> str:
+    """Return the signs that were given, as options, behind " with"; empty without any."""
+    given = {"--delimiter": delimiter, "--decimal": decimal}
+    named = {name: _NAMES[_SIGNS.get(sign.lower(), sign)] for name, sign in given.items() if sign is not None}
+    return f" with {' and '.join(f'{name} {word}' for name, word in named.items())}" if named else ""
+
+
+def _no_rows(segment: Segment, body: Sequence[HeadLine], given: str) -> Finding:
+    """Say why no row of numbers was found with the signs that were given."""
     file = str(segment.path)
     if not body:
         return Finding("found no line with content, allowed: a table with a row a sample", file=file)
@@ -331,7 +356,7 @@ def _no_rows(segment: Segment, body: Sequence[HeadLine]) -> Finding:
         return Finding("found a header and no rows, allowed: a row a sample", file=file, line=body[0].number)
     text = body[0].text.strip()[:60]
     return Finding(
-        f"found {text!r} and no row of numbers below it, allowed: a table with a row a sample",
+        f"found {text!r} and no row of numbers below it{given}, allowed: a table with a row a sample",
         file=file,
         line=body[0].number,
     )

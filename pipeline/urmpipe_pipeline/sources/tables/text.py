@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.files.missing import meant_by
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.sources.vocabulary import Container, vocabulary
 
@@ -21,6 +22,9 @@ _BYTE_ORDER_MARKS = (
     (codecs.BOM_UTF16_LE, "utf-16-le"),
     (codecs.BOM_UTF16_BE, "utf-16-be"),
 )
+LOGS = (".csv", ".txt", ".tsv", ".dat", ".log", ".rrd")
+"""How most logs are called, and their recordings."""
+
 _CONTROL = bytes(set(range(32)) - set(b"\t\n\v\f\r\x1a\x1b"))
 
 
@@ -132,7 +136,7 @@ def _size(path: Path) -> int:
         with path.open("rb"):
             return path.stat().st_size
     except FileNotFoundError:
-        raise LogError(Finding("found no such file", file=str(path))) from None
+        raise LogError(Finding(f"found no such file{meant_by(path, LOGS)}", file=str(path))) from None
     except OSError as error:
         raise LogError(Finding(f"cannot be read: {error.strerror}", file=str(path))) from error
 

@@ -1,0 +1,53 @@
+"""Columns that look like a recorded tool centre point and were not read as one."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.sources.columns.columns import Column, listed
+from urmpipe_pipeline.sources.vocabulary import vocabulary
+
+TCP_NOT_READ = "tcp-not-read"
+
+_NEAR = re.compile(r"(tcp|tpc|ctp|pct|tool|tip|eef|endeff|werkzeug)|(?:^|_)ee(?:_|$)")
+"""Words for a tool centre point, misspelled ones among them, anywhere in a name."""
+
+_ENTRY = re.compile(r"[xyz\d]$")
+"""How the name of an entry of a point ends."""
+
+_TORQUES = re.compile(r"[tp]_?[xyz]")
+"""Names of a position that forces beside them make torques."""
+
+_BESIDE = frozenset({"analog", "digital", "input", "output", "in", "out", "bits", "offset", "payload"})
+"""Words of what a tool has besides its place."""
+
+
+def about_tcp(rest: Sequence[Column]) -> list[LogWarning]:
+    """Return a warning if two columns or more look like a tool centre point.
+
+    Args:
+        rest: The columns of a log that have no role; it has no tool centre point.
+    """
+    alike = [column for column in rest if _is_like(column)]
+    if len(alike) < 2:
+        return []
+    named = [column.header for column in alike] if len(alike) == 3 else ["A", "B", "C"]
+    quoted = ", ".join(f'"{name}"' for name in named)
+    table = f"[tcp] position = [{quoted}]"
+    said = f"{listed(alike)} look like a recorded TCP and are not read as one"
+    hint = f"name its columns tcp_x, tcp_y, tcp_z, or say which in a map (--map): {table}"
+    return [LogWarning(TCP_NOT_READ, f"{said}; {hint}")]
+
+
+def _is_like(column: Column) -> bool:
+    """Return whether the name of a column is that of a position, or near to one."""
+    words = vocabulary()
+    subject = {"tcp", "tool", "pose", "cartesian"}
+    others = words.other - subject | words.joint_words["rate"] | words.joint_words["acceleration"]
+    if column.words & (others | _BESIDE) or (column.unit and column.unit.quantity != "length"):
+        return False
+    named = any(pattern.search(column.key) for pattern in words.tcp_position)
+    near = bool(_NEAR.search(column.key) and _ENTRY.search(column.key))
+    return (named and not _TORQUES.fullmatch(column.key)) or near
