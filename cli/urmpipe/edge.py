@@ -70,6 +70,11 @@ KIND_OF_LIMIT = Kind(
     lambda value: _is_number(value) or isinstance(value, Mapping),
     'a number in m, or a mapping of kinds to m or rad, such as {"axis": 0.0035, "angle": 0.01}',
 )
+KIND_OF_TOLERANCE = Kind(
+    lambda value: _is_number(value) or isinstance(value, (str, Mapping)),
+    'a number in m, a text such as "axis=3.5mm,angle=0.5deg", or a mapping of kinds to m or rad, such as'
+    ' {"axis": 0.0035, "angle": 0.01}',
+)
 NAMES = Kind(lambda value: isinstance(value, Mapping), 'a mapping, such as {"log": "log.csv"}')
 TOLD = Kind(callable, "a function of the share that is done, 0 to 1, such as print")
 
@@ -92,7 +97,7 @@ KINDS = {
     "step": SECONDS,
     "strict": FLAG,
     "told": Kind(callable, "a function of a text, such as print"),
-    "tolerance": KIND_OF_LIMIT,
+    "tolerance": KIND_OF_TOLERANCE,
     "tsp": SECONDS,
     "within_pi": FLAG,
     "write_map": PATH,
