@@ -10,6 +10,7 @@ from typing import TypeAlias
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison, Deviation
 from urmpipe_pipeline.comparison.wording import tolerance_words
+from urmpipe_pipeline.inverse.verdict import verdict_of
 from urmpipe_pipeline.report import (
     gallery,
     log_tables,
@@ -17,7 +18,13 @@ from urmpipe_pipeline.report import (
     simulation_tables,
     verdict_tables,
 )
-from urmpipe_pipeline.report.banner import Banner, banner
+from urmpipe_pipeline.report.banner import (
+    Banner,
+    comparison_banner,
+    ingested_banner,
+    joined,
+    solved_banner,
+)
 from urmpipe_pipeline.report.cards import Card, card
 from urmpipe_pipeline.report.drawings import Drawing, Listing, system_drawing, system_file
 from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_facts, run_facts
@@ -143,9 +150,13 @@ def _banner(
     simulated: Sequence[str],
 ) -> Banner:
     """Return the verdict over all that was judged, or what was simulated or ingested."""
-    if simulations and not comparisons:
-        return simulation_parts.simulation_banner(simulations, simulated)
-    return simulation_parts.combined_banner(banner(comparisons, runs, links), simulations, simulated)
+    aimed = [run for run in runs if run.goals is not None]
+    logs = [run for run in runs if run.goals is None]
+    found = [comparison_banner(comparisons, links)] if comparisons else []
+    found += [simulation_parts.simulation_banner(simulations, simulated)] if simulations else []
+    found += [solved_banner(aimed)] if aimed else []
+    found += [ingested_banner(logs)] if logs else []
+    return joined(found)
 
 
 def _simulations_summary(simulations: Sequence[Simulation], links: Sequence[str]) -> Summary:
@@ -258,7 +269,7 @@ def _run_part(run: Run, ident: str) -> Part:
     missed = log_tables.missed_table(run)
     blocks = (*((missed,) if missed else ()), *gallery.run_figures(run), *_run_tables(run))
     title = f"Log {run.name}" if run.goals is None else f"Targets {run.name}"
-    return Part(title, blocks, (), ident, "", run_facts(run))
+    return Part(title, blocks, (), ident, verdict_of(run) or "", run_facts(run))
 
 
 def _run_tables(run: Run) -> tuple[Block, ...]:

@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.comparison.symbols import SYMBOLS
-from urmpipe_pipeline.comparison.wording import meter_words
+from urmpipe_pipeline.comparison.wording import meter_amount, meter_size, meter_words, out_words
 from urmpipe_pipeline.report.banner import Banner
 from urmpipe_pipeline.report.cards import Card
 from urmpipe_pipeline.report.facts import Fact
@@ -29,7 +27,7 @@ def simulation_banner(simulations: Sequence[Simulation], links: Sequence[str]) -
     if shown.failed is not None:
         end = f"t = {text.seconds(float(shown.t[-1]))} s" if len(shown.t_ns) else "its start"
         said = (Fact("System", shown.name, href=href), Fact("Recorded until", end), Fact("Why", shown.failed))
-        return Banner("fail", "FAILED", f"{shown.name} did not reach its end", said)
+        return Banner("fail", "FAILED", f"{shown.name} did not reach its end", said, _counts(simulations))
     worst = shown.judged_worst
     if worst is None:
         samples = sum(len(one.t_ns) for one in simulations)
@@ -39,30 +37,22 @@ def simulation_banner(simulations: Sequence[Simulation], links: Sequence[str]) -
     within = "within" if worst.verdict == "pass" else "out of"
     facts = (
         Fact("Furthest out" if worst.verdict == "fail" else "Closest to the limit", shown.name, href=href),
-        Fact("How much", _amount(worst)),
+        Fact("How much", meter_amount(worst)),
         Fact("When", f"t = {text.seconds(worst.t)} s"),
-        Fact("Out of tolerance", f"{worst.out_of_tolerance} of {text.counted(worst.samples, 'sample')}"),
+        Fact("Out of tolerance", out_words(worst.out_of_tolerance, worst.samples)),
     )
-    return Banner(
-        worst.verdict, worst.verdict.upper(), f"{worst.block} of {shown.name} is {within} tolerance", facts
-    )
+    headline = f"{worst.block} of {shown.name} {within} tolerance"
+    return Banner(worst.verdict, worst.verdict.upper(), headline, facts, _counts(simulations))
 
 
-def combined_banner(judged: Banner, simulations: Sequence[Simulation], links: Sequence[str]) -> Banner:
-    """Return the verdict of comparisons with that of simulations: whichever fails stands first.
-
-    Args:
-        judged: The verdict of the comparisons.
-        simulations: Those of the page; none leaves the verdict as it is.
-        links: Where each is told of.
-    """
-    if not simulations:
-        return judged
-    failing = [one.name for one in simulations if one.verdict == "fail"]
-    if failing and judged.state == "pass":
-        return replace(simulation_banner(simulations, links), detail="The comparisons are within tolerance.")
-    said = f"Simulations that fail: {', '.join(failing)}." if failing else "No simulation fails."
-    return replace(judged, detail=said)
+def _counts(simulations: Sequence[Simulation]) -> str:
+    """Return how several simulations ended; nothing of one."""
+    if len(simulations) == 1:
+        return ""
+    verdicts = [one.verdict for one in simulations]
+    told = {"fail": "{} failed", "pass": "{} passed", None: "{} without a verdict"}
+    counts = [said.format(verdicts.count(key)) for key, said in told.items() if key in verdicts]
+    return f"Of {len(simulations)} simulations: {', '.join(counts)}."
 
 
 def simulation_card(simulation: Simulation, href: str) -> Card:
@@ -121,12 +111,8 @@ def _size(worst: DeltaVerdict | None) -> str:
     """Return what is worst, such as |Δx|; nothing where nothing is judged."""
     if worst is None:
         return "Simulated"
-    return SYMBOLS["norm"] if worst.quantity == "norm" else f"|{SYMBOLS[worst.quantity]}|"
+    return meter_size(worst)
 
 
 def _worst(worst: DeltaVerdict) -> str:
     return "no value" if worst.used is None else text.quantity(worst.worst, "m", worst.allowed)
-
-
-def _amount(worst: DeltaVerdict) -> str:
-    return f"{_size(worst)} = {_worst(worst)} of {text.limit(worst.allowed)} mm allowed"

@@ -179,8 +179,8 @@ def test_the_summary_says_how_it_ended_and_what_is_joined(make_simulation: MakeS
     found = simulation_summary(make_simulation(tolerance=0.005)).splitlines()
     assert found[0] == "### PASS: log\\-to\\-delta"
     assert (
-        "- **PASS** meter: \\|Δy\\| = 4.0000 mm of 5 mm allowed at t = 1.250 s;"
-        " out of tolerance: 0 of 600 samples" in found
+        "- **PASS** meter: \\|Δy\\| = 4.0000 mm of 5 mm allowed (80.0 % of the tolerance) at t = 1.250 s;"
+        " out of tolerance: 0 of 600 samples (0 %)" in found
     )
     assert "600 samples, 2.995 s, communication step 5 ms." in found
     assert "| chain | unit kinematic\\_chain |" in found
