@@ -125,7 +125,7 @@ def _worst(one: Deviation, several: bool) -> str:
 
 def _table(result: Comparison) -> Iterator[str]:
     """Yield the logs from best to worst."""
-    sizes = (f"max {size_of(result.worst.statistics[axis])} [mm]" for axis in AXES)
+    sizes = (shown(f"max {size_of(result.worst.statistics[axis])} [mm]") for axis in AXES)
     heads = ("log", "drawn", *sizes, "decided by", "at t [s]", "out", "verdict")
     yield table_row(heads)
     yield table_row("---" for _ in heads)

@@ -36,7 +36,7 @@ class Banner:
 
     @property
     def sentence(self) -> str:
-        """The same below another banner: "PASS: poses: arm6 reaches 3 targets. 0 warnings."."""
+        """The same below another banner: "FAIL: poses: arm6 reaches 3 targets, with 1 jump. 1 jump: ..."."""
         said = f"{self.word}: {self.headline}."
         return said if self.state == "ingested" else f"{said} {self.detail}".rstrip()
 
@@ -49,9 +49,8 @@ def joined(banners: Sequence[Banner]) -> Banner:
     Args:
         banners: One a kind, at least one.
     """
-    lead = min(banners, key=lambda one: STATES.index(one.state))
-    others = (one.sentence for one in banners if one is not lead)
-    return replace(lead, detail=" ".join(filter(None, [lead.detail, *others])))
+    lead, *others = sorted(banners, key=lambda one: STATES.index(one.state))
+    return replace(lead, detail=" ".join(filter(None, [lead.detail, *(one.sentence for one in others)])))
 
 
 def comparison_banner(comparisons: Sequence[Comparison], links: Sequence[Sequence[str]]) -> Banner:
@@ -109,8 +108,9 @@ def solved_banner(runs: Sequence[Run]) -> Banner:
         runs: Solved targets, at least one.
     """
     state = "pass" if all(map(solved, runs)) else "fail"
-    said = [fault for run in runs for fault in faults(run)]
-    return Banner(state, state.upper(), reached_words(runs), detail=". ".join([*said, _warnings(runs)]) + ".")
+    facts = (Fact("Warnings", str(sum(len(run.warnings) for run in runs))),)
+    said = " ".join(f"{fault}." for run in runs for fault in faults(run))
+    return Banner(state, state.upper(), reached_words(runs), facts, said)
 
 
 def ingested_banner(runs: Sequence[Run]) -> Banner:
@@ -123,9 +123,6 @@ def ingested_banner(runs: Sequence[Run]) -> Banner:
     wraps = sum(len(run.repolarizations) for run in runs)
     subject = runs[0].name if len(runs) == 1 else text.counted(len(runs), "log")
     headline = f"{subject}: {text.counted(rows, 'row')}, {text.counted(wraps, 'repolarization')}"
-    detail = f"{_warnings(runs)}. Nothing was compared: there is no verdict."
+    warnings = text.counted(sum(len(run.warnings) for run in runs), "warning")
+    detail = f"{warnings}. Nothing was compared: there is no verdict."
     return Banner("ingested", "INGESTED", headline, detail=detail)
-
-
-def _warnings(runs: Sequence[Run]) -> str:
-    return text.counted(sum(len(run.warnings) for run in runs), "warning")

@@ -31,6 +31,7 @@ from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_fact
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.answers import answers_of
 from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
@@ -169,7 +170,8 @@ def _simulations_summary(simulations: Sequence[Simulation], links: Sequence[str]
 
 def _signals_part(simulation: Simulation, groups: Sequence[Group], link: str) -> Part:
     """Return the part of a block, or of several like ones: its signals."""
-    title = f"{'Blocks' if groups[0].family else 'Block'} {groups[0].block}"
+    block = groups[0].block
+    title = block if groups[0].wanted else f"{'Blocks' if groups[0].family else 'Block'} {block}"
     return Part(title, tuple(gallery.signal_figures(simulation, groups)), link=link)
 
 
@@ -178,7 +180,8 @@ def _simulation_part(simulation: Simulation, ident: str) -> Part:
     meters = (simulation_tables.meters_table(simulation.verdicts),) if simulation.verdicts else ()
     drawing, file = system_drawing(simulation), system_file(simulation)
     judged = {one.block for one in simulation.verdicts}
-    groups = sorted(groups_of(simulation), key=lambda group: group.block not in judged)  # what decides first
+    every = [*answers_of(simulation), *groups_of(simulation)]
+    groups = sorted(every, key=lambda group: group.block not in judged)  # what decides first
     blocks = [
         _signals_part(simulation, list(some), ident)
         for _, some in groupby(groups, key=lambda group: group.block)

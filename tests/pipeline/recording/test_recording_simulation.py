@@ -151,6 +151,28 @@ def test_what_decides_is_open_else_what_stands_last(make_simulation: MakeSimulat
     ]
 
 
+def test_set_points_and_answers_come_first_and_are_open_where_nothing_is_judged(
+    make_simulation: MakeSimulation,
+) -> None:
+    simulation = make_simulation(5)
+    pair = [Signal(block, "theta", np.arange(5.0), "rad") for block in ("set_point", "load")]
+    others = [Signal(f"b{i}", f"v{i}", np.arange(5.0)) for i in range(8)]
+    simulation = replace(
+        simulation,
+        signals=(*simulation.signals, *pair, *others),
+        connections={"c.set_theta": "set_point.theta", "c.real_theta": "load.theta"},
+    )
+    judged, plain = simulation_plots(simulation), simulation_plots(replace(simulation, verdicts=()))
+    assert isinstance(judged, rrb.Tabs) and isinstance(plain, rrb.Tabs)
+    assert [list(tabs.contents)[int(str(tabs.active_tab))].name for tabs in (judged, plain)] == [
+        "meter",
+        "Set point and answer",
+    ]
+    (view,) = next(iter(plain.contents)).contents
+    assert view.name == "Set point and answer: theta [rad]"
+    assert list(view.visualizer_overrides) == ["/signals/set_point/theta", "/signals/load/theta"]
+
+
 def test_words_stand_above_the_arm_and_else_beside_the_plots(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation(5)
     for one, left in ((simulation, rrb.Vertical), (replace(simulation, arms=()), rrb.Tabs)):

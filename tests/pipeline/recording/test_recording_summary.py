@@ -43,7 +43,12 @@ def test_the_summary_of_a_comparison_says_the_verdict_first(make_comparison: Mak
         f" stretch: {longest.duration:.3f} s from t = {longest.t:.3f} s."
     )
     assert lines[3] == "Reference: asked for (grey, dashed). Tolerance: ±3.5 mm per axis."
+    assert lines[5] == (
+        "| log | drawn | max \\|Δx\\| \\[mm\\] | max \\|Δy\\| \\[mm\\] | max \\|Δz\\| \\[mm\\] | max ‖Δ‖"
+        " \\[mm\\] | decided by | at t [s] | out | verdict |"
+    )
     rows = [line.split(" | ") for line in lines if line.startswith("| ")][2:]
+    assert rows[2][6] == f"\\|Δ{decisive.quantity}\\|"
     assert [(row[0], row[1], row[-1]) for row in rows] == [
         ("| coppeliasim", "orange", "PASS |"),
         ("| solid\\*", "sky blue", "PASS |"),

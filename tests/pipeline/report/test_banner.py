@@ -103,6 +103,7 @@ def test_of_several_kinds_of_results_none_hides_behind_another() -> None:
     said = joined([PASSES, NOTHING_JUDGED, FAILS])
     assert (said.state, said.headline) == ("fail", "poses: 2 of 3")
     assert said.detail == "1 jump. PASS: log within. SIMULATED: one-drive: 401 samples."
+    assert joined([NOTHING_JUDGED, FAILS, PASSES]) == said
     said = joined([NOTHING_JUDGED, PASSES])
     assert (said.state, said.detail) == ("pass", "SIMULATED: one-drive: 401 samples.")
     said = joined([FAILS, replace(FAILS, headline="log out")])

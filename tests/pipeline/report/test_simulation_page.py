@@ -107,6 +107,27 @@ def test_of_several_simulations_all_are_counted(make_simulation: MakeSimulation)
     assert banner.detail == "Of 3 simulations: 1 failed, 1 passed, 1 without a verdict."
 
 
+def test_set_points_are_dashed_beside_their_answers_behind_what_is_judged(
+    make_simulation: MakeSimulation,
+) -> None:
+    simulation = make_simulation(5)
+    wanted = Signal("set_point", "theta", np.arange(5.0), "rad", description="Set position")
+    real = Signal("load", "theta", np.arange(5.0), "rad", description="Angle")
+    simulation = replace(
+        simulation,
+        signals=(*simulation.signals, wanted, real),
+        connections={"c.set_theta": "set_point.theta", "c.real_theta": "load.theta"},
+    )
+    page = lay_out([simulation])
+    assert [part.title for part in page.parts[0].parts][:2] == ["Block meter", "Set point and answer"]
+    figure = figures(page.parts[0])["Set point and answer/theta"]
+    assert [(one["name"], one["line"]["dash"]) for one in figure.spec["data"]] == [
+        ("set_point.theta", "dash"),
+        ("load.theta", "solid"),
+    ]
+    assert figure.caption == "theta: Angle. Grey, dashed: the set point."
+
+
 def test_nothing_judged_is_no_verdict(make_simulation: MakeSimulation) -> None:
     page = lay_out([replace(make_simulation(), verdicts=())])
     assert (page.banner.state, page.banner.word) == ("ingested", "SIMULATED")
