@@ -81,7 +81,8 @@ def _columns(changes: Sequence[Change]) -> Iterator[Column]:
 
 
 def _verdicts(change: Change) -> str:
-    return ARROW.join((one.verdict or text.NOTHING).upper() for one in (change.before, change.now))
+    found = dict.fromkeys((one.verdict or text.NOTHING).upper() for one in (change.before, change.now))
+    return ARROW.join(found)
 
 
 def _lines(found: BaselineComparison) -> Iterator[str]:

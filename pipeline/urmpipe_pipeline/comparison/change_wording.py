@@ -27,6 +27,8 @@ def statistic_words(change: Change, name: Literal["max", "rms"]) -> str:
 def share_words(change: Change) -> str:
     """Return the share out of tolerance before and now, by digits that differ; that of now alone likewise."""
     before, now = change.before.share_out, change.now.share_out
+    if before is None and now is None:
+        return text.NOTHING
     if before is not None and now is not None:
         if "share_out" not in (*change.worse, *change.better):
             return text.percent(now)

@@ -122,9 +122,14 @@ def part_words(covered: Sequence[float]) -> str:
 
 def meter_words(one: DeltaVerdict) -> str:
     """Return what a delta meter found: how much of how much, when, and how often it was too much."""
-    used = "" if one.used is None or math.isinf(one.used) else f" ({share_words(one.used)})"
-    said = f"{meter_amount(one)}{used} at t = {text.seconds(one.t)} s"
+    used = meter_used(one)
+    said = f"{meter_amount(one)}{f' ({used})' if used else ''} at t = {text.seconds(one.t)} s"
     return f"{said}; out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
+
+
+def meter_used(one: DeltaVerdict) -> str:
+    """Return how much of its tolerance a delta meter uses up; nothing without a value or a tolerance above 0."""
+    return "" if one.used is None or math.isinf(one.used) else share_words(one.used)
 
 
 def meter_amount(one: DeltaVerdict) -> str:

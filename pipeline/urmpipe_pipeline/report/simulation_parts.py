@@ -6,11 +6,12 @@ from collections.abc import Sequence
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.comparison.wording import meter_amount, meter_size, meter_words, out_words
+from urmpipe_pipeline.comparison.wording import meter_amount, meter_size, meter_used, out_words
 from urmpipe_pipeline.report.banner import Banner
 from urmpipe_pipeline.report.cards import Card
 from urmpipe_pipeline.report.facts import Fact
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.simulations.wording import outcome_words
 
 STATES = {"pass": "pass", "fail": "fail", None: "simulated"}
 """How a card looks, by the verdict."""
@@ -27,22 +28,19 @@ def simulation_banner(simulations: Sequence[Simulation], links: Sequence[str]) -
     if shown.failed is not None:
         end = f"t = {text.seconds(float(shown.t[-1]))} s" if len(shown.t_ns) else "its start"
         said = (Fact("System", shown.name, href=href), Fact("Recorded until", end), Fact("Why", shown.failed))
-        return Banner("fail", "FAILED", f"{shown.name} did not reach its end", said, _counts(simulations))
+        return Banner("fail", "FAILED", outcome_words(shown), said, _counts(simulations))
     worst = shown.judged_worst
     if worst is None:
-        samples = sum(len(one.t_ns) for one in simulations)
-        subject = shown.name if len(simulations) == 1 else text.counted(len(simulations), "system")
-        headline = f"{subject}: {text.counted(samples, 'sample')}"
+        samples = text.counted(sum(len(one.t_ns) for one in simulations), "sample")
+        several = f"{text.counted(len(simulations), 'system')}: {samples}"
+        headline = outcome_words(shown) if len(simulations) == 1 else several
         return Banner("ingested", "SIMULATED", headline, detail="Nothing was judged: there is no verdict.")
-    within = "within" if worst.verdict == "pass" else "out of"
     facts = (
         Fact("Furthest out" if worst.verdict == "fail" else "Closest to the limit", shown.name, href=href),
         Fact("How much", meter_amount(worst)),
-        Fact("When", f"t = {text.seconds(worst.t)} s"),
-        Fact("Out of tolerance", out_words(worst.out_of_tolerance, worst.samples)),
+        *_judged_facts(worst),
     )
-    headline = f"{worst.block} of {shown.name} {within} tolerance"
-    return Banner(worst.verdict, worst.verdict.upper(), headline, facts, _counts(simulations))
+    return Banner(worst.verdict, worst.verdict.upper(), outcome_words(shown), facts, _counts(simulations))
 
 
 def _counts(simulations: Sequence[Simulation]) -> str:
@@ -67,7 +65,7 @@ def simulation_card(simulation: Simulation, href: str) -> Card:
         amount=_length(simulation) if simulation.failed is not None or worst is None else _worst(worst),
         allowed="" if allowed is None or simulation.failed is not None else f"{text.limit(allowed)} mm",
         share=None if worst is None or worst.used is None else min(worst.used, 1.0),
-        used="" if worst is None else meter_words(worst),
+        used="" if worst is None else meter_used(worst),
         facts=_card_facts(simulation),
     )
 
@@ -85,8 +83,11 @@ def simulation_facts(simulation: Simulation) -> tuple[Fact, ...]:
 
 
 def _card_facts(simulation: Simulation) -> tuple[Fact, ...]:
+    worst = simulation.judged_worst
+    judged = () if worst is None else _judged_facts(worst)
     found = (
         Fact("Why", simulation.failed or ""),
+        *judged,
         Fact("Duration", _length(simulation)),
         Fact("Step", f"{text.seconds(simulation.step)} s"),
         Fact("Samples", str(len(simulation.t_ns))),
@@ -94,6 +95,14 @@ def _card_facts(simulation: Simulation) -> tuple[Fact, ...]:
         Fact("Warnings", str(len(simulation.warnings))),
     )
     return tuple(fact for fact in found if fact.value)
+
+
+def _judged_facts(worst: DeltaVerdict) -> tuple[Fact, ...]:
+    """Return when a delta meter was worst, and how often it was out of tolerance."""
+    return (
+        Fact("When", f"t = {text.seconds(worst.t)} s"),
+        Fact("Out of tolerance", out_words(worst.out_of_tolerance, worst.samples)),
+    )
 
 
 def _badness(simulation: Simulation) -> tuple[bool, bool, float]:

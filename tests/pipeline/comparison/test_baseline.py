@@ -84,6 +84,7 @@ def test_shares_differ_by_a_digit_where_they_count_as_changed(paths: Compared) -
     assert share_words(against_baseline(paths({"a": one}), paths({"a": out})).changes[0]) == "99.00 %"
     wider = paths({"a": out}, tolerance={"norm": 1.0})
     assert share_words(against_baseline(wider, paths({"a": out})).changes[0]) == "99.0 % → –"
+    assert share_words(against_baseline(wider, wider).changes[0]) == "–"
 
 
 def test_what_grew_by_more_than_the_noise_is_worse(paths: Compared) -> None:

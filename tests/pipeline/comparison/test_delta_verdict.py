@@ -56,6 +56,14 @@ def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
     )
 
 
+def test_of_nothing_allowed_no_share_is_told() -> None:
+    found = delta_verdict("meter", T_NS, DELTA, {"axis": 0.0})
+    assert found is not None
+    assert meter_words(found) == (
+        "|Δy| = 4.0000 mm of 0 mm allowed at t = 0.005 s; out of tolerance: 3 of 3 samples (100 %)"
+    )
+
+
 def test_nothing_allowed_is_a_tolerance() -> None:
     found = delta_verdict("meter", T_NS, DELTA, {"axis": 0.0})
     still = delta_verdict("meter", T_NS, np.zeros((3, 3)), {"axis": 0.0})

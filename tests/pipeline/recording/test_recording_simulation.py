@@ -199,7 +199,7 @@ def test_the_first_arm_moves_and_the_tip_of_each_has_a_path(make_simulation: Mak
 
 def test_the_summary_says_how_it_ended_and_what_is_joined(make_simulation: MakeSimulation) -> None:
     found = simulation_summary(make_simulation(tolerance=0.005)).splitlines()
-    assert found[0] == "### PASS: log\\-to\\-delta"
+    assert found[0] == "### PASS: meter of log\\-to\\-delta within tolerance"
     assert (
         "- **PASS** meter: \\|Δy\\| = 4.0000 mm of 5 mm allowed (80.0 % of the tolerance) at t = 1.250 s;"
         " out of tolerance: 0 of 600 samples (0 %)" in found
@@ -208,7 +208,7 @@ def test_the_summary_says_how_it_ended_and_what_is_joined(make_simulation: MakeS
     assert "| chain | unit kinematic\\_chain |" in found
     assert "| chain.phi | log.q |" in found
     failed = simulation_summary(make_simulation(10, failed="meter: <b>gone</b>")).splitlines()
-    assert failed[0] == "### FAILED: log\\-to\\-delta"
+    assert failed[0] == "### FAILED: log\\-to\\-delta did not reach its end"
     assert "**meter: \\<b\\>gone\\</b\\>** What was recorded until then is here." in failed
 
 

@@ -80,6 +80,17 @@ def test_the_worst_meter_stands_first(make_simulation: MakeSimulation) -> None:
     ]
 
 
+def test_the_card_of_a_meter_says_how_much_when_and_how_often(make_simulation: MakeSimulation) -> None:
+    card = lay_out([make_simulation()]).summaries[0].cards[0]
+    assert (card.size, card.amount, card.allowed, card.used) == (
+        "|Δy|", "4.0000 mm", "3.5 mm", "1.14 times the tolerance",
+    )  # fmt: skip
+    assert [(fact.name, fact.value) for fact in card.facts[:2]] == [
+        ("When", "t = 1.250 s"),
+        ("Out of tolerance", "161 of 600 samples (26.8 %)"),
+    ]
+
+
 def test_one_that_failed_says_so_before_all(make_simulation: MakeSimulation) -> None:
     failed = make_simulation(101, failed="chain: fmi2DoStep returned fmi2Error", name="broken")
     page = lay_out([make_simulation(), failed])
