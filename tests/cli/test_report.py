@@ -11,7 +11,7 @@ from typing import Any
 import pytest
 
 from urmpipe_datasets import LOGS
-from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.operands import load_run
 from urmpipe_pipeline.recording.summary import summary
 
 RunCommand = Callable[..., Any]
@@ -58,7 +58,7 @@ def test_ik_its_recording_and_the_report_of_it_say_one_verdict(
         ("pass", "fail").index(verdict),
         f"{verdict.upper()}  {said} (iterative)",
     )
-    assert summary(read_recording(tmp_path / "poses.rrd")).splitlines()[0] == f"### {verdict.upper()}: {said}"
+    assert summary(load_run(tmp_path / "poses.rrd")).splitlines()[0] == f"### {verdict.upper()}: {said}"
     ran = urmpipe("report", "poses.rrd", "--json")
     assert json.loads(ran.out)["recordings"] == [{"name": "poses", "verdict": verdict}]
     page = (tmp_path / "poses.html").read_text(encoding="utf-8")

@@ -128,7 +128,7 @@ def meter_words(one: DeltaVerdict) -> str:
 
 
 def meter_used(one: DeltaVerdict) -> str:
-    """Return how much of its tolerance a delta meter uses up; nothing without a value or a tolerance above 0."""
+    """Return how much of its tolerance a delta meter uses up; nothing of no value and where it is 0."""
     return "" if one.used is None or math.isinf(one.used) else share_words(one.used)
 
 

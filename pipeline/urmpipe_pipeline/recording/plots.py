@@ -91,8 +91,9 @@ class Plots:
         own = [entities[one.name] for one in group.signals]
         views = self._arrays(name, printable(group.bracket), own, rows, *beside)
         if group.wanted and rows > 1:  # beside each other they have other names and colours
-            for view, shown in zip(views, [overview_entity, str] if rows > LONG else [str], strict=True):
-                view.visualizer_overrides = {shown(one): _looks(group, i) for i, one in enumerate(own)}
+            standing = [list(map(overview_entity, own)), own] if rows > LONG else [own]
+            for view, drawn in zip(views, standing, strict=True):
+                view.visualizer_overrides = {one: _looks(group, i) for i, one in enumerate(drawn)}
         return views
 
     def _arrays(

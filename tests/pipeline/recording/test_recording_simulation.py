@@ -168,7 +168,10 @@ def test_set_points_and_answers_come_first_and_are_open_where_nothing_is_judged(
         "meter",
         "Set point and answer",
     ]
-    (view,) = next(iter(plain.contents)).contents
+    first = next(iter(plain.contents))
+    assert isinstance(first, rrb.Grid)
+    (view,) = first.contents
+    assert isinstance(view, rrb.TimeSeriesView)
     assert view.name == "Set point and answer: theta [rad]"
     assert list(view.visualizer_overrides) == ["/signals/set_point/theta", "/signals/load/theta"]
 

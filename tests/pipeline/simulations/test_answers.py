@@ -18,7 +18,8 @@ MakeSimulation = Callable[..., Simulation]
 @pytest.fixture
 def controlled(make_simulation: MakeSimulation) -> Simulation:
     """Two controllers, each with its set point and its load."""
-    signals, connections = [], {}
+    signals: list[Signal] = []
+    connections: dict[str, str] = {}
     for i in (1, 2):
         for name, unit in (("theta", "rad"), ("omega", "rad/s")):
             signals += [Signal(f"{block}{i}", name, np.arange(3.0), unit) for block in ("load", "set_point")]
