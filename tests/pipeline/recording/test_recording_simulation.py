@@ -25,6 +25,8 @@ from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, write_recording
 from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
+from urmpipe_pipeline.recording.overview import LONG
+from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.simulation_layout import simulation_plots
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
@@ -32,6 +34,7 @@ from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.viewer import opening_times
 from urmpipe_pipeline.recording.writer import SLICE
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.signal_groups import Group
 from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation
 
 MakeSimulation = Callable[..., Simulation]
@@ -174,6 +177,18 @@ def test_set_points_and_answers_come_first_and_are_open_where_nothing_is_judged(
     assert isinstance(view, rrb.TimeSeriesView)
     assert view.name == "Set point and answer: theta [rad]"
     assert list(view.visualizer_overrides) == ["/signals/set_point/theta", "/signals/load/theta"]
+
+
+def test_set_points_of_a_long_simulation_look_alike_in_overview_and_in_full(
+    make_simulation: MakeSimulation,
+) -> None:
+    pair = tuple(Signal(block, "theta", np.zeros(LONG + 1), "rad") for block in ("set_point", "load"))
+    group = Group("Set point and answer", "rad", pair, family=True, wanted=1)
+    views = Plots(make_simulation(5)).signals(group, {one.name: f"/{one.block}" for one in pair}, LONG + 1)
+    assert [list(view.visualizer_overrides) for view in views] == [
+        ["/overview/set_point", "/overview/load"],
+        ["/set_point", "/load"],
+    ]
 
 
 def test_words_stand_above_the_arm_and_else_beside_the_plots(make_simulation: MakeSimulation) -> None:
