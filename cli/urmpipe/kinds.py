@@ -112,6 +112,11 @@ KIND_OF_LIMIT = Kind(
     _is_limit,
     'a number in m, or a mapping of kinds to m or rad, such as {"axis": 0.0035, "angle": 0.01}',
 )
+KIND_OF_TOLERANCE = Kind(
+    lambda value: isinstance(value, str) or _is_limit(value),
+    'a number in m, a text such as "axis=3.5mm,angle=0.5deg", or a mapping of kinds to m or rad, such as'
+    ' {"axis": 0.0035, "angle": 0.01}',
+)
 TOLD = Kind(callable, "a function of the share that is done, 0 to 1, such as print")
 LINK = Kind(_is_text, "the name of a link of the URDF")
 ROBOT_FILE = Kind(_is_path, "a name, or a TOML or URDF file")
@@ -163,7 +168,7 @@ KINDS = {
     "tip_link": LINK,
     "to": _one_of("csv", "parquet", "mat", "tum"),
     "told": Kind(callable, "a function of a text, such as print"),
-    "tolerance": KIND_OF_LIMIT,
+    "tolerance": KIND_OF_TOLERANCE,
     "tsp": SECONDS,
     "unit": Kind(_is_unit, "the name of a unit, a Python file with one, or a Unit"),
     "within_pi": FLAG,

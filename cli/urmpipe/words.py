@@ -80,7 +80,7 @@ SPELLINGS = {
     "--time": Spelling("time", "none|COLUMN|[0-9]+", "text"),
     "--tip": Spelling("tip_link", _SHOWN),
     "--to": Spelling("to", r"csv\|parquet\|mat\|tum|csv|parquet|mat|tum"),
-    "--tolerance": Spelling("tolerance"),
+    "--tolerance": Spelling("tolerance", r"[a-z]+=[0-9.e+-]+[a-z]+"),
     "--tool": Spelling("tool", _FRAME),
     "--tsp": Spelling("tsp", rf"{_SHOWN}|[0-9][0-9.e-]*"),
     "--unit": Spelling("units", r"[^';,()=]*=[A-Za-z]\w*|(?:rad|deg|mm|m|s|ms|us|ns)(?![\w:])", "units"),

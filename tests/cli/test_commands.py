@@ -127,7 +127,7 @@ def test_compare_of_the_counter_rotating_module_fails(urmpipe: RunCommand, tmp_p
     assert ran.code == 1
     assert ran.out.splitlines()[:2] == [
         "FAIL  counter_rotating out of tolerance against path",
-        "      max |Δx|: 807.0047 mm of 3.5 mm allowed (231 times the tolerance), at t = 35.535 s"
+        "      |Δx| = 807.0047 mm of 3.5 mm allowed (231 times the tolerance) at t = 35.535 s"
         " (row 7108), at (0.4619, 0.0480, 0.3527) m",
     ]
     assert files_in(tmp_path) == ["counter_rotating-against-path.rrd"]

@@ -110,7 +110,7 @@ def test_a_quiet_failure_against_a_baseline_says_what_is_worse(capsys: Captured)
     assert compare("slack.csv", "good.csv", "-q", "-o", "now.rrd", "--baseline", "before.rrd", *noise) == 1
     verdict, decided, *against = capsys.readouterr().err.splitlines()
     assert verdict.endswith("by the joints on both sides, but worse than the baseline against-wanted")
-    assert decided.startswith("      max |")
+    assert decided.startswith("      slack: |Δ")
     assert against == [
         "FAIL  against the baseline against-wanted: 0 quantities worse, 1 gone",
         "      gone: bad",

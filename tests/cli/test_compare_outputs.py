@@ -196,7 +196,7 @@ def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[st
     out, err = capsys.readouterr()
     assert bool(out) == ("--json" in flags)
     said = "FAIL  bad out of tolerance against wanted, by the joints on both sides"
-    assert err.startswith(f"{said}\n      max |")
+    assert err.startswith(f"{said}\n      |Δ")
     assert err.count("\n") == 2
 
 

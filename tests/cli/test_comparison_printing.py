@@ -75,7 +75,7 @@ def test_one_log_is_a_verdict_and_its_statistics(capsys: Captured) -> None:
     result = urmpipe.compare(write_path("path.csv", NOTHING_OFF), [write_path("a.csv", Y_OFF)])
     assert printed(result, capsys) == [
         "PASS  a within tolerance against path",
-        "      max |Δy|: 1.0000 mm of 3.5 mm allowed (28.6 % of the tolerance), at t = 0.000 s"
+        "      |Δy| = 1.0000 mm of 3.5 mm allowed (28.6 % of the tolerance) at t = 0.000 s"
         " (row 1), at (0.0000, -0.0010, 1.0000) m",
         "",
         "a against path",
@@ -96,22 +96,63 @@ def test_several_logs_are_one_table_from_best_to_worst(capsys: Captured) -> None
     tolerance = {"axis": 0.0035, "norm": 0.01}
     lines = printed(urmpipe.compare(write_path("path.csv", NOTHING_OFF), logs, tolerance=tolerance), capsys)
     assert lines[:4] == [
-        "FAIL  1 of 2 logs out of tolerance against path",
-        "      max |Δz| of b: 4.5000 mm of 3.5 mm allowed (1.29 times the tolerance), at t = 0.500 s"
+        "FAIL  1 of 2 logs (b) out of tolerance against path",
+        "      b: |Δz| = 4.5000 mm of 3.5 mm allowed (1.29 times the tolerance) at t = 0.500 s"
         " (row 3), at (0.2000, 0.0000, 0.9955) m",
         "",
         "From best to worst",
     ]
     cells = [line.replace(" %", "%").split() for line in lines[7:9]]
     assert cells == [
-        ["a", "PASS", "0.0000", "1.0000", "0.0000", "1.0000", "1.0000", "0%", "–", "–", "0.000", "–"],
-        ["b", "FAIL", "0.0000", "0.0000", *["4.5000"] * 3, "40.0%", "0.250", "0.250", "0.500", "-0.233"],
+        ["a", "PASS", "0.0000", "1.0000", "0.0000", "1.0000", "1.0000", "0%", "–", "–", "|Δy|", "0.000", "–"],
+        [
+            *("b", "FAIL", "0.0000", "0.0000", *["4.5000"] * 3, "40.0%", "0.250", "0.250"),
+            *("|Δz|", "0.500", "-0.233"),
+        ],
     ]
     z = next(line for line in lines if line.startswith("Δz") and "FAIL" in line)
     assert z.split()[2:] == [
         "FAIL", "3.5", "4.5000", "0.500", "2.6926", "4.4000", "1.7000", "2.0881", "0.0000", "40.0", "%",
     ]  # fmt: skip
-    assert "  40.0 % out of tolerance; the longest stretch: 0.250 s (2 samples) from t = 0.250 s" in lines
+    out = "2 of 5 samples (40.0 %), the longest stretch: 0.250 s from t = 0.250 s"
+    assert f"  out of tolerance: {out}" in lines
+
+
+def test_the_ranking_tells_what_decided_and_when(capsys: Captured) -> None:
+    """One joint decides at the end, while the norm is largest in the middle."""
+    result = compared_arms()
+    run = result.runs[0]
+    joints = dict(run.joint_statistics)
+    joints["q4"] = replace(joints["q4"], max=0.009, t_max=0.195, sample_max=39)
+    norm = replace(run.statistics["norm"], t_max=0.1, sample_max=20)
+    decided = replace(run, joint_statistics=joints, statistics=run.statistics | {"norm": norm})
+    lines = printed(replace(result, runs=(decided, replace(decided, name="again"))), capsys)
+    assert lines[1].startswith("      again: |Δ q4| = 0.5157 deg of 0.572958 deg allowed (90.0 % of the")
+    rows = [line.split() for line in lines if line.startswith(("again ", "done "))]
+    assert [row[row.index("|Δ") : row.index("|Δ") + 3] for row in rows if "|Δ" in row] == [
+        ["|Δ", "q4|", "0.195"]
+    ] * 2
+
+
+def test_the_log_that_is_told_of_is_the_one_furthest_out_also_where_another_ends_early(
+    capsys: Captured,
+) -> None:
+    reference = write_path("path.csv", NOTHING_OFF)
+    write_path("early.csv", Z_OFF)
+    lines = Path("early.csv").read_text().splitlines()
+    Path("early.csv").write_text("\n".join(lines[:4]) + "\n")
+    result = urmpipe.compare(reference, ["early.csv", write_path("far.csv", 2 * Z_OFF)])
+    assert [run.name for run in result.ranking] == ["far", "early"]
+    assert result.worst.name == "far"
+    assert printed(result, capsys)[:2] == [
+        "FAIL  both logs out of tolerance against path; 1 log covers only a part of the reference",
+        "      far: |Δz| = 9.0000 mm of 3.5 mm allowed (2.57 times the tolerance) at t = 0.500 s (row 3), at"
+        " (0.2000, 0.0000, 0.9910) m",
+    ]
+    alone = urmpipe.compare(reference, ["early.csv"], tolerance=0.01)
+    assert printed(alone, capsys)[0] == (
+        "PASS  early within tolerance against path; only 60.0 % of the reference was judged"
+    )
 
 
 def test_of_many_logs_those_that_fail_have_their_statistics(capsys: Captured) -> None:
@@ -120,7 +161,7 @@ def test_of_many_logs_those_that_fail_have_their_statistics(capsys: Captured) ->
     reference = write_path("path.csv", NOTHING_OFF)
     lines = printed(urmpipe.compare(reference, [*good, bad[0]]), capsys)
     assert [line for line in lines if line.endswith("against path")] == [
-        "FAIL  1 of 4 logs out of tolerance against path", "bad0 against path",
+        "FAIL  1 of 4 logs (bad0) out of tolerance against path", "bad0 against path",
     ]  # fmt: skip
     assert lines[-1] == "Statistics of 3 more logs: --csv FILE, --json or the report."
     lines = printed(urmpipe.compare(reference, [*bad, *good]), capsys)
@@ -150,7 +191,7 @@ def test_tables_fit_the_terminal_and_no_column_is_lost(
     assert tables
     assert max(cell_len(line) for line in tables if not line.endswith("against wanted")) <= width
     heads = " ".join(tables)
-    for head in ("Verdict", "max |Δx|", "max angle", "max joint", "worst at", "speed)", "p95", "at start"):
+    for head in ("Verdict", "max |Δx|", "max angle", "max joint", "decided", "speed)", "p95", "at start"):
         assert head in heads
 
 
@@ -160,7 +201,7 @@ def test_angles_are_in_degrees_and_columns_that_no_log_has_are_not_shown(capsys:
     lines = printed(replace(result, runs=(result.runs[0], again)), capsys)
     assert "max angle" in lines[4] and "max joint" in lines[4]
     assert "max slide" not in lines[4] and "longest" not in lines[4]
-    said = "max |Δ q1| of again: 0.0573 deg of 0.572958 deg allowed (10.0 % of the tolerance), at t = "
+    said = "again: |Δ q1| = 0.0573 deg of 0.572958 deg allowed (10.0 % of the tolerance) at t = "
     assert lines[1].startswith(f"      {said}")
     path = write_path("path.csv", NOTHING_OFF)
     paths = urmpipe.compare(path, [write_path("a.csv", Y_OFF), write_path("b.csv", Y_OFF)])

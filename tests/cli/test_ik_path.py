@@ -17,7 +17,7 @@ from urmpipe_datasets import LOGS
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.recording.reader import read_recording
 from urmpipe_pipeline.recording.summary import summary
-from urmpipe_pipeline.report.banner import Banner, banner
+from urmpipe_pipeline.report.banner import Banner, solved_banner
 from urmpipe_pipeline.runs.results import Run
 
 Captured = pytest.CaptureFixture[str]
@@ -93,7 +93,7 @@ def told(output: Path) -> tuple[list[tuple[int | None, str]], Banner, str]:
     assert isinstance(solved, Run)
     kinds = ("jump", "joint-too-fast")
     said = [(one.row, one.message) for one in solved.warnings if one.kind in kinds]
-    return said, banner([], [solved], []), summary(solved).splitlines()[0]
+    return said, solved_banner([solved]), summary(solved).splitlines()[0]
 
 
 def test_recording_and_report_of_a_path_that_is_too_fast_fail_as_ik_does(folder: Path) -> None:
@@ -107,9 +107,9 @@ def test_recording_and_report_of_a_path_that_is_too_fast_fail_as_ik_does(folder:
     fast = "2 joints too fast, here the first: shoulder_pan_joint at 286.5 deg/s of 180 deg/s allowed"
     assert said == [(1, fast)]
     assert (verdict.state, verdict.word) == ("fail", "FAIL")
-    assert verdict.headline == "path: 30 of 30 targets with a solution"
-    assert verdict.detail.startswith(f"{fast}. ")
-    assert head == "### FAIL path: 30 of 30 targets with a solution"
+    assert verdict.headline == "path: ur5e reaches 30 targets, with 2 joints too fast"
+    assert verdict.detail == f"{fast}."
+    assert head == "### FAIL: path: ur5e reaches 30 targets, with 2 joints too fast"
 
 
 def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
@@ -132,7 +132,8 @@ def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
     said, verdict, head = told(folder / "path.rrd")
     steps = f"wrist_3_joint by {np.degrees(jump['steps']['wrist_3_joint']):.4g} deg"
     assert said[0] == (24, f"1 jump: {steps}")
-    assert (verdict.word, head) == ("FAIL", "### FAIL path: 33 of 40 targets with a solution")
+    reached = "path: ur5e reaches 33 of 40 targets, with 1 jump and 1 joint too fast"
+    assert (verdict.word, verdict.headline, head) == ("FAIL", reached, f"### FAIL: {reached}")
     assert run(["ik", "path.csv", "--robot", "ur5e", "--start", start]) == 1
     lines = capsys.readouterr().out.splitlines()
     assert any(line.startswith("      jump at t = 0.230 s (row 24), since row 16, at (") for line in lines)

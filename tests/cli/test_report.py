@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,6 +11,8 @@ from typing import Any
 import pytest
 
 from urmpipe_datasets import LOGS
+from urmpipe_pipeline.operands import load_run
+from urmpipe_pipeline.recording.summary import summary
 
 RunCommand = Callable[..., Any]
 MATLAB = LOGS / "matlab.csv"
@@ -42,6 +45,26 @@ def test_json_lists_no_figures_where_none_were_asked_for(urmpipe: RunCommand, re
         "recordings": [{"name": "coppeliasim-against-matlab", "verdict": "fail"}],
         "figures": [],
     }
+
+
+@pytest.mark.parametrize(("x", "verdict", "reached"), [(0.3, "pass", ""), (9.0, "fail", "1 of ")])
+def test_ik_its_recording_and_the_report_of_it_say_one_verdict(
+    urmpipe: RunCommand, tmp_path: Path, x: float, verdict: str, reached: str
+) -> None:
+    (tmp_path / "poses.csv").write_text(f"x [m],y [m],z [m]\n0.4,0.2,0.3\n{x},0.2,0.4\n")
+    ran = urmpipe("ik", "poses.csv", "--robot", "ur5e", "-o", "poses.rrd")
+    said = f"poses: ur5e reaches {reached}2 targets"
+    assert (ran.code, ran.out.splitlines()[0]) == (
+        ("pass", "fail").index(verdict),
+        f"{verdict.upper()}  {said} (iterative)",
+    )
+    assert summary(load_run(tmp_path / "poses.rrd")).splitlines()[0] == f"### {verdict.upper()}: {said}"
+    ran = urmpipe("report", "poses.rrd", "--json")
+    assert json.loads(ran.out)["recordings"] == [{"name": "poses", "verdict": verdict}]
+    page = (tmp_path / "poses.html").read_text(encoding="utf-8")
+    assert " ".join(re.sub("<[^>]*>", " ", page.split("<h1")[1].split("</h1")[0]).split()).endswith(
+        f"{verdict.upper()} {said}"
+    )
 
 
 def test_the_numbers_of_compare_stand_in_the_report_of_its_recording(

@@ -116,7 +116,10 @@ def test_the_command_prints_system_verdict_and_signals(urmpipe: RunCommand, tmp_
     lines = ran.out.splitlines()
     assert ran.code == 0
     assert lines[0].startswith("log-to-delta: 21 samples over 0.100 s, communication step 5 ms; in ")
-    assert lines[1].startswith("PASS  delta: |Δy| = 0.4174 mm of 3.5 mm allowed at t = 0.085 s;")
+    assert lines[1] == (
+        "PASS  delta: |Δy| = 0.4174 mm of 3.5 mm allowed (11.9 % of the tolerance) at t = 0.085 s;"
+        " out of tolerance: 0 of 21 samples (0 %)"
+    )
     assert any(line.startswith("delta.norm [m]") for line in lines)
     assert sum(line.startswith(("delta.", "repolarizer.", "chain.")) for line in lines) == 12
     assert lines[-2] == "... and 39 more; --json has all, and the recording"

@@ -12,7 +12,8 @@ import pytest
 
 import urmpipe
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.errors import LogError
+from urmpipe_models.errors import LogError, OptionError
+from urmpipe_pipeline.comparison.sync import SyncOption
 
 Spoil = Callable[[FloatArray], FloatArray]
 
@@ -65,23 +66,73 @@ def test_a_doubt_is_a_warning_and_with_strict_an_error(
     assert [path.name for path in tmp_path.iterdir()] == ["log.csv"]
 
 
-def test_what_an_offset_leaves_out_is_no_doubt(tmp_path: Path) -> None:
-    t = 0.005 * np.arange(400)
+def write_piece(path: Path, first: int, rows: int) -> Path:
+    """Write a piece of one motion of six joints, by a clock of its own."""
+    t = 0.005 * np.arange(first, first + rows)
     q = np.cos(np.outer(t, 0.5 + 0.4 * np.arange(6)))
     header = "t [s]," + ",".join(f"q{j} [rad]" for j in range(1, 7))
-    for name, rows in (("wanted", slice(300)), ("late", slice(100, 400))):
-        table = np.column_stack([t[:300], q[rows]])
-        np.savetxt(tmp_path / f"{name}.csv", table, fmt="%.9f", delimiter=",", header=header, comments="")
-    wanted, late = tmp_path / "wanted.csv", tmp_path / "late.csv"
+    table = np.column_stack([t - t[0], q])
+    np.savetxt(path, table, fmt="%.9f", delimiter=",", header=header, comments="")
+    return path
+
+
+def test_what_an_offset_leaves_out_of_a_log_is_no_doubt(tmp_path: Path) -> None:
+    wanted = write_piece(tmp_path / "wanted.csv", 100, 300)
+    late = write_piece(tmp_path / "late.csv", 0, 397)
     result = urmpipe.compare(wanted, [late], robot="ur5e", sync="auto", strict=True)
-    assert result.runs[0].sync.offset == pytest.approx(0.5, abs=1e-7)  # of values to 1e-9 rad
+    assert result.runs[0].sync.offset == pytest.approx(-0.5, abs=1e-7)  # of values to 1e-9 rad
     assert [(one.kind, one.message) for one in result.warnings] == [
         (
             "sync-left-out",
-            "late: the offset of 0.5 s leaves 100 of 300 samples and 100 of 300 samples of wanted without the"
+            "late: the offset of -0.5 s leaves 100 of 397 samples and 3 of 300 samples of wanted without the"
             " other side",
         )
     ]
     with pytest.raises(LogError) as error:
         urmpipe.compare(wanted, [late], robot="ur5e", sync="auto", tsp=0.0051, strict=True)
     assert "resampled" in str(error.value)
+
+
+@pytest.mark.parametrize("sync", ["auto", 0.5])
+def test_a_part_of_the_reference_that_an_offset_leaves_out_is_a_doubt(
+    tmp_path: Path, sync: SyncOption
+) -> None:
+    wanted = write_piece(tmp_path / "wanted.csv", 0, 300)
+    late = write_piece(tmp_path / "late.csv", 100, 200)
+    result = urmpipe.compare(wanted, [late], robot="ur5e", sync=sync)
+    said = "late: it covers 0.995 s of the 1.495 s of wanted (66.7 %) at the offset of 0.5 s"
+    assert [(one.kind, one.message) for one in result.warnings] == [
+        ("not-covered", f"{said}: the rest was not judged")
+    ]
+    with pytest.raises(LogError) as error:
+        urmpipe.compare(wanted, [late], robot="ur5e", sync=sync, strict=True)
+    assert str(error.value) == f"not-covered: {said}: the rest was not judged (strict)"
+
+
+LARGE = "a tolerance of 500 mm (axis) lets anything pass: 0.5 is in m; 0.5mm meant? If not:"
+
+
+def test_a_large_tolerance_is_a_doubt_unless_its_unit_says_that_it_is_meant(
+    urmpipe: Callable[..., Any], tmp_path: Path
+) -> None:
+    logs = [write_piece(tmp_path / f"{name}.csv", 0, 100) for name in ("wanted", "done")]
+    given = ("compare", *logs, "--robot", "ur5e", "--strict", "-q", "--tolerance")
+    bare = urmpipe(*given, "0.5")
+    said = f"error: large-tolerance: {LARGE} --tolerance axis=0.5m (--strict)"
+    assert (bare.code, bare.err.splitlines()) == (2, [said])
+    for meant in ("axis=500mm", "0.5m", "axis=0.5m,angle=15deg,joint=1rad"):
+        ran = urmpipe(*given, meant)
+        assert (ran.code, ran.err) == (0, ""), meant
+    assert urmpipe(*given, "axis=500mm", "--tolerance", "norm=0.5").code == 2
+
+
+def test_in_python_a_tolerance_with_units_is_a_text(tmp_path: Path) -> None:
+    logs = [write_piece(tmp_path / f"{name}.csv", 0, 100) for name in ("wanted", "done")]
+    with pytest.raises(LogError) as error:
+        urmpipe.compare(logs[0], logs[1], robot="ur5e", tolerance=0.5, strict=True)
+    assert str(error.value) == f'large-tolerance: {LARGE} tolerance="axis=0.5m" (strict)'
+    text = "axis=500mm,angle=15deg"
+    result = urmpipe.compare(logs[0], logs[1], robot="ur5e", tolerance=text, strict=True)
+    assert (result.verdict, result.tolerance) == ("pass", {"axis": 0.5, "angle": pytest.approx(np.pi / 12)})
+    with pytest.raises(OptionError, match=r"^tolerance: found 'foo', allowed: a length in m, or axis="):
+        urmpipe.compare(logs[0], logs[1], robot="ur5e", tolerance="foo")

@@ -32,7 +32,7 @@ from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
 from urmpipe_pipeline.comparison.statistics_table import write_statistics
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE
+from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE, kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.operands import load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
@@ -58,7 +58,7 @@ def compare(
     read: ReadOptions | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
-    tolerance: float | Mapping[str, float] = DEFAULT_TOLERANCE,
+    tolerance: float | str | Mapping[str, float] = DEFAULT_TOLERANCE,
     tcp: Tcp = "fk",
     sync: SyncOption = "start",
     align: AlignMode = "none",
@@ -83,7 +83,8 @@ def compare(
         read: How to read a log where it cannot tell by itself.
         tsp: Period of a log's grid in [s].
         derivative: How a log is differentiated: central or savgol.
-        tolerance: Largest deviation allowed of an axis in [m], or in [m] and [rad] by kind.
+        tolerance: Largest deviation allowed of an axis in [m], or in [m] and [rad] by kind, or as a text with
+            units, such as "axis=3.5mm,angle=0.5deg".
         tcp: Where a log was: fk or recorded.
         sync: How the clocks are put together: start, auto, or t_reference - t_log in [s].
         align: How a log is moved in space first: none, start, rigid or tool.
@@ -108,8 +109,7 @@ def compare(
     }  # fmt: skip
     told = None if junit is None else Path(junit)
     with told_in_junit(told, kept), guarded_outputs(outputs, kept) as parts:
-        allowed = tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
-        options = CompareOptions(allowed, tcp, sync, align)
+        options = CompareOptions(_allowed(tolerance), tcp, sync, align, _with_unit(tolerance))
         level = _noise_level(noise, baseline)
         given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
         given.refuse_unused(operands)
@@ -130,6 +130,18 @@ def _operands(reference: Operand | Comparison, logs: Sequence[Operand]) -> list[
     given = {"reference": [reference]} | ({"logs": logs} if logs else {})
     for_each(lambda named: refuse_others(*named, (Run, Comparison), OPERANDS), given.items())
     return [reference, *logs]
+
+
+def _allowed(tolerance: float | str | Mapping[str, float]) -> Mapping[str, float]:
+    """Return what is allowed in [m] and [rad], by kind."""
+    if isinstance(tolerance, str):
+        return parse_tolerance(tolerance)
+    return tolerance if isinstance(tolerance, Mapping) else {"axis": tolerance}
+
+
+def _with_unit(tolerance: float | str | Mapping[str, float]) -> frozenset[str]:
+    """Return the kinds of which it was said with a unit what is allowed."""
+    return kinds_with_unit(tolerance) if isinstance(tolerance, str) else frozenset()
 
 
 @dataclass(frozen=True)

@@ -12,6 +12,7 @@ from urmpipe.guards import PathLike, one_or_many, paths, refuse_foreign, refuse_
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.inverse.verdict import verdict_of
 from urmpipe_pipeline.recording import read_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
@@ -52,8 +53,8 @@ class Report(Shown):
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe report --json` prints."""
         kinds = [
-            {"name": result.name, "verdict": None if isinstance(result, Run) else result.verdict}
-            for result in self.results
+            {"name": one.name, "verdict": verdict_of(one) if isinstance(one, Run) else one.verdict}
+            for one in self.results
         ]
         return {
             "schema": 1,

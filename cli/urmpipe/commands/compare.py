@@ -40,12 +40,13 @@ def _sync(text: str) -> str | float:
     return text if text in ("start", "auto") else offset
 
 
-def _tolerance(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, float]:
-    """Return what is allowed, by kind; given several times, it is all of it."""
+def _tolerance(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> str:
+    """Return what is allowed, which can be read; given several times, it is all of it."""
     from urmpipe_pipeline.comparison.tolerance import parse_tolerance
 
-    kinds: dict[str, float] = parsed(parse_tolerance, ",".join(values), ctx, param)
-    return kinds
+    text = ",".join(values)
+    parsed(parse_tolerance, text, ctx, param)
+    return text
 
 
 def _noise(text: str) -> dict[str, float]:

@@ -13,6 +13,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.kinematics.singularity import singularity_over_log
+from urmpipe_pipeline.inverse import verdict
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.text import DIGITS, SHOWN, counted, enumerated
 
@@ -63,9 +64,8 @@ def method_words(method: str) -> str:
 
 def reach_words(result: InverseResult) -> str:
     """Say how many targets the arm reaches, and how they were solved."""
-    count, reached = len(result), int(result.reached.sum())
-    number = counted(count, "target") if reached == count else f"{reached} of {counted(count, 'target')}"
-    said = f"{result.name}: {result.robot.name} reaches {number} ({method_words(result.method)})"
+    reached = verdict.reach_words(result.name, [result.robot.name], int(result.reached.sum()), len(result))
+    said = f"{reached} ({method_words(result.method)})"
     if result.path is None:
         return said
     jumps, fast = len(result.path.jumps), len({one.joint for one in result.path.too_fast})

@@ -8,17 +8,19 @@ from typing import TYPE_CHECKING
 from urmpipe.printing.columns import Column, print_columns
 from urmpipe.printing.terminal import LISTED, judged_line
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.change import Absent, BaselineComparison, Change, Worse
+from urmpipe_pipeline.comparison.change import Absent, BaselineComparison, Change
+from urmpipe_pipeline.comparison.change_wording import (
+    ARROW,
+    WORDS,
+    samples_words,
+    share_words,
+    statistic_words,
+)
 from urmpipe_pipeline.comparison.symbols import symbol
 from urmpipe_pipeline.json_values import plain
 
 if TYPE_CHECKING:
     from rich.console import Console
-
-ARROW = " → "
-
-WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out", "samples": "samples"}
-"""What people call what may be worse."""
 
 
 def print_baseline(console: Console, found: BaselineComparison) -> None:
@@ -66,11 +68,11 @@ def _columns(changes: Sequence[Change]) -> Iterator[Column]:
     )
     yield Column("worse", [_how(one) or None for one in changes])
     for name in ("max", "rms"):
-        yield Column(name, [_both(one, name) for one in changes])
+        yield Column(name, [statistic_words(one, name) for one in changes])
     if any("samples" in (*one.worse, *one.better) for one in changes):
-        yield Column("samples", [f"{one.before.samples}{ARROW}{one.now.samples}" for one in changes])
+        yield Column("samples", [samples_words(one) for one in changes])
     if any(one.before.share_out or one.now.share_out for one in changes):
-        yield Column("out", [_shares(one) for one in changes])
+        yield Column("out", [share_words(one) for one in changes])
     yield Column("most at\none sample", [text.number(one.largest, one.now.unit) for one in changes])
     times = [one.t_largest for one in changes]
     yield Column("at t\n[s]", [None if t is None else text.seconds(t) for t in times])
@@ -78,23 +80,9 @@ def _columns(changes: Sequence[Change]) -> Iterator[Column]:
         yield Column("verdict", [_verdicts(one) for one in changes])
 
 
-def _both(change: Change, name: str) -> str:
-    """Return a statistic before and now, with more digits only where they tell a change beyond the noise."""
-    before, now = (getattr(one, name) for one in (change.before, change.now))
-    apart = abs(now - before) > change.noise
-    unit = change.now.unit
-    return ARROW.join(
-        text.number(one, unit, other if apart else None) for one, other in ((before, now), (now, before))
-    )
-
-
-def _shares(change: Change) -> str:
-    shares = (change.before.share_out, change.now.share_out)
-    return ARROW.join(text.NOTHING if share is None else text.percent(share) for share in shares)
-
-
 def _verdicts(change: Change) -> str:
-    return ARROW.join((one.verdict or text.NOTHING).upper() for one in (change.before, change.now))
+    found = dict.fromkeys((one.verdict or text.NOTHING).upper() for one in (change.before, change.now))
+    return ARROW.join(found)
 
 
 def _lines(found: BaselineComparison) -> Iterator[str]:

@@ -11,8 +11,8 @@ from urmpipe.printing.terminal import judged, judged_line, new_console
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation, Statistics
-from urmpipe_pipeline.comparison.symbols import SYMBOLS, size_of, symbol, used_words
-from urmpipe_pipeline.comparison.wording import correlation, lacking_words, of_allowed
+from urmpipe_pipeline.comparison.symbols import SYMBOLS, size_of, symbol
+from urmpipe_pipeline.comparison.wording import correlation, decided_words, verdict_words
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -58,38 +58,17 @@ def print_verdict(result: Comparison, *, err: bool = False) -> None:
 
 def _print_verdict(console: Console, result: Comparison) -> None:
     """Print pass or fail, and which quantity uses up most of its tolerance: how much, when and where."""
-    console.print(judged_line(result.verdict, verdict_words(result)), soft_wrap=True)
-    worst = result.ranking[-1]
-    console.print(f"      {_decisive(worst, named=len(result.runs) > 1)}", soft_wrap=True)
-
-
-def verdict_words(result: Comparison) -> str:
-    """Say what was held against what, by which tool centre points, and how it came out."""
-    failed = [run.name for run in result.runs if run.verdict == "fail"]
-    total = len(result.runs)
-    number = f"{len(failed)} of {total} logs" if failed else f"all {total} logs"
-    who = result.runs[0].name if total == 1 else number
-    said = f"{who} {'out of' if failed else 'within'} tolerance against {result.reference.name}"
-    if result.reference.joints:
-        recorded = result.provenance.options.get("tcp") == "recorded"
-        said += f", {'as recorded' if recorded else 'by the joints'} on both sides"
-    if result.baseline is not None and result.within_tolerance and result.baseline.verdict == "fail":
-        said += f", but worse than the baseline {result.baseline.name}"
-    return said
+    console.print(judged_line(result.verdict, verdict_words([result])), soft_wrap=True)
+    console.print(f"      {_decisive(result.worst, named=len(result.runs) > 1)}", soft_wrap=True)
 
 
 def _decisive(run: Deviation, *, named: bool) -> str:
-    """Say which quantity uses up most of its tolerance: how much of how much, when and where."""
+    """Return which quantity uses up most of its tolerance: how much, when and where."""
     one = run.decisive
+    of = f"{run.name}: " if named else ""
     if one.tolerance is not None and one.missing:
-        return f"{size_of(one)}{f' of {run.name}' if named else ''}: {lacking_words(one)}"
-    place = text.point(run.place(one))
-    of = f" of {run.name}" if named else ""
-    used = f" ({used_words(one)})" if one.tolerance is not None else ""
-    return (
-        f"max {size_of(one)}{of}: {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
-        f"{used}, at t = {text.seconds(one.t_max)} s (row {run.row(one)}), at ({place}) m"
-    )
+        return f"{of}{decided_words(one)}"
+    return f"{of}{decided_words(one)} (row {run.row(one)}), at ({text.point(run.place(one))}) m"
 
 
 def _ranking(result: Comparison) -> Iterator[Column]:
@@ -120,13 +99,14 @@ def _ranking(result: Comparison) -> Iterator[Column]:
 
 
 def _when(runs: Sequence[Deviation]) -> Iterator[Column]:
-    """Yield the columns that tell how much was out, when, and what it goes with."""
+    """Yield the columns that tell how much was out, what decided and when, and what it goes with."""
     stretches = [run.longest_out for run in runs]
     if any(stretches):
         yield Column("out", [text.percent(run.share_out) for run in runs])
         yield Column("longest\nout [s]", [_seconds(one.duration if one else None) for one in stretches])
         yield Column("from t\n[s]", [_seconds(one.t if one else None) for one in stretches])
-    yield Column("worst at\nt [s]", [text.seconds(float(run.t[run.worst])) for run in runs])
+    yield Column("decided\nby", [size_of(run.decisive) for run in runs])
+    yield Column("at t\n[s]", [text.seconds(run.decisive.t_max) for run in runs])
     if any(run.speed_correlation is not None for run in runs):
         yield Column("r(‖Δ‖,\nspeed)", [correlation(run.speed_correlation) for run in runs])
     if any(run.sync.offset for run in runs):

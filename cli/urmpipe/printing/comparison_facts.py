@@ -4,9 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
+
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.wording import alignment_words, correlation, sync_words, tool_option
+from urmpipe_pipeline.comparison.wording import (
+    alignment_words,
+    correlation,
+    out_words,
+    stretch_words,
+    sync_words,
+    tool_option,
+)
 
 
 def facts(run: Deviation) -> Iterator[str]:
@@ -19,11 +28,8 @@ def facts(run: Deviation) -> Iterator[str]:
             f" {text.counted(run.reference_left_out, 'sample')} of the reference outside its time"
         )
     if longest := run.longest_out:
-        yield (
-            f"{text.percent(run.share_out)} out of tolerance; the longest stretch:"
-            f" {text.seconds(longest.duration)} s ({text.counted(longest.samples, 'sample')})"
-            f" from t = {text.seconds(longest.t)} s"
-        )
+        out = out_words(int(np.count_nonzero(run.outside)), len(run.sample))
+        yield f"out of tolerance: {out}, the longest stretch: {stretch_words(longest)}"
     yield sync_words(run.sync) or "clocks: both from their first samples"
     turns = zip(run.joint_statistics, run.joint_turns, strict=True)
     turned = [f"{name} by {number:+d}" for name, number in turns if number]

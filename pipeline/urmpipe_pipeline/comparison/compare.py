@@ -50,12 +50,14 @@ class CompareOptions:
         sync: How the clocks are put together: start (both start together), auto (by the motion), or
             the offset in [s]: t_reference = t_log + offset, both from their first samples.
         align: How a log is moved in space before it is compared: none, start, rigid or tool.
+        with_unit: Kinds whose tolerance was given with its unit: however large it is, it is meant.
     """
 
     tolerance: Mapping[str, float] = field(default_factory=lambda: {"axis": DEFAULT_TOLERANCE})
     tcp: Tcp = "fk"
     sync: SyncOption = "start"
     align: AlignMode = "none"
+    with_unit: frozenset[str] = frozenset()
 
     def __post_init__(self) -> None:
         check_tolerance(self.tolerance)
@@ -188,7 +190,8 @@ def _comparison(
     options: CompareOptions,
     told: Sequence[LogWarning] = (),
 ) -> Comparison:
-    warnings = [*large_tolerances(options.tolerance), *told]
+    bare = {kind: value for kind, value in options.tolerance.items() if kind not in options.with_unit}
+    warnings = [*large_tolerances(bare), *told]
     for one in deviations:
         warnings += sync_doubts(one.name, one.sync, one.run.tsp)
         warnings += left_out_warnings(one, reference)

@@ -19,6 +19,11 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+def by_tolerance(run: Deviation) -> tuple[bool, float, float]:
+    """Return how far out of its tolerance a log is, the furthest last: share used up, then the rms norm."""
+    return run.verdict == "fail", run.decisive.used or 0.0, run.statistics["norm"].rms
+
+
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
 class Comparison(Shown):
     """Some logs held against one reference.
@@ -73,10 +78,18 @@ class Comparison(Shown):
 
         def place(run: Deviation) -> tuple[bool, bool, float, float]:
             """Return what a log is ranked by, the least first."""
-            partly = self.covered(run) < WHOLE
-            return run.verdict == "fail", partly, run.decisive.used or 0.0, run.statistics["norm"].rms
+            failed, used, rms = by_tolerance(run)
+            return failed, self.covered(run) < WHOLE, used, rms
 
         return tuple(sorted(self.runs, key=place))
+
+    @property
+    def worst(self) -> Deviation:
+        """The log that is furthest out of its tolerance, or closest to it: by it the verdict is told.
+
+        It need not be the last of the ranking, where logs that cover a part of the reference stand behind.
+        """
+        return sorted(self.runs, key=by_tolerance)[-1]
 
     def rows(self) -> Iterator[dict[str, Any]]:
         """Yield one row a log and quantity: the offset of the clocks, the statistics and the verdict."""

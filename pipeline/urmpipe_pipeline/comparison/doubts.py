@@ -57,19 +57,18 @@ def _extent(values: FloatArray) -> float:
 
 
 def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
-    """Yield a warning for each tolerance that nobody means.
+    """Yield a warning for each tolerance that hardly anybody means.
 
     Args:
-        tolerance: In [m] or [rad], by kind or coordinate.
+        tolerance: In [m] or [rad], by kind or coordinate, of numbers that were given without a unit.
     """
     for kind, value in tolerance.items():
         unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
         if value > most:
             shown, bare = text.limit(value, unit), f"{value:g}"
-            said = f"a tolerance of {shown} {other} ({kind}) lets anything pass"
-            hint = f": {bare} is in {unit}; {bare}{other} meant?"
-            plain = len(bare) <= len(shown)  # 0.261799 rad was written as 15deg: it was meant
-            yield LogWarning("large-tolerance", said + hint if plain else said)
+            said = f"a tolerance of {shown} {other} ({kind}) lets anything pass: {bare} is in {unit}"
+            hint = f"{bare}{other} meant? If not: --tolerance {kind}={bare}{unit}"
+            yield LogWarning("large-tolerance", f"{said}; {hint}")
 
 
 def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:

@@ -29,9 +29,11 @@ from typing import Any, Literal
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.change import Absent, Change
+from urmpipe_pipeline.comparison.change_wording import noise_words, worse_words
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
-from urmpipe_pipeline.comparison.wording import excess
+from urmpipe_pipeline.comparison.symbols import size_of
+from urmpipe_pipeline.comparison.wording import decided_words, out_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import JUNIT_HEADER
 
@@ -151,12 +153,9 @@ def _judged(run: Deviation, one: Statistics) -> ET.Element:
     """Return the test case of a quantity that has a tolerance."""
     case = _case(run.name, _named(one))
     if one.verdict == "fail":
-        joint = "joint " if one.kind == "joint" else ""
-        at = "" if one.missing else f" at t = {text.seconds(one.t_max)} s (row {run.row(one)})"
-        out = (
-            f"{text.counted(one.out_of_tolerance or 0, 'sample')} out ({text.percent(one.share_out or 0.0)})"
-        )
-        _told(case, "failure", OUT_OF_TOLERANCE, f"{joint}{excess(one)}{at}; {out}")
+        row = "" if one.missing else f" (row {run.row(one)})"
+        out = out_words(one.out_of_tolerance or 0, len(run.sample))
+        _told(case, "failure", OUT_OF_TOLERANCE, f"{decided_words(one)}{row}; out of tolerance: {out}")
     return case
 
 
@@ -164,12 +163,8 @@ def _changed(change: Change) -> ET.Element:
     """Return the test case of a quantity that is held against the baseline."""
     case = _case(f"{change.run} against baseline", _named(change.now))
     if change.worse:
-        told = (
-            f"{field} {getattr(change.before, field)!r} -> {getattr(change.now, field)!r}"
-            for field in change.worse
-        )
-        noise = f"noise {change.noise!r} {change.now.unit}"
-        _told(case, "failure", WORSE, f"{_named(change.now)}: {', '.join(told)} ({noise})")
+        said = f"{size_of(change.now)}: {worse_words(change)} ({noise_words(change)})"
+        _told(case, "failure", WORSE, said)
     return case
 
 

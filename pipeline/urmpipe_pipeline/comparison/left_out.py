@@ -15,10 +15,11 @@ BEYOND = "sync-left-out"
 
 
 def left_out_warnings(one: Deviation, reference: Trajectory) -> list[LogWarning]:
-    """Return what was not compared of a log, and, where the clocks are shifted, of the reference.
+    """Return what was not compared of a log and of the reference.
 
     Samples that an offset moves beyond the reference's time are what --sync asks for; they are told apart
     from those that lack a value, lie in a gap, or come after a reference that started together with the log.
+    A part of the reference that was not judged is told however the clocks were put together.
 
     Args:
         one: The deviation of the log.
@@ -30,9 +31,10 @@ def left_out_warnings(one: Deviation, reference: Trajectory) -> list[LogWarning]
     if one.left_out > beyond:
         said = f"{one.name}: {one.left_out - beyond} of {samples} samples have no reference or no value"
         warnings.append(LogWarning("left-out", said))
-    if not one.sync.offset and one.reference_left_out > (1.0 - WHOLE) * len(reference.t_ns):
+    partly = one.reference_left_out > (1.0 - WHOLE) * len(reference.t_ns)
+    if partly:
         warnings.append(LogWarning("not-covered", f"{one.name}: {_covered(one, reference)}"))
-    if one.sync.offset and (beyond or one.reference_left_out):
+    if one.sync.offset and (beyond or (one.reference_left_out and not partly)):
         theirs = f"{one.reference_left_out} of {len(reference.t_ns)} samples of {reference.name}"
         said = f"the offset of {one.sync.offset:.6g} s leaves {beyond} of {samples} samples and {theirs}"
         warnings.append(LogWarning(BEYOND, f"{one.name}: {said} without the other side"))
@@ -40,10 +42,14 @@ def left_out_warnings(one: Deviation, reference: Trajectory) -> list[LogWarning]
 
 
 def _covered(one: Deviation, reference: Trajectory) -> str:
-    """Say how much of the time of the reference a log lasts."""
+    """Say how much of the time of the reference a log lasts, and by which offset."""
     kept = len(reference.t_ns) - one.reference_left_out
-    lasts = f"{text.seconds(one.run.t[-1])} s of the {text.seconds(reference.t[-1])} s of {reference.name}"
-    return f"it covers {lasts} ({text.percent(kept / len(reference.t_ns))}): the rest was not judged"
+    first, last = one.sync.offset, one.sync.offset + float(one.run.t[-1])
+    lasts = min(last, float(reference.t[-1])) - max(first, 0.0)
+    share = text.percent(kept / len(reference.t_ns))
+    shifted = f" at the offset of {one.sync.offset:.6g} s" if one.sync.offset else ""
+    said = f"{text.seconds(lasts)} s of the {text.seconds(reference.t[-1])} s of {reference.name}"
+    return f"it covers {said} ({share}){shifted}: the rest was not judged"
 
 
 def _beyond(one: Deviation, reference: Trajectory) -> int:

@@ -46,12 +46,13 @@ class Estimate:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Line:
+class Line:
     """reference(t + offset) - log(t) = nuisance + rate * step, with the nuisance taken out.
 
     Attributes:
-        residual: The left side, shape (n, k).
-        rate: Rate of the reference, shape (n, k).
+        residual: The left side in [rad] or [m], shape (n, k).
+        rate: Rate of the reference in [rad/s] or [m/s], shape (n, k): what the residual grows by with the
+            offset.
         energy: Sum of the squares of the rate before anything was taken out.
     """
 
@@ -79,7 +80,7 @@ def refine(view: View, found: Rates, peak: Peak) -> Estimate:
     """
     offset_ns = float(peak.offset_ns)
     for _ in range(STEPS):
-        line = _line(view, found, round(offset_ns))
+        line = line_at(view, found, round(offset_ns))
         if line.known <= TELLS * line.energy:
             return _lost(peak)
         step_ns = -1e9 * float((line.rate * line.residual).sum()) / line.known
@@ -99,8 +100,14 @@ def _lost(peak: Peak) -> Estimate:
     return Estimate(peak.offset_ns / 1e9, np.inf, peak.similarity)
 
 
-def _line(view: View, found: Rates, offset_ns: int) -> _Line:
-    """Return the equation for a step from an offset, at the samples of the log that both sides have."""
+def line_at(view: View, found: Rates, offset_ns: int) -> Line:
+    """Return the equation for a step from an offset, at the samples of the log that both sides have.
+
+    Args:
+        view: The channels.
+        found: Their rates in [rad/s] or [m/s].
+        offset_ns: t_reference - t_log in integer [ns].
+    """
     thinned = slice(None, None, -(-len(view.log_ns) // MOST))
     at_ns = view.log_ns[thinned] + offset_ns
     middles = found.reference_ns[:-1] + found.period_ns // 2
@@ -110,14 +117,14 @@ def _line(view: View, found: Rates, offset_ns: int) -> _Line:
         parts += list(np.moveaxis(view.tool_axes[thinned], 2, 0))
     both = np.all([np.isfinite(part).all(axis=1) for part in parts], axis=0)
     if np.count_nonzero(both) < LEAST:
-        return _Line(np.empty((0, 1)), np.empty((0, 1)), 0.0)
+        return Line(np.empty((0, 1)), np.empty((0, 1)), 0.0)
     energy = float((parts[2][both] ** 2).sum())
     reference, log, rate, *nuisance = (part[both] - part[both].mean(axis=0) for part in parts)
     if view.turned:
         log = log @ best_rotation(reference.T @ log)[0].T
         nuisance = [np.cross(axis, log) for axis in np.eye(3)]
     residual, rate = (_without(part, nuisance) for part in (reference - log, rate))
-    return _Line(residual, rate, energy)
+    return Line(residual, rate, energy)
 
 
 def _without(values: FloatArray, nuisance: Sequence[FloatArray]) -> FloatArray:
@@ -129,7 +136,7 @@ def _without(values: FloatArray, nuisance: Sequence[FloatArray]) -> FloatArray:
     return np.asarray(values - (columns @ weights).reshape(values.shape))
 
 
-def _precision(line: _Line) -> float:
+def _precision(line: Line) -> float:
     """Return the standard error of the offset in [s], from blocks in time.
 
     What is left over deviates in whole stretches, not from sample to sample: the blocks are taken to be

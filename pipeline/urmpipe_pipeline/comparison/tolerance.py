@@ -79,6 +79,22 @@ def parse_tolerance(
     return found
 
 
+def kinds_with_unit(text: str, bare: Sequence[str] = ("axis",)) -> frozenset[str]:
+    """Return the kinds whose tolerance has its unit behind it: nobody took a metre for a millimetre there.
+
+    Args:
+        text: One length, or some kinds with theirs, as `parse_tolerance` takes it.
+        bare: The kinds that a length without a name is for.
+    """
+    kinds: set[str] = set()
+    for part in text.split(","):
+        name, sign, value = part.rpartition("=")
+        match = QUANTITY.fullmatch(value)
+        if match is not None and match[2]:
+            kinds.update((name.strip(),) if sign else bare)
+    return frozenset(kinds)
+
+
 def check_tolerance(
     tolerance: Mapping[str, float], option: str = "--tolerance", *, zero: bool = False
 ) -> None:

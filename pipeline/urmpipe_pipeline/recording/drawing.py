@@ -14,6 +14,7 @@ from urmpipe_pipeline.recording.marks import MARK_SIZE, draw_meter_worst, draw_r
 from urmpipe_pipeline.recording.overview import overviews
 from urmpipe_pipeline.recording.scene import Scene
 from urmpipe_pipeline.recording.scene_drawing import draw_scene
+from urmpipe_pipeline.recording.series import series_lines
 from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.summary import summary
@@ -23,9 +24,6 @@ from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
-
-LINE_WIDTH = 2.0
-"""Width of a series in points of the screen."""
 
 
 def draw(stream: RecordingStream, result: Result, every: Sequence[Block], scene: Scene) -> None:
@@ -87,16 +85,9 @@ def _draw_styles(stream: RecordingStream, every: Sequence[Block], *, lone: bool)
     for block in every:
         if not block.names:
             continue
-        colours, names = [rgb(colour) for colour in block.colours], list(block.names)
         if lone or len(block.t_ns) == 1:  # no line goes through one sample
+            colours, names = [rgb(colour) for colour in block.colours], list(block.names)
             points = rr.SeriesPoints(colors=colours, names=names, marker_sizes=[MARK_SIZE] * len(names))
             stream.log(block.entity, points, static=True)
             continue
-        style = rr.SeriesLines(
-            colors=colours,
-            names=names,
-            widths=[LINE_WIDTH] * len(names),
-            # Where samples are closer than pixels, the default draws their mean: peaks would vanish.
-            aggregation_policy=rr.components.AggregationPolicy.MinMax,
-        )
-        stream.log(block.entity, style, static=True)
+        stream.log(block.entity, series_lines(block.names, block.colours), static=True)

@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import IntArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.wording import alignment_words, excess, sync_words
+from urmpipe_pipeline.comparison.wording import alignment_words, amount_words, sync_words
 from urmpipe_pipeline.recording.columns import time_columns
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
@@ -60,7 +60,7 @@ def _events(one: Deviation) -> Iterator[Event]:
         yield round(longest.t * 1e9), said, level
     decisive = one.decisive
     if decisive.tolerance is not None:
-        yield round(decisive.t_max * 1e9), f"decides: {excess(decisive)}", level
+        yield round(decisive.t_max * 1e9), f"decides: {amount_words(decisive)}", level
     x, y, z, norm = (text.quantity(float(value), "m") for value in one.delta[one.worst])
     yield int(one.t_ns[one.worst]), f"largest deviation: {norm} (x {x}, y {y}, z {z})", level
 

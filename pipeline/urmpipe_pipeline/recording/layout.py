@@ -107,9 +107,8 @@ def opening_time(result: Result) -> int:
         shown = worst if result.failed is None else -1
         return int(result.t_ns[shown]) if len(result.t_ns) else 0
     if isinstance(result, Run):
-        return fullest_time(result) if result.ghosts else int(result.t_ns[0])
-    open_first = result.ranking[-1]
-    return int(open_first.t_ns[decided_row(open_first)])
+        return fullest_time(result) if result.goals is not None else int(result.t_ns[0])
+    return int(result.worst.t_ns[decided_row(result.worst)])
 
 
 def eye_and_target(scene: Scene) -> tuple[FloatArray, FloatArray]:
@@ -158,7 +157,7 @@ def _of_comparison(result: Comparison) -> Container:
     columns = [_of_log(plots, one, place, result) for one, place in zip(result.runs, standing, strict=True)]
     if len(columns) == 1:
         return columns[0]
-    return rrb.Tabs(*columns, active_tab=result.runs.index(result.ranking[-1]))
+    return rrb.Tabs(*columns, active_tab=result.runs.index(result.worst))
 
 
 def _of_log(plots: Plots, one: Deviation, place: Place, result: Comparison) -> Container:

@@ -13,6 +13,7 @@ from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.recording.marks import mark_entity, worst_entity
 from urmpipe_pipeline.recording.overview import LONG, overview_entity, speed_entity
+from urmpipe_pipeline.recording.series import series_lines
 from urmpipe_pipeline.recording.shown_units import (
     deviation_entity,
     factors,
@@ -26,6 +27,7 @@ from urmpipe_pipeline.simulations.signal_groups import Group
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
 if TYPE_CHECKING:
+    from rerun import SeriesLines
     from rerun.blueprint import TimeSeriesView
     from rerun.encodings import TimeRange
 
@@ -87,7 +89,12 @@ class Plots:
         """Return the plot of some signals of a block, as `array` does it."""
         name = printable(f"{group.block}: {group.variables}")
         own = [entities[one.name] for one in group.signals]
-        return self._arrays(name, printable(group.bracket), own, rows, *beside)
+        views = self._arrays(name, printable(group.bracket), own, rows, *beside)
+        if group.wanted and rows > 1:  # beside each other they have other names and colours
+            standing = [list(map(overview_entity, own)), own] if rows > LONG else [own]
+            for view, drawn in zip(views, standing, strict=True):
+                view.visualizer_overrides = {one: _looks(group, i) for i, one in enumerate(drawn)}
+        return views
 
     def _arrays(
         self,
@@ -187,6 +194,11 @@ class Plots:
         elif run.tcp_recorded is not None:
             return self.array("Recorded TCP", "m", f"{place.prefix}tcp/recorded", len(run.t_ns))
         return [self.series(name, place.prefix + entity) for name, entity in found]
+
+
+def _looks(group: Group, number: int) -> SeriesLines:
+    """Return how the lines of one signal of a group are drawn."""
+    return series_lines(list(map(printable, group.names[number])), group.colours[number])
 
 
 def decisive_plot(one: Deviation) -> str:

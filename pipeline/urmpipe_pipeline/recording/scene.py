@@ -14,11 +14,11 @@ from urmpipe_models.elementwise import Vector
 from urmpipe_models.kinematics.forward import points_over_log, positions_over_log
 from urmpipe_models.transform import Transform, translation
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
 from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
-from urmpipe_pipeline.comparison.wording import excess
+from urmpipe_pipeline.comparison.wording import amount_words
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, joint_colour, run_colour
 from urmpipe_pipeline.recording.bodies import Body, bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import enlarged
@@ -174,7 +174,7 @@ def _of_run(run: Run, place: Place) -> Scene:
 
 def arm_of(result: Comparison) -> Deviation:
     """Return the compared log whose arm is drawn: the worst that has kinematics, else the worst."""
-    worst_first = result.ranking[::-1]
+    worst_first = sorted(result.runs, key=by_tolerance)[::-1]
     return next((one for one in worst_first if one.run.tcp is not None), worst_first[0])
 
 
@@ -182,7 +182,7 @@ def _worst(one: Deviation, *, several: bool) -> Mark:
     """Return where the verdict on a log was decided: by what, how much and when."""
     x, y, z = one.actual[decided_row(one)].tolist()
     whose = f", {printable(one.name)}" if several else ""
-    said = f"{printable(excess(one.decisive))} at {text.seconds(one.decisive.t_max)} s{whose}"
+    said = f"{printable(amount_words(one.decisive))} at t = {text.seconds(one.decisive.t_max)} s{whose}"
     return Mark((x, y, z), said)
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from urmpipe_pipeline.recording.entities import SUMMARY, printable
 from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE, signal_entities, verdict_entities
+from urmpipe_pipeline.simulations.answers import answers_of
 from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
 from urmpipe_pipeline.simulations.simulation import Simulation
 
@@ -36,12 +37,14 @@ def simulation_words() -> Container:
 def simulation_plots(result: Simulation) -> View | Container:
     """Return the plots: all at once if they are few, else a tab a block.
 
-    That of the worst meter is open; without one the last, to where the signals of most systems flow.
+    That of the worst meter is open; without one that of set points and answers, which comes first; else the
+    last, to where the signals of most systems flow.
     """
     import rerun.blueprint as rrb
 
     plots = Plots(result)
-    groups = groups_of(result)
+    answers = answers_of(result)
+    groups = [*answers, *groups_of(result)]
     if not groups:
         return rrb.TextDocumentView(origin=SYSTEM_FILE, name="No signal was recorded")
     entities = signal_entities(result)
@@ -51,7 +54,7 @@ def simulation_plots(result: Simulation) -> View | Container:
     paired = list(zip(groups, views, strict=True))
     tabs: list[Container] = []
     judged = result.judged_worst
-    opened: int | None = None
+    opened = 0 if answers else None
     for block, some in groupby(paired, key=lambda pair: pair[0].block):
         if judged is not None and judged.block == block:
             opened = len(tabs)

@@ -9,6 +9,7 @@ from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.wording import meter_words
 from urmpipe_pipeline.recording.summary import shown, table_row, warning_lines
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.simulations.wording import outcome_words
 
 LISTED = 30
 """Blocks and connections that are listed; the others are counted."""
@@ -42,9 +43,9 @@ def _lines(result: Simulation) -> Iterator[str]:
 
 
 def _head(result: Simulation) -> str:
-    """Return the verdict, if there is one, and the name."""
+    """Return the verdict, if there is one, and how it ended; else the name."""
     state = "FAILED" if result.failed is not None else (result.verdict or "").upper()
-    return f"{state}: {shown(result.name)}" if state else shown(result.name)
+    return f"{state}: {shown(outcome_words(result))}" if state else shown(result.name)
 
 
 def _verdict(one: DeltaVerdict) -> str:

@@ -12,9 +12,17 @@ import numpy as np
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
-from urmpipe_pipeline.comparison.symbols import used_words
-from urmpipe_pipeline.comparison.wording import alignment_words, excess, sync_words, tolerance_words
-from urmpipe_pipeline.inverse.verdict import reached, solved
+from urmpipe_pipeline.comparison.symbols import size_of
+from urmpipe_pipeline.comparison.wording import (
+    alignment_words,
+    decided_words,
+    out_words,
+    stretch_words,
+    sync_words,
+    tolerance_words,
+    verdict_words,
+)
+from urmpipe_pipeline.inverse.verdict import reached, reached_words, solved
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import ghost_colour_word, run_colour_word
 from urmpipe_pipeline.recording.entities import printable
@@ -47,7 +55,8 @@ def _of_run(run: Run) -> Iterator[str]:
     yield f"{files}, {done} {shown(run.log.source)}: {rows}. {robot}"
     yield ""
     if run.single_poses:
-        yield "Without times: the timeline counts rows, t = 0 s is row 1."
+        missing = " Rows that are not reached show no arm." if not solved(run) else ""
+        yield f"Without times: the timeline counts rows, t = 0 s is row 1.{missing}"
     else:
         every = f", one in {1e3 * run.tsp:.6g} ms" if len(run.t_ns) > 1 else ""
         grid = f"Grid: {text.counted(len(run.t_ns), 'sample')}{every}."
@@ -57,13 +66,10 @@ def _of_run(run: Run) -> Iterator[str]:
 
 
 def _headline(run: Run) -> str:
-    """Return the name, of solved targets behind the verdict and with how many have a solution."""
+    """Return the name, of solved targets behind the verdict and with how many are reached."""
     if run.goals is None:
         return shown(run.name)
-    word = "SOLVED" if solved(run) else "FAIL"
-    return (
-        f"{word} {shown(run.name)}: {reached(run)} of {text.counted(run.log.rows, 'target')} with a solution"
-    )
+    return f"{'PASS' if solved(run) else 'FAIL'}: {shown(reached_words([run]))}"
 
 
 def _branches(run: Run) -> Iterator[str]:
@@ -88,12 +94,9 @@ def _branches(run: Run) -> Iterator[str]:
 
 
 def _of_comparison(result: Comparison) -> Iterator[str]:
-    failing = sum(one.verdict == "fail" for one in result.runs)
     several = len(result.runs) > 1
-    yield f"### {result.verdict.upper()}" + (
-        f": {failing} of {len(result.runs)} logs out of tolerance" if several and failing else ""
-    )
-    worst = result.ranking[-1]
+    yield f"### {result.verdict.upper()}: {shown(verdict_words([result]))}"
+    worst = result.worst
     yield _worst(worst, several)
     yield ""
     yield f"Reference: {shown(result.reference.name)} (grey, dashed). Tolerance: {tolerance_words(result)}."
@@ -112,22 +115,20 @@ def _of_comparison(result: Comparison) -> Iterator[str]:
 
 def _worst(one: Deviation, several: bool) -> str:
     """Return how much, where and when of the log that comes out worst."""
-    decisive = one.decisive
-    used = "" if decisive.used is None else f" ({used_words(decisive)})"
     said = f"**{shown(one.name)}**: " if several else ""
-    said += f"{shown(excess(decisive))}{used}, at {text.seconds(decisive.t_max)} s."
+    said += f"{shown(decided_words(one.decisive))}."
     if one.verdict == "fail":
-        out = int(np.count_nonzero(one.outside))
-        said += f" Out of tolerance: {out} of {len(one.sample)} samples ({text.percent(one.share_out)})"
+        said += f" Out of tolerance: {out_words(int(np.count_nonzero(one.outside)), len(one.sample))}"
         if (longest := one.longest_out) is not None:
-            said += f", longest for {text.seconds(longest.duration)} s from {text.seconds(longest.t)} s"
+            said += f", the longest stretch: {stretch_words(longest)}"
         said += "."
     return said
 
 
 def _table(result: Comparison) -> Iterator[str]:
     """Yield the logs from best to worst."""
-    heads = ("log", "drawn", *(f"{axis} [mm]" for axis in AXES), "decides at [s]", "out", "verdict")
+    sizes = (shown(f"max {size_of(result.worst.statistics[axis])} [mm]") for axis in AXES)
+    heads = ("log", "drawn", *sizes, "decided by", "at t [s]", "out", "verdict")
     yield table_row(heads)
     yield table_row("---" for _ in heads)
     for one in result.ranking:
@@ -139,6 +140,7 @@ def _cells(index: int, one: Deviation) -> Iterable[str]:
     yield run_colour_word(index)
     for axis in AXES:
         yield text.millimetres(one.statistics[axis].max, one.statistics[axis].tolerance)
+    yield shown(size_of(one.decisive))
     yield text.seconds(one.decisive.t_max)
     yield text.percent(one.share_out)
     yield one.verdict.upper()

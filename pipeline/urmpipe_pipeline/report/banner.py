@@ -3,19 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.symbols import size_of
-from urmpipe_pipeline.comparison.wording import of_allowed, tolerance_words
-from urmpipe_pipeline.inverse.verdict import faults, reached, solved
+from urmpipe_pipeline.comparison.wording import amount_words, tolerance_words, verdict_words
+from urmpipe_pipeline.inverse.verdict import faults, reached_words, solved
 from urmpipe_pipeline.report.facts import Fact
 from urmpipe_pipeline.runs.results import Run
 
-NAMED = 3
-"""Logs named in the headline; more are only counted."""
+STATES = ("fail", "pass", "ingested")
+"""What a banner may say, the most important first."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -36,56 +35,49 @@ class Banner:
     facts: tuple[Fact, ...] = ()
     detail: str = ""
 
+    @property
+    def sentence(self) -> str:
+        """The same below another banner: "FAIL: poses: arm6 reaches 3 targets, with 1 jump. 1 jump: ..."."""
+        said = f"{self.word}: {self.headline}."
+        return said if self.state == "ingested" else f"{said} {self.detail}".rstrip()
 
-def banner(comparisons: Sequence[Comparison], runs: Sequence[Run], links: Sequence[Sequence[str]]) -> Banner:
-    """Return the verdict over all comparisons, or what was ingested if there are none.
+
+def joined(banners: Sequence[Banner]) -> Banner:
+    """Return one banner of several kinds of results: the first that fails leads, else the first judged one.
+
+    What the others found stands below, each with its own word: none hides behind another.
 
     Args:
-        comparisons: Those of the page.
-        runs: The logs of the page that were only ingested.
+        banners: One a kind, at least one.
+    """
+    lead, *others = sorted(banners, key=lambda one: STATES.index(one.state))
+    return replace(lead, detail=" ".join(filter(None, [lead.detail, *(one.sentence for one in others)])))
+
+
+def comparison_banner(comparisons: Sequence[Comparison], links: Sequence[Sequence[str]]) -> Banner:
+    """Return the verdict over all comparisons.
+
+    Args:
+        comparisons: Those of the page, at least one.
         links: Where each log of each comparison is told of, best to worst.
     """
-    if not comparisons:
-        return _ingested(runs)
     places = [
         (run, link)
         for comparison, some in zip(comparisons, links, strict=True)
         for run, link in zip(comparison.ranking, some, strict=True)
     ]
-    failed = [run for run, _ in places if run.verdict == "fail"]
-    run, href = max(places, key=lambda one: one[0].decisive.used or 0.0)
-    total = len(places)
-    if failed:
-        headline = f"{_who(failed, total)} out of tolerance{_named(failed, total)}"
-    else:
-        headline = f"{_who([one for one, _ in places], total)} within tolerance"
+    run, href = sorted(places, key=lambda one: by_tolerance(one[0]))[-1]
     state = "fail" if any(one.verdict == "fail" for one in comparisons) else "pass"
-    if state == "fail" and not failed:
-        headline += ", but worse than the baseline"
-    return Banner(state, state.upper(), headline, (*_decisive(run, href), *_against(comparisons)))
-
-
-def _who(runs: Sequence[Deviation], total: int) -> str:
-    """Return the subject and verb of the headline."""
-    if total == 1:
-        return f"{runs[0].name} is"
-    every = "both logs" if total == 2 else f"all {total} logs"
-    count = every if len(runs) == total else f"{len(runs)} of {total} logs"
-    return f"{count} {'is' if len(runs) == 1 else 'are'}"
-
-
-def _named(runs: Sequence[Deviation], total: int) -> str:
-    """Return the names of some of many logs, unless they are all or too many as well."""
-    return f": {', '.join(run.name for run in runs)}" if len(runs) < total and len(runs) <= NAMED else ""
+    facts = (*_decisive(run, href), *_against(comparisons))
+    return Banner(state, state.upper(), verdict_words(comparisons), facts)
 
 
 def _decisive(run: Deviation, href: str) -> tuple[Fact, ...]:
     """Return which quantity uses up the largest share of its tolerance, how much, when and where."""
     one = run.decisive
-    amount = f"{size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
     return (
         Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", run.name, href=href),
-        Fact("How much", amount),
+        Fact("How much", amount_words(one)),
         *_joint_furthest_off(run),
         Fact("When", f"t = {text.seconds(one.t_max)} s"),
         Fact("Where the log was (x, y, z)", f"{text.point(run.place(one))} m"),
@@ -110,25 +102,28 @@ def _against(comparisons: Sequence[Comparison]) -> tuple[Fact, ...]:
     )
 
 
-def _ingested(runs: Sequence[Run]) -> Banner:
-    """Say what was ingested, or solved if nothing else was."""
-    warnings = text.counted(sum(len(run.warnings) for run in runs), "warning")
-    aimed = [run for run in runs if run.goals is not None]
-    if aimed and (len(aimed) == len(runs) or not all(map(solved, aimed))):
-        return _solved(aimed, warnings)
+def solved_banner(runs: Sequence[Run]) -> Banner:
+    """Return how many targets are reached, and what keeps an arm from the path: the verdict of ik.
+
+    Args:
+        runs: Solved targets, at least one.
+    """
+    state = "pass" if all(map(solved, runs)) else "fail"
+    facts = (Fact("Warnings", str(sum(len(run.warnings) for run in runs))),)
+    said = " ".join(f"{fault}." for run in runs for fault in faults(run))
+    return Banner(state, state.upper(), reached_words(runs), facts, said)
+
+
+def ingested_banner(runs: Sequence[Run]) -> Banner:
+    """Return what was ingested.
+
+    Args:
+        runs: Logs that were not compared, at least one.
+    """
     rows = sum(run.log.rows for run in runs)
     wraps = sum(len(run.repolarizations) for run in runs)
     subject = runs[0].name if len(runs) == 1 else text.counted(len(runs), "log")
     headline = f"{subject}: {text.counted(rows, 'row')}, {text.counted(wraps, 'repolarization')}"
+    warnings = text.counted(sum(len(run.warnings) for run in runs), "warning")
     detail = f"{warnings}. Nothing was compared: there is no verdict."
     return Banner("ingested", "INGESTED", headline, detail=detail)
-
-
-def _solved(runs: Sequence[Run], warnings: str) -> Banner:
-    """Say how many targets have a solution, and what keeps an arm from the path: the verdict of ik."""
-    found, wanted = sum(map(reached, runs)), sum(run.log.rows for run in runs)
-    subject = runs[0].name if len(runs) == 1 else text.counted(len(runs), "file")
-    headline = f"{subject}: {found} of {text.counted(wanted, 'target')} with a solution"
-    state, word = ("pass", "SOLVED") if all(map(solved, runs)) else ("fail", "FAIL")
-    said = [fault for run in runs for fault in faults(run)]
-    return Banner(state, word, headline, detail=". ".join([*said, warnings]) + ".")

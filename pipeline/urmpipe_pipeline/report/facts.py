@@ -11,7 +11,13 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Stretch
 from urmpipe_pipeline.comparison.trajectory import Sync
-from urmpipe_pipeline.comparison.wording import correlation, tolerance_words, tool_option
+from urmpipe_pipeline.comparison.wording import (
+    correlation,
+    out_words,
+    stretch_words,
+    tolerance_words,
+    tool_option,
+)
 from urmpipe_pipeline.inverse.verdict import reached
 from urmpipe_pipeline.runs.results import Run
 
@@ -80,8 +86,7 @@ def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact,
         deviation: The compared log.
         reference_samples: Samples of the whole reference.
     """
-    out = int(np.count_nonzero(deviation.outside))
-    outside = f"{out} of {len(deviation.sample)} samples ({text.percent(deviation.share_out)})"
+    outside = out_words(int(np.count_nonzero(deviation.outside)), len(deviation.sample))
     return _told(
         Fact("Clocks", sync_value(deviation.sync), _sync_note(deviation.sync)),
         Fact("Left out", _left_out(deviation, reference_samples), "no counterpart, or no value"),
@@ -101,11 +106,7 @@ def speed_correlation(deviation: Deviation) -> str:
 
 def stretch(found: Stretch | None) -> str:
     """Return a stretch out of tolerance; nothing without one."""
-    if found is None:
-        return ""
-    if found.samples == 1:
-        return f"1 sample at t = {text.seconds(found.t)} s"
-    return f"{text.seconds(found.duration)} s from t = {text.seconds(found.t)} s"
+    return "" if found is None else stretch_words(found)
 
 
 def sync_value(sync: Sync) -> str:

@@ -34,7 +34,7 @@ def signals_figure(simulation: Simulation, group: Group) -> Figure | None:
         spec["layout"]["yaxis"] |= {"range": [-0.1, 1.1], "tickvals": [0, 1]}
     return Figure(
         group.variables,
-        " ".join(dict.fromkeys(map(_described, group.signals))) + _shading(group),
+        " ".join(dict.fromkeys(map(_described, group.signals[group.wanted :]))) + _shading(group),
         f"{group.variables} of {group.block} over time. {_ends(simulation, group)}",
         spec,
         SIGNALS_PX,
@@ -44,11 +44,12 @@ def signals_figure(simulation: Simulation, group: Group) -> Figure | None:
 def _lines(simulation: Simulation, group: Group, number: int, factor: float) -> list[Spec]:
     """Return a line a scalar of one of a group's signals: stairs of what changes only between steps."""
     signal, unit = group.signals[number], group.shown[0]
-    before = sum(one.columns.shape[1] for one in group.signals[:number])
+    wanted = number < group.wanted
+    before = 0 if wanted else sum(one.columns.shape[1] for one in group.signals[group.wanted : number])
     lines = []
     for k, (name, values) in enumerate(zip(group.names[number], signal.columns.T, strict=True)):
         colour = group.colours[number][k]
-        look = stroke(colour, DASHES[(before + k) // MOST % len(DASHES)])
+        look = stroke(colour, DASHES[1] if wanted else DASHES[(before + k) // MOST % len(DASHES)])
         if signal.type != "Real":
             look |= {"shape": "hv"}
         digits = DIGITS if factor == 1.0 else 4
@@ -75,6 +76,8 @@ def _allowed(group: Group, factor: float) -> list[Spec]:
 
 
 def _shading(group: Group) -> str:
+    if group.wanted:
+        return " Grey, dashed: the set point."
     return "" if group.verdict is None else " Dashed: what is allowed."
 
 

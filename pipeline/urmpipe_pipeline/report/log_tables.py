@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.inverse.verdict import reached, verdict_of
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.json_values import plain
 from urmpipe_pipeline.provenance import Provenance
@@ -18,6 +19,7 @@ from urmpipe_pipeline.report.tables import (
     Cell,
     Column,
     Table,
+    judged,
     listing,
     numbers,
     without_empty_columns,
@@ -38,17 +40,20 @@ AUDIT_NOTES: dict[AuditKind, str] = {
 
 
 def ingest_table(runs: Sequence[Run], links: Sequence[str]) -> Table:
-    """Return one line an ingested log."""
+    """Return one line an ingested log, or the targets of a file with the verdict of ik on them."""
     columns = (
-        *words("Log", "Robot", "Source"),
-        *numbers("Rows", "Duration [s]", "Joints", "Repolarizations", "Warnings"),
+        *words("Targets" if all(run.goals is not None for run in runs) else "Log", "Verdict"),
+        *words("Robot", "Source"),
+        *numbers("Rows", "Reached", "Duration [s]", "Joints", "Repolarizations", "Warnings"),
     )
     rows = tuple(
         (
             Cell(run.name, href=link),
+            judged(verdict_of(run)),
             Cell(run.robot.name if run.robot else "none"),
             Cell(run.log.source),
             Cell(str(run.log.rows)),
+            Cell(text.NOTHING if run.goals is None else str(reached(run))),
             Cell(text.NOTHING if run.single_poses else text.seconds(run.duration)),
             Cell(str(len(run.log.joints))),
             Cell(str(len(run.repolarizations))),
@@ -56,7 +61,8 @@ def ingest_table(runs: Sequence[Run], links: Sequence[str]) -> Table:
         )
         for run, link in zip(runs, links, strict=True)
     )
-    return without_empty_columns(Table("What was read", columns, rows))
+    title = "What was solved" if all(run.goals is not None for run in runs) else "What was read"
+    return without_empty_columns(Table(title, columns, rows))
 
 
 def audit_table(run: Run) -> Table:

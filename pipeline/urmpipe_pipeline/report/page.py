@@ -11,6 +11,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.wording import tolerance_words
+from urmpipe_pipeline.inverse.verdict import verdict_of
 from urmpipe_pipeline.report import (
     gallery,
     log_tables,
@@ -18,13 +19,20 @@ from urmpipe_pipeline.report import (
     simulation_tables,
     verdict_tables,
 )
-from urmpipe_pipeline.report.banner import Banner, banner
+from urmpipe_pipeline.report.banner import (
+    Banner,
+    comparison_banner,
+    ingested_banner,
+    joined,
+    solved_banner,
+)
 from urmpipe_pipeline.report.cards import Card, card
 from urmpipe_pipeline.report.drawings import Drawing, Listing, system_drawing, system_file
 from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_facts, run_facts
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.answers import answers_of
 from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
@@ -144,9 +152,13 @@ def _banner(
     simulated: Sequence[str],
 ) -> Banner:
     """Return the verdict over all that was judged, or what was simulated or ingested."""
-    if simulations and not comparisons:
-        return simulation_parts.simulation_banner(simulations, simulated)
-    return simulation_parts.combined_banner(banner(comparisons, runs, links), simulations, simulated)
+    aimed = [run for run in runs if run.goals is not None]
+    logs = [run for run in runs if run.goals is None]
+    found = [comparison_banner(comparisons, links)] if comparisons else []
+    found += [simulation_parts.simulation_banner(simulations, simulated)] if simulations else []
+    found += [solved_banner(aimed)] if aimed else []
+    found += [ingested_banner(logs)] if logs else []
+    return joined(found)
 
 
 def _simulations_summary(simulations: Sequence[Simulation], links: Sequence[str]) -> Summary:
@@ -159,7 +171,8 @@ def _simulations_summary(simulations: Sequence[Simulation], links: Sequence[str]
 
 def _signals_part(simulation: Simulation, groups: Sequence[Group], link: str) -> Part:
     """Return the part of a block, or of several like ones: its signals."""
-    title = f"{'Blocks' if groups[0].family else 'Block'} {groups[0].block}"
+    block = groups[0].block
+    title = block if groups[0].wanted else f"{'Blocks' if groups[0].family else 'Block'} {block}"
     return Part(title, tuple(gallery.signal_figures(simulation, groups)), link=link)
 
 
@@ -168,7 +181,8 @@ def _simulation_part(simulation: Simulation, ident: str) -> Part:
     meters = (simulation_tables.meters_table(simulation.verdicts),) if simulation.verdicts else ()
     drawing, file = system_drawing(simulation), system_file(simulation)
     judged = {one.block for one in simulation.verdicts}
-    groups = sorted(groups_of(simulation), key=lambda group: group.block not in judged)  # what decides first
+    every = [*answers_of(simulation), *groups_of(simulation)]
+    groups = sorted(every, key=lambda group: group.block not in judged)  # what decides first
     blocks = [
         _signals_part(simulation, list(some), ident)
         for _, some in groupby(groups, key=lambda group: group.block)
@@ -259,7 +273,7 @@ def _run_part(run: Run, ident: str) -> Part:
     missed = log_tables.missed_table(run)
     blocks = (*((missed,) if missed else ()), *gallery.run_figures(run), *_run_tables(run))
     title = f"Log {run.name}" if run.goals is None else f"Targets {run.name}"
-    return Part(title, blocks, (), ident, "", run_facts(run))
+    return Part(title, blocks, (), ident, verdict_of(run) or "", run_facts(run))
 
 
 def _run_tables(run: Run) -> tuple[Block, ...]:

@@ -8,7 +8,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.wording import excess
+from urmpipe_pipeline.comparison.wording import amount_words
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.report.figures_motion import point_name
@@ -52,7 +52,7 @@ def path_figure(deviation: Deviation) -> Figure:
         "Equal scale on all axes. The colour is the distance from the reference at the same time. "
         f"{HANDLING}",
         f"Paths of the reference and of {deviation.name} in three dimensions. The verdict was decided at"
-        f" x, y, z = {text.point(place)} m: {excess(deviation.decisive)}.",
+        f" x, y, z = {text.point(place)} m: {amount_words(deviation.decisive)}.",
         _scene([reference, actual, *spots], deviation.actual, deviation.reference),
         SCENE_PX,
         space=True,

@@ -3,16 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.comparison.symbols import SYMBOLS
-from urmpipe_pipeline.comparison.wording import meter_words
+from urmpipe_pipeline.comparison.wording import meter_amount, meter_size, meter_used, out_words
 from urmpipe_pipeline.report.banner import Banner
 from urmpipe_pipeline.report.cards import Card
 from urmpipe_pipeline.report.facts import Fact
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.simulations.wording import outcome_words
 
 STATES = {"pass": "pass", "fail": "fail", None: "simulated"}
 """How a card looks, by the verdict."""
@@ -29,40 +28,29 @@ def simulation_banner(simulations: Sequence[Simulation], links: Sequence[str]) -
     if shown.failed is not None:
         end = f"t = {text.seconds(float(shown.t[-1]))} s" if len(shown.t_ns) else "its start"
         said = (Fact("System", shown.name, href=href), Fact("Recorded until", end), Fact("Why", shown.failed))
-        return Banner("fail", "FAILED", f"{shown.name} did not reach its end", said)
+        return Banner("fail", "FAILED", outcome_words(shown), said, _counts(simulations))
     worst = shown.judged_worst
     if worst is None:
-        samples = sum(len(one.t_ns) for one in simulations)
-        subject = shown.name if len(simulations) == 1 else text.counted(len(simulations), "system")
-        headline = f"{subject}: {text.counted(samples, 'sample')}"
+        samples = text.counted(sum(len(one.t_ns) for one in simulations), "sample")
+        several = f"{text.counted(len(simulations), 'system')}: {samples}"
+        headline = outcome_words(shown) if len(simulations) == 1 else several
         return Banner("ingested", "SIMULATED", headline, detail="Nothing was judged: there is no verdict.")
-    within = "within" if worst.verdict == "pass" else "out of"
     facts = (
         Fact("Furthest out" if worst.verdict == "fail" else "Closest to the limit", shown.name, href=href),
-        Fact("How much", _amount(worst)),
-        Fact("When", f"t = {text.seconds(worst.t)} s"),
-        Fact("Out of tolerance", f"{worst.out_of_tolerance} of {text.counted(worst.samples, 'sample')}"),
+        Fact("How much", meter_amount(worst)),
+        *_judged_facts(worst),
     )
-    return Banner(
-        worst.verdict, worst.verdict.upper(), f"{worst.block} of {shown.name} is {within} tolerance", facts
-    )
+    return Banner(worst.verdict, worst.verdict.upper(), outcome_words(shown), facts, _counts(simulations))
 
 
-def combined_banner(judged: Banner, simulations: Sequence[Simulation], links: Sequence[str]) -> Banner:
-    """Return the verdict of comparisons with that of simulations: whichever fails stands first.
-
-    Args:
-        judged: The verdict of the comparisons.
-        simulations: Those of the page; none leaves the verdict as it is.
-        links: Where each is told of.
-    """
-    if not simulations:
-        return judged
-    failing = [one.name for one in simulations if one.verdict == "fail"]
-    if failing and judged.state == "pass":
-        return replace(simulation_banner(simulations, links), detail="The comparisons are within tolerance.")
-    said = f"Simulations that fail: {', '.join(failing)}." if failing else "No simulation fails."
-    return replace(judged, detail=said)
+def _counts(simulations: Sequence[Simulation]) -> str:
+    """Return how several simulations ended; nothing of one."""
+    if len(simulations) == 1:
+        return ""
+    verdicts = [one.verdict for one in simulations]
+    told = {"fail": "{} failed", "pass": "{} passed", None: "{} without a verdict"}
+    counts = [said.format(verdicts.count(key)) for key, said in told.items() if key in verdicts]
+    return f"Of {len(simulations)} simulations: {', '.join(counts)}."
 
 
 def simulation_card(simulation: Simulation, href: str) -> Card:
@@ -77,7 +65,7 @@ def simulation_card(simulation: Simulation, href: str) -> Card:
         amount=_length(simulation) if simulation.failed is not None or worst is None else _worst(worst),
         allowed="" if allowed is None or simulation.failed is not None else f"{text.limit(allowed)} mm",
         share=None if worst is None or worst.used is None else min(worst.used, 1.0),
-        used="" if worst is None else meter_words(worst),
+        used="" if worst is None else meter_used(worst),
         facts=_card_facts(simulation),
     )
 
@@ -95,8 +83,11 @@ def simulation_facts(simulation: Simulation) -> tuple[Fact, ...]:
 
 
 def _card_facts(simulation: Simulation) -> tuple[Fact, ...]:
+    worst = simulation.judged_worst
+    judged = () if worst is None else _judged_facts(worst)
     found = (
         Fact("Why", simulation.failed or ""),
+        *judged,
         Fact("Duration", _length(simulation)),
         Fact("Step", f"{text.seconds(simulation.step)} s"),
         Fact("Samples", str(len(simulation.t_ns))),
@@ -104,6 +95,14 @@ def _card_facts(simulation: Simulation) -> tuple[Fact, ...]:
         Fact("Warnings", str(len(simulation.warnings))),
     )
     return tuple(fact for fact in found if fact.value)
+
+
+def _judged_facts(worst: DeltaVerdict) -> tuple[Fact, ...]:
+    """Return when a delta meter was worst, and how often it was out of tolerance."""
+    return (
+        Fact("When", f"t = {text.seconds(worst.t)} s"),
+        Fact("Out of tolerance", out_words(worst.out_of_tolerance, worst.samples)),
+    )
 
 
 def _badness(simulation: Simulation) -> tuple[bool, bool, float]:
@@ -121,12 +120,8 @@ def _size(worst: DeltaVerdict | None) -> str:
     """Return what is worst, such as |Δx|; nothing where nothing is judged."""
     if worst is None:
         return "Simulated"
-    return SYMBOLS["norm"] if worst.quantity == "norm" else f"|{SYMBOLS[worst.quantity]}|"
+    return meter_size(worst)
 
 
 def _worst(worst: DeltaVerdict) -> str:
     return "no value" if worst.used is None else text.quantity(worst.worst, "m", worst.allowed)
-
-
-def _amount(worst: DeltaVerdict) -> str:
-    return f"{_size(worst)} = {_worst(worst)} of {text.limit(worst.allowed)} mm allowed"

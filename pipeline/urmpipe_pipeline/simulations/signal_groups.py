@@ -8,7 +8,7 @@ from itertools import groupby
 
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.display_unit import display_unit
-from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS
+from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
 MOST = len(JOINT_COLOURS)
@@ -32,6 +32,7 @@ class Group:
         signals: At least one.
         verdict: The verdict on them, if they are what a delta meter is judged by.
         family: Whether they are of several blocks.
+        wanted: How many of the first signals are set points of the others, drawn in the reference's grey.
     """
 
     block: str
@@ -39,6 +40,7 @@ class Group:
     signals: tuple[Signal, ...]
     verdict: DeltaVerdict | None = None
     family: bool = False
+    wanted: int = 0
 
     @property
     def variables(self) -> str:
@@ -68,11 +70,13 @@ class Group:
         widths = [one.columns.shape[1] for one in self.signals]
         spatial = self.verdict is not None or widths == [3]
         palette = tuple(AXIS_COLOURS.values()) if spatial else JOINT_COLOURS
-        starts = [sum(widths[:i]) for i in range(len(widths))]
-        return tuple(
+        starts = [sum(widths[self.wanted : i]) for i in range(self.wanted, len(widths))]
+        grey = tuple((REFERENCE_COLOUR,) * width for width in widths[: self.wanted])
+        coloured = (
             tuple(palette[(start + k) % len(palette)] for k in range(width))
-            for start, width in zip(starts, widths, strict=True)
+            for start, width in zip(starts, widths[self.wanted :], strict=True)
         )
+        return (*grey, *coloured)
 
 
 def groups_of(simulation: Simulation) -> list[Group]:

@@ -136,6 +136,11 @@ def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: 
     assert result.warnings == (
         LogWarning("left-out", "log: 1 of 400 samples have no reference or no value"),
         LogWarning(
+            "not-covered",
+            "log: it covers 1.745 s of the 2.245 s of path (77.8 %) at the offset of 0.5 s: the rest was not"
+            " judged",
+        ),
+        LogWarning(
             "sync-left-out",
             "log: the offset of 0.5 s leaves 50 of 400 samples and 100 of 450 samples of path without the"
             " other side",

@@ -29,7 +29,8 @@ def test_the_component_that_uses_up_most_is_the_worst() -> None:
     assert (found.samples, found.out_of_tolerance, found.verdict) == (3, 1, "fail")  # what is allowed passes
     assert (found.used, found.share_out) == (4e-3 / 0.0035, 1 / 3)
     assert meter_words(found) == (
-        "|Δy| = 4.0000 mm of 3.5 mm allowed at t = 0.005 s; out of tolerance: 1 of 3 samples"
+        "|Δy| = 4.0000 mm of 3.5 mm allowed (1.14 times the tolerance) at t = 0.005 s; out of tolerance: 1"
+        " of 3 samples (33.3 %)"
     )
 
 
@@ -50,7 +51,17 @@ def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
     assert found is not None
     assert (found.sample, found.out_of_tolerance, found.verdict, found.used) == (0, 1, "fail", None)
     assert math.isnan(found.worst) and found.to_dict()["worst"] is None
-    assert meter_words(found) == "no value at t = 0.000 s; out of tolerance: 1 of 3 samples"
+    assert meter_words(found) == (
+        "|Δx| has no value at t = 0.000 s; out of tolerance: 1 of 3 samples (33.3 %)"
+    )
+
+
+def test_of_nothing_allowed_no_share_is_told() -> None:
+    found = delta_verdict("meter", T_NS, DELTA, {"axis": 0.0})
+    assert found is not None
+    assert meter_words(found) == (
+        "|Δy| = 4.0000 mm of 0 mm allowed at t = 0.005 s; out of tolerance: 3 of 3 samples (100 %)"
+    )
 
 
 def test_nothing_allowed_is_a_tolerance() -> None:

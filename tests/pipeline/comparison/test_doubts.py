@@ -15,7 +15,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.doubts import large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.comparison.statistics import Measured, describe
-from urmpipe_pipeline.comparison.tolerance import parse_tolerance
+from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 
 Compared = Callable[..., Comparison]
 
@@ -87,17 +87,28 @@ def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compa
     ]
 
 
-def test_a_tolerance_that_nobody_means_is_told(paths: Compared) -> None:
+def test_a_large_tolerance_without_a_unit_is_told(paths: Compared) -> None:
     assert told(paths({"log": off(50)}, tolerance={"axis": 3.5, "norm": 0.1})) == [
-        ("large-tolerance", "a tolerance of 3500 mm (axis) lets anything pass: 3.5 is in m; 3.5mm meant?")
+        (
+            "large-tolerance",
+            "a tolerance of 3500 mm (axis) lets anything pass: 3.5 is in m; 3.5mm meant? If not:"
+            " --tolerance axis=3.5m",
+        )
     ]
     assert [one.message for one in large_tolerances({"angle": 0.5, "joint": 0.17})] == [
-        "a tolerance of 28.6479 deg (angle) lets anything pass: 0.5 is in rad; 0.5deg meant?"
+        "a tolerance of 28.6479 deg (angle) lets anything pass: 0.5 is in rad; 0.5deg meant? If not:"
+        " --tolerance angle=0.5rad"
     ]
-    assert [one.message for one in large_tolerances(parse_tolerance("angle=15deg,norm=150mm"))] == [
-        "a tolerance of 15 deg (angle) lets anything pass",
-        "a tolerance of 150 mm (norm) lets anything pass",
-    ]
+
+
+def test_a_large_tolerance_with_its_unit_is_meant(paths: Compared) -> None:
+    text = "axis=500mm,norm=0.5,path=1m"
+    tolerance = parse_tolerance(text)
+    found = told(paths({"log": off(50)}, tolerance=tolerance, with_unit=kinds_with_unit(text)))
+    assert [message.partition(" lets")[0] for _, message in found] == ["a tolerance of 500 mm (norm)"]
+    assert kinds_with_unit("0.5") == kinds_with_unit("axis=0.5, angle = 1.5") == frozenset()
+    assert kinds_with_unit("± 500 mm") == {"axis"}
+    assert kinds_with_unit("2um", ("axis", "norm")) == {"axis", "norm"}
 
 
 def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(arms: Compared) -> None:

@@ -82,7 +82,8 @@ def test_a_log_is_a_suite_and_a_judged_quantity_a_case(paths: Compared, tmp_path
     failure = root[1].findall("testcase/failure")[0]
     assert (failure.get("type"), failure.text) == (
         "out-of-tolerance",
-        "x reaches 4.0000 mm of 3.5 mm allowed at t = 0.495 s (row 100); 13 samples out (13.0 %)",
+        "|Δx| = 4.0000 mm of 3.5 mm allowed (1.14 times the tolerance) at t = 0.495 s (row 100); out of"
+        " tolerance: 13 of 100 samples (13.0 %)",
     )
     assert root[0].get("timestamp") == result.provenance.created[:19]
 
@@ -126,9 +127,8 @@ def test_what_is_worse_than_the_baseline_fails(paths: Compared, arms: Compared, 
         ("a against baseline", "x"), ("a against baseline", "norm"),
         ("old against baseline", "log is there"),
     ]  # fmt: skip
-    old, new = (one.runs[0].statistics["x"] for one in (before, now))
     assert failures["a against baseline", "x"].text == (
-        f"x: max {old.max!r} -> {new.max!r}, rms {old.rms!r} -> {new.rms!r} (noise 1e-06 m)"
+        "|Δx|: max 1.0000 → 1.5000 mm, rms 0.5788 → 0.8682 mm (noise 0.001 mm)"
     )
     assert failures["old against baseline", "log is there"].text == (
         "old: a log of the baseline, not compared any more"
@@ -157,7 +157,8 @@ def test_the_warnings_of_a_log_stand_behind_its_cases(paths: Compared, tmp_path:
     result = paths({"short": off(0.001, 50), "long": off(0.001)}, tolerance={"norm": 0.15})
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
     covered = "it covers 0.245 s of the 0.495 s of path (50.0 %)"
-    for_all = "large-tolerance: a tolerance of 150 mm (norm) lets anything pass"
+    for_all = "large-tolerance: a tolerance of 150 mm (norm) lets anything pass: 0.15 is in m; 0.15mm meant?"
+    for_all += " If not: --tolerance norm=0.15m"
     assert told == [f"{for_all}\nnot-covered: short: {covered}: the rest was not judged", for_all]
     result = paths({"short": off(0.001, 50), "long": off(0.001)})
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]

@@ -16,7 +16,9 @@ from urmpipe_models.errors import LogError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import trajectory
 from urmpipe_pipeline.comparison.sync import sync_doubts, synchronise
-from urmpipe_pipeline.comparison.sync_coarse import similarity
+from urmpipe_pipeline.comparison.sync_coarse import mean_rates, similarity
+from urmpipe_pipeline.comparison.sync_fine import line_at
+from urmpipe_pipeline.comparison.sync_views import views
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 
@@ -175,6 +177,42 @@ def test_a_tool_that_is_not_known_does_not_move_the_offset() -> None:
     late = replace(path(flange[700:], t[700:]), quat_xyzw=quat[700:])
     assert abs(synchronise(path(tip, t), late, "auto", "tool").offset - 3.5) < 1e-8  # exact but for rounding
     assert abs(synchronise(path(tip, t), late, "auto", "none").offset - 3.5) > CLEAN
+
+
+@pytest.mark.parametrize("align", ["none", "start", "tool"])
+def test_the_rate_is_the_derivative_of_the_residual_by_the_offset(align: AlignMode) -> None:
+    """Of a motion at the true offset: what is left over is small, and so is what its turn and tool change."""
+    t = times(0.0, 20.0, 0.002)
+    turn = np.outer(np.sin(0.9 * t + 0.4), [0.6, 0.3, 0.2])
+    angle = np.linalg.norm(turn, axis=1, keepdims=True)
+    quat = np.hstack((turn * 0.5 * np.sinc(angle / (2.0 * np.pi)), np.cos(0.5 * angle)))
+    motion = smooth(4, 3)(t)
+    log = replace(path(motion[700:9000], t[700:9000]), quat_xyzw=quat[700:9000])
+    view = next(views(path(motion, t), log, align))
+    assert (view.turned, view.tool_axes is not None) == (align == "start", align == "tool")
+    found = mean_rates(view)
+    assert found is not None
+    offset_ns, step_ns = 1_400_000_000, 1_000_000
+    before, at, after = (line_at(view, found, offset_ns + k * step_ns) for k in (-1, 0, 1))
+    slope = (after.residual - before.residual) / (2e-9 * step_ns)
+    # Both are of lines between samples 2 ms apart: they miss a motion of 0.6 Hz by (2 pi 0.6 0.002)^2 / 8.
+    np.testing.assert_allclose(at.rate, slope, rtol=0.0, atol=1e-3 * np.abs(slope).max())
+
+
+def test_the_standard_error_is_that_of_least_squares() -> None:
+    """White noise of s in the log: s / sqrt(sum of the squares of the rate), the constants taken out."""
+    t = times(0.0, 20.0, 0.005)
+    motion = smooth(5, 6)
+    rate = (motion(t + 1e-4) - motion(t - 1e-4)) / 2e-4
+    theory = 0.01 / np.sqrt(((rate - rate.mean(axis=0)) ** 2).sum())
+    found = []
+    for seed in range(20):
+        noise = np.random.default_rng(seed).normal(scale=0.01, size=(len(t), 6))
+        sync = synchronise(joints(motion(t), t, "asked"), joints(motion(t) + noise, t), "auto")
+        assert sync.precision is not None
+        found.append(sync.precision)
+    # Each is of 20 blocks, known to 1 / sqrt(2 * 19) = 16 %; the mean of 20 to 4 %, three times that.
+    assert np.mean(found) == pytest.approx(theory, rel=0.12)
 
 
 def test_two_arms_that_follow_one_path_with_other_joints_are_matched_by_the_path() -> None:

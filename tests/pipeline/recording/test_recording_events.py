@@ -66,7 +66,7 @@ def test_events_tell_how_a_log_compares(make_comparison: MakeComparison, tmp_pat
         (0.5, "longest stretch out of tolerance begins: 3 samples, 0.010 s"),
         (
             decisive.t_max,
-            f"decides: {decisive.quantity} reaches {1e3 * decisive.max:.4f} mm of 3.5 mm allowed",
+            f"decides: |Δ{decisive.quantity}| = {1e3 * decisive.max:.4f} mm of 3.5 mm allowed",
         ),
         (
             one.t[one.worst],
@@ -86,4 +86,4 @@ def test_what_no_text_can_hold_is_told_all_the_same(make_comparison: MakeCompari
     one = replace(one, joint_statistics={"q\udcff": worst})
     path = write_recording(replace(make_comparison(), runs=(one,)), tmp_path / "odd.rrd")
     said = [row[0] for row in columns(path, "/events/deviation", "TextLog:text")]
-    assert any("decides: q? reaches 0.1146 deg of 5.72958e-08 deg allowed" in line for line in said)
+    assert any("decides: |Δ q?| = 0.1146 deg of 5.72958e-08 deg allowed" in line for line in said)

@@ -18,7 +18,9 @@ from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.palette import AXIS_COLOURS, rgb
 from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.recording.layout import opening_time
 from urmpipe_pipeline.recording.scene import NEAR, scene_of
+from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.runs.results import Run
 
 MakeSolved = Callable[..., Run]
@@ -110,6 +112,20 @@ def test_a_run_without_a_target_that_is_one_can_be_recorded(tmp_path: Path) -> N
     run = solved_at(np.full((2, 3), np.nan), [True, True])
     np.testing.assert_array_equal(scene_of(run).points(), np.zeros((1, 3)))
     write_recording(run, tmp_path / "none.rrd")
+
+
+def test_the_viewer_opens_at_the_first_target_with_an_arm() -> None:
+    places = np.array([[100.0, 0.0, 0.0], [0.3, 0.2, 0.4], [0.3, 0.3, 0.4]])
+    assert opening_time(solved_at(places, [True, False, False])) == 1_000_000_000
+    assert opening_time(solved_at(places, [True, True, True])) == 0
+
+
+def test_rows_without_an_arm_are_told() -> None:
+    counts = "Without times: the timeline counts rows, t = 0 s is row 1."
+    places = np.array([[0.3, 0.2, 0.4], [0.3, 0.3, 0.4]])
+    assert counts in summary(solved_at(places, [False, False])).splitlines()
+    told = summary(solved_at(places, [True, False])).splitlines()
+    assert f"{counts} Rows that are not reached show no arm." in told
 
 
 def test_a_comparison_draws_no_ghosts(make_solved: MakeSolved) -> None:

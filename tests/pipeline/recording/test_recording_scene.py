@@ -22,7 +22,7 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.comparison.wording import excess
+from urmpipe_pipeline.comparison.wording import amount_words
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.recording import read_recording, write_recording
 from urmpipe_pipeline.recording.bodies import bodies_over_log, lacks_shapes
@@ -233,7 +233,7 @@ def test_of_several_runs_only_the_deviation_of_the_one_whose_arm_stands_there_is
     scene = scene_of(replace(comparison, runs=(one, two, wide)))
     assert (scene.whose, scene.enlarged) == ("far", None)
     assert scene.worst is not None
-    assert scene.worst.text == f"{excess(far.decisive)} at {far.decisive.t_max:.3f} s, far"
+    assert scene.worst.text == f"{amount_words(far.decisive)} at t = {far.decisive.t_max:.3f} s, far"
 
 
 @pytest.mark.parametrize(
@@ -270,7 +270,7 @@ def test_the_place_that_decides_has_its_size_and_its_time(
     assert decisive.quantity == "x" and row != one.worst
     assert abs(one.delta[row, 0]) == decisive.max
     x, y, z = one.actual[row].tolist()
-    text = f"x reaches {1e3 * decisive.max:.4f} mm of 3.5 mm allowed at {decisive.t_max:.3f} s"
+    text = f"|Δx| = {1e3 * decisive.max:.4f} mm of 3.5 mm allowed at t = {decisive.t_max:.3f} s"
     assert scene_of(comparison).worst == Mark((x, y, z), text)
     path = write_recording(comparison, tmp_path / "one.rrd")
     assert column(path, "/point/worst/label", "Points3D:labels").tolist() == [[text]]
@@ -288,4 +288,4 @@ def test_a_log_against_itself_has_nothing_to_enlarge(
     scene = scene_of(compare_runs(run, [run], CompareOptions({"axis": 0.0035})))
     assert scene.enlarged is None
     assert scene.worst is not None
-    assert scene.worst.text == "x reaches 0.0000 mm of 3.5 mm allowed at 0.000 s"
+    assert scene.worst.text == "|Δx| = 0.0000 mm of 3.5 mm allowed at t = 0.000 s"

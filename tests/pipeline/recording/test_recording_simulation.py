@@ -25,6 +25,8 @@ from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording import read_recording, write_recording
 from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
+from urmpipe_pipeline.recording.overview import LONG
+from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.simulation_layout import simulation_plots
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
@@ -32,6 +34,7 @@ from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.viewer import opening_times
 from urmpipe_pipeline.recording.writer import SLICE
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.signal_groups import Group
 from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation
 
 MakeSimulation = Callable[..., Simulation]
@@ -151,6 +154,43 @@ def test_what_decides_is_open_else_what_stands_last(make_simulation: MakeSimulat
     ]
 
 
+def test_set_points_and_answers_come_first_and_are_open_where_nothing_is_judged(
+    make_simulation: MakeSimulation,
+) -> None:
+    simulation = make_simulation(5)
+    pair = [Signal(block, "theta", np.arange(5.0), "rad") for block in ("set_point", "load")]
+    others = [Signal(f"b{i}", f"v{i}", np.arange(5.0)) for i in range(8)]
+    simulation = replace(
+        simulation,
+        signals=(*simulation.signals, *pair, *others),
+        connections={"c.set_theta": "set_point.theta", "c.real_theta": "load.theta"},
+    )
+    judged, plain = simulation_plots(simulation), simulation_plots(replace(simulation, verdicts=()))
+    assert isinstance(judged, rrb.Tabs) and isinstance(plain, rrb.Tabs)
+    assert [list(tabs.contents)[int(str(tabs.active_tab))].name for tabs in (judged, plain)] == [
+        "meter",
+        "Set point and answer",
+    ]
+    first = next(iter(plain.contents))
+    assert isinstance(first, rrb.Grid)
+    (view,) = first.contents
+    assert isinstance(view, rrb.TimeSeriesView)
+    assert view.name == "Set point and answer: theta [rad]"
+    assert list(view.visualizer_overrides) == ["/signals/set_point/theta", "/signals/load/theta"]
+
+
+def test_set_points_of_a_long_simulation_look_alike_in_overview_and_in_full(
+    make_simulation: MakeSimulation,
+) -> None:
+    pair = tuple(Signal(block, "theta", np.zeros(LONG + 1), "rad") for block in ("set_point", "load"))
+    group = Group("Set point and answer", "rad", pair, family=True, wanted=1)
+    views = Plots(make_simulation(5)).signals(group, {one.name: f"/{one.block}" for one in pair}, LONG + 1)
+    assert [list(view.visualizer_overrides) for view in views] == [
+        ["/overview/set_point", "/overview/load"],
+        ["/set_point", "/load"],
+    ]
+
+
 def test_words_stand_above_the_arm_and_else_beside_the_plots(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation(5)
     for one, left in ((simulation, rrb.Vertical), (replace(simulation, arms=()), rrb.Tabs)):
@@ -177,16 +217,16 @@ def test_the_first_arm_moves_and_the_tip_of_each_has_a_path(make_simulation: Mak
 
 def test_the_summary_says_how_it_ended_and_what_is_joined(make_simulation: MakeSimulation) -> None:
     found = simulation_summary(make_simulation(tolerance=0.005)).splitlines()
-    assert found[0] == "### PASS: log\\-to\\-delta"
+    assert found[0] == "### PASS: meter of log\\-to\\-delta within tolerance"
     assert (
-        "- **PASS** meter: \\|Δy\\| = 4.0000 mm of 5 mm allowed at t = 1.250 s;"
-        " out of tolerance: 0 of 600 samples" in found
+        "- **PASS** meter: \\|Δy\\| = 4.0000 mm of 5 mm allowed (80.0 % of the tolerance) at t = 1.250 s;"
+        " out of tolerance: 0 of 600 samples (0 %)" in found
     )
     assert "600 samples, 2.995 s, communication step 5 ms." in found
     assert "| chain | unit kinematic\\_chain |" in found
     assert "| chain.phi | log.q |" in found
     failed = simulation_summary(make_simulation(10, failed="meter: <b>gone</b>")).splitlines()
-    assert failed[0] == "### FAILED: log\\-to\\-delta"
+    assert failed[0] == "### FAILED: log\\-to\\-delta did not reach its end"
     assert "**meter: \\<b\\>gone\\</b\\>** What was recorded until then is here." in failed
 
 

@@ -33,15 +33,22 @@ def test_the_summary_of_a_comparison_says_the_verdict_first(make_comparison: Mak
     decisive, longest = worst.decisive, worst.longest_out
     assert longest is not None and decisive.used is not None
     lines = summary(comparison).splitlines()
-    assert lines[0] == "### FAIL: 1 of 3 logs out of tolerance"
+    assert lines[0] == (
+        "### FAIL: 1 of 3 logs (matlab) out of tolerance against asked for, by the joints on both sides"
+    )
     assert lines[1] == (
-        f"**matlab**: {decisive.quantity} reaches {1e3 * decisive.max:.4f} mm of 3.5 mm allowed"
-        f" ({decisive.used:.3g} times the tolerance), at {decisive.t_max:.3f} s. Out of tolerance:"
-        f" {np.count_nonzero(worst.outside)} of 1500 samples ({100 * worst.share_out:.1f} %), longest for"
-        f" {longest.duration:.3f} s from {longest.t:.3f} s."
+        f"**matlab**: \\|Δ{decisive.quantity}\\| = {1e3 * decisive.max:.4f} mm of 3.5 mm allowed"
+        f" ({decisive.used:.3g} times the tolerance) at t = {decisive.t_max:.3f} s. Out of tolerance:"
+        f" {np.count_nonzero(worst.outside)} of 1500 samples ({100 * worst.share_out:.1f} %), the longest"
+        f" stretch: {longest.duration:.3f} s from t = {longest.t:.3f} s."
     )
     assert lines[3] == "Reference: asked for (grey, dashed). Tolerance: ±3.5 mm per axis."
+    assert lines[5] == (
+        "| log | drawn | max \\|Δx\\| \\[mm\\] | max \\|Δy\\| \\[mm\\] | max \\|Δz\\| \\[mm\\] | max ‖Δ‖"
+        " \\[mm\\] | decided by | at t [s] | out | verdict |"
+    )
     rows = [line.split(" | ") for line in lines if line.startswith("| ")][2:]
+    assert rows[2][6] == f"\\|Δ{decisive.quantity}\\|"
     assert [(row[0], row[1], row[-1]) for row in rows] == [
         ("| coppeliasim", "orange", "PASS |"),
         ("| solid\\*", "sky blue", "PASS |"),

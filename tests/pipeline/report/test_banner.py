@@ -7,17 +7,24 @@ from dataclasses import replace
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.report.banner import banner
+from urmpipe_pipeline.report.banner import Banner, comparison_banner, ingested_banner, joined
 from urmpipe_pipeline.report.cards import card
 from urmpipe_pipeline.runs.results import Run
 
 LINKS = (("#a", "#b"),)
 
+PATH = "path, by the joints on both sides"
+"""What both are held against, and how."""
+
 
 def test_a_banner_of_a_log_that_passes_says_how_close_when_and_where(comparison: Comparison) -> None:
     shifted = comparison.runs[0]
-    said = banner([replace(comparison, runs=(shifted,))], [], [["#a"]])
-    assert (said.state, said.word, said.headline) == ("pass", "PASS", "shifted is within tolerance")
+    said = comparison_banner([replace(comparison, runs=(shifted,))], [["#a"]])
+    assert (said.state, said.word, said.headline) == (
+        "pass",
+        "PASS",
+        f"shifted within tolerance against {PATH}",
+    )
     z = shifted.statistics["z"]
     index = shifted.sample.tolist().index(z.sample_max)
     x, y, height = shifted.actual[index]
@@ -32,9 +39,9 @@ def test_a_banner_of_a_log_that_passes_says_how_close_when_and_where(comparison:
 
 
 def test_a_banner_of_logs_that_fail_names_the_worst(comparison: Comparison) -> None:
-    said = banner([comparison], [], LINKS)
+    said = comparison_banner([comparison], LINKS)
     worst = comparison.runs[1].decisive
-    assert said.headline == "1 of 2 logs is out of tolerance: joint-off"
+    assert said.headline == f"1 of 2 logs (joint-off) out of tolerance against {PATH}"
     assert (said.facts[0].name, said.facts[0].value, said.facts[0].href) == (
         "Furthest out",
         "joint-off",
@@ -42,16 +49,16 @@ def test_a_banner_of_logs_that_fail_names_the_worst(comparison: Comparison) -> N
     )
     assert said.facts[1].value.startswith(f"|Δ{worst.quantity}| = {worst.max * 1e3:.4f} mm of 3.5 mm")
     every = replace(comparison, runs=comparison.runs[1:] * 2)
-    assert banner([every], [], LINKS).headline == "both logs are out of tolerance"
+    assert comparison_banner([every], LINKS).headline == f"both logs out of tolerance against {PATH}"
     many = replace(comparison, runs=comparison.runs[1:] * 4)
-    assert banner([many], [], ("abcd",)).headline == "all 4 logs are out of tolerance"
+    assert comparison_banner([many], ("abcd",)).headline == f"all 4 logs out of tolerance against {PATH}"
 
 
 def test_a_banner_names_the_joint_that_is_furthest_off(comparison: Comparison) -> None:
     off = comparison.runs[1]
     joint = off.furthest_joint("rad")
     assert joint is not None and off.decisive.kind == "axis"
-    told = {fact.name: fact.value for fact in banner([comparison], [], LINKS).facts}
+    told = {fact.name: fact.value for fact in comparison_banner([comparison], LINKS).facts}
     assert told["Joint furthest off"] == f"phi2: {text.quantity(joint.max, 'rad')}"
 
 
@@ -60,26 +67,48 @@ def test_a_banner_of_logs_within_tolerance_says_that_they_are_worse_than_the_bas
 ) -> None:
     gone = BaselineComparison("before", None, {}, (), (), (Absent("old"),), ())
     held = replace(comparison, runs=comparison.runs[:1], baseline=gone)
-    said = banner([held], [], [["#a"]])
+    said = comparison_banner([held], [["#a"]])
     assert (said.state, said.word) == ("fail", "FAIL")
-    assert said.headline == "shifted is within tolerance, but worse than the baseline"
+    assert said.headline == f"shifted within tolerance against {PATH}, but worse than the baseline before"
 
 
 def test_a_banner_of_some_comparisons_counts_their_logs(
     comparison: Comparison, everything: Comparison
 ) -> None:
-    said = banner([comparison, everything], [], LINKS * 2)
-    assert said.headline == "3 of 4 logs are out of tolerance: joint-off, joint-off, shifted"
+    said = comparison_banner([comparison, everything], LINKS * 2)
+    assert said.headline == (
+        f"3 of 4 logs (joint-off, shifted, joint-off) out of tolerance against {PATH}; 2 logs cover only a"
+        " part of the reference"
+    )
     assert [fact.value for fact in said.facts[-2:]] == ["path", "as each comparison says"]
 
 
 def test_a_banner_without_a_comparison(bare_run: Run) -> None:
-    said = banner([], [bare_run], [])
+    said = ingested_banner([bare_run])
     count = len(bare_run.repolarizations)
     assert said.word == "INGESTED"
     assert said.headline == f"bare: 3000 rows, {count} repolarizations"
     assert said.detail == "0 warnings. Nothing was compared: there is no verdict."
     assert said.facts == ()
+
+
+FAILS, PASSES = (
+    Banner("fail", "FAIL", "poses: 2 of 3", detail="1 jump."),
+    Banner("pass", "PASS", "log within"),
+)
+NOTHING_JUDGED = Banner("ingested", "SIMULATED", "one-drive: 401 samples", detail="Nothing was judged.")
+
+
+def test_of_several_kinds_of_results_none_hides_behind_another() -> None:
+    said = joined([PASSES, NOTHING_JUDGED, FAILS])
+    assert (said.state, said.headline) == ("fail", "poses: 2 of 3")
+    assert said.detail == "1 jump. PASS: log within. SIMULATED: one-drive: 401 samples."
+    assert joined([NOTHING_JUDGED, FAILS, PASSES]) == said
+    said = joined([NOTHING_JUDGED, PASSES])
+    assert (said.state, said.detail) == ("pass", "SIMULATED: one-drive: 401 samples.")
+    said = joined([FAILS, replace(FAILS, headline="log out")])
+    assert (said.headline, said.detail) == ("poses: 2 of 3", "1 jump. FAIL: log out. 1 jump.")
+    assert joined([NOTHING_JUDGED]) == NOTHING_JUDGED
 
 
 def test_a_card_holds_what_decides_and_the_rest(everything: Comparison) -> None:

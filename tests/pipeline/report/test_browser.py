@@ -149,7 +149,9 @@ def test_a_simulation_is_drawn_and_its_drawing_runs_no_script(
 def test_the_verdict_is_seen_first(browser: Browser, report: Path) -> None:
     with opened(browser, report) as page:
         heading = page.locator("h1")
-        assert " ".join(heading.inner_text().split()) == "FAIL 1 of 2 logs is out of tolerance: joint-off"
+        assert " ".join(heading.inner_text().split()) == (
+            "FAIL 1 of 2 logs (joint-off) out of tolerance against path, by the joints on both sides"
+        )
         box = heading.bounding_box()
         assert box is not None
         assert box["y"] < 200

@@ -180,7 +180,7 @@ def test_every_ink_is_legible_on_every_ground(ink: str) -> None:
 
 def test_the_verdict_stands_first_in_words(page: Page, comparison: Comparison) -> None:
     (_, said) = page.all("h1")[0]
-    assert said == "FAIL 1 of 2 logs is out of tolerance: joint-off"
+    assert said == ("FAIL 1 of 2 logs (joint-off) out of tolerance against path, by the joints on both sides")
     assert page.all("title")[0][1] == "FAIL: against-path, bare - urmpipe report"
 
 
@@ -292,7 +292,7 @@ def test_a_log_of_one_sample_and_a_path_have_pages_too(comparison: Comparison) -
     page = Page(render_report([result, single, path]))
     plots = [attrs for _, attrs, _ in page.elements if (attrs.get("class") or "").startswith("plot")]
     assert len(plots) == 4 + 3 + 2
-    assert [said for _, said in page.all("h1")] == ["PASS shifted is within tolerance"]
+    assert [said for _, said in page.all("h1")] == ["PASS shifted within tolerance against shifted"]
 
 
 def test_nothing_to_report_is_an_error(tmp_path: Path) -> None:

@@ -67,16 +67,27 @@ def figures(part: Part) -> dict[str, Figure]:
 def test_the_worst_meter_stands_first(make_simulation: MakeSimulation) -> None:
     page = lay_out([make_simulation(tolerance=0.005), make_simulation(name="other")])
     assert (page.banner.state, page.banner.word) == ("fail", "FAIL")
-    assert page.banner.headline == "meter of other is out of tolerance"
+    assert page.banner.headline == "meter of other out of tolerance"
     assert [(fact.name, fact.value, fact.href) for fact in page.banner.facts] == [
         ("Furthest out", "other", "#s2"),
         ("How much", "|Δy| = 4.0000 mm of 3.5 mm allowed", ""),
         ("When", "t = 1.250 s", ""),
-        ("Out of tolerance", "161 of 600 samples", ""),
+        ("Out of tolerance", "161 of 600 samples (26.8 %)", ""),
     ]
     assert [(card.name, card.state, card.amount, card.allowed) for card in page.summaries[0].cards] == [
         ("log-to-delta", "pass", "4.0000 mm", "5 mm"),
         ("other", "fail", "4.0000 mm", "3.5 mm"),
+    ]
+
+
+def test_the_card_of_a_meter_says_how_much_when_and_how_often(make_simulation: MakeSimulation) -> None:
+    card = lay_out([make_simulation()]).summaries[0].cards[0]
+    assert (card.size, card.amount, card.allowed, card.used) == (
+        "|Δy|", "4.0000 mm", "3.5 mm", "1.14 times the tolerance",
+    )  # fmt: skip
+    assert [(fact.name, fact.value) for fact in card.facts[:2]] == [
+        ("When", "t = 1.250 s"),
+        ("Out of tolerance", "161 of 600 samples (26.8 %)"),
     ]
 
 
@@ -100,6 +111,34 @@ def test_one_that_failed_at_once_has_no_plots(make_simulation: MakeSimulation) -
     assert "chain: crashed" in render_report([make_simulation(0, failed="chain: crashed")])
 
 
+def test_of_several_simulations_all_are_counted(make_simulation: MakeSimulation) -> None:
+    within, out = make_simulation(tolerance=0.005), make_simulation(name="other")
+    banner = lay_out([within, out, replace(out, verdicts=())]).banner
+    assert (banner.word, banner.headline) == ("FAIL", "meter of other out of tolerance")
+    assert banner.detail == "Of 3 simulations: 1 failed, 1 passed, 1 without a verdict."
+
+
+def test_set_points_are_dashed_beside_their_answers_behind_what_is_judged(
+    make_simulation: MakeSimulation,
+) -> None:
+    simulation = make_simulation(5)
+    wanted = Signal("set_point", "theta", np.arange(5.0), "rad", description="Set position")
+    real = Signal("load", "theta", np.arange(5.0), "rad", description="Angle")
+    simulation = replace(
+        simulation,
+        signals=(*simulation.signals, wanted, real),
+        connections={"c.set_theta": "set_point.theta", "c.real_theta": "load.theta"},
+    )
+    page = lay_out([simulation])
+    assert [part.title for part in page.parts[0].parts][:2] == ["Block meter", "Set point and answer"]
+    figure = figures(page.parts[0])["Set point and answer/theta"]
+    assert [(one["name"], one["line"]["dash"]) for one in figure.spec["data"]] == [
+        ("set_point.theta", "dash"),
+        ("load.theta", "solid"),
+    ]
+    assert figure.caption == "theta: Angle. Grey, dashed: the set point."
+
+
 def test_nothing_judged_is_no_verdict(make_simulation: MakeSimulation) -> None:
     page = lay_out([replace(make_simulation(), verdicts=())])
     assert (page.banner.state, page.banner.word) == ("ingested", "SIMULATED")
@@ -114,11 +153,12 @@ def test_a_comparison_that_passes_does_not_hide_a_simulation_that_fails(
     passing = replace(comparison, runs=tuple(replace(run, verdict="pass") for run in comparison.runs))
     page = lay_out([make_simulation(tolerance=tolerance), passing])
     assert page.banner.state == ends
+    logs, meter = "within tolerance against path, by the joints on both sides", "meter of log-to-delta"
     assert page.banner.detail == (
-        "The comparisons are within tolerance." if ends == "fail" else "No simulation fails."
+        f"PASS: both logs {logs}." if ends == "fail" else f"PASS: {meter} within tolerance."
     )
     failing = lay_out([make_simulation(), comparison])
-    assert (failing.banner.state, failing.banner.detail) == ("fail", "Simulations that fail: log-to-delta.")
+    assert (failing.banner.state, failing.banner.detail) == ("fail", f"FAIL: {meter} out of tolerance.")
 
 
 def test_the_tables_have_blocks_settings_connections_and_extremes(make_simulation: MakeSimulation) -> None:

@@ -14,7 +14,7 @@ from urmpipe_models.inverse.targets import targets_of
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.report import gallery
-from urmpipe_pipeline.report.banner import banner
+from urmpipe_pipeline.report.banner import solved_banner
 from urmpipe_pipeline.report.facts import run_facts
 from urmpipe_pipeline.report.log_tables import missed_table
 from urmpipe_pipeline.report.page import lay_out
@@ -40,21 +40,38 @@ def run() -> Run:
     return solved_run("poses", robot, None, q, goals=goals)
 
 
-def test_the_banner_counts_the_targets_with_a_solution(run: Run) -> None:
-    said = banner([], [run], [])
-    assert (said.state, said.word, said.headline) == ("fail", "FAIL", "poses: 2 of 3 targets with a solution")
-    assert said.detail == "1 warning."
-    log = replace(run, goals=None)
-    assert banner([], [run, log], []).headline == said.headline
-    assert banner([], [run, run], []).headline == "2 files: 4 of 6 targets with a solution"
+def test_the_banner_counts_the_targets_that_are_reached(run: Run) -> None:
+    said = lay_out([run]).banner
+    assert (said.state, said.word, said.headline) == ("fail", "FAIL", "poses: ur5e reaches 2 of 3 targets")
+    assert [(fact.name, fact.value) for fact in said.facts] == [("Warnings", "1")]
+    assert said.detail == ""
+    assert solved_banner([run, run]).headline == "2 files: ur5e reaches 4 of 6 targets"
     solved = replace(run, log=replace(run.log, q=np.zeros((3, 6))))
-    said = banner([], [solved], [])
-    assert (said.state, said.word, said.headline) == (
-        "pass",
-        "SOLVED",
-        "poses: 3 of 3 targets with a solution",
-    )
-    assert banner([], [solved, log], []).word == "INGESTED"
+    said = lay_out([solved]).banner
+    assert (said.state, said.word, said.headline) == ("pass", "PASS", "poses: ur5e reaches 3 targets")
+
+
+def test_targets_and_logs_are_both_told_of(run: Run) -> None:
+    log = replace(run, name="log", goals=None)
+    ingested = "INGESTED: log: 3 rows, 0 repolarizations."
+    said = lay_out([log, run]).banner
+    assert (said.word, said.detail) == ("FAIL", ingested)
+    solved = replace(run, log=replace(run.log, q=np.zeros((3, 6))))
+    said = lay_out([log, solved]).banner
+    assert (said.word, said.detail) == ("PASS", ingested)
+
+
+def test_the_table_of_targets_has_the_verdict_and_how_many_are_reached(run: Run) -> None:
+    page = lay_out([run])
+    (table,) = page.summaries[0].tables
+    assert table.title == "What was solved"
+    assert [column.title for column in table.columns[:2]] == ["Targets", "Verdict"]
+    found = {column.title: cell.text for column, cell in zip(table.columns, table.rows[0], strict=True)}
+    assert (found["Verdict"], found["Rows"], found["Reached"]) == ("FAIL", "3", "2")
+    assert page.parts[0].verdict == "fail"
+    (mixed,) = lay_out([run, replace(run, goals=None)]).summaries[0].tables
+    assert mixed.title == "What was read"
+    assert [row[1].text for row in mixed.rows] == ["FAIL", "–"]
 
 
 def test_poses_without_times_have_no_duration(run: Run) -> None:
