@@ -72,7 +72,8 @@ def verdict_words(result: Comparison) -> str:
     said = f"{who} {'out of' if failed else 'within'} tolerance against {result.reference.name}"
     if result.reference.joints:
         recorded = result.provenance.options.get("tcp") == "recorded"
-        said += f", {'as recorded' if recorded else 'by the joints'} on both sides"
+        sides = "on both sides" if all(run.run.log.joints for run in result.runs) else "of the reference"
+        said += f", {'as recorded' if recorded else 'by the joints'} {sides}"
     if result.baseline is not None and result.within_tolerance and result.baseline.verdict == "fail":
         said += f", but worse than the baseline {result.baseline.name}"
     return said
