@@ -23,6 +23,7 @@ from urmpipe.options.types import UNIT
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.text import pasted
 
 RunCommand = Callable[..., Any]
 
@@ -218,6 +219,8 @@ def test_a_shipped_system_is_written_to_be_changed(urmpipe: RunCommand, tmp_path
     ran = urmpipe("simulate", "one-drive", "--write-system", "mine.toml")
     assert (ran.code, ran.err) == (0, "")
     assert ran.out == "System: mine.toml  (change it, then: urmpipe simulate mine.toml)\n"
+    told = f"System: my drive.toml  (change it, then: urmpipe simulate {pasted('my drive.toml')})\n"
+    assert urmpipe("simulate", "one-drive", "--write-system", "my drive.toml").out == told
     text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
     changed = text.replace('unit = "dc_drive"', 'unit = "dc_drive"\nstart = { C = 0.1 }')
     (tmp_path / "mine.toml").write_text(changed, encoding="utf-8")
