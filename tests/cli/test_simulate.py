@@ -119,7 +119,11 @@ def test_the_command_prints_system_verdict_and_signals(urmpipe: RunCommand, tmp_
     assert lines[0].startswith("log-to-delta: 21 samples over 0.100 s, communication step 5 ms; in ")
     assert lines[1].startswith("PASS  delta: |Δy| = 0.4174 mm of 3.5 mm allowed at t = 0.085 s;")
     assert any(line.startswith("delta.norm [m]") for line in lines)
-    assert sum(line.startswith(("delta.", "repolarizer.", "chain.")) for line in lines) == 12
+    table = [line.split(maxsplit=1)[0].split("[")[0] for line in lines[6:18]]
+    assert table == [
+        *["delta.delta"] * 3, "delta.norm", *["log.q"] * 3, "reference.p", *["repolarizer.q"] * 2,
+        *["chain.p7"] * 2,
+    ]  # fmt: skip
     assert lines[-2] == "... and 39 more; --json has all, and the recording"
     assert lines[-1].startswith("Recording: log-to-delta.rrd")
     assert ran.err.splitlines()[-1].startswith("warning: path: no unit is given for x, y, z")
@@ -134,7 +138,7 @@ def test_signals_that_stand_still_come_last(urmpipe: RunCommand, tmp_path: Path)
     lines = urmpipe("simulate", "still.toml").out.splitlines()
     assert "communication step 10 ms, a sample every 50 ms; in " in lines[0]
     named = [line.split()[0] for line in lines if line.startswith(("lag.", "still."))]
-    assert named == ["lag.x", "lag.error", "still.x", "still.error", "lag.u"]
+    assert named == ["lag.x", "lag.error", "lag.u", "still.x", "still.error"]
 
 
 def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> None:
