@@ -89,6 +89,9 @@ _PLAIN = {
 _ALONE = {"": BaseUnit(), "degC": BaseUnit(K=1, offset=273.15)}
 """Those that stand in no product: a temperature with an offset has no multiple."""
 
+_COHERENT = {"g": "kg", "bar": "Pa", "deg": "rad", "rev": "rad", "min": "s", "h": "s", "d": "s"}
+"""What stands in SI itself for a symbol with a factor."""
+
 GRAM = -3
 """The gram is the base unit times this power of ten."""
 
@@ -154,6 +157,24 @@ def display_conversion(unit: str, display_unit: str) -> tuple[float, float]:
             f"display unit {display_unit!r}: found for values in {unit!r}, allowed: one of the same quantity"
         )
     return held.factor / shown.factor, (held.offset - shown.offset) / shown.factor
+
+
+def coherent(spelling: str) -> str:
+    """Return the unit of SI itself, without a factor or an offset, of the same quantity: of deg/s rad/s.
+
+    Raises:
+        UnitError: If the spelling is none of a unit.
+    """
+    base_unit(spelling)
+    return (
+        "K" if spelling == "degC" else re.sub(r"[A-Za-z]+", lambda word: _without_factor(word[0]), spelling)
+    )
+
+
+def _without_factor(symbol: str) -> str:
+    """Return a symbol without its prefix; of one that is no unit of SI itself, what stands for it there."""
+    plain = symbol if symbol in (*_SYMBOLS, *_PLAIN) else symbol[1:]
+    return _COHERENT.get(plain, plain)
 
 
 def _base(unit: str | BaseUnit) -> BaseUnit:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from numbers import Real
 from typing import Literal
 
-from urmpipe_fmus.si_units import display_conversion
+from urmpipe_fmus.si_units import coherent, display_conversion, same_unit
 from urmpipe_models.errors import UnitError, shown
 
 Causality = Literal["parameter", "input", "output", "local"]
@@ -96,13 +96,22 @@ class Variable(ABC):
     def _unit_faults(self) -> Iterator[str]:
         if self.type != "Real" and (self.unit or self.display_unit):
             yield f"found {self.type} with a unit, allowed: a unit of a Real"
-        elif self.display_unit and not self.unit:
+            return
+        if self.display_unit and not self.unit:
             yield f"found display unit {shown(self.display_unit)} without a unit, allowed: both or none"
         try:
             if self.unit:
                 display_conversion(self.unit, self.display_unit or self.unit)
+                yield from self._factor_faults()
         except UnitError as error:
             yield str(error)
+
+    def _factor_faults(self) -> Iterator[str]:
+        """Yield why a unit is none that a model's equations can be written in: 1 deg/s is not 1 rad/s."""
+        in_si = coherent(self.unit)
+        if not same_unit(self.unit, in_si):
+            shown = f", with display_unit={self.unit!r} to show it so" if not self.display_unit else ""
+            yield f"found unit {self.unit!r}, allowed: values in SI, unit={in_si!r}{shown}"
 
     def refusals(self, value: float) -> Iterator[str]:
         """Yield why one of its scalars cannot take a value: not finite, out of range, no integer."""

@@ -200,6 +200,16 @@ def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[st
     assert err.count("\n") == 2
 
 
+def test_a_path_held_against_a_log_is_not_said_to_have_joints(capsys: Captured) -> None:
+    rows = "".join(f"{0.01 * k:.2f},0.3,{0.001 * k:.3f},0.4\n" for k in range(40))
+    Path("asked.csv").write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
+    assert run(["compare", "good.csv", "asked.csv", "--robot", "ur5e"]) == 1
+    first = capsys.readouterr().out.splitlines()[0]
+    assert first == "FAIL  asked out of tolerance against good, by the joints of the reference"
+    assert run(["compare", "asked.csv", "good.csv", "--robot", "ur5e"]) == 1
+    assert capsys.readouterr().out.splitlines()[0] == "FAIL  good out of tolerance against asked"
+
+
 def test_tolerances_add_up(capsys: Captured) -> None:
     assert compare("good.csv", "--tolerance", "axis=1mm", "--tolerance", "norm=2mm", "--json") == 0
     assert json.loads(capsys.readouterr().out)["tolerance"] == {"axis": 0.001, "norm": 0.002}

@@ -15,6 +15,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.recording import read_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.text import pasted
 
 Captured = pytest.CaptureFixture[str]
 
@@ -196,6 +197,11 @@ def test_a_joint_log_is_what_ingest_reads(capsys: Captured, folder: Path) -> Non
     assert np.array_equal(log.t_ns, 10_000_000 * np.arange(60))
     assert np.abs(log.q - q).max() < 1e-9  # the poses stand in the file with 16 digits
     assert run(["robot", "export", "ur5e", "-o", "mine.toml", "-q"]) == 0
+    (folder / "mine.toml").replace(folder / "my arm.toml")
+    assert run(["ik", "path.csv", "--robot", "my arm.toml", "-o", "my log.csv"]) == 0
+    told = f"(read it: urmpipe ingest {pasted('my log.csv')} --robot {pasted('my arm.toml')})"
+    assert capsys.readouterr().out.splitlines()[-1] == f"Joints: my log.csv  {told}"
+    (folder / "my arm.toml").replace(folder / "mine.toml")
     assert run(["ik", "path.csv", "--robot", "mine.toml", "-o", "log.csv"]) == 0
     told = "(read it: urmpipe ingest log.csv --robot mine.toml; it replaced an earlier one)"
     assert capsys.readouterr().out.splitlines()[-1] == f"Joints: log.csv  {told}"

@@ -32,6 +32,31 @@ def refused(capsys: Captured, *arguments: str) -> list[str]:
     return err.splitlines()
 
 
+@pytest.mark.parametrize(
+    ("units", "said"),
+    [
+        (
+            ["mm", "deg"],
+            "found mm and deg without a column, allowed: one; that of another column as COLUMN=UNIT",
+        ),
+        (["x=mm", "x=m"], "found mm and m for x, allowed: one; that of another column as COLUMN=UNIT"),
+        (
+            ["rz=deg, ry=deg"],
+            "found 'rz=deg, ry=deg', allowed: one COLUMN=UNIT an option: --unit rz=deg --unit ry=deg",
+        ),
+    ],
+)
+def test_no_unit_is_dropped(capsys: Captured, units: list[str], said: str) -> None:
+    options = [word for unit in units for word in ("--unit", unit)]
+    assert refused(capsys, "targets.csv", "--robot", "arm6", *options) == [f"error: --unit: {said}"]
+
+
+def test_a_unit_that_is_given_twice_alike_is_one(folder: Path) -> None:
+    (folder / "in_mm.csv").write_text("x,y,z,rz,ry,rx\n-69,0,112,45,-90,-45\n")
+    units = ["--unit", "mm", "--unit", "rz=deg", "--unit", "mm"]
+    assert run(["ik", "in_mm.csv", "--robot", "arm6", *units]) == 0
+
+
 def test_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv")
     assert said == (

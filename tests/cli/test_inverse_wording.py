@@ -22,6 +22,7 @@ from urmpipe.inverse.wording import (
     singular_warnings,
     start_warnings,
     unreached,
+    within_pi_warnings,
 )
 from urmpipe_models.inverse.solutions import Singular, Solutions
 from urmpipe_models.inverse.targets import Targets, targets_of
@@ -158,6 +159,22 @@ def test_a_start_in_degrees_is_told_of() -> None:
             "--start: found phi2 = 45 rad (2578.31 deg), phi3 = -90 rad (-5156.62 deg): in deg? Allowed: rad",
         )
     ]
+
+
+def test_a_joint_with_limits_that_within_pi_leaves_beyond_pi_is_told_of() -> None:
+    arm = load_robot("ur5e")
+    limited = replace(arm, joints=(*arm.joints[:-1], replace(arm.joints[-1], lower=-7.0, upper=7.0)))
+    q = np.zeros((3, 1, 6))
+    q[1, 0, 5] = -3.5
+    q[2] = np.nan
+    assert list(within_pi_warnings(limited, q)) == [
+        LogWarning(
+            "beyond-pi",
+            "--within-pi: wrist_3_joint goes to 200.535 deg: it is for joints without limits; a joint with"
+            " limits stays",
+        )
+    ]
+    assert not list(within_pi_warnings(limited, np.clip(q, -np.pi, np.pi)))
 
 
 def test_rows_out_of_reach_for_one_reason_are_one_line_whatever_its_numbers() -> None:

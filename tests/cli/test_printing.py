@@ -10,6 +10,7 @@ from typing import Any
 import pytest
 
 from urmpipe.printing.terminal import print_recording, progress_bar
+from urmpipe_pipeline.text import pasted
 
 
 def test_the_command_that_opens_a_recording_works_without_an_activated_environment(
@@ -24,6 +25,10 @@ def test_the_command_that_opens_a_recording_works_without_an_activated_environme
     print_recording(Path("run.rrd"), replaced=True)
     said = "Recording: run.rrd  (open it: urmpipe view run.rrd; it replaced an earlier one)\n"
     assert capsys.readouterr().out == said
+
+    print_recording(Path("joint 3.rrd"))
+    quoted = pasted("joint 3.rrd")
+    assert capsys.readouterr().out == f"Recording: joint 3.rrd  (open it: urmpipe view {quoted})\n"
 
     monkeypatch.setenv("PATH", str(tmp_path))
     monkeypatch.setattr(sys, "executable", str(command.with_name("python")))

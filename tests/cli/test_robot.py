@@ -224,3 +224,12 @@ def test_the_picture_is_svg_with_all_points() -> None:
 def test_show_says_what_its_inverse_is(urmpipe: Any, name: str, inverse: str, said: str) -> None:
     assert f"Inverse: {said}" in urmpipe("robot", "show", name).out.splitlines()
     assert json.loads(urmpipe("robot", "show", name, "--json").out)["inverse"] == inverse
+
+
+def test_a_pose_in_degrees_is_told_of(urmpipe: Any) -> None:
+    ran = urmpipe("robot", "show", "urm6", "--q", "0,90,0,3,0,0")
+    assert (ran.code, ran.err) == (
+        0,
+        "warning: --q: found phi2 = 90 rad (5156.62 deg): in deg? Allowed: rad\n",
+    )
+    assert urmpipe("robot", "show", "urm6", "--q", "0,3.14,0,3,0,0").err == ""

@@ -23,6 +23,7 @@ from urmpipe.options.types import UNIT
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.text import pasted
 
 RunCommand = Callable[..., Any]
 
@@ -121,7 +122,11 @@ def test_the_command_prints_system_verdict_and_signals(urmpipe: RunCommand, tmp_
         " out of tolerance: 0 of 21 samples (0 %)"
     )
     assert any(line.startswith("delta.norm [m]") for line in lines)
-    assert sum(line.startswith(("delta.", "repolarizer.", "chain.")) for line in lines) == 12
+    table = [line.split(maxsplit=1)[0].split("[")[0] for line in lines[6:18]]
+    assert table == [
+        *["delta.delta"] * 3, "delta.norm", *["log.q"] * 3, "reference.p", *["repolarizer.q"] * 2,
+        *["chain.p7"] * 2,
+    ]  # fmt: skip
     assert lines[-2] == "... and 39 more; --json has all, and the recording"
     assert lines[-1].startswith("Recording: log-to-delta.rrd")
     assert ran.err.splitlines()[-1].startswith("warning: path: no unit is given for x, y, z")
@@ -136,7 +141,7 @@ def test_signals_that_stand_still_come_last(urmpipe: RunCommand, tmp_path: Path)
     lines = urmpipe("simulate", "still.toml").out.splitlines()
     assert "communication step 10 ms, a sample every 50 ms; in " in lines[0]
     named = [line.split()[0] for line in lines if line.startswith(("lag.", "still."))]
-    assert named == ["lag.x", "lag.error", "still.x", "still.error", "lag.u"]
+    assert named == ["lag.x", "lag.error", "lag.u", "still.x", "still.error"]
 
 
 def test_out_of_tolerance_is_exit_code_1_and_json_tells(urmpipe: RunCommand) -> None:
@@ -221,6 +226,8 @@ def test_a_shipped_system_is_written_to_be_changed(urmpipe: RunCommand, tmp_path
     ran = urmpipe("simulate", "one-drive", "--write-system", "mine.toml")
     assert (ran.code, ran.err) == (0, "")
     assert ran.out == "System: mine.toml  (change it, then: urmpipe simulate mine.toml)\n"
+    told = f"System: my drive.toml  (change it, then: urmpipe simulate {pasted('my drive.toml')})\n"
+    assert urmpipe("simulate", "one-drive", "--write-system", "my drive.toml").out == told
     text = (tmp_path / "mine.toml").read_text(encoding="utf-8")
     changed = text.replace('unit = "dc_drive"', 'unit = "dc_drive"\nstart = { C = 0.1 }')
     (tmp_path / "mine.toml").write_text(changed, encoding="utf-8")

@@ -18,6 +18,7 @@ import pytest
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import ViewerError
 from urmpipe_pipeline.recording.viewer import refuse_without_display
+from urmpipe_pipeline.text import pasted
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
@@ -39,6 +40,13 @@ def test_without_a_display_it_says_what_to_do(urmpipe: RunCommand, monkeypatch: 
     urmpipe("ingest", LOGS / "path.csv", "-q", "-o", "run.rrd")
     ran = urmpipe("view", "run.rrd")
     assert (ran.code, ran.out, ran.err) == (2, "", f"error: {NO_DISPLAY}\n")
+
+
+def test_the_commands_for_another_computer_can_be_pasted() -> None:
+    with pytest.raises(ViewerError) as caught:
+        refuse_without_display([Path("a.rrd"), Path("joint 3.rrd")], {}, "linux")
+    files = f"a.rrd {pasted('joint 3.rrd')}"
+    assert str(caught.value) == NO_DISPLAY.replace("run.rrd", files)
 
 
 def refused(environment: dict[str, str], platform: str) -> bool:

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_fmus.si_units import BaseUnit, base_unit, display_conversion, same_unit
+from urmpipe_fmus.si_units import BaseUnit, base_unit, coherent, display_conversion, same_unit
 from urmpipe_fmus.unit import Unit
-from urmpipe_fmus.variable import Input, Output
+from urmpipe_fmus.variable import Input, Output, Parameter
 from urmpipe_models.errors import UnitError
 
 ALLOWED = (
@@ -193,6 +194,30 @@ def test_a_value_is_displayed_by_factor_and_offset(
     assert factor * value + offset == pytest.approx(shown, rel=1e-14)  # three roundings
 
 
+@pytest.mark.parametrize(
+    ("spelling", "in_si"),
+    [
+        ("", ""),
+        ("1/s", "1/s"),
+        ("kg.m2", "kg.m2"),
+        ("Hz", "Hz"),
+        ("rev/min", "rad/s"),
+        ("deg/s2", "rad/s2"),
+        ("N.mm/deg", "N.m/rad"),
+        ("g", "kg"),
+        ("mg.cm2", "kg.m2"),
+        ("kW", "W"),
+        ("mbar", "Pa"),
+        ("kOhm", "Ohm"),
+        ("J/(g.mK)", "J/(kg.K)"),
+        ("degC", "K"),
+    ],
+)
+def test_the_unit_of_si_of_the_same_quantity(spelling: str, in_si: str) -> None:
+    assert coherent(spelling) == in_si
+    assert base_unit(in_si) == replace(base_unit(spelling), factor=1.0, offset=0.0)
+
+
 def test_a_display_unit_of_another_quantity_is_refused() -> None:
     with pytest.raises(UnitError, match=r"^display unit 'mm': found for values in 'rad', allowed: one of "):
         display_conversion("rad", "mm")
@@ -208,6 +233,8 @@ def test_a_unit_tells_all_variables_with_a_wrong_unit() -> None:
                 Input(name="phi", description="", unit="rad", display_unit="mm"),
                 Input(name="n", description="", display_unit="mm"),
                 Input(name="turns", description="", type="Integer", unit="rev"),
+                Parameter(name="ws", description="", unit="deg/s", start=1.0),
+                Parameter(name="play", description="", unit="mm", display_unit="um"),
                 Output(name="y", description="", unit="m"),
             ),
             outputs=lambda v: {"y": v.tau},
@@ -218,4 +245,7 @@ def test_a_unit_tells_all_variables_with_a_wrong_unit() -> None:
         "unit wrong: phi: display unit 'mm': found for values in 'rad', allowed: one of the same quantity",
         "unit wrong: n: found display unit 'mm' without a unit, allowed: both or none",
         "unit wrong: turns: found Integer with a unit, allowed: a unit of a Real",
+        "unit wrong: ws: found unit 'deg/s', allowed: values in SI, unit='rad/s', with display_unit='deg/s'"
+        " to show it so",
+        "unit wrong: play: found unit 'mm', allowed: values in SI, unit='m'",
     ]

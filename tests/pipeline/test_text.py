@@ -130,3 +130,19 @@ def test_sizes_counts_and_options() -> None:
 def test_how_much_of_a_tolerance_is_used_is_never_rounded_to_all_of_it(largest: float, written: str) -> None:
     one = Statistics("path", "path", "m", largest, 0.0, 0.0, 0.0, 0.0, 0.0, 0, 0.01, 1, 1.0, "fail")
     assert used_words(one) == written
+
+
+@pytest.mark.parametrize(
+    ("word", "elsewhere", "on_windows"),
+    [
+        ("log.csv", "log.csv", "log.csv"),
+        ("weld path.csv", "'weld path.csv'", '"weld path.csv"'),
+        ("run(2).rrd", "'run(2).rrd'", '"run(2).rrd"'),
+        (r"logs\run.rrd", r"'logs\run.rrd'", r"logs\run.rrd"),
+        ("it's.csv", """'it'"'"'s.csv'""", '"it\'s.csv"'),
+        ("", "''", '""'),
+    ],
+)
+def test_a_word_is_quoted_where_a_shell_would_part_it(word: str, elsewhere: str, on_windows: str) -> None:
+    assert text.pasted(word, "linux") == text.pasted(word, "darwin") == elsewhere
+    assert text.pasted(word, "win32") == on_windows

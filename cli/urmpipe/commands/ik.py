@@ -127,6 +127,7 @@ def _print(result: InverseResult, every: bool, robot: str | None, replaces: bool
     """Print what was found, and what was written: how to read it names the robot as the caller does."""
     from urmpipe.printing.inverse import print_inverse
     from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_pipeline.text import pasted
 
     print_inverse(result, every=every)
     written = result.output
@@ -134,4 +135,5 @@ def _print(result: InverseResult, every: bool, robot: str | None, replaces: bool
         print_recording(written, replaced=replaces)
     elif written is not None:
         earlier = "; it replaced an earlier one" if replaces else ""
-        say(f"Joints: {written}  (read it: urmpipe ingest {written} --robot {robot}{earlier})")
+        how = f"urmpipe ingest {pasted(written)} --robot {pasted(robot)}"
+        say(f"Joints: {written}  (read it: {how}{earlier})")

@@ -70,6 +70,9 @@ def show(
       urmpipe robot show urm6 --q 0,3.14,0,3.14,0,0 --picture urm6.svg
       urmpipe robot show panda.urdf --tip panda_hand_tcp --json
     """
+    import numpy as np
+
+    from urmpipe.inverse.wording import start_warnings
     from urmpipe.printing.chain_drawing import chain_svg
     from urmpipe.printing.robot import chain_at, print_chain
     from urmpipe_models.errors import OptionError
@@ -80,6 +83,7 @@ def show(
     if len(q) != len(chain.coordinates):
         allowed = f"{len(chain.coordinates)}, one for each of {', '.join(chain.coordinates)}"
         raise OptionError(f"--q: found {len(q)} values, allowed: {allowed}")
+    terminal.warn(list(start_warnings(chain, np.array(q), "--q")))
     posed = chain_at(chain, q)
     if picture is not None:
         write_export(picture, chain_svg(posed.skeleton, posed.title), Path(name))

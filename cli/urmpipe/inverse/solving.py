@@ -16,6 +16,7 @@ from urmpipe.inverse.wording import (
     shortfall_warnings,
     singular_warnings,
     start_warnings,
+    within_pi_warnings,
 )
 from urmpipe_models.arrays import BoolArray, IndexArray, IntArray, TextArray
 from urmpipe_models.inverse.along_path.joint_path import JointPath
@@ -106,6 +107,7 @@ def _result(
         *singular_warnings(solutions, given.row, listed),
         *(_nearly_singular(asked, solutions, listed) if path is None else ()),
         *shortfall_warnings(solutions, given.row),
+        *(within_pi_warnings(asked.arm, solutions.q) if asked.within_pi else ()),
         *_far(asked, reached),
     )
     return InverseResult(

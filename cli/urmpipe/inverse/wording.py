@@ -34,6 +34,9 @@ NEARLY = 1e-4
 """Smallest singular value [-] below which a pose counts as nearly singular: a spherical wrist is aligned
 within some 0.05 deg, and joints turn ten thousand times as far as the tool."""
 
+ROUNDING = 1e-9
+"""In [rad]: pi written and read is no angle beyond pi."""
+
 MANY_TURNS = 4.0 * np.pi
 """Joint values beyond two turns in [rad] are hardly meant: they may be in deg."""
 
@@ -158,8 +161,8 @@ def near_singular_warnings(
         yield LogWarning("near-singular", said)
 
 
-def start_warnings(chain: Chain, start: FloatArray | None) -> Iterator[LogWarning]:
-    """Yield a warning of a start that is hardly in rad, shape (joints,)."""
+def start_warnings(chain: Chain, start: FloatArray | None, given_by: str = "--start") -> Iterator[LogWarning]:
+    """Yield a warning of a pose, shape (joints,), that is hardly in rad, and by which option it was given."""
     if start is None:
         return
     found = [
@@ -168,7 +171,21 @@ def start_warnings(chain: Chain, start: FloatArray | None) -> Iterator[LogWarnin
         if joint.kind == "revolute" and abs(value) > MANY_TURNS
     ]
     if found:
-        yield LogWarning("start-unit", f"--start: found {', '.join(found)}: in deg? Allowed: rad")
+        yield LogWarning("start-unit", f"{given_by}: found {', '.join(found)}: in deg? Allowed: rad")
+
+
+def within_pi_warnings(chain: Chain, q: FloatArray) -> Iterator[LogWarning]:
+    """Yield a warning of joints that have limits and go beyond pi: q in [rad] or [m], shape (..., joints)."""
+    values = np.abs(q.reshape(-1, q.shape[-1]))
+    furthest = np.where(np.isfinite(values), values, 0.0).max(axis=0, initial=0.0)
+    found = [
+        f"{joint.name} goes to {np.degrees(most):.6g} deg"
+        for joint, most in zip(chain.moving, furthest.tolist(), strict=True)
+        if joint.kind == "revolute" and most > np.pi + ROUNDING
+    ]
+    if found:
+        said = f"--within-pi: {', '.join(found)}: it is for joints without limits; a joint with limits stays"
+        yield LogWarning("beyond-pi", said)
 
 
 def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarning]:

@@ -131,8 +131,17 @@ OF_LOGS = {*names_of(LogOptions), "tsp", "derivative"} - {*names_of(PlacingOptio
 
 def _units(ctx: click.Context, param: click.Parameter, values: tuple[str, ...]) -> dict[str, str] | None:
     """Return UNIT (all joint angles) and COLUMN=UNIT options as a mapping."""
-    pairs = (value.rpartition("=") for value in values)
-    return {column: unit for column, _, unit in pairs} or None
+    units: dict[str, str] = {}
+    for value in values:
+        column, _, unit = value.rpartition("=")
+        several = value.split(",")
+        if len(several) > 1 and all("=" in one for one in several):
+            apart = " ".join(f"--unit {one.strip()}" for one in several)
+            raise click.BadParameter(f"found {value!r}, allowed: one COLUMN=UNIT an option: {apart}")
+        if units.setdefault(column, unit) != unit:
+            found = f"found {units[column]} and {unit} {f'for {column}' if column else 'without a column'}"
+            raise click.BadParameter(f"{found}, allowed: one; that of another column as COLUMN=UNIT")
+    return units or None
 
 
 def _intervals(

@@ -24,6 +24,13 @@ SHOWN = 12
 """Signals whose extremes are printed; the others are counted."""
 
 
+AT_ONCE = 5
+"""As many as a delta meter has: x, y, z, norm, and whether they are tolerated."""
+
+_Row = tuple[str, str, FloatArray]
+"""Name, unit and values of a scalar signal."""
+
+
 def print_simulation(result: Simulation, wall: float) -> None:
     """Print what was simulated and how fast, each verdict, and the extremes of each output.
 
@@ -49,35 +56,48 @@ def _head(result: Simulation, wall: float) -> str:
 
 
 def _print_extremes(console: Console, result: Simulation) -> None:
-    """Print the least and the largest value of the first scalar signals; those that stand still come last."""
-    rows = [row for signal in _last_first(result) for row in _scalars(signal)]
+    """Print the least and the largest value of some signals of every block; those that stand still last."""
+    rows = list(_by_turns(result))
     if not rows or not len(result.t_ns):
         return
-    shown = sorted(rows, key=lambda row: bool(np.ptp(row[2]) == 0.0))[:SHOWN]
-    print_columns(console, "Signals", list(_columns(shown, result.t)))
+    blocks = list(dict.fromkeys(block for block, _ in rows))
+    shown = sorted(rows[:SHOWN], key=lambda one: (_stands_still(one[1]), blocks.index(one[0])))
+    print_columns(console, "Signals", list(_columns([row for _, row in shown], result.t)))
     if len(rows) > SHOWN:
         console.print(f"... and {len(rows) - SHOWN} more; --json has all, and the recording")
 
 
-def _last_first(result: Simulation) -> list[Signal]:
-    """Return the signals, what comes out at the end of the system first.
+def _by_turns(result: Simulation) -> list[tuple[str, _Row]]:
+    """Return every scalar with its block: some of each block in turns, what stands still behind the rest.
 
-    That is what blocks compute whose outputs no other block takes, then what no block takes, then the rest.
+    The blocks come first whose outputs no other block takes, which judge or end the system, with `AT_ONCE`
+    rows a turn; of the others one a turn, first what another block takes of them.
     """
     taken = set(result.connections.values())
     inner = {source.partition(".")[0] for source in taken}
-    return sorted(
-        result.signals, key=lambda one: (one.block in inner, not taken.isdisjoint((one.name, *one.names)))
-    )
+    turns: list[tuple[bool, int, bool, str, _Row]] = []
+    signals = sorted(result.signals, key=lambda one: taken.isdisjoint((one.name, *one.names)))
+    for block in dict.fromkeys(one.block for one in result.signals):
+        rows = [row for one in signals if one.block == block for row in _scalars(one)]
+        rows.sort(key=_stands_still)
+        at_once = 1 if block in inner else AT_ONCE
+        turns += [
+            (_stands_still(row), k // at_once, block in inner, block, row) for k, row in enumerate(rows)
+        ]
+    return [(block, row) for *_, block, row in sorted(turns, key=lambda one: one[:3])]
 
 
-def _scalars(signal: Signal) -> Iterator[tuple[str, str, FloatArray]]:
+def _stands_still(row: _Row) -> bool:
+    return not len(row[2]) or bool(np.ptp(row[2]) == 0.0)
+
+
+def _scalars(signal: Signal) -> Iterator[_Row]:
     """Yield name, unit and values of each scalar of a signal."""
     for name, values in zip(signal.names, signal.columns.T, strict=True):
         yield name, signal.unit, values
 
 
-def _columns(rows: Sequence[tuple[str, str, FloatArray]], t: FloatArray) -> Iterator[Column]:
+def _columns(rows: Sequence[_Row], t: FloatArray) -> Iterator[Column]:
     """Yield the columns of the table: a row a scalar."""
     found = [extremes(values, t) for _, _, values in rows]
     yield Column("Signal", [f"{name} [{unit}]" if unit else name for name, unit, _ in rows], key=True)

@@ -53,12 +53,14 @@ def say(line: str, *, err: bool = False) -> None:
 
 def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     """Print where a recording is, and how to open it with the urmpipe that is running."""
+    from urmpipe_pipeline.text import pasted
+
     command = "urmpipe"
     if shutil.which(command) is None:  # not on the path, as in an environment that was not activated
         installed, here = Path(sys.executable).parent / command, Path.cwd()
         command = str(installed.relative_to(here) if installed.is_relative_to(here) else installed)
     earlier = "; it replaced an earlier one" if replaced else ""
-    say(f"Recording: {recording}  (open it: {command} view {recording}{earlier})")
+    say(f"Recording: {recording}  (open it: {pasted(command)} view {pasted(recording)}{earlier})")
 
 
 def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:

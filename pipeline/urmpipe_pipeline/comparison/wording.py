@@ -47,11 +47,12 @@ def _who(runs: Sequence[Deviation], total: int) -> str:
 
 
 def _points(one: Comparison) -> str:
-    """Return by which tool centre points two logs were held against each other; nothing of a path."""
+    """Return by which tool centre points a log is held against others; nothing if a path is the reference."""
     if not one.reference.joints:
         return ""
     recorded = one.provenance.options.get("tcp") == "recorded"
-    return f", {'as recorded' if recorded else 'by the joints'} on both sides"
+    sides = "on both sides" if all(run.run.log.joints for run in one.runs) else "of the reference"
+    return f", {'as recorded' if recorded else 'by the joints'} {sides}"
 
 
 def decided_words(one: Statistics) -> str:

@@ -19,6 +19,7 @@ import numpy as np
 
 from urmpipe_models.errors import ViewerError, for_each
 from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.text import pasted
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
@@ -83,7 +84,7 @@ def refuse_without_display(
     """
     if not platform.startswith("linux") or any(environment.get(name) for name in DISPLAYS):
         return
-    files = " ".join(str(path) for path in paths)
+    files = " ".join(map(pasted, paths))
     raise ViewerError(
         f"found no display (neither {' nor '.join(DISPLAYS)} is set), allowed: a copy on a computer with one,"
         f" there: urmpipe view {files}; or a browser there, here: rerun --serve-web --bind {LOOPBACK}"

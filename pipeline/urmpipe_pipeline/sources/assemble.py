@@ -14,9 +14,10 @@ from urmpipe_models.orientation import RotationForm
 from urmpipe_pipeline.joint_log import ROLES, Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.sources.cells.cell import is_number, plain, significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
-from urmpipe_pipeline.sources.clocks.clock import Clock, even_clock
+from urmpipe_pipeline.sources.clocks.clock import even_clock
+from urmpipe_pipeline.sources.clocks.clock_columns import like_a_time
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
-from urmpipe_pipeline.sources.columns.columns import Column
+from urmpipe_pipeline.sources.columns.columns import Column, columns_of
 from urmpipe_pipeline.sources.content import Content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan
@@ -81,7 +82,7 @@ def assemble(
         OptionError: If an option does not fit the log.
     """
     roles, layout, clock = content.roles, plan.tables.layouts[plan.main], plan.clock
-    t_ns, start, timed, noticed = _times(content, clock, options)
+    t_ns, start, timed, noticed = _times(content, plan, options)
     signs, offsets = _corrections(options, len(roles.joints))
     measured = _measured(plan, content, robot, t_ns, signs, offsets)
     joints, rates, seconds, position, rotation = measured.groups
@@ -184,15 +185,27 @@ def _measured(
 
 
 def _times(
-    content: Content, clock: Clock, options: ReadOptions
+    content: Content, plan: Plan, options: ReadOptions
 ) -> tuple[IntArray, int, tuple[Inference, ...], Sequence[LogWarning]]:
     """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say."""
     if content.clock is None:
-        t_ns, said, noticed = even_clock(content.rows, options.period)
+        like = None if options.time else _like_a_time(plan, content.roles.columns)
+        t_ns, said, noticed = even_clock(content.rows, options.period, column=like.name if like else "")
         return t_ns, 0, said, noticed
     start = int(content.clock[0])
-    counted = Inference("start of the time", clock.shown(start), "the first row; times are counted from it")
+    counted = Inference(
+        "start of the time", plan.clock.shown(start), "the first row; times are counted from it"
+    )
     return content.clock - start, start, (counted,) if start else (), ()
+
+
+def _like_a_time(plan: Plan, used: Sequence[Column]) -> Column | None:
+    """Return a column of the main table that may be the time though its name does not say so."""
+    layout = plan.tables.layouts[plan.main]
+    if layout.header is None:
+        return None
+    columns = columns_of(plan.tables.layouts, plan.tables.titles)
+    return like_a_time([one for one in columns if one.table == plan.main], layout, used)
 
 
 def _corrections(options: ReadOptions, joints: int) -> tuple[tuple[int, ...], tuple[float, ...]]:

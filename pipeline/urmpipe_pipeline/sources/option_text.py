@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import shlex
 from collections.abc import Sequence
 
 from urmpipe_pipeline.joint_log import LogColumn
 from urmpipe_pipeline.sources.vocabulary import split_unit
+from urmpipe_pipeline.text import pasted
 
 
 def option(name: str, value: str) -> str:
     """Return an option with its value, quoted where a shell would part it: --unit 'q 1=deg'."""
-    return f"{name} {shlex.quote(value)}"
+    return f"{name} {pasted(value)}"
 
 
 def joints_option(columns: Sequence[LogColumn]) -> str:

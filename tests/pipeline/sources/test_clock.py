@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.joint_log import JointLog, LogWarning
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -20,7 +20,8 @@ def clocked(name: str, *times: str) -> str:
 @pytest.mark.parametrize(
     "name",
     ["t", "time", "Time", "Zeit", "timestamp", "Time (s)", "Zeit[sec]", "t_s", "time_sec", "simulation time",
-     "__time", "%time", "field.header.stamp", "elapsed_time [s]", "robot time", "duration [s]"],
+     "__time", "%time", "field.header.stamp", "elapsed_time [s]", "robot time", "duration [s]",
+     "tout", "t_out", "tsim", "sim_t"],
 )  # fmt: skip
 def test_names_of_the_time(read: Read, name: str) -> None:
     log = read(clocked(name, "1.5", "1.51", "1.53"))
@@ -120,6 +121,33 @@ def test_without_a_time_the_period_is_given_or_that_of_the_paper(read: Read, wro
         assert wrong(text, period=period) == [
             f"--period: found {period:g} s, allowed: a positive time of 1e-9 s or more"
         ]
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "takt,q1,q2\n0.5,0.1,1\n1.25,0.2,1\n1.5,0.3,1\n",
+        "q1,q2,way,takt\n0.1,1,0.5,0.5\n0.2,1,0.5,1.25\n0.3,1,0.25,1.5\n",
+    ],
+)
+def test_a_column_that_runs_like_a_clock_is_named_not_taken(read: Read, text: str) -> None:
+    log = read(text)
+    assert log.t_ns.tolist() == [0, 5_000_000, 10_000_000]
+    assert log.warnings[0] == LogWarning(
+        "assumed-period",
+        "no time column: the rows are taken as 5 ms apart; --period S says otherwise; takt always increases:"
+        " --time takt takes it as the time",
+    )
+    assert read(text, time="takt").t_ns.tolist() == [0, 750_000_000, 1_000_000_000]
+
+
+@pytest.mark.parametrize("column", ["1,2,3", "0.5,0.5,0.75", "0.5,,x"])
+def test_a_counter_and_what_stands_still_are_not_named_as_a_time(read: Read, column: str) -> None:
+    cells = column.split(",")
+    log = read("takt,q1,q2\n" + "".join(f"{cell},0.{k},1\n" for k, cell in enumerate(cells, 1)))
+    assert log.warnings[0].message == (
+        "no time column: the rows are taken as 5 ms apart; --period S says otherwise"
+    )
 
 
 def test_the_time_as_the_user_says(read: Read, wrong: Wrong) -> None:

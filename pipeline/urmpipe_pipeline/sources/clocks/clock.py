@@ -174,7 +174,7 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
 
 
 def even_clock(
-    rows: int, period: float | None, option: str = "--period"
+    rows: int, period: float | None, given_by: str = "--period", column: str = ""
 ) -> tuple[IntArray, tuple[Inference, ...], list[LogWarning]]:
     """Return the times in [ns], shape (rows,), of a log without a clock, what they rest on, and a warning.
 
@@ -183,19 +183,22 @@ def even_clock(
     Args:
         rows: Number of rows.
         period: Time between rows in [s], if the user gave it.
-        option: How it was given, for errors.
+        given_by: How it was given, for errors.
+        column: A column that may be the time, for the warning.
 
     Raises:
         OptionError: If the period is not a positive time of 1 ns or more.
     """
     if period is not None and not (math.isfinite(period) and period >= 1e-9):
-        raise OptionError(f"{option}: found {period:g} s, allowed: a positive time of 1e-9 s or more")
+        raise OptionError(f"{given_by}: found {period:g} s, allowed: a positive time of 1e-9 s or more")
     step = PAPER_PERIOD if period is None else period
     if rows * step * 1e9 >= LONGEST_NS:
         longest = LONGEST_NS / 1e9 / rows
-        raise OptionError(f"{option}: found {step:g} s, allowed: less than {longest:g} s for {rows} rows")
+        raise OptionError(f"{given_by}: found {step:g} s, allowed: less than {longest:g} s for {rows} rows")
     times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
     if period is not None:
         return times, (Inference("period", f"{step:g} s", "given as an option"),), []
     said = "no time column: the rows are taken as 5 ms apart; --period S says otherwise"
+    if column:
+        said += f"; {column} always increases: {option('--time', column)} takes it as the time"
     return times, (Inference("period", "0.005 s", "assumed"),), [LogWarning("assumed-period", said)]

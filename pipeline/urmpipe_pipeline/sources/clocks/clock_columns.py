@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 from urmpipe_models.errors import Finding, LogError
@@ -117,8 +117,8 @@ def _by_content(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column
     timed = [c for c in columns if not c.text and c.unit and (c.unit.quantity, c.unit.order) == ("time", 0)]
     if len(timed) == 1:
         return (timed[0],), f"its unit, {timed[0].unit_text}"
-    cells = layout.cells(0)
-    if columns[0].key == "" and not columns[0].text and not count_up(cells) and _increases(cells, layout):
+    first = columns[0]
+    if first.key == "" and not first.text and _runs_like_a_clock(layout.cells(0), layout):
         return (columns[0],), "the first column has no name and always increases"
     return None
 
@@ -170,6 +170,24 @@ def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | Non
     message = f"found a first column that increases from row to row, which may be {what}: say --time 1 or"
     rest = "" if path else ", or name the joint columns with --joints 2,3,..."
     raise LogError(Finding(f"{message} --time none{rest}", str(layout.segment.path), layout.first_line, 1))
+
+
+def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Column]) -> Column | None:
+    """Return the first column without a role that runs like a clock, whatever its name; None without one.
+
+    It is told, not taken: a way or a counter of pulses increases from row to row as well.
+
+    Args:
+        columns: The table's columns.
+        layout: The table.
+        used: The columns that have a role.
+    """
+    free = (one for one in columns if one not in used and not one.text)
+    return next((one for one in free if _runs_like_a_clock(layout.cells(one.index), layout)), None)
+
+
+def _runs_like_a_clock(cells: Sequence[str], layout: Layout) -> bool:
+    return not count_up(cells) and _increases(cells, layout)
 
 
 def steps_of(cells: Sequence[str], layout: Layout) -> list[float]:
