@@ -49,7 +49,9 @@ def test_a_comparison_is_held_against_another(folder: Path, capsys: Captured) ->
     none = ["--noise", "0,angle=0,joint=0"]
     assert run(["compare", "before.rrd", "--baseline", "before.rrd", "-q", *none]) == 0
     assert compare("good.csv", "--baseline", "before.rrd", "-q") == 1
-    assert recorded("good-against-wanted.rrd").baseline is None
+    assert recorded("now.rrd").baseline is None
+    kept = recorded("good-against-wanted.rrd").baseline
+    assert kept is not None and (kept.verdict, kept.recording) == ("fail", Path("before.rrd"))
 
 
 def test_what_changed_is_printed(folder: Path, capsys: Captured) -> None:
@@ -71,6 +73,17 @@ def test_what_changed_is_printed(folder: Path, capsys: Captured) -> None:
         "gone: bad",
         'made otherwise: tolerance: {"axis": 0.0035} → {"axis": 0.004}',
     } <= set(lines)
+
+
+def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    noise = ["--noise", "50um,angle=1deg,joint=1deg"]
+    assert compare("slack.csv", "--baseline", "before.rrd", "-q", "-o", "now.rrd", *noise) == 1
+    assert run(["report", "now.rrd", "-q"]) == 0
+    page = Path("now.html").read_text(encoding="utf-8")
+    assert "<title>FAIL: slack-against-wanted" in page
+    assert "within tolerance, but worse than the baseline" in page
+    assert "Against the baseline good-against-wanted: " in page
 
 
 def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -> None:

@@ -33,7 +33,7 @@ class Comparison(Shown):
         warnings: What a person should know about the comparison itself.
         provenance: How to repeat it.
         recording: Where it was written.
-        baseline: What changed since an earlier comparison, if it was held against one; not in the recording.
+        baseline: What changed since an earlier comparison, if it was held against one.
     """
 
     name: str

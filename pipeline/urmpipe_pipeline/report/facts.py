@@ -12,6 +12,7 @@ from urmpipe_pipeline.comparison.comparison import Comparison, Deviation, Stretc
 from urmpipe_pipeline.comparison.trajectory import Sync
 from urmpipe_pipeline.comparison.wording import correlation, tolerance_words, tool_option
 from urmpipe_pipeline.inverse.verdict import reached
+from urmpipe_pipeline.report.baseline_table import worse_words
 from urmpipe_pipeline.runs.results import Run
 
 
@@ -68,8 +69,14 @@ def comparison_facts(comparison: Comparison) -> tuple[Fact, ...]:
         Fact("Reference", comparison.reference.name),
         Fact("Reference samples", str(len(comparison.reference.t_ns))),
         Fact("Tolerance", tolerance_words(comparison)),
+        Fact("Against the baseline", _since_baseline(comparison)),
         Fact("Recording", str(comparison.recording) if comparison.recording else ""),
     )
+
+
+def _since_baseline(comparison: Comparison) -> str:
+    """Return what is worse than the baseline; nothing without one."""
+    return "" if comparison.baseline is None else worse_words(comparison.baseline)
 
 
 def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact, ...]:

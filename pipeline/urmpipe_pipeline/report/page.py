@@ -18,6 +18,7 @@ from urmpipe_pipeline.report import (
     verdict_tables,
 )
 from urmpipe_pipeline.report.banner import Banner, banner
+from urmpipe_pipeline.report.baseline_table import baseline_table
 from urmpipe_pipeline.report.cards import Card, card
 from urmpipe_pipeline.report.drawings import Drawing, Listing, system_drawing, system_file
 from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_facts, run_facts
@@ -198,8 +199,9 @@ def _simulation_part(simulation: Simulation, ident: str) -> Part:
 
 
 def _summary(comparison: Comparison, links: Sequence[str]) -> Summary:
-    """Return the cards of a comparison, and of several logs the tables that rank them."""
+    """Return the cards of a comparison, what changed since its baseline, and how several logs rank."""
     several = len(comparison.runs) > 1
+    changed = () if comparison.baseline is None else (baseline_table(comparison.baseline),)
     return Summary(
         f"Verdict{'s' if several else ''} against {comparison.reference.name}"
         f"{', best to worst' if several else ''}",
@@ -207,7 +209,7 @@ def _summary(comparison: Comparison, links: Sequence[str]) -> Summary:
             card(run, link, comparison.covered(run), len(comparison.warnings_of(run)))
             for run, link in zip(comparison.ranking, links, strict=True)
         ),
-        verdict_tables.ranking_tables(comparison, links) if several else (),
+        (*changed, *(verdict_tables.ranking_tables(comparison, links) if several else ())),
         f"Tolerance: {tolerance_words(comparison)}. The bars show how much of it is used up.",
     )
 
