@@ -71,7 +71,13 @@ def comparison_facts(comparison: Comparison) -> tuple[Fact, ...]:
         Fact("Tolerance", tolerance_words(comparison)),
         Fact("Against the baseline", _since_baseline(comparison)),
         Fact("Recording", str(comparison.recording) if comparison.recording else ""),
+        Fact("Made", made(comparison)),
     )
+
+
+def made(comparison: Comparison) -> str:
+    """Return when a comparison was made, to the minute."""
+    return f"{comparison.provenance.created[:16].replace('T', ' ')} UTC"
 
 
 def _since_baseline(comparison: Comparison) -> str:
