@@ -126,7 +126,7 @@ def ik(
 def _print(result: InverseResult, every: bool, robot: str | None, replaces: bool) -> None:
     """Print what was found, and what was written: how to read it names the robot as the caller does."""
     from urmpipe.printing.inverse import print_inverse
-    from urmpipe.printing.terminal import print_recording, say
+    from urmpipe.printing.terminal import as_typed, print_recording, say
 
     print_inverse(result, every=every)
     written = result.output
@@ -134,4 +134,5 @@ def _print(result: InverseResult, every: bool, robot: str | None, replaces: bool
         print_recording(written, replaced=replaces)
     elif written is not None:
         earlier = "; it replaced an earlier one" if replaces else ""
-        say(f"Joints: {written}  (read it: urmpipe ingest {written} --robot {robot}{earlier})")
+        read = f"urmpipe ingest {as_typed(written)} --robot {as_typed(str(robot))}"
+        say(f"Joints: {written}  (read it: {read}{earlier})")

@@ -152,7 +152,7 @@ def _refuse_run_options(given: dict[str, Any]) -> None:
 def _write(system: str, path: Path, terminal: Terminal) -> int:
     """Write the file of a shipped system, under a name that is new; the logs that came along stay there."""
     from urmpipe.api.simulate import own_logs
-    from urmpipe.printing.terminal import say
+    from urmpipe.printing.terminal import as_typed, say
     from urmpipe_fmus.cosim import system_text
     from urmpipe_pipeline.outputs import guarded_output
 
@@ -160,7 +160,7 @@ def _write(system: str, path: Path, terminal: Terminal) -> int:
     with guarded_output(path, [], "system") as part:
         part.write_text(text, encoding="utf-8")
     logs = "".join(f" --set {name}=FILE.csv" for name in own_logs(system))
-    said = f"System: {path}  (change it, then: urmpipe simulate {path}{logs})"
+    said = f"System: {path}  (change it, then: urmpipe simulate {as_typed(path)}{logs})"
     terminal.answer(lambda: {"schema": 1, "system": str(path)}, lambda: say(said))
     return 0
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import os
+import shlex
 import shutil
 import sys
 from collections.abc import Callable, Iterator, Sequence
@@ -51,6 +53,14 @@ def say(line: str, *, err: bool = False) -> None:
     click.echo(one_line(line), err=err)
 
 
+def as_typed(word: str | Path) -> str:
+    """Return a word as a shell takes it whole: in quotes where it holds a space or a sign of the shell's."""
+    said = str(word)
+    if os.name == "nt":
+        return f'"{said}"' if " " in said else said
+    return shlex.quote(said)
+
+
 def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     """Print where a recording is, and how to open it with the urmpipe that is running."""
     command = "urmpipe"
@@ -58,7 +68,8 @@ def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
         installed, here = Path(sys.executable).parent / command, Path.cwd()
         command = str(installed.relative_to(here) if installed.is_relative_to(here) else installed)
     earlier = "; it replaced an earlier one" if replaced else ""
-    say(f"Recording: {recording}  (open it: {command} view {recording}{earlier})")
+    opened = f"{as_typed(command)} view {as_typed(str(recording))}"
+    say(f"Recording: {recording}  (open it: {opened}{earlier})")
 
 
 def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:

@@ -6,6 +6,7 @@ One window a recording: within one, the viewer shows all recordings of a program
 from __future__ import annotations
 
 import os
+import shlex
 import socket
 import subprocess
 import sys
@@ -83,7 +84,7 @@ def refuse_without_display(
     """
     if not platform.startswith("linux") or any(environment.get(name) for name in DISPLAYS):
         return
-    files = " ".join(str(path) for path in paths)
+    files = shlex.join(map(str, paths))
     raise ViewerError(
         f"found no display (neither {' nor '.join(DISPLAYS)} is set), allowed: a copy on a computer with one,"
         f" there: urmpipe view {files}; or a browser there, here: rerun --serve-web --bind {LOOPBACK}"
