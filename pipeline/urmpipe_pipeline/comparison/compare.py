@@ -106,7 +106,16 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
     told = [*_told_of(reference), *_differing_robots([reference, *runs], chosen.tcp)]
     if chosen.tcp == "fk" and wanted.joints:
         told += [one for run in (reference, *runs) for one in recorded_apart(run, RECORDED_APART)]
+    elif chosen.tcp == "fk":
+        told += [one for run in deviations for one in _lacking_tool(run)]
     return _comparison(wanted, deviations, chosen, told)
+
+
+def _lacking_tool(one: Deviation) -> list[LogWarning]:
+    """Return what the tool centre point that a log recorded says of why the log is out of tolerance."""
+    if one.verdict == "pass" or one.run.robot is None:
+        return []
+    return [hint.of(one.name) for hint in lacking_tool(one.run.robot, one.run.log)]
 
 
 def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOption) -> None:

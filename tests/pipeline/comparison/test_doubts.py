@@ -67,6 +67,15 @@ def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not(arms: Co
     assert [one.kind for one in thin_evidence(replace(still, run=at_rest))] == ["one-pose"]
 
 
+def test_encoders_that_flicker_are_no_motion(arms: Compared) -> None:
+    moving = arms({"log": np.zeros((50, 6))}).runs[0]
+    flicker = np.where(np.arange(50) % 2, 1.05e-4, 0.0)[:, None]  # as a UR5e at rest was logged
+    for scale, expected in ((1.0, ["one-pose"]), (3.0, [])):
+        run = replace(moving.run, q=np.tile(moving.run.q[0], (50, 1)) + scale * flicker)
+        still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)) + flicker, run=run)
+        assert [one.kind for one in thin_evidence(still)] == expected
+
+
 def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) -> None:
     moving = arms({"log": np.zeros((50, 6))}).runs[0]
     q = moving.run.q.copy()
