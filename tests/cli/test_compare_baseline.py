@@ -86,6 +86,20 @@ def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) ->
     assert "Against the baseline good-against-wanted: " in page
 
 
+def test_a_noise_in_mm_without_its_unit_is_told(capsys: Captured) -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    capsys.readouterr()
+    noise = ["--baseline", "before.rrd", "--noise", "0.5", "-o", "now.rrd"]
+    assert compare("slack.csv", *noise) == 1  # by its angles: a length is for lengths alone
+    told = [line for line in capsys.readouterr().err.splitlines() if "noise" in line]
+    assert told == [
+        "warning: a noise of 500 mm (axis) reaches the tolerance of 3.5 mm: nothing within it can be worse"
+        " than the baseline; a number without a unit is in m"
+    ]
+    assert compare("slack.csv", *noise, "--strict", "-q") == 2
+    assert compare("slack.csv", "-q", "-o", "now.rrd") == 0
+
+
 def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -> None:
     assert compare("good.csv", "-q", "-o", "a.rrd") == 0
     given = ["--tolerance", "1mm", "--align", "none", "-o", "b.rrd"]

@@ -26,6 +26,7 @@ from urmpipe_models.errors import Finding, OptionError, RecordingError
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.doubts import large_noises
 from urmpipe_pipeline.comparison.junit import write_junit
 from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
@@ -116,6 +117,8 @@ def compare(
         earlier = None if baseline is None else _earlier(baseline)
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
         made = made or _compared(operands, given, options)
+        if earlier is not None:
+            made = replace(made, warnings=(*made.warnings, *large_noises(level, made.tolerance)))
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         if told is not None:

@@ -8,8 +8,8 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.tolerance import UNITS
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation
+from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.results import Run
 
@@ -67,6 +67,22 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
             hint = f": {bare} is in {unit}; {bare}{other} meant?"
             plain = len(bare) <= len(shown)  # 0.261799 rad was written as 15deg: it was meant
             yield LogWarning("large-tolerance", said + hint if plain else said)
+
+
+def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
+    """Yield a warning for each noise that reaches its tolerance: nothing within that can then be worse.
+
+    Args:
+        noise: Changes in [m] or [rad] that mean nothing, of every kind, perhaps of a coordinate.
+        tolerance: In [m] or [rad], by kind or coordinate.
+    """
+    for kind, allowed in tolerance.items():
+        level = allowed_for(kind, "axis" if kind in AXES else kind, noise)
+        if level is not None and level >= allowed:
+            unit, other = ("rad", "deg") if "rad" in UNITS[kind] else ("m", "mm")
+            said = f"a noise of {text.limit(level, unit)} {other} ({kind}) reaches the tolerance of"
+            why = f"{text.limit(allowed, unit)} {other}: nothing within it can be worse than the baseline"
+            yield LogWarning("large-noise", f"{said} {why}; a number without a unit is in {unit}")
 
 
 def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
