@@ -120,7 +120,11 @@ def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
     for baseline, found in (
         ("good.rrd", "found the recording of one log, allowed: that of a comparison (--baseline)"),
         ("good.csv", "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"),
-        ("missing.rrd", "found no such file, allowed: a recording (.rrd) that urmpipe wrote"),
+        (
+            "missing.rrd",
+            "found no such file, allowed: the recording of an earlier comparison; before there is one:"
+            " without --baseline",
+        ),
     ):
         assert compare("good.csv", "--baseline", baseline, "-q") == 2
         assert said(capsys) == f"error: {baseline}: {found}"

@@ -205,6 +205,9 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
     if isinstance(baseline, Comparison):
         return baseline
     path = Path(baseline)
+    if not path.exists():
+        said = "found no such file, allowed: the recording of an earlier comparison"
+        raise RecordingError(Finding(f"{said}; before there is one: without --baseline", str(path)))
     refuse_foreign([path])
     result = read_recording(path)
     if not isinstance(result, Comparison):
