@@ -26,7 +26,7 @@ from urmpipe_models.errors import Finding, OptionError, RecordingError
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.doubts import large_noises
+from urmpipe_pipeline.comparison.doubts import EXCHANGED, large_noises
 from urmpipe_pipeline.comparison.junit import write_junit
 from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
@@ -221,7 +221,9 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
     of_logs = [w.of(one.name) for one in result.runs for w in one.run.warnings]
-    doubts = [w for w in result.warnings if w.kind not in (LACKING_TOOL, BEYOND)]  # those explain a result
+    doubts = [
+        w for w in result.warnings if w.kind not in (LACKING_TOOL, BEYOND, EXCHANGED)
+    ]  # those explain a result
     refuse_warnings(strict, (*of_logs, *doubts))
 
 

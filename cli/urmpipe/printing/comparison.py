@@ -70,7 +70,7 @@ def verdict_words(result: Comparison) -> str:
     number = f"{len(failed)} of {total} logs" if failed else f"all {total} logs"
     who = result.runs[0].name if total == 1 else number
     said = f"{who} {'out of' if failed else 'within'} tolerance against {result.reference.name}"
-    if result.reference.joints:
+    if result.reference.joints and all(run.run.log.joints for run in result.runs):
         recorded = result.provenance.options.get("tcp") == "recorded"
         said += f", {'as recorded' if recorded else 'by the joints'} on both sides"
     if result.baseline is not None and result.within_tolerance and result.baseline.verdict == "fail":

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
@@ -12,6 +12,9 @@ from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.results import Run
+
+EXCHANGED = "path-as-log"
+"""The kind of a doubt about the order of what was given: it says nothing against a log."""
 
 AT_REST = 3e-4
 """What moves by less in [m] or [rad] rests: three times what a UR5e at rest was logged to span in 25 s,
@@ -83,6 +86,14 @@ def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> 
             said = f"a noise of {text.limit(level, unit)} {other} ({kind}) reaches the tolerance of"
             why = f"{text.limit(allowed, unit)} {other}: nothing within it can be worse than the baseline"
             yield LogWarning("large-noise", f"{said} {why}; a number without a unit is in {unit}")
+
+
+def exchanged(reference: Run, runs: Iterable[Run]) -> Iterator[LogWarning]:
+    """Yield a warning for each path that is held as a log against one with joints: perhaps the wrong way."""
+    for run in runs:
+        if reference.log.joints and not run.log.joints:
+            said = f"a path without joints, held against {reference.name}, which has joints"
+            yield LogWarning(EXCHANGED, f"{run.name}: {said}: the reference stands first, then the logs")
 
 
 def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:

@@ -207,6 +207,17 @@ def test_a_log_that_misses_a_path_for_want_of_a_tool_says_so(q: FloatArray) -> N
     assert compare_runs(wanted, [arm_run(q)]).warnings == ()  # nothing was recorded that could tell
 
 
+def test_a_path_held_against_a_log_is_told(q: FloatArray) -> None:
+    path = path_run(positions_over_log(URM6, q))
+    (warning,) = compare_runs(arm_run(q), [path]).warnings
+    assert (warning.kind, warning.message) == (
+        "path-as-log",
+        "path: a path without joints, held against log, which has joints: the reference stands first, then"
+        " the logs",
+    )
+    assert compare_runs(path, [arm_run(q)]).warnings == compare_runs(path, [path]).warnings == ()
+
+
 def test_what_is_lacking_is_named(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     with pytest.raises(LogError) as error:
