@@ -71,6 +71,15 @@ def fact(run: Deviation, word: str, capsys: Captured) -> list[str]:
     return [line.strip() for line in lines if line.strip().startswith(word)]
 
 
+def test_what_a_log_out_of_tolerance_looks_like_is_said(capsys: Captured) -> None:
+    logs = write_arm("wanted.csv", 0.0), write_arm("done.csv", 0.01)
+    (line,) = (one for one in printed(urmpipe.compare(*logs, robot="ur5e"), capsys) if "looks like" in one)
+    said, _, spread = line.partition(", std ")  # of rounding alone
+    assert said == "  looks like: q1 is off by the same throughout (reference - log = 0.5730 deg"
+    assert spread.endswith(" deg): another zero?")
+    assert not any("looks like" in one for one in printed(compared_arms(), capsys))
+
+
 def test_joints_are_said_to_have_decided_only_where_both_sides_have_some(capsys: Captured) -> None:
     log, path = write_arm("log.csv", 0.0), "path.csv"
     run = urmpipe.ingest(log, robot="ur5e")

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison, Deviation, Stretch
 from urmpipe_pipeline.comparison.trajectory import Sync
 from urmpipe_pipeline.comparison.wording import correlation, tolerance_words, tool_option
@@ -102,6 +103,7 @@ def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact,
         Fact("Out of tolerance", outside),
         Fact("Longest stretch out", stretch(deviation.longest_out)),
         Fact("r(‖Δ‖, speed)", speed_correlation(deviation), "1: they grow together; 0: they are unrelated"),
+        *(Fact("Looks like", cause) for cause in causes(deviation)),
     )
 
 
