@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -26,6 +27,9 @@ Frame = Transform | Sequence[float] | FloatArray
 
 FRAME_ALLOWED = "x, y, z in m and rx, ry, rz in rad (3 or 6 numbers), a 4 x 4 matrix, or a Transform"
 
+GIANT = 10
+"""A tool that is more times as long as its arm was written in mm: 13 of them would be 13 m on a UR5e."""
+
 WRITTEN_FIRST = 'arrays and tables are written first, such as table.to_csv("log.csv", index=False)'
 
 
@@ -48,19 +52,34 @@ def place_robot(
 
     Raises:
         RobotError: If the robot is unknown, or with everything that is wrong with its file.
-        OptionError: If the arm is placed or cut, but there is none.
+        OptionError: If the arm is placed or cut, but there is none; if the tool dwarfs it.
     """
     frames = (frame_of("base", base), frame_of("tool", tool))
     if robot is not None:
         chain = (
             robot if isinstance(robot, Chain) else load_robot(robot, base_link=base_link, tip_link=tip_link)
         )
+        _refuse_giant_tool(chain, frames[1])
         return chain.placed(*frames)
     if any(value is not None for value in (base, tool, base_link, tip_link)):
         raise OptionError(
             "found --base, --tool, --base-link or --tip without a robot; allowed: with --robot NAME|FILE"
         )
     return None
+
+
+def _refuse_giant_tool(chain: Chain, tool: Transform | None) -> None:
+    """Raise an `OptionError` for a tool many times as long as its arm: it was written in mm."""
+    if tool is None:
+        return
+    from urmpipe_models.kinematics.singularity import characteristic_length
+
+    reach, length = characteristic_length(chain), math.hypot(*tool.translation)
+    if length > GIANT * reach:
+        raise OptionError(
+            f"--tool: found {length:g} m from the tip, {length / reach:.0f} times the length of {chain.name},"
+            f" allowed: up to {GIANT} times it; a number without a unit is in m"
+        )
 
 
 def frame_of(name: str, given: Frame | None) -> Transform | None:

@@ -49,7 +49,9 @@ def test_a_comparison_is_held_against_another(folder: Path, capsys: Captured) ->
     none = ["--noise", "0,angle=0,joint=0"]
     assert run(["compare", "before.rrd", "--baseline", "before.rrd", "-q", *none]) == 0
     assert compare("good.csv", "--baseline", "before.rrd", "-q") == 1
-    assert recorded("good-against-wanted.rrd").baseline is None
+    assert recorded("now.rrd").baseline is None
+    kept = recorded("good-against-wanted.rrd").baseline
+    assert kept is not None and (kept.verdict, kept.recording) == ("fail", Path("before.rrd"))
 
 
 def test_what_changed_is_printed(folder: Path, capsys: Captured) -> None:
@@ -73,6 +75,31 @@ def test_what_changed_is_printed(folder: Path, capsys: Captured) -> None:
     } <= set(lines)
 
 
+def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    noise = ["--noise", "50um,angle=1deg,joint=1deg"]
+    assert compare("slack.csv", "--baseline", "before.rrd", "-q", "-o", "now.rrd", *noise) == 1
+    assert run(["report", "now.rrd", "-q"]) == 0
+    page = Path("now.html").read_text(encoding="utf-8")
+    assert "<title>FAIL: slack-against-wanted" in page
+    assert "within tolerance, but worse than the baseline" in page
+    assert "Against the baseline good-against-wanted: " in page
+
+
+def test_a_noise_in_mm_without_its_unit_is_told(capsys: Captured) -> None:
+    assert compare("good.csv", "-q", "-o", "before.rrd") == 0
+    capsys.readouterr()
+    noise = ["--baseline", "before.rrd", "--noise", "0.5", "-o", "now.rrd"]
+    assert compare("slack.csv", *noise) == 1  # by its angles: a length is for lengths alone
+    told = [line for line in capsys.readouterr().err.splitlines() if "noise" in line]
+    assert told == [
+        "warning: a noise of 500 mm (axis) reaches the tolerance of 3.5 mm: nothing within it can be worse"
+        " than the baseline; a number without a unit is in m"
+    ]
+    assert compare("slack.csv", *noise, "--strict", "-q") == 2
+    assert compare("slack.csv", "-q", "-o", "now.rrd") == 0
+
+
 def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -> None:
     assert compare("good.csv", "-q", "-o", "a.rrd") == 0
     given = ["--tolerance", "1mm", "--align", "none", "-o", "b.rrd"]
@@ -93,7 +120,11 @@ def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
     for baseline, found in (
         ("good.rrd", "found the recording of one log, allowed: that of a comparison (--baseline)"),
         ("good.csv", "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"),
-        ("missing.rrd", "found no such file, allowed: a recording (.rrd) that urmpipe wrote"),
+        (
+            "missing.rrd",
+            "found no such file, allowed: the recording of an earlier comparison; before there is one:"
+            " without --baseline",
+        ),
     ):
         assert compare("good.csv", "--baseline", baseline, "-q") == 2
         assert said(capsys) == f"error: {baseline}: {found}"

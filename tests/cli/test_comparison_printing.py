@@ -11,6 +11,7 @@ import pytest
 from rich.cells import cell_len
 
 import urmpipe
+from urmpipe.main import run as run_command
 from urmpipe.printing import terminal as printing
 from urmpipe.printing.comparison import print_comparison
 from urmpipe.printing.terminal import new_console
@@ -69,6 +70,32 @@ def fact(run: Deviation, word: str, capsys: Captured) -> list[str]:
     """Return the printed lines of a comparison with one log that begin with a word."""
     lines = printed(replace(compared_arms(), runs=(run,)), capsys)
     return [line.strip() for line in lines if line.strip().startswith(word)]
+
+
+def test_what_a_log_out_of_tolerance_looks_like_is_said(capsys: Captured) -> None:
+    logs = write_arm("wanted.csv", 0.0), write_arm("done.csv", 0.01)
+    (line,) = (one for one in printed(urmpipe.compare(*logs, robot="ur5e"), capsys) if "looks like" in one)
+    said, _, spread = line.partition(", std ")  # of rounding alone
+    assert said == "  looks like: q1 is off by the same throughout (reference - log = 0.5730 deg"
+    assert spread.endswith(" deg): another zero?")
+    assert not any("looks like" in one for one in printed(compared_arms(), capsys))
+
+
+def test_joints_are_said_to_have_decided_only_where_both_sides_have_some(capsys: Captured) -> None:
+    log, path = write_arm("log.csv", 0.0), "path.csv"
+    run = urmpipe.ingest(log, robot="ur5e")
+    assert run.tcp is not None
+    table = np.column_stack([run.t, run.tcp.position])
+    np.savetxt(path, table, fmt="%.9f", delimiter=",", header="t [s],x [m],y [m],z [m]", comments="")
+    assert run_command(["compare", log, path, "--robot", "ur5e", "-o", "a.rrd", "--strict"]) == 0
+    said = capsys.readouterr()
+    assert said.out.splitlines()[0] == "PASS  path within tolerance against log"
+    assert said.err.splitlines() == [
+        "warning: path: a path without joints, held against log, which has joints: the reference stands"
+        " first, then the logs"
+    ]
+    assert run_command(["compare", path, log, "--robot", "ur5e", "-o", "a.rrd", "--strict"]) == 0
+    assert capsys.readouterr().err == ""
 
 
 def test_one_log_is_a_verdict_and_its_statistics(capsys: Captured) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -68,3 +69,28 @@ def test_a_bar_shows_the_name_of_a_file_as_it_is(
         assert tell is not None
         tell(0.5)
     assert r"reading [/b]a\x07.csv" in capsys.readouterr().err
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="its shell quotes otherwise")
+def test_what_is_to_be_typed_holds_names_with_spaces_together(
+    urmpipe: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PATH", "")
+    rows = "".join(f"{0.005 * k:.3f},{0.001 * k:.3f},0,0\n" for k in range(40))
+    for name in ("wanted path.csv", "run 01.csv"):
+        (tmp_path / name).write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
+    ran = urmpipe("compare", "wanted path.csv", "run 01.csv")
+    assert ran.code == 0
+    typed = ran.out.rpartition("(open it: ")[2].strip().removesuffix(")")
+    *_, view, name = shlex.split(typed)
+    assert (view, name) == ("view", "run 01-against-wanted path.rrd")
+    assert (tmp_path / name).is_file()
+
+
+def test_a_report_says_that_it_replaced_an_earlier_one(urmpipe: Callable[..., Any], tmp_path: Path) -> None:
+    rows = "".join(f"{0.005 * k:.3f},{0.001 * k:.3f},0,0\n" for k in range(40))
+    (tmp_path / "path.csv").write_text("t,x [m],y [m],z [m]\n" + rows, encoding="utf-8")
+    assert urmpipe("compare", "path.csv", "path.csv", "-o", "verdict.rrd").code == 0
+    assert urmpipe("report", "verdict.rrd").out == "Report: verdict.html  (open it in any browser)\n"
+    said = "Report: verdict.html  (open it in any browser; it replaced an earlier one)\n"
+    assert urmpipe("report", "verdict.rrd").out == said

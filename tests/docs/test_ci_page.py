@@ -67,24 +67,42 @@ def test_each_exit_code_leaves_the_junit_file_that_the_page_says(
     assert found == {1: (True, False), 2: (False, True)}
 
 
+def run_script(folder: Path, script: str) -> int:
+    """Run a script of the page in the folder, as a job does, and return its exit code."""
+    shim = folder / "bin" / "urmpipe"
+    shim.parent.mkdir(exist_ok=True)
+    shim.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m urmpipe "$@"\n')
+    shim.chmod(0o755)
+    path = os.pathsep.join([str(shim.parent), os.environ["PATH"]])
+    environment = {**os.environ, "PATH": path, "PYTHONPATH": os.pathsep.join(sys.path)}
+    return subprocess.run(["sh", "-e", "-c", script], cwd=folder, env=environment, check=False).returncode
+
+
 def test_the_worst_exit_code_of_several_logs_is_kept(folder: Path) -> None:
     (folder / "logs").mkdir()
     log = (folder / "robot_data.csv").read_text(encoding="utf-8")
     (folder / "logs" / "a.csv").write_text("broken\n")
     (folder / "logs" / "b.csv").write_text(log, encoding="utf-8")
-    shim = folder / "bin" / "urmpipe"
-    shim.parent.mkdir()
-    shim.write_text(f'#!/bin/sh\nexec {shlex.quote(sys.executable)} -m urmpipe "$@"\n')
-    shim.chmod(0o755)
-    path = os.pathsep.join([str(shim.parent), os.environ["PATH"]])
-    environment = {**os.environ, "PATH": path, "PYTHONPATH": os.pathsep.join(sys.path)}
-    (script,) = snippets(PAGE, "sh")
-    done = subprocess.run(["sh", "-e", "-c", script], cwd=folder, env=environment, check=False)
-    assert done.returncode == 2
+    each, _ = snippets(PAGE, "sh")
+    assert run_script(folder, each) == 2
     errors = {
         path.name: ET.parse(path).getroot().get("errors") for path in sorted(folder.glob("verdict-*.xml"))
     }
     assert errors == {"verdict-a.xml": "1", "verdict-b.xml": "0"}
+
+
+def test_a_first_run_needs_no_baseline_and_a_later_one_is_held_against_it(folder: Path) -> None:
+    _, script = snippets(PAGE, "sh")
+    assert run_script(folder, script) == 0
+    (folder / "released.rrd").write_bytes((folder / "verdict.rrd").read_bytes())
+    path = folder / "path.csv"
+    head, *rows = path.read_text(encoding="utf-8").splitlines()
+    cells = [row.split(",") for row in rows]
+    moved = [[t, x, y, str(float(z) + 0.0005), *more] for t, x, y, z, *more in cells]  # by half a millimetre
+    path.write_text("\n".join([head, *map(",".join, moved)]) + "\n", encoding="utf-8")
+    assert run_script(folder, script) == 1
+    types = {one.get("type") for one in ET.parse(folder / "verdict.xml").iter("failure")}
+    assert types == {"worse-than-baseline"}
 
 
 def test_the_defaults_of_the_page_are_those_of_a_call(folder: Path) -> None:

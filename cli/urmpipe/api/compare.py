@@ -27,6 +27,7 @@ from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.doubts import EXCHANGED, large_noises
 from urmpipe_pipeline.comparison.junit import write_junit
 from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
@@ -116,6 +117,8 @@ def compare(
         earlier = None if baseline is None else _earlier(baseline)
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
         made = made or _compared(operands, given, options)
+        if earlier is not None:
+            made = replace(made, warnings=(*made.warnings, *large_noises(level, made.tolerance)))
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         if told is not None:
@@ -221,6 +224,9 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
     if isinstance(baseline, Comparison):
         return baseline
     path = Path(baseline)
+    if not path.exists():
+        said = "found no such file, allowed: the recording of an earlier comparison"
+        raise RecordingError(Finding(f"{said}; before there is one: without --baseline", str(path)))
     refuse_foreign([path])
     result = read_recording(path)
     if not isinstance(result, Comparison):
@@ -234,7 +240,9 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
     of_logs = [w.of(one.name) for one in result.runs for w in one.run.warnings]
-    doubts = [w for w in result.warnings if w.kind not in (LACKING_TOOL, BEYOND)]  # those explain a result
+    doubts = [
+        w for w in result.warnings if w.kind not in (LACKING_TOOL, BEYOND, EXCHANGED)
+    ]  # those explain a result
     refuse_warnings(strict, (*of_logs, *doubts))
 
 

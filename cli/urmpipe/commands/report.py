@@ -68,18 +68,20 @@ def report(
         raise click.UsageError("--format: found without --figures, allowed: with --figures DIR")
     tune_pyarrow()
     target = output or Path(f"{recordings[0].stem}.html")
+    replaces = target.is_file()
     with terminal.progress(f"Writing {target}") as progress:
         result = urmpipe.report(
             recordings, target, figures=figures, formats=FORMATS[figure_format], progress=progress
         )
-    terminal.answer(result.to_dict, lambda: _print(result, figures))
+    terminal.answer(result.to_dict, lambda: _print(result, figures, replaces))
     return 0
 
 
-def _print(result: Report, figures: Path | None) -> None:
+def _print(result: Report, figures: Path | None, replaces: bool) -> None:
     """Print what was written."""
     from urmpipe.printing.terminal import say
 
-    say(f"Report: {result.path}  (open it in any browser)")
+    earlier = "; it replaced an earlier one" if replaces else ""
+    say(f"Report: {result.path}  (open it in any browser{earlier})")
     if figures:
         say(f"Figures: {len(result.figures)} files in {figures}")

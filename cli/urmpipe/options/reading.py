@@ -173,7 +173,9 @@ STRICT_OPTION = click.option("--strict", is_flag=True, help="Warnings are errors
 
 PLACING = (
     click.option("--base", type=OffsetType(), help="Where the arm stands in the world (m, rad)."),
-    click.option("--tool", type=OffsetType(), help="Tool centre point in the tip's frame (m, rad)."),
+    click.option(
+        "--tool", type=OffsetType(), help="Tool centre point in the tip's frame (m, rad), as 0,0,150mm."
+    ),
     click.option("--base-link", metavar="LINK", help="Link of a URDF where it begins [default: the root]."),
     click.option("--tip", metavar="LINK", help="Link of a URDF where the arm ends [default: its end]."),
 )

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.wording import (
     alignment_words,
@@ -39,6 +40,7 @@ def facts(run: Deviation) -> Iterator[str]:
     yield from _sliding(run)
     if run.speed_correlation is not None:
         yield f"the norm goes with the speed by r = {correlation(run.speed_correlation)}"
+    yield from (f"looks like: {cause}" for cause in causes(run))
 
 
 def _place(run: Deviation) -> Iterator[str]:

@@ -15,7 +15,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import align, check_align
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.doubts import large_tolerances, recorded_apart, thin_evidence
+from urmpipe_pipeline.comparison.doubts import exchanged, large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.comparison.left_out import left_out_warnings
 from urmpipe_pipeline.comparison.matching import Matched, as_recorded, by_kinematics, lacking, match
 from urmpipe_pipeline.comparison.measure import measure, unheld
@@ -106,10 +106,20 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         lambda named: _deviation(*named, wanted, trajectory(named[1], chosen.tcp), chosen),
         zip(names, runs, strict=True),
     )
-    told = [*_told_of(reference), *_differing_robots([reference, *runs], chosen.tcp)]
+    told = [*_told_of(reference), *exchanged(reference, runs)]
+    told += _differing_robots([reference, *runs], chosen.tcp)
     if chosen.tcp == "fk" and wanted.joints:
         told += [one for run in (reference, *runs) for one in recorded_apart(run, RECORDED_APART)]
+    elif chosen.tcp == "fk":
+        told += [one for run in deviations for one in _lacking_tool(run)]
     return _comparison(wanted, deviations, chosen, told)
+
+
+def _lacking_tool(one: Deviation) -> list[LogWarning]:
+    """Return what the tool centre point that a log recorded says of why the log is out of tolerance."""
+    if one.verdict == "pass" or one.run.robot is None:
+        return []
+    return [hint.of(one.name) for hint in lacking_tool(one.run.robot, one.run.log)]
 
 
 def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOption) -> None:

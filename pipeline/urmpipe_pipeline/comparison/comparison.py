@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import Shown, line_of
+from urmpipe_models.display import HEAD, Shown, line_of
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
@@ -36,7 +36,7 @@ class Comparison(Shown):
         warnings: What a person should know about the comparison itself.
         provenance: How to repeat it.
         recording: Where it was written.
-        baseline: What changed since an earlier comparison, if it was held against one; not in the recording.
+        baseline: What changed since an earlier comparison, if it was held against one.
     """
 
     name: str
@@ -98,14 +98,35 @@ class Comparison(Shown):
                 yield {"run": run.name, "sync_offset": run.sync.offset, **asdict(one)}
 
     def _headline(self) -> str:
-        """Return its verdict, and that of each log."""
-        logs = (f"{one.name} {one.verdict} ({one.decisive.max:.4g} {one.decisive.unit})" for one in self.runs)
-        return line_of(f"{self.name}: {self.verdict}", *logs)
+        """Return its verdict, and that of each log: the worst first, so that it is not what is cut."""
+        logs = (
+            f"{one.name} {one.verdict} ({one.decisive.max:.4g} {one.decisive.unit})"
+            for one in reversed(self.ranking)
+        )
+        failed = sum(one.verdict == "fail" for one in self.runs)
+        count = f" ({failed} of {len(self.runs)} logs)" if failed and len(self.runs) > 1 else ""
+        worse = ", worse than the baseline" if self.baseline and self.baseline.verdict == "fail" else ""
+        return line_of(f"{self.name}: {self.verdict}{count}{worse}", *logs)
 
     def _notes(self) -> list[str]:
         """Return what is to be known of it, and of its logs."""
         of_logs = [w.of(one.name).message for one in self.runs for w in one.run.warnings]
         return [*(warning.message for warning in self.warnings), *of_logs]
+
+    def _table(self) -> str:
+        """Return for a notebook one row a log, the worst first; of one log the head of its table."""
+        if len(self.runs) == 1:
+            return Shown._table(self)
+        import pandas as pd
+
+        rows = [
+            {"run": one.name, "verdict": one.verdict}
+            | {f"max {name} [{found.unit}]": found.max for name, found in one.statistics.items()}
+            for one in reversed(self.ranking)
+        ]
+        shown = pd.DataFrame(rows[:HEAD]).to_html(index=False, float_format="{:.4g}".format)
+        shares = f"{min(HEAD, len(rows))} of {len(rows)} logs, the worst first"
+        return f"{shown}<p>{shares}; to_frame() has a row a log and quantity</p>"
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a log and quantity, as `rows`."""

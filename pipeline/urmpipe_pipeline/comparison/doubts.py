@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.tolerance import UNITS
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation
+from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.results import Run
 
-AT_REST = 1e-4
-"""What moves by less in [m] or [rad] rests: five times what the best arms repeat a pose to (0.02 mm)."""
+EXCHANGED = "path-as-log"
+"""The kind of a doubt about the order of what was given: it says nothing against a log."""
+
+AT_REST = 3e-4
+"""What moves by less in [m] or [rad] rests: three times what a UR5e at rest was logged to span in 25 s,
+0.10 mrad and 0.10 mm."""
 
 CALIBRATION = 5e-3
 """A controller's own calibration moves the tool by up to this in [m] from where those of the data sheet have
@@ -69,6 +73,30 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
             said = f"a tolerance of {shown} {other} ({kind}) lets anything pass: {bare} is in {unit}"
             hint = f"{bare}{other} meant? If not: --tolerance {kind}={bare}{unit}"
             yield LogWarning("large-tolerance", f"{said}; {hint}")
+
+
+def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
+    """Yield a warning for each noise that reaches its tolerance: nothing within that can then be worse.
+
+    Args:
+        noise: Changes in [m] or [rad] that mean nothing, of every kind, perhaps of a coordinate.
+        tolerance: In [m] or [rad], by kind or coordinate.
+    """
+    for kind, allowed in tolerance.items():
+        level = allowed_for(kind, "axis" if kind in AXES else kind, noise)
+        if level is not None and level >= allowed:
+            unit, other = ("rad", "deg") if "rad" in UNITS[kind] else ("m", "mm")
+            said = f"a noise of {text.limit(level, unit)} {other} ({kind}) reaches the tolerance of"
+            why = f"{text.limit(allowed, unit)} {other}: nothing within it can be worse than the baseline"
+            yield LogWarning("large-noise", f"{said} {why}; a number without a unit is in {unit}")
+
+
+def exchanged(reference: Run, runs: Iterable[Run]) -> Iterator[LogWarning]:
+    """Yield a warning for each path that is held as a log against one with joints: perhaps the wrong way."""
+    for run in runs:
+        if reference.log.joints and not run.log.joints:
+            said = f"a path without joints, held against {reference.name}, which has joints"
+            yield LogWarning(EXCHANGED, f"{run.name}: {said}: the reference stands first, then the logs")
 
 
 def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:

@@ -19,6 +19,7 @@ from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.recording.baseline_data import baseline_data, baseline_from
 from urmpipe_pipeline.recording.entities import (
     LAYOUTS,
     Block,
@@ -102,6 +103,7 @@ def comparison_fields(data: Mapping[str, Any]) -> dict[str, Any]:
         "tolerance": data["tolerance"],
         "warnings": warnings_from(data["warnings"]),
         "provenance": provenance_from(data["provenance"]),
+        "baseline": baseline_from(data.get("baseline")),
     }
 
 
@@ -178,6 +180,7 @@ def _comparison(result: Comparison, standing: list[Place]) -> dict[str, Any]:
         "tolerance": dict(result.tolerance),
         "warnings": [flat(one) for one in result.warnings],
         "provenance": provenance_data(result.provenance),
+        "baseline": baseline_data(result.baseline),
     }
 
 

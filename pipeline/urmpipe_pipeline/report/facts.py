@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Stretch
 from urmpipe_pipeline.comparison.trajectory import Sync
@@ -19,6 +20,7 @@ from urmpipe_pipeline.comparison.wording import (
     tool_option,
 )
 from urmpipe_pipeline.inverse.verdict import reached
+from urmpipe_pipeline.report.baseline_table import worse_words
 from urmpipe_pipeline.runs.results import Run
 
 
@@ -75,8 +77,20 @@ def comparison_facts(comparison: Comparison) -> tuple[Fact, ...]:
         Fact("Reference", comparison.reference.name),
         Fact("Reference samples", str(len(comparison.reference.t_ns))),
         Fact("Tolerance", tolerance_words(comparison)),
+        Fact("Against the baseline", _since_baseline(comparison)),
         Fact("Recording", str(comparison.recording) if comparison.recording else ""),
+        Fact("Made", made(comparison)),
     )
+
+
+def made(comparison: Comparison) -> str:
+    """Return when a comparison was made, to the minute."""
+    return f"{comparison.provenance.created[:16].replace('T', ' ')} UTC"
+
+
+def _since_baseline(comparison: Comparison) -> str:
+    """Return what is worse than the baseline; nothing without one."""
+    return "" if comparison.baseline is None else worse_words(comparison.baseline)
 
 
 def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact, ...]:
@@ -95,6 +109,7 @@ def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact,
         Fact("Out of tolerance", outside),
         Fact("Longest stretch out", stretch(deviation.longest_out)),
         Fact("r(‖Δ‖, speed)", speed_correlation(deviation), "1: they grow together; 0: they are unrelated"),
+        *(Fact("Looks like", cause) for cause in causes(deviation)),
     )
 
 

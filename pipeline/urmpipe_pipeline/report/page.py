@@ -26,9 +26,10 @@ from urmpipe_pipeline.report.banner import (
     joined,
     solved_banner,
 )
+from urmpipe_pipeline.report.baseline_table import baseline_table
 from urmpipe_pipeline.report.cards import Card, card
 from urmpipe_pipeline.report.drawings import Drawing, Listing, system_drawing, system_file
-from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_facts, run_facts
+from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_facts, made, run_facts
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.tables import Table
 from urmpipe_pipeline.runs.results import Run
@@ -120,7 +121,9 @@ def lay_out(results: Sequence[Result]) -> Page:
         [f"#c{i}-{k}" for k in range(1, len(comparison.runs) + 1)]
         for i, comparison in enumerate(comparisons, start=1)
     ]
-    summaries = [_summary(*pair) for pair in zip(comparisons, links, strict=True)]
+    several = len(comparisons) > 1
+    summaries = [_side_by_side(comparisons, links)] if several else []
+    summaries += [_summary(*pair, several) for pair in zip(comparisons, links, strict=True)]
     if simulations:
         summaries.append(_simulations_summary(simulations, simulated))
     if runs:
@@ -131,7 +134,7 @@ def lay_out(results: Sequence[Result]) -> Page:
         banner=_banner(comparisons, simulations, runs, links, simulated),
         summaries=tuple(summaries),
         parts=(
-            *(_comparison_part(comparison, f"c{i}") for i, comparison in enumerate(comparisons, start=1)),
+            *(_comparison_part(one, f"c{i}", several) for i, one in enumerate(comparisons, start=1)),
             *(_simulation_part(one, f"s{i}") for i, one in enumerate(simulations, start=1)),
             *(_run_part(run, f"r{i}") for i, run in enumerate(runs, start=1)),
         ),
@@ -212,22 +215,34 @@ def _simulation_part(simulation: Simulation, ident: str) -> Part:
     )
 
 
-def _summary(comparison: Comparison, links: Sequence[str]) -> Summary:
-    """Return the cards of a comparison, and of several logs the tables that rank them."""
+def _side_by_side(comparisons: Sequence[Comparison], links: Sequence[Sequence[str]]) -> Summary:
+    """Return several comparisons, such as this month's and last month's, in one table."""
+    table = verdict_tables.side_by_side(comparisons, links)
+    return Summary(f"{len(comparisons)} comparisons side by side", (), (table,))
+
+
+def _which(comparison: Comparison, several: bool) -> str:
+    """Return which of several comparisons it is: they may all have one name."""
+    return f" ({comparison.recording or made(comparison)})" if several else ""
+
+
+def _summary(comparison: Comparison, links: Sequence[str], beside: bool) -> Summary:
+    """Return the cards of a comparison, what changed since its baseline, and how several logs rank."""
     several = len(comparison.runs) > 1
+    changed = () if comparison.baseline is None else (baseline_table(comparison.baseline),)
     return Summary(
         f"Verdict{'s' if several else ''} against {comparison.reference.name}"
-        f"{', best to worst' if several else ''}",
+        f"{', best to worst' if several else ''}{_which(comparison, beside)}",
         tuple(
             card(run, link, comparison.covered(run), len(comparison.warnings_of(run)))
             for run, link in zip(comparison.ranking, links, strict=True)
         ),
-        verdict_tables.ranking_tables(comparison, links) if several else (),
+        (*changed, *(verdict_tables.ranking_tables(comparison, links) if several else ())),
         f"Tolerance: {tolerance_words(comparison)}. The bars show how much of it is used up.",
     )
 
 
-def _comparison_part(comparison: Comparison, ident: str) -> Part:
+def _comparison_part(comparison: Comparison, ident: str, beside: bool) -> Part:
     """Return the part of a comparison: all logs together, one part a log, then how it was made."""
     about = Part(
         "Provenance of the comparison",
@@ -242,7 +257,7 @@ def _comparison_part(comparison: Comparison, ident: str) -> Part:
     )
     warnings = (log_tables.warnings_table(comparison),) if comparison.warnings else ()
     return Part(
-        f"Comparison {comparison.name}",
+        f"Comparison {comparison.name}{_which(comparison, beside)}",
         (*warnings, *gallery.comparison_figures(comparison)),
         (*logs, about),
         ident,

@@ -9,7 +9,7 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
 from urmpipe_pipeline.comparison.symbols import SYMBOLS, size_of, symbol
-from urmpipe_pipeline.report.facts import alignment_value, speed_correlation
+from urmpipe_pipeline.report.facts import alignment_value, made, speed_correlation
 from urmpipe_pipeline.report.tables import (
     Cell,
     Column,
@@ -34,6 +34,45 @@ def ranking_tables(comparison: Comparison, links: Sequence[str]) -> tuple[Table,
     return (
         _how_far(comparison, links),
         _when_and_where(comparison, links),
+    )
+
+
+def side_by_side(comparisons: Sequence[Comparison], links: Sequence[Sequence[str]]) -> Table:
+    """Return one line a log of each comparison, those of one name below each other, in the order given.
+
+    Args:
+        comparisons: Some comparisons, perhaps of one log each month.
+        links: Where each log of each is told of, best to worst.
+    """
+    columns: tuple[Column, ...] = (
+        *words("Log", "Recording", "Made", "Reference", "Verdict", "Worse than its baseline"),
+        *numbers(*(f"max |{SYMBOLS[axis]}| [mm]" for axis in "xyz"), "max ‖Δ‖ [mm]", "max path [mm]"),
+        *numbers("max angle [deg]", "max joint [deg]", "max joint [mm]", "Share out", "Covered"),
+    )
+    lines = [
+        (run.name, _beside(comparison, run, link))
+        for comparison, some in zip(comparisons, links, strict=True)
+        for run, link in zip(comparison.ranking, some, strict=True)
+    ]
+    first = list(dict.fromkeys(name for name, _ in lines))
+    lines.sort(key=lambda line: first.index(line[0]))
+    note = "The bars show how much of a tolerance is used up: each comparison has its own."
+    table = Table("Largest deviations", columns, tuple(row for _, row in lines), note=note)
+    return without_empty_columns(table)
+
+
+def _beside(comparison: Comparison, run: Deviation, link: str) -> tuple[Cell, ...]:
+    name, verdict, _, *sizes = _how_far_row(run, link, comparison.covered(run))
+    baseline = comparison.baseline
+    worse = sum(one.run == run.name for one in baseline.worse) if baseline else 0
+    return (
+        name,
+        Cell(str(comparison.recording or text.NOTHING)),
+        Cell(made(comparison)),
+        Cell(comparison.reference.name),
+        verdict,
+        Cell(f"in {worse} quantities" if worse > 1 else f"in {worse} quantity" if worse else text.NOTHING),
+        *sizes,
     )
 
 

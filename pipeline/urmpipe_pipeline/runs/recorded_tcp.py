@@ -70,7 +70,7 @@ def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
         return []
     apart = f"the kinematics of {robot.name} stay {found.distance * 1e3:.1f} mm (rms) from the recorded TCP"
     if not np.isfinite(found.with_tool):
-        said = f"{apart}, and the log moves too little to tell why: is a --tool or a --base missing?"
+        said = f"{apart}, and the log moves too little to tell why: {_asked(robot)}"
     else:
         base, distance = _base(robot, q, recorded)
         remedies = {f"--tool {_frame(bare.tool)}": found.with_tool, f"--base {base}": distance}
@@ -80,6 +80,14 @@ def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
             return []
         said = f"{apart}, but {' or '.join(helping)}"
     return [LogWarning(LACKING_TOOL, said)]
+
+
+def _asked(robot: Chain) -> str:
+    """Return what to look at first: a tool or a base that is not there, or the tool that is."""
+    length = float(np.linalg.norm(robot.tool.translation))
+    if not length:
+        return "is a --tool or a --base missing?"
+    return f"is the --tool, {length * 1e3:.1f} mm long, the right one, or a --base missing?"
 
 
 def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[str]:

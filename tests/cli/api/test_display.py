@@ -12,6 +12,7 @@ import pytest
 import urmpipe
 from urmpipe_datasets import LOGS
 from urmpipe_models.display import Shown
+from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
 OTHERS = {"LogMap", "ReadOptions", "Targets", "Transform"}
@@ -78,6 +79,23 @@ def test_the_lines_say_what_each_holds(results: dict[str, Any]) -> None:
     assert repr(results["Comparison"]) == line
     assert repr(results["InverseResult"]) == (
         "<InverseResult targets: pass, ur5e, 1 of 1 target reached, iterative>"
+    )
+
+
+def test_of_many_logs_the_worst_is_shown_first(results: dict[str, Any]) -> None:
+    one = results["Comparison"]
+    (good,) = one.runs
+    largest = replace(good.statistics["x"], max=0.0758, tolerance=0.0035, verdict="fail")
+    bad = replace(good, name="<run 7>", verdict="fail", statistics={**good.statistics, "x": largest})
+    every = replace(one, name="ten", runs=(*(replace(good, name=f"run {k}") for k in range(9)), bad))
+    assert repr(every).startswith("<Comparison ten: fail (1 of 10 logs): <run 7> fail (0.0758 m), run ")
+    html = every._repr_html_()
+    cells = [cell.split("</td>")[0] for cell in html.split("<td>")[1:]]
+    assert cells[:3] == ["&lt;run 7&gt;", "fail", "0.0758"]
+    assert "<p>8 of 10 logs, the worst first; to_frame() has a row a log and quantity</p>" in html
+    worse = replace(one, baseline=BaselineComparison("before", None, {}, (), (), (Absent("old"),), ()))
+    assert repr(worse).startswith(
+        "<Comparison <b>&log-against-path: fail, worse than the baseline: <b>&log pass"
     )
 
 

@@ -121,6 +121,20 @@ def test_what_is_no_frame_is_refused(given: Any, found: str) -> None:
     assert str(error.value).startswith(f"tool: {found}")
 
 
+@pytest.mark.parametrize(("length", "times"), [(150.0, 130), (11.5, 10)])
+def test_a_tool_in_mm_is_refused(length: float, times: int) -> None:
+    with pytest.raises(urmpipe.OptionError) as error:
+        urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", tool=(0.0, 0.0, length))
+    assert str(error.value) == (
+        f"tool: found {length:g} m from the tip, {times} times the length of ur5e, allowed: up to 10 times"
+        " it; a number without a unit is in m"
+    )
+
+
+def test_a_tool_much_longer_than_its_arm_is_allowed() -> None:
+    urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e", tool=(0.0, 0.0, 11.4))
+
+
 def test_all_keywords_of_a_wrong_kind_are_told_at_once() -> None:
     wrong: dict[str, Any] = {"robot": 6, "tsp": "5ms", "read": {}, "strict": 1, "output": ""}
     with pytest.raises(urmpipe.OptionError) as error:

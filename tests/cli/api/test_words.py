@@ -93,6 +93,7 @@ def test_each_spelling_is_an_option_and_a_keyword() -> None:
         ("which with --interval q1=LOW:HIGH", 'which with read=ReadOptions(interval={"q1": (LOW, HIGH)})'),
         ("; --skip-bad leaves them out", "; read=ReadOptions(skip_bad=True) leaves them out"),
         ("is a --tool or a --base missing?", "is a tool or a base missing?"),
+        ("is the --tool, 100.0 mm long, the right one", "is the tool, 100.0 mm long, the right one"),
         ("1 mm with --tool 0.1,0,-0.2, which", "1 mm with tool=(0.1, 0, -0.2), which"),
         ("urmpipe simulate --write-system FILE.toml one-drive makes a copy",
          "urmpipe simulate --write-system FILE.toml one-drive makes a copy"),

@@ -195,6 +195,34 @@ def test_a_verdict_that_fails_for_want_of_a_tool_says_so(q: FloatArray) -> None:
     assert compare_recorded(told).warnings == ()
 
 
+def test_a_log_that_misses_a_path_for_want_of_a_tool_says_so(q: FloatArray) -> None:
+    tooled = URM6.placed(tool=translation(0.0, 0.0, 0.15))
+    recorded = positions_over_log(tooled, q)
+    wanted = path_run(recorded)
+    bare, given = arm_run(q, recorded=recorded), arm_run(q, name="given", robot=tooled, recorded=recorded)
+    result = compare_runs(wanted, [bare, given])
+    assert [run.verdict for run in result.runs] == ["fail", "pass"]
+    (warning,) = result.warnings
+    assert (warning.kind, warning.message) == (
+        "recorded-tcp-tool",
+        "log: the kinematics of urm6 stay 150.0 mm (rms) from the recorded TCP,"
+        " but 0.00 mm with --tool 0.0000,0.0000,0.1500",
+    )
+    assert compare_runs(wanted, [bare], CompareOptions(tcp="recorded")).warnings == ()
+    assert compare_runs(wanted, [arm_run(q)]).warnings == ()  # nothing was recorded that could tell
+
+
+def test_a_path_held_against_a_log_is_told(q: FloatArray) -> None:
+    path = path_run(positions_over_log(URM6, q))
+    (warning,) = compare_runs(arm_run(q), [path]).warnings
+    assert (warning.kind, warning.message) == (
+        "path-as-log",
+        "path: a path without joints, held against log, which has joints: the reference stands first, then"
+        " the logs",
+    )
+    assert compare_runs(path, [arm_run(q)]).warnings == compare_runs(path, [path]).warnings == ()
+
+
 def test_what_is_lacking_is_named(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     with pytest.raises(LogError) as error:

@@ -12,8 +12,9 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.comparison.baseline import complete_noise
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.doubts import large_tolerances, recorded_apart, thin_evidence
+from urmpipe_pipeline.comparison.doubts import large_noises, large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.comparison.statistics import Measured, describe
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 
@@ -28,6 +29,27 @@ def off(samples: int) -> FloatArray:
 def told(result: Comparison) -> list[tuple[str, str]]:
     """Return the warnings of a comparison."""
     return [(one.kind, one.message) for one in result.warnings]
+
+
+def test_a_noise_that_reaches_its_tolerance_is_told() -> None:
+    noise = complete_noise({"axis": 0.5, "angle": 0.01})
+    allowed = {"axis": 0.0035, "norm": 0.005, "angle": 0.01, "joint": 0.01}
+    assert [(one.kind, one.message) for one in large_noises(noise, allowed)] == [
+        (
+            "large-noise",
+            "a noise of 500 mm (axis) reaches the tolerance of 3.5 mm: nothing within it can be worse than"
+            " the baseline; a number without a unit is in m",
+        ),
+        (
+            "large-noise",
+            "a noise of 0.572958 deg (angle) reaches the tolerance of 0.572958 deg: nothing within it can be"
+            " worse than the baseline; a number without a unit is in rad",
+        ),
+    ]
+    assert [
+        one.message[:25] for one in large_noises({"axis": 1e-6, "x": 0.01}, {"x": 0.004, "y": 0.004})
+    ] == ["a noise of 10 mm (x) reac"]
+    assert list(large_noises(complete_noise(0.0034), {"axis": 0.0035})) == []
 
 
 @settings(max_examples=50, deadline=None)
@@ -65,6 +87,15 @@ def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not(arms: Co
     assert list(thin_evidence(moving)) == list(thin_evidence(still)) == []
     at_rest = replace(moving.run, q=np.tile(moving.run.q[0], (50, 1)))
     assert [one.kind for one in thin_evidence(replace(still, run=at_rest))] == ["one-pose"]
+
+
+def test_encoders_that_flicker_are_no_motion(arms: Compared) -> None:
+    moving = arms({"log": np.zeros((50, 6))}).runs[0]
+    flicker = np.where(np.arange(50) % 2, 1.05e-4, 0.0)[:, None]  # as a UR5e at rest was logged
+    for scale, expected in ((1.0, ["one-pose"]), (3.0, [])):
+        run = replace(moving.run, q=np.tile(moving.run.q[0], (50, 1)) + scale * flicker)
+        still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)) + flicker, run=run)
+        assert [one.kind for one in thin_evidence(still)] == expected
 
 
 def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) -> None:

@@ -16,6 +16,7 @@ from hypothesis import strategies as st
 
 from same_results import assert_same
 from urmpipe_models.errors import OutputError
+from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.trajectory import AlignMode
@@ -135,6 +136,18 @@ def test_a_comparison_comes_back_as_it_was(make_comparison: MakeComparison, tmp_
     assert [one.verdict for one in comparison.runs] == ["pass", "pass", "fail"]
     assert comparison.runs[2].outside.any()
     assert_same(round_trip(comparison, tmp_path), comparison)
+
+
+def test_what_changed_since_a_baseline_comes_back_as_it_was(
+    make_comparison: MakeComparison, tmp_path: Path
+) -> None:
+    now = make_comparison(("coppeliasim", "matlab", "solidworks"))
+    before = make_comparison(("matlab", "old"))
+    before = replace(before, tolerance={"axis": 0.002}, recording=Path("before.rrd"))
+    found = against_baseline(now, before, {"axis": 1e-5})
+    assert found.changes and found.new and found.gone and found.differences
+    held = replace(now, baseline=found)
+    assert_same(round_trip(held, tmp_path), held)
 
 
 def test_a_comparison_with_samples_left_out_comes_back_as_it_was(make_run: MakeRun, tmp_path: Path) -> None:

@@ -10,6 +10,7 @@ import pytest
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.orientation import quaternions
 from urmpipe_pipeline.joint_log import JointLog
+from urmpipe_pipeline.sources.cells.cell import grouped_number
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -334,3 +335,29 @@ def test_three_angles_beside_a_position_are_no_joints(read: Read) -> None:
     log = read(table(["t", "X [mm]", "Y [mm]", "Z [mm]", "W [deg]", "P [deg]", "R [deg]"]))
     assert log.joints == ()
     assert log.tcp_position is not None
+
+
+@pytest.mark.parametrize(
+    ("head", "row", "found", "plain"),
+    [
+        ("Zeit [s];X [mm];Y [mm];Z [mm]", "0,0{k};1.234,567;-2.965,000;1.731,830", "1.234,567", "1234,567"),
+        ("Zeit [s]\tX [mm]\tY [mm]\tZ [mm]", "0,0{k}\t3,5\t-2.965,0\t173,5", "-2.965,0", "-2965,0"),
+        ("t,X [mm],Y [mm],Z [mm]", '0.0{k},173.5,"-1,234,567.5",3.0', "-1,234,567.5", "-1234567.5"),
+    ],
+)
+def test_signs_between_thousands_are_told(wrong: Wrong, head: str, row: str, found: str, plain: str) -> None:
+    text = "\n".join([head, *(row.format(k=k) for k in range(9)), ""])
+    said = f"allowed: {plain}; export the table without signs between thousands"
+    assert wrong(text) == [f"log.csv: found '{found}', {said}"]
+
+
+@pytest.mark.parametrize(
+    "text", ["1,234", "1.234", "447,688", "1.2345,6", "a1.234,5", "1,234,567", "1.234,567,8"]
+)
+def test_what_may_be_a_list_or_a_fraction_has_no_thousands(text: str) -> None:
+    assert grouped_number(text) is None
+
+
+def test_a_comma_between_columns_is_none_between_thousands(wrong: Wrong) -> None:
+    (said,) = wrong("boom,stick\n1.234,567\n1.235,568\n")
+    assert said.startswith("log.csv: found no joint columns in boom, stick")

@@ -34,6 +34,16 @@ LONGEST_NS = 1 << 62
 _INFINITE = re.compile(r"[+-]?(?:inf|infinity|1\.#inf)\Z", re.IGNORECASE)
 
 
+_GROUPED = re.compile(r"(?<![\w.,])[+-]?\d{1,3}(?:(?:\.\d{3})+,\d+|(?:,\d{3})+\.\d+)(?![\w.,])")
+"""A number with a point or a comma between its thousands, and the other one before its decimals."""
+
+
+def grouped_number(text: str) -> str | None:
+    """Return the first number in a text that has signs between its thousands, as spreadsheets write it."""
+    found = _GROUPED.search(text)
+    return found[0] if found else None
+
+
 def split_line(line: str, delimiter: str) -> list[str]:
     """Return the cells of a line, without the spaces and quotes around them.
 

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.orientation import RotationForm
 from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.sources.cells.cell import grouped_number
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.families import families, measured
 from urmpipe_pipeline.sources.columns.pose import Pose, chosen_pose, find_pose, with_form
@@ -320,6 +321,7 @@ def _path(
         said = [Inference("path", names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms)
         return _with_rest(roles, said, numeric)
+    _refuse_thousands(layouts, file)
     if path:
         need = 'x, y, z; name them so in the header, or in a map (--map): [tcp] position = ["A", "B", "C"]'
         raise LogError(Finding(f"found no position in {listed(columns)}, allowed: {need}", file=file))
@@ -345,6 +347,23 @@ def _some_named(numeric: Sequence[Column], robot: Chain | None) -> tuple[tuple[C
         if len(names) / 2 < len(found) == len(names) - len(missing) < len(names):
             return found, missing
     return (), []
+
+
+def _refuse_thousands(layouts: Sequence[Layout], file: str) -> None:
+    """Raise a `LogError` where numbers have signs between their thousands: their columns count as text."""
+    cells = (cell for layout in layouts for row in layout.sample for cell in _as_written(row, layout))
+    found = next((one for cell in cells if (one := grouped_number(cell))), None)
+    if found:
+        between = min(",.", key=found.index)
+        allowed = f"{found.replace(between, '')}; export the table without signs between thousands"
+        raise LogError(Finding(f"found {found!r}, allowed: {allowed}", file=file))
+
+
+def _as_written(row: Sequence[str], layout: Layout) -> Iterator[str]:
+    """Yield the cells of a row, and those of its line if it was parted at the commas within its numbers."""
+    yield from row
+    line = layout.delimiter.join(row)
+    yield from (cell for sign in ";\t|" if sign in line for cell in line.split(sign))
 
 
 def _with_rest(roles: Roles, said: list[Inference], numeric: Sequence[Column]) -> Roles:
