@@ -71,6 +71,13 @@ def test_a_flip_at_pi_is_undone_and_a_rest_keeps_its_axis() -> None:
     np.testing.assert_allclose(continuous_vectors(v), expected, rtol=0, atol=2e-15)
 
 
+def test_a_vector_goes_on_by_a_turn_though_none_of_its_components_is_large() -> None:
+    """From (1, 1, 1) to (-1, -1, -1): two square roots of 3 back, or a turn less so much on."""
+    v = np.array([[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0]])
+    expected = [[1.0] * 3, [2 * np.pi / np.sqrt(3.0) - 1.0] * 3]
+    np.testing.assert_allclose(continuous_vectors(v), expected, rtol=0, atol=1e-15)
+
+
 @settings(max_examples=40, deadline=None)
 @given(steps, st.lists(st.booleans(), min_size=60, max_size=60), st.integers(0, 59))
 def test_euler_angles_of_either_family_become_continuous(

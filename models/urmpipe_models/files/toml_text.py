@@ -22,14 +22,14 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
     Raises:
         UrmpipeError: `error`, if it cannot be read, is no UTF-8 or no TOML, with the line.
     """
-    text = ""
     try:
         text = path.read_text(encoding="utf-8-sig")
-        return tomllib.loads(text)
     except UnicodeDecodeError as fault:
         raise error(Finding(f"byte {fault.start} is no UTF-8; allowed: TOML in UTF-8", str(path))) from fault
     except OSError as fault:
         raise error(Finding(f"cannot be read: {fault.strerror}", str(path))) from fault
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(fault))
         line = int(place[1]) if place else None
