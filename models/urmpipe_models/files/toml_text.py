@@ -33,14 +33,12 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
     except tomllib.TOMLDecodeError as fault:
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(fault))
         line = int(place[1]) if place else None
-        hint = _unquoted(text, line)
+        hint = _unquoted(text.split("\n")[line - 1]) if line else ""
         raise error(Finding(f"not valid TOML: {fault}{hint}", str(path), line=line)) from fault
 
 
-def _unquoted(text: str, line: int | None) -> str:
-    """Return what to write for a text without quotes or a True; nothing where that is not the fault."""
-    lines = text.splitlines()
-    written = lines[line - 1] if line and line <= len(lines) else ""
+def _unquoted(written: str) -> str:
+    """Return what to write for a text without quotes or a True; nothing where that is not a line's fault."""
     bare = re.fullmatch(r"\s*([\w.-]+)\s*=\s*([^\s\"'\[{#][^\"'\[{#]*?)\s*(#.*)?", written)
     if bare is None or not re.search(r"[A-Za-z]", bare[2]):  # 1,5 or .5: a number that is none in TOML
         return ""
