@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -152,6 +153,49 @@ def test_everything_wrong_is_said_at_once_with_its_line(urdf: Any) -> None:
         "arm.urdf:11: link b: child of joints j2 and j3; allowed: one parent",
         "arm.urdf:12: joint j4: mimics 'ghost'; allowed: a joint of the file",
     ]
+
+
+def test_each_end_and_axis_that_is_missing_is_said_by_itself(urdf: Any) -> None:
+    text = robot(
+        link("r"),
+        '<joint name="j1" type="continuous"><parent link="r"/></joint>',
+        '<joint name="j2" type="continuous"><parent link="r"/><axis xyz="0 0"/></joint>',
+        '<joint name="j3"><parent link="r"/><limit velocity="x" lower="y"/></joint>',
+    )
+    assert complaint(urdf, text) == [
+        'arm.urdf:3: joint j1: no <child link="...">; allowed: one',
+        'arm.urdf:4: joint j2: no <child link="...">; allowed: one',
+        "arm.urdf:4: joint j2: axis xyz: found '0 0', expected three numbers",
+        "arm.urdf:5: joint j3: found type ''; allowed: revolute, continuous, prismatic, fixed",
+        'arm.urdf:5: joint j3: no <child link="...">; allowed: one',
+        "arm.urdf:5: joint j3: limit velocity: found 'x', expected a number",
+        "arm.urdf:5: joint j3: limit lower: found 'y', expected a number",
+    ]
+
+
+def test_what_a_joint_leaves_out_is_what_urdf_takes_for_it(urdf: Any) -> None:
+    limits = ["", '<limit velocity="2"/>', '<limit lower="-1"/>', '<limit upper="1"/>', "<axis/>"]
+    names = [f"l{k}" for k in range(len(limits) + 1)]
+    joints = [joint(f"j{k}", names[k], names[k + 1], "revolute", inside) for k, inside in enumerate(limits)]
+    chain = urdf(robot(*map(link, names), *joints))
+    inf = math.inf
+    assert [(one.lower, one.upper, one.velocity) for one in chain.joints] == [
+        (-inf, inf, inf), (-inf, inf, 2.0), (-1.0, 0.0, inf), (0.0, 1.0, inf), (-inf, inf, inf),
+    ]  # fmt: skip
+    assert chain.joints[-1].axis == (1.0, 0.0, 0.0)
+
+
+def test_an_axis_whose_length_is_1_but_for_rounding_keeps_its_bits(urdf: Any) -> None:
+    axis = (0.12427743641858018, 0.509194982237367, -0.8516311342720586)
+    assert math.hypot(*axis) == math.nextafter(1.0, 0.0)
+    written = f'<axis xyz="{axis[0]!r} {axis[1]!r} {axis[2]!r}"/>'
+    assert urdf(robot(link("a"), link("b"), joint("j", "a", "b", inside=written))).joints[0].axis == axis
+
+
+def test_a_fixed_joint_follows_none_whatever_the_file_says(urdf: Any) -> None:
+    fixed = joint("f", "b", "c", "fixed", '<mimic joint="ghost"/>')
+    chain = urdf(robot(link("a"), link("b"), link("c"), joint("j", "a", "b"), fixed))
+    assert [one.mimic for one in chain.joints] == [None, None]
 
 
 def test_loops_are_refused(urdf: Any) -> None:
