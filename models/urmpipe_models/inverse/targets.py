@@ -68,6 +68,6 @@ def _rotation_vector(rotation: FloatArray) -> FloatArray:
     imaginary, real = quat[:, :3], quat[:, 3]
     length = np.linalg.norm(imaginary, axis=1)
     angle = 2.0 * np.arctan2(length, np.abs(real))
-    scale = np.divide(angle, length, out=np.full_like(angle, 2.0), where=length > 0.0)
+    scale = 2.0 / np.sinc(angle / (2.0 * np.pi))  # a / sin(a / 2)
     vector[whole] = imaginary * (np.copysign(scale, real))[:, None]
     return vector

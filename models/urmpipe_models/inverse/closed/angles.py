@@ -25,6 +25,6 @@ def angle_about(axis: FloatArray, start: FloatArray, end: FloatArray) -> FloatAr
 
 def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return the angle in [0, pi] between a vector, shape (3,), and others, shape (3, ...), in [rad]."""
-    x, y, z = cross(tuple(first.tolist()), tuple(second))
-    cosine = sum(a * b for a, b in zip(first.tolist(), second, strict=True))
-    return np.asarray(np.arctan2(np.sqrt(x * x + y * y + z * z), cosine))
+    u, v = tuple(first.tolist()), tuple(second)
+    x, y, z = cross(u, v)
+    return np.asarray(np.arctan2(np.sqrt(x * x + y * y + z * z), dot(u, v)))
