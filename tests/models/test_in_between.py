@@ -232,6 +232,16 @@ def test_the_second_sample_is_told_by_the_first() -> None:
     assert beside_wraps(q[1:], x[1:], t[1:], indices(3), 1024.0).tolist() == [2]
 
 
+def test_the_first_and_the_last_sample_have_no_neighbours_at_the_other_end() -> None:
+    """Between the last sample and the second stands the first; the last but one is told by the last."""
+    q = np.array([300.0, -516.0, -516.0, -516.0, -516.0, -516.0, -516.0, 508.0])
+    x = np.r_[300.0, np.full(7, 508.0)]
+    assert beside_wraps(q, x, TSP * np.arange(8.0), indices(1, 7), 1024.0).tolist() == []
+    q = np.r_[np.full(6, 508.0), 300.0, -516.0]
+    x = np.r_[np.full(6, 508.0), 300.0, 508.0]
+    assert beside_wraps(q, x, TSP * np.arange(8.0), indices(7), 1024.0).tolist() == [6]
+
+
 def test_what_can_be_perceived_is_more_than_a_share_of_the_period() -> None:
     period = 1.0 / PERCEPTIBLE  # 2000, of which the share is 1
     for off, told in ((1.0, []), (1.0 + 2.0**-40, [3])):

@@ -16,6 +16,7 @@ def test_the_name_most_like_it_may_have_been_meant() -> None:
     assert did_you_mean("igest", ("compare", "ingest", "export")) == " (did you mean ingest?)"
     assert did_you_mean("UR-5E", ("ur3e", "ur5e")) == " (did you mean ur5e?)"
     assert did_you_mean("base-link", ("base", "base_link")) == " (did you mean base_link?)"
+    assert did_you_mean("q_- 1", ("q1",)) == " (did you mean q1?)"
     assert did_you_mean("MASSE", ("mas", "maße")) == " (did you mean maße?)"
     assert did_you_mean("lenght", ()) == did_you_mean("q1", ("tool", "base")) == ""
     assert did_you_mean("abcde", ("abcxy",)) == " (did you mean abcxy?)"  # 6 of 10 letters

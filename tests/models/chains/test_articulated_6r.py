@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from urmpipe_models.chains.articulated_6r import articulated_6r, articulated_6r_rows
-from urmpipe_models.chains.geometric_model import GeometricRow
+from urmpipe_models.chains.articulated_6r import articulated_6r
 
 LENGTHS = (0.3, 0.1, 0.45, 0.4, 0.15)
 
@@ -21,6 +20,10 @@ def test_name_start_and_words_go_into_the_chain() -> None:
     assert (chain.description, chain.source) == ("short", "a test")
 
 
-def test_the_last_two_joints_stand_in_the_wrist_centre() -> None:
-    wrist = articulated_6r_rows(*LENGTHS[:4])[4:]
-    assert wrist == (GeometricRow("R", "x", (0.0, 0.0, 0.0)), GeometricRow("R", "z", (0.0, 0.0, 0.0)))
+def test_six_joints_turn_about_z_x_x_z_x_z_the_last_three_in_the_wrist_centre() -> None:
+    chain = articulated_6r(*LENGTHS)
+    assert {joint.kind for joint in chain.joints} == {"revolute"}
+    assert ["xyz"[joint.axis.index(1.0)] for joint in chain.joints] == ["z", "x", "x", "z", "x", "z"]
+    heights = [joint.origin.translation for joint in chain.joints]
+    assert heights == [(0.0, 0.0, z) for z in (*LENGTHS[:4], 0.0, 0.0)]
+    assert chain.tip.translation == (0.0, 0.0, LENGTHS[4])
