@@ -15,7 +15,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.closed.closed_form import closed_form, exact_form
 from urmpipe_models.inverse.closed.idealised import compact, with_parallel_axes, with_spherical_wrist
-from urmpipe_models.inverse.closed.nearly import LOST, NearlyClosedForm
+from urmpipe_models.inverse.closed.nearly import LOST, MET, NearlyClosedForm
 from urmpipe_models.inverse.closed.parallel_axes import parallel_axes
 from urmpipe_models.inverse.closed.spherical_wrist import spherical_wrist
 from urmpipe_models.inverse.closed.trigonometric import wrapped
@@ -72,7 +72,7 @@ def regular_joints(chain: Chain, count: int) -> FloatArray:
 def assert_all_found(chain: Chain, q: FloatArray, solutions: Solutions) -> None:
     """Hold solutions to their poses: each once, the joint values that the poses were made of among them."""
     targets = targets_of(chain, q)
-    assert_reached(chain, targets, solutions)
+    assert_reached(chain, targets, solutions, MET + 1e-15)  # rounding of poses of some metres
     assert away_from(chain, solutions, q).min(axis=1).max() < 1e-6
     for k in range(1, solutions.q.shape[1]):
         apart = np.abs(wrapped(solutions.q[:, :k] - solutions.q[:, [k]])).max(axis=2)
