@@ -72,8 +72,8 @@ def test_a_flip_at_pi_is_undone_and_a_rest_keeps_its_axis() -> None:
 
 
 def test_a_record_that_begins_with_rests_goes_on_about_the_first_axis_that_there_is() -> None:
-    v = np.array([[0.0] * 3, [0.0] * 3, [0.0, 3.0, 0.0], [0.0] * 3, [0.0, 3.0 - 2 * np.pi, 0.0]])
-    expected = [[0.0] * 3, [0.0] * 3, [0.0, 3.0, 0.0], [0.0] * 3, [0.0, 3.0, 0.0]]  # from 0 nearer than -3.28
+    v = np.array([[0.0] * 3, [0.0] * 3, [0.0, 3.0, 0.0], [0.0, 3.0 - 2 * np.pi, 0.0], [0.0] * 3])
+    expected = [[0.0] * 3, [0.0] * 3, [0.0, 3.0, 0.0], [0.0, 3.0, 0.0], [0.0] * 3]
     np.testing.assert_allclose(continuous_vectors(v), expected, rtol=0, atol=1e-15)
 
 

@@ -204,10 +204,11 @@ def test_a_sample_is_told_though_a_wrap_leads_to_its_neighbour() -> None:
 def test_a_sample_with_a_wrap_on_either_side_is_none() -> None:
     """It goes over the limit and comes back, or goes two turns on."""
     t = TSP * np.arange(5.0)
-    q = np.array([-508.0, -508.0, 300.0, 508.0, 508.0])  # between its neighbours, and far off their line
-    for after in (0, -2):
-        x = q + 1024.0 * np.array([0, 0, -1, after, after])
+    for after, turns in ((16.0, 0), (2048.0, -2)):  # between its neighbours, and far off their line
+        q = np.array([0.0, 0.0, after / 2.0 - 200.0 * (turns != 0), after, after])
+        x = q + 1024.0 * np.array([0, 0, -1, turns, turns])
         assert beside_wraps(q, x, t, indices(2, 3), 1024.0).tolist() == []
+    q = np.array([-508.0, -508.0, 300.0, 508.0, 508.0])
     x = q + 1024.0 * np.array([0, 0, 0, -1, -1])
     assert beside_wraps(q, x, t, indices(3), 1024.0).tolist() == [2]
 

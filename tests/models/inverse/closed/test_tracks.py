@@ -77,3 +77,4 @@ def test_a_circle_out_of_reach_has_no_root_and_a_point_is_its_centre() -> None:
     centre = circle_roots(alpha, np.zeros(1), 1e-12)
     np.testing.assert_array_equal(centre.u, np.zeros((2, 2, 1)))
     assert centre.meet.tolist() == [False]
+    assert np.isnan(circle_roots(alpha, np.array([1e-10, 1.0]), 1e-12).u).all()
