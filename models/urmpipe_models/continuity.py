@@ -99,7 +99,7 @@ def _vectors(v: FloatArray) -> FloatArray:
     axis, angle = along / lengths[:, np.newaxis], largest * lengths
     signs = _signs(axis)
     turns = _nearest_turns(signs * angle)
-    return v + axis * (signs * turns * FULL_TURN)[:, np.newaxis]
+    return np.asarray(v + axis * (signs * turns * FULL_TURN)[:, np.newaxis])
 
 
 def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
