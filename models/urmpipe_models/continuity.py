@@ -105,15 +105,13 @@ def _vectors(v: FloatArray) -> FloatArray:
     turning = np.flatnonzero(largest > 0.0)
     if not len(turning):
         return v
-    last = np.maximum.accumulate(np.where(largest > 0.0, np.arange(len(v)), -1))
-    known = np.where(last < 0, turning[0], last)
+    known = np.maximum.accumulate(np.where(largest > 0.0, np.arange(len(v)), turning[0]))
     along = v[known] / largest[known, np.newaxis]  # squares of tiny components are no numbers any more
     lengths = np.linalg.norm(along, axis=1)
     axis, angle = along / lengths[:, np.newaxis], largest * lengths
     signs = _signs(axis)
     turns = _nearest_turns(signs * angle)
-    more = axis * (signs * turns * FULL_TURN)[:, np.newaxis]
-    return np.where(turns[:, np.newaxis] == 0.0, v, v + more)
+    return np.asarray(v + axis * (signs * turns * FULL_TURN)[:, np.newaxis])
 
 
 def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
@@ -123,8 +121,7 @@ def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
     switches = np.append(False, across < own)[: len(angles)]
     swapped = np.cumsum(switches) % 2 == 1
     family = np.where(swapped[:, np.newaxis], other, angles)
-    turns = _nearest_turns(family)
-    return np.where(turns == 0.0, family, family + FULL_TURN * turns)
+    return family + FULL_TURN * _nearest_turns(family)
 
 
 def _distance(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -39,11 +39,9 @@ def beside_wraps(q: FloatArray, x: FloatArray, t: FloatArray, wraps: IntArray, p
     Returns:
         Their indices, ascending, shape (b,).
     """
-    at = np.unique(np.concatenate((wraps - 1, wraps)))
+    at = np.setxor1d(wraps - 1, wraps)  # one of the two steps beside each is a wrap, not both
     at = at[(at > 0) & (at < len(q) - 1)]
-    lies_between = (q[at] - q[at - 1]) * (q[at + 1] - q[at]) > 0.0
-    turns = np.rint((x[at + 1] - q[at + 1] - x[at - 1] + q[at - 1]) / period)
-    at = at[lies_between & (np.abs(turns) == 1.0)]
+    at = at[(q[at] - q[at - 1]) * (q[at + 1] - q[at]) > 0.0]
     off = np.abs(off_line(x, t, at))
     motion = np.abs(x[at + 1] - x[at - 1]) / (t[at + 1] - t[at - 1])
     for offset in AROUND:

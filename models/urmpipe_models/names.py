@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable
 from difflib import SequenceMatcher
 
@@ -52,4 +53,4 @@ def _nearest_first(name: str, allowed: Iterable[str], least: float) -> list[str]
 
 def _letters(name: str) -> str:
     """Return a name without what is easily written otherwise."""
-    return name.lower().translate(dict.fromkeys(map(ord, "-_ ")))
+    return re.sub("[-_ ]", "", name.casefold())

@@ -223,8 +223,7 @@ def repolarize(
     for j in np.unique(found.joints[wraps]):
         mine = wraps & (found.joints == j)
         _add_turns(out[:, j], found.rows[mine], found.change[mine], periods[j])
-    between = found.between[found.between >= 0]
-    on_jump = np.column_stack((between, found.joints[found.between >= 0]))
+    on_jump = np.column_stack((found.between, found.joints))[found.between >= 0]
     odd = np.column_stack((found.rows, found.joints))[found.unexplained]
     explained = np.isin(odd[:, 0] * joints + odd[:, 1], on_jump[:, 0] * joints + on_jump[:, 1])
     return Repolarized(

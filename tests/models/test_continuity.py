@@ -71,12 +71,30 @@ def test_a_flip_at_pi_is_undone_and_a_rest_keeps_its_axis() -> None:
     np.testing.assert_allclose(continuous_vectors(v), expected, rtol=0, atol=2e-15)
 
 
+def test_a_record_that_begins_with_rests_goes_on_about_the_first_axis_that_there_is() -> None:
+    v = np.array([[0.0] * 3, [0.0] * 3, [0.0, 3.0, 0.0], [0.0, 3.0 - 2 * np.pi, 0.0], [0.0] * 3])
+    expected = [[0.0] * 3, [0.0] * 3, [0.0, 3.0, 0.0], [0.0, 3.0, 0.0], [0.0] * 3]
+    np.testing.assert_allclose(continuous_vectors(v), expected, rtol=0, atol=1e-15)
+
+
+def test_a_vector_goes_on_by_a_turn_though_none_of_its_components_is_large() -> None:
+    """From (1, 1, 1) to (-1, -1, -1): two square roots of 3 back, or a turn less so much on."""
+    v = np.array([[1.0, 1.0, 1.0], [-1.0, -1.0, -1.0]])
+    expected = [[1.0] * 3, [2 * np.pi / np.sqrt(3.0) - 1.0] * 3]
+    np.testing.assert_allclose(continuous_vectors(v), expected, rtol=0, atol=1e-15)
+
+
 @settings(max_examples=40, deadline=None)
-@given(steps, st.lists(st.booleans(), min_size=60, max_size=60), st.integers(0, 59))
+@given(
+    steps,
+    st.lists(st.booleans(), min_size=60, max_size=60),
+    st.integers(0, 59),
+    st.tuples(st.floats(-3.0, 3.0), st.floats(-1.0, 1.0), st.floats(-3.0, 3.0)),
+)
 def test_euler_angles_of_either_family_become_continuous(
-    moves: list[tuple[float, ...]], swaps: list[bool], missing: int
+    moves: list[tuple[float, ...]], swaps: list[bool], missing: int, start: tuple[float, float, float]
 ) -> None:
-    true = np.cumsum(np.array([[0.4, 0.2, -0.3], *moves]), axis=0)
+    true = np.cumsum(np.array([start, *moves]), axis=0)
     true[:, 1] = np.clip(true[:, 1], -1.2, 1.2)  # at +-pi/2 the two families meet
     swapped = np.array([False, *swaps[: len(moves)]])[:, np.newaxis]
     recorded = wrap(np.where(swapped, true * [1.0, -1.0, 1.0] + np.pi, true))
@@ -101,6 +119,8 @@ def test_of_two_names_that_are_equally_near_the_recorded_one_stays() -> None:
     """A quarter turn of two axes: the other family, half a turn off, is a quarter turn away as well."""
     recorded = np.array([[0.0, 0.0, 0.0], [-np.pi / 2, 0.0, -np.pi / 2]])
     np.testing.assert_array_equal(continuous_euler(recorded, proper=True), recorded)
+    half_a_turn = np.array([[0.0, 0.0, 0.0, 1.0], [1.0, 0.0, 0.0, 0.0], [0.0, 0.0, 0.0, -1.0]])
+    np.testing.assert_array_equal(continuous_quaternions(half_a_turn), half_a_turn)
 
 
 @pytest.mark.parametrize(
@@ -114,7 +134,7 @@ def test_records_without_samples_pass_through(work: object, width: int) -> None:
 
 
 FLIPPED: dict[RotationForm, list[list[float]]] = {
-    "vector": [[0.0, 0.0, 3.1], [0.0, 0.0, 3.1 - 2 * np.pi]],
+    "vector": [[0.6 * 3.1, 0.0, 0.8 * 3.1], [0.6 * (3.1 - 2 * np.pi), 0.0, 0.8 * (3.1 - 2 * np.pi)]],
     "rpy": [[0.1, 0.2, 0.3], [0.1 - np.pi, np.pi - 0.2, 0.3 - np.pi]],
     "zyx": [[0.1, 1.5, 0.3], [0.1 + np.pi, np.pi - 1.5, 0.3 - np.pi]],
     "xyz": [[0.1, -1.5, 0.3], [0.1 + np.pi, np.pi + 1.5, 0.3 + np.pi]],

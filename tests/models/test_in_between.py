@@ -201,6 +201,56 @@ def test_a_sample_is_told_though_a_wrap_leads_to_its_neighbour() -> None:
     assert beside_wraps(q, x, t, indices(3, 5), 1024.0).tolist() == [4]
 
 
+def test_a_sample_with_a_wrap_on_either_side_is_none() -> None:
+    """It goes over the limit and comes back, or goes two turns on."""
+    t = TSP * np.arange(5.0)
+    for after, turns in ((16.0, 0), (2048.0, -2)):  # between its neighbours, and far off their line
+        q = np.array([0.0, 0.0, after / 2.0 - 200.0 * (turns != 0), after, after])
+        x = q + 1024.0 * np.array([0, 0, -1, turns, turns])
+        assert beside_wraps(q, x, t, indices(2, 3), 1024.0).tolist() == []
+    q = np.array([-508.0, -508.0, 300.0, 508.0, 508.0])
+    x = q + 1024.0 * np.array([0, 0, 0, -1, -1])
+    assert beside_wraps(q, x, t, indices(3), 1024.0).tolist() == [2]
+
+
+def test_a_wrap_that_comes_late_is_clean() -> None:
+    """A file of a little more than a period: it goes back by more than one, and noise brings it on again."""
+    q = np.array([520.0, 520.0, 520.0, -516.0, -504.0, -504.0, -504.0])
+    x = q + 1024.0 * np.array([0, 0, 0, 1, 1, 1, 1])
+    assert beside_wraps(q, x, TSP * np.arange(7.0), indices(3), 1024.0).tolist() == []
+
+
+def test_the_second_sample_is_told_by_the_first() -> None:
+    """It stands 100 off the line; the first step is the motion around the next one, 100 a sample."""
+    q = np.array([508.0, 408.0, -516.0, -516.0, -516.0])
+    x = q + 1024.0 * np.array([0, 0, 1, 1, 1])
+    t = TSP * np.arange(5.0)
+    assert beside_wraps(q, x, t, indices(2), 1024.0).tolist() == [1]
+    q = np.array([8.0, 508.0, 508.0, 408.0, -516.0, -516.0, -516.0, -516.0])
+    x = q + 1024.0 * np.array([0, 0, 0, 0, 1, 1, 1, 1])
+    t = TSP * np.arange(8.0)
+    assert beside_wraps(q, x, t, indices(4), 1024.0).tolist() == []
+    assert beside_wraps(q[1:], x[1:], t[1:], indices(3), 1024.0).tolist() == [2]
+
+
+def test_the_first_and_the_last_sample_have_no_neighbours_at_the_other_end() -> None:
+    """Between the last sample and the second stands the first; the last but one is told by the last."""
+    q = np.array([300.0, -516.0, -516.0, -516.0, -516.0, -516.0, -516.0, 508.0])
+    x = np.r_[300.0, np.full(7, 508.0)]
+    assert beside_wraps(q, x, TSP * np.arange(8.0), indices(1, 7), 1024.0).tolist() == []
+    q = np.r_[np.full(6, 508.0), 300.0, -516.0]
+    x = np.r_[np.full(6, 508.0), 300.0, 508.0]
+    assert beside_wraps(q, x, TSP * np.arange(8.0), indices(7), 1024.0).tolist() == [6]
+
+
+def test_what_can_be_perceived_is_more_than_a_share_of_the_period() -> None:
+    period = 1.0 / PERCEPTIBLE  # 2000, of which the share is 1
+    for off, told in ((1.0, []), (1.0 + 2.0**-40, [3])):
+        q = np.array([1000.0, 1000.0, 1000.0, 1000.0 - off, -1000.0, -1000.0, -1000.0])
+        x = q + period * np.array([0, 0, 0, 0, 1, 1, 1])
+        assert beside_wraps(q, x, TSP * np.arange(7.0), indices(4), period).tolist() == told
+
+
 def test_beyond_the_ends_of_a_log_nothing_moves() -> None:
     """The joint stands still, so that whatever can be perceived is off the line: 0.01 rad is."""
     q = np.full(7, np.pi - 1e-9)

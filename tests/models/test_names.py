@@ -16,6 +16,8 @@ def test_the_name_most_like_it_may_have_been_meant() -> None:
     assert did_you_mean("igest", ("compare", "ingest", "export")) == " (did you mean ingest?)"
     assert did_you_mean("UR-5E", ("ur3e", "ur5e")) == " (did you mean ur5e?)"
     assert did_you_mean("base-link", ("base", "base_link")) == " (did you mean base_link?)"
+    assert did_you_mean("q_- 1", ("q1",)) == " (did you mean q1?)"
+    assert did_you_mean("MASSE", ("mas", "maße")) == " (did you mean maße?)"
     assert did_you_mean("lenght", ()) == did_you_mean("q1", ("tool", "base")) == ""
     assert did_you_mean("abcde", ("abcxy",)) == " (did you mean abcxy?)"  # 6 of 10 letters
     assert did_you_mean("copy", ("compare",)) == ""  # 6 of 11
@@ -44,3 +46,4 @@ def test_of_many_names_the_nearest_are_listed() -> None:
     assert text.endswith(" and 9 others")
     assert len(text.removesuffix(" and 9 others").split(", ")) == MOST_LISTED
     assert listed("sped", names[:12]) == ", ".join(names[:12])
+    assert not_among("sped", names) == f"found 'sped' (did you mean speed?), allowed: {text}"

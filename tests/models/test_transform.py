@@ -91,6 +91,12 @@ def test_constant_right_angles_are_exact(
     np.testing.assert_array_equal(matrix(turn(angle).rotation), expected)
 
 
+@pytest.mark.parametrize("quarters", [-5, 5])
+def test_beyond_two_half_turns_a_constant_is_an_angle_as_any(quarters: int) -> None:
+    angle = quarters * math.pi / 2
+    assert rotation_z(angle).rotation[0][0] == np.cos(angle) != 0.0
+
+
 @settings(max_examples=40, deadline=None)
 @given(st.lists(units, min_size=9, max_size=9))
 def test_a_point_is_that_of_the_4x4_matrix(values: list[float]) -> None:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
-from urmpipe_models.elementwise import ZERO, Element
+from urmpipe_models.elementwise import Element
 
 
 def articulated_6r_rows(l0: Element, l1: Element, l2: Element, l3: Element) -> tuple[GeometricRow, ...]:
@@ -25,8 +25,8 @@ def articulated_6r_rows(l0: Element, l1: Element, l2: Element, l3: Element) -> t
         GeometricRow("R", "x", (0.0, 0.0, l1)),
         GeometricRow("R", "x", (0.0, 0.0, l2)),
         GeometricRow("R", "z", (0.0, 0.0, l3)),
-        GeometricRow("R", "x", ZERO),
-        GeometricRow("R", "z", ZERO),
+        GeometricRow("R", "x"),
+        GeometricRow("R", "z"),
     )
 
 

@@ -23,26 +23,24 @@ def parse_toml(path: Path, error: type[UrmpipeError]) -> dict[str, Any]:
     Raises:
         UrmpipeError: `error`, if it cannot be read, is no UTF-8 or no TOML, with the line.
     """
-    text = ""
     try:
         text = path.read_text(encoding="utf-8-sig")
-        return tomllib.loads(text)
     except UnicodeDecodeError as fault:
         raise error(Finding(f"byte {fault.start} is no UTF-8; allowed: TOML in UTF-8", str(path))) from fault
     except OSError as fault:
         meant = meant_by(path, (".toml",)) if isinstance(fault, FileNotFoundError) else ""
         raise error(Finding(f"cannot be read: {fault.strerror}{meant}", str(path))) from fault
+    try:
+        return tomllib.loads(text)
     except tomllib.TOMLDecodeError as fault:
         place = re.search(r"\(at line (\d+), column (\d+)\)", str(fault))
         line = int(place[1]) if place else None
-        hint = _unquoted(text, line)
+        hint = _unquoted(text.split("\n")[line - 1]) if line else ""
         raise error(Finding(f"not valid TOML: {fault}{hint}", str(path), line=line)) from fault
 
 
-def _unquoted(text: str, line: int | None) -> str:
-    """Return what to write for a text without quotes or a True; nothing where that is not the fault."""
-    lines = text.splitlines()
-    written = lines[line - 1] if line and line <= len(lines) else ""
+def _unquoted(written: str) -> str:
+    """Return what to write for a text without quotes or a True; nothing where that is not a line's fault."""
     bare = re.fullmatch(r"\s*([\w.-]+)\s*=\s*([^\s\"'\[{#][^\"'\[{#]*?)\s*(#.*)?", written)
     if bare is None or not re.search(r"[A-Za-z]", bare[2]):  # 1,5 or .5: a number that is none in TOML
         return ""

@@ -36,12 +36,12 @@ class Node:
         return next(iter(self.all(tag)), None)
 
     def walk(self) -> Iterator[Node]:
-        """Yield this element and all below it."""
+        """Yield this element and all below it, in the order of the file."""
         waiting = [self]
         while waiting:
             node = waiting.pop()
             yield node
-            waiting.extend(node.children)
+            waiting.extend(reversed(node.children))
 
 
 def read_xml(path: Path) -> Node:

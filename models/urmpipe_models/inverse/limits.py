@@ -41,20 +41,35 @@ def within_limits(chain: Chain, solutions: Solutions, near: FloatArray | None = 
     Returns:
         The solutions; one with a joint that cannot be brought into its limits is NaN and has a reason.
     """
-    lower, upper = limits_of(chain)
-    least = np.ceil((lower - LIMIT_ROUNDING - solutions.q) / TURN)
-    most = np.floor((upper + LIMIT_ROUNDING - solutions.q) / TURN)
-    wish = 0.0 if near is None else np.atleast_2d(near)[:, None, :]
-    turns = np.where(turning(chain), np.clip(np.round((wish - solutions.q) / TURN), least, most), 0.0)
-    shifted = solutions.q + turns * TURN
-    outside = (shifted < lower - LIMIT_ROUNDING) | (shifted > upper + LIMIT_ROUNDING)
+    q, outside = in_nearest_turn(chain, solutions.q, 0.0 if near is None else np.atleast_2d(near)[:, None, :])
     refused = np.asarray(outside.any(axis=2))
     return replace(
         solutions,
-        q=np.where(refused[..., None], np.nan, np.clip(shifted, lower, upper)),
+        q=np.where(refused[..., None], np.nan, q),
         reasons=_reasons(chain, solutions, outside),
         singular=tuple(replace(one, where=one.where & ~refused) for one in solutions.singular),
     )
+
+
+def in_nearest_turn(chain: Chain, q: FloatArray, near: FloatArray | float) -> tuple[FloatArray, BoolArray]:
+    """Return joint values shifted by whole turns into their limits, and where they cannot be brought there.
+
+    Args:
+        chain: The arm.
+        q: In [rad] or [m], shape (..., joints).
+        near: Of the turns that are allowed the nearest to it is taken, in [rad] or [m], of a shape that
+            broadcasts to that of q.
+
+    Returns:
+        Both of the shape of q; what is outside of its limits is put on the nearest one.
+    """
+    lower, upper = limits_of(chain)
+    least = np.ceil((lower - LIMIT_ROUNDING - q) / TURN)
+    most = np.floor((upper + LIMIT_ROUNDING - q) / TURN)
+    turns = np.where(turning(chain), np.clip(np.round((near - q) / TURN), least, most), 0.0)
+    shifted = q + turns * TURN
+    outside = (shifted < lower - LIMIT_ROUNDING) | (shifted > upper + LIMIT_ROUNDING)
+    return np.clip(shifted, lower, upper), outside
 
 
 def within_pi(q: FloatArray, period: FloatArray) -> FloatArray:

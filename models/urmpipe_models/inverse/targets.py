@@ -62,12 +62,9 @@ def _rotation_vector(rotation: FloatArray) -> FloatArray:
     By the unit quaternion v = u sin(a / 2), w = cos(a / 2) of either sign: a = 2 atan2(|v|, |w|). Without
     scipy, which would take longer to import than a thousand targets to be solved.
     """
-    vector = np.full((len(rotation), 3), np.nan)
-    whole = np.isfinite(rotation).all(axis=(1, 2))
-    quat = quaternions(rotation[whole].reshape(-1, 9), "matrix")
+    quat = quaternions(rotation.reshape(-1, 9), "matrix")
     imaginary, real = quat[:, :3], quat[:, 3]
     length = np.linalg.norm(imaginary, axis=1)
     angle = 2.0 * np.arctan2(length, np.abs(real))
-    scale = np.divide(angle, length, out=np.full_like(angle, 2.0), where=length > 0.0)
-    vector[whole] = imaginary * (np.copysign(scale, real))[:, None]
-    return vector
+    scale = 2.0 / np.sinc(angle / (2.0 * np.pi))  # a / sin(a / 2)
+    return np.asarray(imaginary * np.copysign(scale, real)[:, None])

@@ -96,10 +96,8 @@ def _carried(state: Motion, origin: Transform) -> Motion:
 
 
 def _driven(state: Motion, joint: Joint, value: Element, rate: Element, second: Element) -> Motion:
-    """Return the motion of the joint's moving frame from that of its fixed one."""
+    """Return the motion of the joint's moving frame from that of its fixed one; a fixed joint slides by 0."""
     pose = moved(state.pose, joint, value)
-    if joint.kind == "fixed":
-        return state
     axis = state.pose.rotate(joint.axis)
     own, own_second = scale(rate, axis), scale(second, axis)
     coupling = cross(state.omega, own)

@@ -100,8 +100,9 @@ def read_tree(path: Path) -> UrdfTree:
     for node in root.all("joint"):
         _add_joint(tree, node)
     for node in root.walk():
-        if node.tag == "material" and (colour := node.first("color")):
-            tree.colours.setdefault(node.attributes.get("name", ""), colour)
+        name, colour = node.attributes.get("name"), node.first("color")
+        if node.tag == "material" and name and colour:
+            tree.colours.setdefault(name, colour)
     _check_links(tree)
     _check_mimics(tree)
     return tree
@@ -200,13 +201,11 @@ def _limits(tree: UrdfTree, node: Node, joint: str, type_: str) -> tuple[float, 
     (velocity,) = numbers_of(tree, limit, place, "velocity", (math.inf,))
     if velocity < 0.0:
         tree.fault(f"{place} velocity: found {velocity:g}; allowed: 0 (not known) or more", limit.line)
-        velocity = 0.0
     if type_ == "continuous" or not limit.attributes.keys() & {"lower", "upper"}:
         return -math.inf, math.inf, velocity or math.inf
     (lower,), (upper,) = (numbers_of(tree, limit, place, end, (0.0,)) for end in ("lower", "upper"))
     if lower > upper:
         tree.fault(f"{place}: lower {lower:g} above upper {upper:g}", limit.line)
-        upper = lower
     return lower, upper, velocity or math.inf
 
 

@@ -63,7 +63,7 @@ def _sizes(tree: UrdfTree, node: Node, place: str, attribute: str, count: int = 
 
 
 def _colour(tree: UrdfTree, material: Node | None, place: str) -> Colour | None:
-    """Return the colour of a material: its own, or that of the material of its name elsewhere in the file."""
+    """Return the colour of a material: its own, or that of the first of its name in the file."""
     if material is None:
         return None
     node = material.first("color") or tree.colours.get(material.attributes.get("name", ""))

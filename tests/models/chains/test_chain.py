@@ -9,6 +9,7 @@ import pytest
 from urmpipe_models.chains.chain import AXIS_TOLERANCE, Chain, Joint, Mimic
 from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.errors import RobotError
+from urmpipe_models.robots.robot_file import chain_to_dict
 from urmpipe_models.transform import Transform, translation
 
 
@@ -84,13 +85,32 @@ def test_a_chain_without_a_moving_joint_is_none() -> None:
     assert str(caught.value) == "robot rod: has no moving joint; at least one is needed"
 
 
+def test_a_chain_shows_itself_by_its_coordinates_and_a_row_a_joint() -> None:
+    joints = (Joint("a<b", lower=-1.5, upper=2.0), Joint("c", "prismatic"), Joint("d", "fixed"))
+    chain = Chain("arm", joints, description="a test")
+    assert repr(chain) == "<Chain arm: a test, 2 coordinates (a<b, c)>"
+    assert chain._repr_html_() == (
+        "<p><b>Chain</b> arm: a test, 2 coordinates (a&lt;b, c)</p>"
+        "<table><tr><th>joint</th><th>kind</th><th>lower</th><th>upper</th></tr>"
+        "<tr><td>a&lt;b</td><td>revolute</td><td>-1.5</td><td>2</td></tr>"
+        "<tr><td>c</td><td>prismatic</td><td>-inf</td><td>inf</td></tr>"
+        "<tr><td>d</td><td>fixed</td><td>-inf</td><td>inf</td></tr></table>"
+    )
+    assert repr(Chain("rod", (Joint("a"),))) == "<Chain rod: 1 coordinate (a)>"
+
+
+def test_a_chain_is_the_dictionary_of_its_robot_file() -> None:
+    chain = Chain("arm", (Joint("a"),))
+    assert chain.to_dict() == chain_to_dict(chain)
+
+
 def test_urm_modules_are_joints_about_z_and_a_tilted_effector() -> None:
     chain = urm_chain("two", (0.3, 0.2, 0.1), (0.5, math.pi / 2), directions=(1, -1), start=(0.1, 0.2))
     assert chain.coordinates == ("phi1", "phi2")
     assert [joint.axis for joint in chain.moving] == [(0.0, 0.0, 1.0), (0.0, 0.0, -1.0)]
     assert chain.joints[0].origin == Transform()
     assert chain.joints[1].origin.translation == (0.0, 0.0, 0.3)
-    assert chain.joints[2].kind == "fixed"
+    assert (chain.joints[2].name, chain.joints[2].kind) == ("effector", "fixed")
     assert chain.joints[2].origin.rotation == ((0.0, 0.0, 1.0), (0.0, 1.0, 0.0), (-1.0, 0.0, 0.0))
     assert chain.tip == translation(0.0, 0.0, 0.1)
     assert all(math.isinf(joint.velocity) and math.isinf(joint.upper) for joint in chain.joints)

@@ -100,6 +100,8 @@ def test_a_chain_of_rows_names_its_joints_and_keeps_their_kinds() -> None:
         ("q2", "revolute", (0.0, 1.0, 0.0)),
     ]
     assert (chain.start, chain.description, chain.source) == ((0.1, 0.2), "two joints", "a test")
+    bare = geometric_chain("arm", rows)
+    assert (bare.start, bare.description, bare.source) == ((0.0, 0.0), "", "")
     with pytest.raises(RobotError) as caught:
         geometric_chain("none", ())
     assert str(caught.value) == "robot none: has no moving joint; at least one is needed"

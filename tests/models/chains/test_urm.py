@@ -25,7 +25,8 @@ def test_name_start_and_words_go_into_the_chain() -> None:
     chain = urm_chain("two", (0.3, 0.2, 0.1), (0.5, -0.7), start=(1, 2), description="short", source="a test")
     assert (chain.name, chain.start) == ("two", (1.0, 2.0))
     assert (chain.description, chain.source) == ("short", "a test")
-    assert (ARM.start, ARM.description, ARM.source) == ((0.0, 0.0), "", "")
+    bare = urm_chain("two", (0.3, 0.2, 0.1), (0.5, -0.7))
+    assert (bare.start, bare.description, bare.source) == ((0.0, 0.0), "", "")
 
 
 @settings(max_examples=30)

@@ -83,11 +83,34 @@ def test_the_base_link_carries_what_it_shows_wherever_the_chain_begins(tmp_path:
     ]  # fmt: skip
 
 
+def test_a_colour_is_a_material_s_own_or_that_of_its_name(tmp_path: Path) -> None:
+    """A colour left out is white, a scale 1; materials without a name have nothing in common."""
+    shape = "<geometry><mesh filename='/a.stl'/></geometry>"
+    materials = [
+        "<material name='m'><color rgba='1 0 0 1'/></material>",
+        "<material name='m'><color rgba='0 2 -1 1'/></material>",
+        "<material name='m'/>",
+        "<material><color rgba='0 0 1 1'/></material>",
+        "<material/>",
+        "<material name='w'><color/></material>",
+        "<material name='urmpipe'/>",
+        "",
+    ]
+    visuals = "".join(f"<visual>{shape}{material}</visual>" for material in materials)
+    joint = "<joint name='j' type='continuous'><parent link='b'/><child link='e'/></joint>"
+    text = f"<robot name='r'><link name='b'>{visuals}</link><link name='e'/>{joint}</robot>"
+    found = read_urdf(arm(tmp_path, text)).visuals
+    red, green, blue, white = (1.0, 0.0, 0.0, 1.0), (0.0, 1.0, 0.0, 1.0), (0.0, 0.0, 1.0, 1.0), (1.0,) * 4
+    assert [one.colour for one in found] == [red, green, red, blue, None, white, None]
+    assert {one.shape for one in found} == {Mesh("/a.stl", (1.0, 1.0, 1.0))}
+
+
 def test_what_is_wrong_with_a_visual_is_said_with_its_line(tmp_path: Path) -> None:
     wrong = [
         "<visual/>",
         "<visual><geometry><plane/><box size='1 1'/></geometry></visual>",
         "<visual><geometry><plane/></geometry></visual>",
+        "<visual><geometry><sphere radius='1'/><plane/><box size='1 1 1'/></geometry></visual>",
         "<visual><geometry><sphere/></geometry></visual>",
         "<visual><geometry><cylinder radius='-1' length='x'/></geometry></visual>",
         "<visual><geometry><mesh filename='' scale='1'/></geometry><origin rpy='0'/></visual>",
@@ -105,13 +128,15 @@ def test_what_is_wrong_with_a_visual_is_said_with_its_line(tmp_path: Path) -> No
         "arm.urdf:2: link b: visual: found no shape; allowed: one of box, cylinder, capsule, sphere, mesh",
         "arm.urdf:3: link b: visual: box size: found '1 1', expected three numbers",
         "arm.urdf:4: link b: visual: found plane; allowed: one of box, cylinder, capsule, sphere, mesh",
-        "arm.urdf:5: link b: visual: sphere: no radius; allowed: one",
-        "arm.urdf:6: link b: visual: cylinder radius: found -1; allowed: 0 or more",
-        "arm.urdf:6: link b: visual: cylinder length: found 'x', expected a number",
-        "arm.urdf:7: link b: visual: mesh scale: found '1', expected three numbers",
-        "arm.urdf:7: link b: visual: mesh: no filename; allowed: one",
-        "arm.urdf:7: link b: visual: origin rpy: found '0', expected three numbers",
-        "arm.urdf:8: link b: visual: color rgba: found '1 1 1', expected four numbers",
+        "arm.urdf:5: link b: visual: found sphere, plane, box; allowed: one of box, cylinder, capsule,"
+        " sphere, mesh",
+        "arm.urdf:6: link b: visual: sphere: no radius; allowed: one",
+        "arm.urdf:7: link b: visual: cylinder radius: found -1; allowed: 0 or more",
+        "arm.urdf:7: link b: visual: cylinder length: found 'x', expected a number",
+        "arm.urdf:8: link b: visual: mesh scale: found '1', expected three numbers",
+        "arm.urdf:8: link b: visual: mesh: no filename; allowed: one",
+        "arm.urdf:8: link b: visual: origin rpy: found '0', expected three numbers",
+        "arm.urdf:9: link b: visual: color rgba: found '1 1 1', expected four numbers",
     ]
 
 

@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.chains.chain import Chain, Joint, Mimic
-from urmpipe_models.inverse.limits import periods, within_limits, within_pi
+from urmpipe_models.chains.chain import Chain, Joint, JointKind, Mimic
+from urmpipe_models.inverse.limits import LIMIT_ROUNDING, nearest_to_limits, periods, within_limits, within_pi
 from urmpipe_models.inverse.solutions import Singular, Solutions
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -34,6 +34,25 @@ def test_only_a_joint_without_limits_turns_without_end() -> None:
         Joint("follows", mimic=Mimic("leads", 0.5)),
     )
     assert periods(chain).tolist() == [TURN, math.inf, math.inf, math.inf, math.inf]
+
+
+@pytest.mark.parametrize("kind", ["revolute", "prismatic"])
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+def test_beyond_a_limit_by_just_the_rounding_is_on_it(kind: JointKind, sign: float) -> None:
+    chain = arm(Joint("held", kind, lower=0.0, upper=0.0))
+    assert within_limits(chain, one_solution(sign * LIMIT_ROUNDING)).q.tolist() == [[[0.0]]]
+    assert np.isnan(within_limits(chain, one_solution(sign * 1.01 * LIMIT_ROUNDING)).q).all()
+
+
+def test_each_joint_that_two_limits_hold_is_put_into_the_turn_nearest_to_their_middle() -> None:
+    chain = arm(
+        Joint("held", lower=2.0, upper=10.0),
+        Joint("half", lower=5.0),
+        Joint("slide", "prismatic", lower=20.0, upper=30.0),
+    )
+    found = nearest_to_limits(chain, np.array([[0.5, 0.5, 0.5], [9.5, 9.5, 9.5]]))
+    np.testing.assert_allclose(found, [[0.5 + TURN, 0.5, 0.5], [9.5 - TURN, 9.5, 9.5]], rtol=0, atol=2e-15)
+    assert found.dtype == np.float64
 
 
 def test_a_joint_is_shifted_by_turns_into_its_limits_and_then_as_near_as_may_be() -> None:

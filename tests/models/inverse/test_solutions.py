@@ -34,6 +34,14 @@ def test_the_nearest_solution_is_taken_by_the_shorter_way() -> None:
     np.testing.assert_allclose(found.nearest(start, np.array([math.inf])), [[-1.0], [0.5]])
 
 
+def test_where_there_are_none_reasons_can_be_made_longer() -> None:
+    none = no_solutions(["short", ""], ("up", "down"), 3)
+    assert none.q.shape == (2, 2, 3) and np.isnan(none.q).all()
+    assert none.reasons.tolist() == [["short", "short"], ["", ""]]
+    none.reasons[0] += ", and more"
+    assert none.reasons.tolist() == [["short, and more"] * 2, ["", ""]]
+
+
 def test_each_target_can_have_a_start_of_its_own() -> None:
     assert two_targets().nearest_column(np.array([[2.0], [2.0]]), np.array([math.inf])).tolist() == [0, 1]
 

@@ -310,6 +310,9 @@ def test_a_mimic_moves_with_its_leader_and_has_no_coordinate() -> None:
     np.testing.assert_allclose(J[1], [-1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     (motion,) = motions(chain, [0.0, 0.2], [0.0, 1.0], [0.0, 0.0])[-1:]
     np.testing.assert_allclose(motion.velocity, [-1.0, 0.0, 0.0])
+    for qd, qdd in (([0.0], [0.0, 0.0]), ([0.0, 0.0], [0.0]), ([0.0] * 3, [0.0, 0.0])):
+        with pytest.raises(ValueError, match=r"zip\(\) argument 2 is (shorter|longer) than argument 1"):
+            motions(chain, [0.0, 0.2], qd, qdd)
 
 
 # --- logs: whole arrays are the single poses -------------------------------------------------------

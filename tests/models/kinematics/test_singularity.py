@@ -18,6 +18,7 @@ from urmpipe_models.chains.dh import DHRow, dh_chain
 from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.kinematics.singularity import (
+    PARALLEL,
     characteristic_length,
     singularity_over_log,
 )
@@ -240,9 +241,26 @@ def test_the_length_is_that_of_the_links_after_the_first_axis(name: str, length:
     assert characteristic_length(longer) == pytest.approx(length + 0.25, rel=1e-14)
 
 
-@pytest.mark.parametrize("name", ["panda", "ur5", "arm6"])
+SKEW = dh_chain(
+    "skew",
+    [
+        DHRow(d=0.3, a=0.4, alpha=0.7),
+        DHRow(theta=0.5, d=-0.2, a=-0.5, alpha=-1.2),
+        DHRow(theta=-0.9, d=0.6, a=0.25, alpha=2.0),
+        DHRow(theta=1.1, d=-0.35, a=0.15, alpha=0.4),
+    ],
+)
+"""An arm whose axes pass each other at any angle."""
+
+
+def test_between_skew_axes_it_is_the_sum_of_the_parameters_of_denavit_and_hartenberg() -> None:
+    # 0.4 + 0.5 + 0.25 between the axes, 0.2 + 0.6 along the second and the third; the last is the tip's
+    assert characteristic_length(SKEW) == pytest.approx(1.95 + math.hypot(0.35, 0.15), rel=1e-14)
+
+
+@pytest.mark.parametrize("name", ["panda", "ur5", "arm6", "skew"])
 def test_it_does_not_ask_where_frames_stand_or_where_joints_are_zero(name: str) -> None:
-    chain = load_robot(name)
+    chain = SKEW if name == "skew" else load_robot(name)
     shifts = [translation(0.0, 0.0, 0.1 * k) @ rotation_z(0.3 * k) for k in range(len(chain.joints))]
     before = [Transform(), *(shift.inverse() for shift in shifts)]
     joints = tuple(
@@ -257,6 +275,14 @@ def test_axes_that_were_meant_to_be_parallel_are() -> None:
     leaning = Joint("second", origin=from_offset([0.4, 0.0, 0.0, 0.0, 1e-4, 0.0]))  # they meet 4 km away
     chain = Chain("calibrated", (Joint("first"), leaning), tip=translation(0.3, 0.0, 0.0))
     assert characteristic_length(chain) == pytest.approx(0.7, rel=1e-6)
+
+
+def test_axes_are_parallel_below_a_sine_of_a_tenth_not_from_it_on() -> None:
+    """At 0.1 the axes meet 3 m down the first one: the way to the tip is longer than the 0.3 m across."""
+    for lean, length in ((PARALLEL, 3.0), (PARALLEL - 1e-9, 0.3)):
+        axis = (lean, 0.0, math.sqrt(1.0 - lean * lean))
+        turns = (Joint("first"), Joint("second", origin=translation(0.3, 0.0, 0.0), axis=axis))
+        assert characteristic_length(Chain("leaning", turns)) == pytest.approx(length, rel=0.02)
 
 
 def test_arms_of_few_axes() -> None:

@@ -42,6 +42,14 @@ DH = {  # d1, a2, a3, d4, d5, d6 in m, as Universal Robots publishes them
 SPEEDS = {"ur3": (180,) * 3 + (360,) * 3, "ur5": (180,) * 6, "ur10": (120,) * 2 + (180,) * 4}  # deg/s
 
 
+def test_a_xacro_file_is_told_the_command_that_expands_it(tmp_path: Path) -> None:
+    file = tmp_path / "arm.xacro"
+    file.write_text('<robot name="arm"/>', encoding="utf-8")
+    with pytest.raises(RobotError) as caught:
+        load_robot(file)
+    assert str(caught.value) == f"{file}: is a xacro file; expand it first: xacro {file} -o arm.urdf"
+
+
 def test_all_robots_are_there_and_say_what_they_are() -> None:
     assert robot_names() == NAMES
     for name in NAMES:

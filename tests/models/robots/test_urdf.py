@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -152,6 +153,67 @@ def test_everything_wrong_is_said_at_once_with_its_line(urdf: Any) -> None:
         "arm.urdf:11: link b: child of joints j2 and j3; allowed: one parent",
         "arm.urdf:12: joint j4: mimics 'ghost'; allowed: a joint of the file",
     ]
+
+
+def test_each_end_and_axis_that_is_missing_is_said_by_itself(urdf: Any) -> None:
+    text = robot(
+        link("r") + link("another root"),
+        '<joint name="j1" type="continuous"><parent link="r"/></joint>',
+        '<joint name="j2" type="continuous"><parent link="r"/><axis xyz="0 0"/></joint>',
+        '<joint name="j3"><parent link="r"/><limit velocity="x" lower="y"/></joint>',
+        '<joint name="j4" type="revolute"><parent link="r"/><mimic joint="j1" offset="x"/></joint>',
+    )
+    assert complaint(urdf, text) == [
+        'arm.urdf:3: joint j1: no <child link="...">; allowed: one',
+        'arm.urdf:4: joint j2: no <child link="...">; allowed: one',
+        "arm.urdf:4: joint j2: axis xyz: found '0 0', expected three numbers",
+        "arm.urdf:5: joint j3: found type ''; allowed: revolute, continuous, prismatic, fixed",
+        'arm.urdf:5: joint j3: no <child link="...">; allowed: one',
+        "arm.urdf:5: joint j3: limit velocity: found 'x', expected a number",
+        "arm.urdf:5: joint j3: limit lower: found 'y', expected a number",
+        'arm.urdf:6: joint j4: no <child link="...">; allowed: one',
+        "arm.urdf:6: joint j4: mimic offset: found 'x', expected a number",
+    ]
+
+
+def test_where_a_link_has_two_parents_its_roots_are_not_asked_for(urdf: Any) -> None:
+    text = robot(link("r"), link("s"), link("a"), joint("j1", "r", "a"), joint("j2", "s", "a"))
+    assert complaint(urdf, text) == ["arm.urdf:6: link a: child of joints j1 and j2; allowed: one parent"]
+
+
+def test_what_a_joint_leaves_out_is_what_urdf_takes_for_it(urdf: Any) -> None:
+    limits = ["", '<limit velocity="2"/>', '<limit lower="-1"/>', '<limit upper="1"/>', "<axis/>"]
+    names = [f"l{k}" for k in range(len(limits) + 1)]
+    joints = [joint(f"j{k}", names[k], names[k + 1], "revolute", inside) for k, inside in enumerate(limits)]
+    chain = urdf(robot(*map(link, names), *joints))
+    inf = math.inf
+    assert [(one.lower, one.upper, one.velocity) for one in chain.joints] == [
+        (-inf, inf, inf), (-inf, inf, 2.0), (-1.0, 0.0, inf), (0.0, 1.0, inf), (-inf, inf, inf),
+    ]  # fmt: skip
+    assert chain.joints[-1].axis == (1.0, 0.0, 0.0)
+
+
+def test_an_axis_whose_length_is_1_but_for_rounding_keeps_its_bits(urdf: Any) -> None:
+    axis = (0.12427743641858018, 0.509194982237367, -0.8516311342720586)
+    assert math.hypot(*axis) == math.nextafter(1.0, 0.0)
+    written = f'<axis xyz="{axis[0]!r} {axis[1]!r} {axis[2]!r}"/>'
+    assert urdf(robot(link("a"), link("b"), joint("j", "a", "b", inside=written))).joints[0].axis == axis
+
+
+def test_a_joint_that_is_fixed_in_a_chain_has_neither_axis_nor_limit_and_follows_none(urdf: Any) -> None:
+    inside = '<axis xyz="0 0 0"/><limit lower="2" upper="1"/><mimic joint="ghost"/>'
+    fixed = joint("f", "b", "c", "fixed", inside)
+    beside = joint("g", "b", "d", "floating", '<axis xyz="0 0 0"/><mimic joint="ghost"/>')
+    arm = robot(*map(link, "abcd"), joint("j", "a", "b"), fixed, beside)
+    assert urdf(arm, tip_link="c").joints[1] == Joint("f", "fixed")
+
+
+def test_an_axis_is_brought_to_unit_length_and_a_follower_goes_as_far_as_its_leader(urdf: Any) -> None:
+    axis, follow = '<axis xyz="3 0 4"/>', '<mimic joint="j"/>'
+    text = robot(*map(link, "abc"), joint("j", "a", "b", inside=axis), joint("f", "b", "c", inside=follow))
+    chain = urdf(text)
+    assert chain.joints[0].axis == (0.6, 0.0, 0.8)
+    assert chain.joints[1].mimic == Mimic("j", 1.0, 0.0)
 
 
 def test_loops_are_refused(urdf: Any) -> None:

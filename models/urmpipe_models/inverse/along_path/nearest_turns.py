@@ -6,8 +6,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.inverse.limits import within_limits
-from urmpipe_models.inverse.solutions import Solutions
+from urmpipe_models.inverse.limits import in_nearest_turn
 
 
 def in_nearest_turns(chain: Chain, q: FloatArray, last: FloatArray) -> FloatArray:
@@ -22,8 +21,6 @@ def in_nearest_turns(chain: Chain, q: FloatArray, last: FloatArray) -> FloatArra
         Joint values in [rad] or [m], shape (m, joints).
     """
     turned = q.copy()
-    none = np.array([[""]], dtype=np.object_)
     for sample in np.flatnonzero(np.isfinite(q).all(axis=1)).tolist():
-        one = Solutions(q[sample][None, None], ("",), none)
-        turned[sample] = last = within_limits(chain, one, last).q[0, 0]
+        turned[sample] = last = in_nearest_turn(chain, q[sample], last)[0]
     return turned

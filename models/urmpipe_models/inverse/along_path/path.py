@@ -90,7 +90,7 @@ def follow(
     if form is None:
         far = too_far(chain, targets, search.tolerance)
         reasons = [fault or reason for fault, reason in zip(reasons, far, strict=True)]
-    good = np.array([not reason for reason in reasons], dtype=bool)
+    good = np.array([not reason for reason in reasons])
     asked = _Asked(chain, targets.rows(good), begin, search, progress or _untold)
     found = _spread(asked.by_least_motion() if form is None else asked.by_closed_form(form), good, reasons)
     asked.progress(1.0)

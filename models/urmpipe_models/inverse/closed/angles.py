@@ -35,6 +35,6 @@ def angle_between(first: FloatArray, second: FloatArray) -> FloatArray:
         first: In any unit, shape (3,).
         second: In any unit, shape (3, ...).
     """
-    x, y, z = cross(tuple(first.tolist()), tuple(second))
-    cosine = sum(a * b for a, b in zip(first.tolist(), second, strict=True))
-    return np.asarray(np.arctan2(np.sqrt(x * x + y * y + z * z), cosine))
+    u, v = tuple(first.tolist()), tuple(second)
+    x, y, z = cross(u, v)
+    return np.asarray(np.arctan2(np.sqrt(x * x + y * y + z * z), dot(u, v)))

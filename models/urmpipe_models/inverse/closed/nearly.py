@@ -13,7 +13,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IndexArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.closed.idealised import with_parallel_axes, with_spherical_wrist
 from urmpipe_models.inverse.closed.parallel_axes import ParallelAxes, parallel_axes
@@ -157,15 +157,15 @@ class NearlyClosedForm:
             start: Of each branch, shape (m, k, joints); NaN where there is none.
             wish: Joint values in [rad] or [m], shape (m, joints).
         """
-        came = refine(self.chain, targets, wish, metres=MET, radians=MET, iterations=FEW)
-        found, known = self._within_turn(came.q), q[rows]
+        found, converged = self._stepped(targets, wish, FEW)
+        known = q[rows]
         lost = np.isnan(known[:, :, 0])
         far = np.square(self._apart(known, wish[:, None])).sum(axis=2)
         nearer = np.square(self._apart(found, wish)).sum(axis=1) < np.where(lost, np.inf, far).min(axis=1)
         same = np.abs(self._apart(found[:, None], known)).max(axis=2) < SAME
         away = np.square(self._apart(found[:, None], np.where(lost[..., None], start, known))).sum(axis=2)
         branch = np.argmin(np.where(np.isnan(away), np.inf, away), axis=1)
-        new = came.converged & nearer & ~same.any(axis=1)
+        new = converged & nearer & ~same.any(axis=1)
         q[rows[new], branch[new]] = found[new]
 
     def _refined(self, targets: Targets, start: FloatArray, row: IndexArray, slot: IndexArray) -> FloatArray:
@@ -176,12 +176,16 @@ class NearlyClosedForm:
         found = np.full_like(start, np.nan)
         if len(row):
             asked = targets.rows(row % len(targets))
-            came = refine(self.chain, asked, start[row, slot], metres=MET, radians=MET, iterations=STEPS)
-            q = self._within_turn(came.q)
+            q, converged = self._stepped(asked, start[row, slot], STEPS)
             away = np.square(self._apart(q[:, None], start[row])).sum(axis=2)
-            own = came.converged & (np.nanargmin(away, axis=1) == slot)
+            own = converged & (np.nanargmin(away, axis=1) == slot)
             found[row[own], slot[own]] = q[own]
         return found
+
+    def _stepped(self, targets: Targets, q: FloatArray, steps: int) -> tuple[FloatArray, BoolArray]:
+        """Return where so many steps lead from q, shape (n, joints), and whether a target is met there."""
+        came = refine(self.chain, targets, q, metres=MET, radians=MET, iterations=steps)
+        return self._within_turn(came.q), came.converged
 
     def _apart(self, q: FloatArray, other: FloatArray) -> FloatArray:
         """Return the difference of joint values by the shorter way."""

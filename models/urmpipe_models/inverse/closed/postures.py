@@ -63,7 +63,7 @@ def leave_out_equal(
         q[:, second, same] = np.nan
         reasons[second, same] = f"the same as {branches[first]}: both meet here"
     if meet.any():
-        meeting["postures meet"] = meet | meeting.get("postures meet", np.zeros_like(meet))
+        meeting["postures meet"] = meet | meeting.get("postures meet", False)
 
 
 def leave_out_second(
@@ -83,6 +83,6 @@ def leave_out_second(
     second: tuple[slice | int, ...] = (slice(None), 1) if axis == 1 else (1,)
     for u in (u1, u3):
         u[(slice(None), *second)][:, meet[second]] = np.nan
-    same = np.array([f"the same as {name}: both meet here" for name in names[first]], dtype=np.object_)
+    same = np.array([f"the same as {name}: both meet here" for name in names[first]])
     where = meet[second] & (reasons[second] == "")
     reasons[second] = np.where(where, same[:, None], reasons[second])

@@ -14,18 +14,20 @@ from spherical_arms import KINDS, assert_reached, away_from, random_arm, random_
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.closed.closed_form import closed_form, exact_form
-from urmpipe_models.inverse.closed.idealised import compact
-from urmpipe_models.inverse.closed.nearly import LOST, NearlyClosedForm
+from urmpipe_models.inverse.closed.idealised import compact, with_parallel_axes, with_spherical_wrist
+from urmpipe_models.inverse.closed.nearly import LOST, MET, NearlyClosedForm
+from urmpipe_models.inverse.closed.parallel_axes import parallel_axes
+from urmpipe_models.inverse.closed.spherical_wrist import spherical_wrist
 from urmpipe_models.inverse.closed.trigonometric import wrapped
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.solve import solve
-from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_models.inverse.targets import Targets, misses, targets_of
 from urmpipe_models.kinematics.forward import jacobian_over_log, poses_over_log
 from urmpipe_models.kinematics.screws import chain_of, screws
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.robots.urdf_writer import urdf_text
-from urmpipe_models.transform import from_offset
+from urmpipe_models.transform import from_offset, translation
 
 SINGULAR = 1e-2
 """Least singular value of the Jacobian (m and rad) from which on no branch may be lost."""
@@ -70,7 +72,7 @@ def regular_joints(chain: Chain, count: int) -> FloatArray:
 def assert_all_found(chain: Chain, q: FloatArray, solutions: Solutions) -> None:
     """Hold solutions to their poses: each once, the joint values that the poses were made of among them."""
     targets = targets_of(chain, q)
-    assert_reached(chain, targets, solutions)
+    assert_reached(chain, targets, solutions, MET + 1e-15)  # rounding of poses of some metres
     assert away_from(chain, solutions, q).min(axis=1).max() < 1e-6
     for k in range(1, solutions.q.shape[1]):
         apart = np.abs(wrapped(solutions.q[:, :k] - solutions.q[:, [k]])).max(axis=2)
@@ -168,6 +170,42 @@ def test_a_branch_that_is_lost_beside_a_singular_pose_says_so() -> None:
     assert_reached(chain, targets_of(chain, q), solutions)
     assert ((solutions.reasons == "") == solutions.reached).all()
     assert (solutions.reasons == LOST).any()
+
+
+def idealised(chain: Chain) -> Chain:
+    """Return the arm whose closed form an arm has nearly."""
+    found, names = screws(chain), chain.coordinates
+    assert found is not None
+    ideals = (
+        *(one for one in with_spherical_wrist(found) if spherical_wrist(one, names)),
+        *(one for one in with_parallel_axes(found) if parallel_axes(one, names)),
+    )
+    return chain_of(ideals[0], names)
+
+
+@pytest.mark.parametrize("name", ["arm6", "ur5e"])
+def test_the_deviation_is_about_the_largest_of_many_poses(name: str) -> None:
+    chain = as_built(load_robot(name), 1e-4)
+    q = random_joints(np.random.default_rng(7), chain, 1000)
+    apart = misses(chain, q, targets_of(idealised(chain), q))
+    for found, of_many in zip(nearly(chain).deviation, apart, strict=True):
+        assert np.linalg.norm(of_many, axis=1).max() == pytest.approx(found, rel=0.3)
+
+
+def test_what_is_left_of_singular_poses_is_told_where_a_solution_is_left() -> None:
+    """The idealised arm's wrist is aligned in all poses but the first; the arm's own axis 5 passes by it."""
+    exact = load_robot("articulated6r")
+    shifted = replace(exact.joints[4], origin=exact.joints[4].origin @ translation(0.0, 1e-4, 0.0))
+    chain = replace(exact, joints=(*exact.joints[:4], shifted, exact.joints[5]), visuals=())
+    q = np.random.default_rng(5).uniform(-3.0, 3.0, (6, 6))
+    q[1:, 4], q[3, 2] = 0.0, 0.0  # and the arm stretched in one of them
+    form, targets = nearly(chain), targets_of(idealised(chain), q)
+    solutions = form.solve(targets)
+    (before,), (after,) = form.form.solve(targets).singular, solutions.singular
+    assert before.family == after.family == "wrist aligned"
+    np.testing.assert_array_equal(after.where, before.where & solutions.reached)
+    assert before.where.any(axis=1).tolist() == [False] + [True] * 5
+    assert after.where.sum() < before.where.sum()
 
 
 @pytest.mark.parametrize("near", [None, np.zeros(6)])

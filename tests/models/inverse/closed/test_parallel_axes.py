@@ -89,15 +89,16 @@ def test_positions_alone_are_refused() -> None:
 
 
 @pytest.mark.parametrize(
-    "fault", ["axis 4 tilted", "links of no length", "axis 1 parallel", "axis 5 parallel"]
+    "fault", ["axis 3 tilted", "axis 4 tilted", "links of no length", "axis 1 parallel", "axis 5 parallel"]
 )
 def test_what_has_another_geometry_is_not_recognised(fault: str) -> None:
     of_chain = screws(load_robot("ur5e"))
     assert of_chain is not None
     direction, point = of_chain.direction.copy(), of_chain.point.copy()
-    if fault == "axis 4 tilted":  # a calibrated arm: 1e-6 rad is 1 um at 1 m
-        direction[3] = np.array((math.sin(1e-6), *direction[3][1:]))
-        direction[3] /= np.linalg.norm(direction[3])
+    if fault in {"axis 3 tilted", "axis 4 tilted"}:  # a calibrated arm: 1e-6 rad is 1 um at 1 m
+        tilted = int(fault.split()[1]) - 1
+        direction[tilted] = np.array((math.sin(1e-6), *direction[tilted][1:]))
+        direction[tilted] /= np.linalg.norm(direction[tilted])
     if fault == "links of no length":
         point[2] = point[1]
     if fault == "axis 1 parallel":

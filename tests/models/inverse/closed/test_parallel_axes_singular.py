@@ -137,6 +137,18 @@ def test_where_q6_of_the_convention_is_out_of_reach_the_nearest_in_reach_is_take
     assert apart(further, q)[0] < 1e-9
 
 
+def test_two_branches_that_are_one_are_told_once_whatever_stands_before_them() -> None:
+    chain = load_robot("ur5e")
+    regular, stretched = [0.3, -1.0, 1.2, -0.5, 0.7, 0.2], [0.3, -1.0, 0.0, -0.5, 0.7, 0.2]
+    targets = targets_of(chain, np.array([regular, stretched, regular]))
+    together = form_of(chain).solve(targets)
+    assert any(text.startswith("the same as") for text in together.reasons[1])
+    for row in range(3):
+        alone = form_of(chain).solve(targets.rows(slice(row, row + 1)))
+        np.testing.assert_array_equal(together.q[row], alone.q[0])
+        assert together.reasons[row].tolist() == alone.reasons[0].tolist()
+
+
 def arm_without_shoulder_offset(upper: float, fore: float) -> Chain:
     """An arm like a UR arm, whose axes 5 and 6 meet in the plane of its links, which goes through axis 1."""
     right = math.pi / 2

@@ -13,7 +13,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.dh import DHRow, dh_chain
 from urmpipe_models.inverse.closed.spherical_wrist import BLOCK
 from urmpipe_models.inverse.solutions import Solutions
-from urmpipe_models.inverse.targets import targets_of
+from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.kinematics.forward import jacobian_over_log
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -219,6 +219,24 @@ def test_a_wrist_nearer_to_axis_1_than_the_offset_is_told_with_figures() -> None
     targets.position[0] = targets.rotation[0] @ np.array([0.0, 0.0, 0.1]) + np.array([0.03, 0.04, 0.6])
     solutions = inverse_of(chain).solve(targets)
     assert solutions.reason(0) == "the wrist centre is 0.050 m from axis 1, allowed: 0.150 m or more"
+
+
+def test_a_wrist_nearer_than_a_slide_can_draw_it_is_told_with_figures() -> None:
+    """The slide passes the point where axes 1 and 2 meet."""
+    rows = [
+        DHRow(d=0.4, alpha=-math.pi / 2),
+        DHRow(d=0.15, a=0.1, alpha=math.pi / 2),
+        DHRow(kind="prismatic", a=0.05, alpha=0.3),
+        DHRow(d=0.1, alpha=-math.pi / 2),
+        DHRow(alpha=math.pi / 2),
+        DHRow(),
+    ]
+    # the slide draws the wrist along z of joint 3; across it stand 0.1 + 0.05 and 0.15 less 0.1 sin 0.3
+    least = math.hypot(0.1 + 0.05, 0.15 - 0.1 * math.sin(0.3))
+    target = Targets(np.array([[0.16, 0.0, 0.4]]), np.eye(3)[None])
+    found = inverse_of(dh_chain("polar", rows)).solve(target).reason(0)
+    where = "from the point where axes 1 and 2 meet"
+    assert found == f"the wrist centre is 0.160 m {where}, allowed: {least:.3f} m or more"
 
 
 def test_wrist_on_axis_2_leaves_joint_2() -> None:

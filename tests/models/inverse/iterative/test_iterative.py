@@ -28,6 +28,19 @@ MET = 1e-10
 """What is promised by default in [m] and [rad], and what forward kinematics confirms."""
 
 
+def test_where_nothing_bends_each_step_is_what_was_foreseen_and_the_next_is_damped_an_eighth() -> None:
+    """e' = e mu / (1 + mu) of an arm whose Jacobian is the unit matrix, mu = g |e|^2, g from 0.1."""
+    axes = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    chain = Chain("gantry", tuple(Joint(f"q{k}", "prismatic", axis=axis) for k, axis in enumerate(axes)))
+    target = Targets(np.array([[1.0, 2.0, 2.0]]))
+    error, gain = 3.0, 0.1
+    for steps in range(1, 4):
+        error, gain = error * gain * error**2 / (1.0 + gain * error**2), gain / 8.0
+        found = refine(chain, target, np.zeros((1, 3)), iterations=steps)
+        # the last is 7e-8: the rounding of coordinates of 2 m
+        np.testing.assert_allclose(found.residual, error, rtol=1e-14, atol=1e-15)
+
+
 def within(chain: Chain, count: int, seed: int = 3) -> FloatArray:
     """Return joint values, uniform within limits and one turn."""
     lower, upper = limits_of(chain)

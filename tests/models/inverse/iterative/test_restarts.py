@@ -239,6 +239,17 @@ def test_a_target_out_of_reach_says_how_near_the_tool_comes() -> None:
     )
 
 
+@pytest.mark.parametrize("every", [True, False])
+def test_of_all_attempts_the_one_that_came_nearest_counts(every: bool) -> None:
+    """The target stands behind a joint that ends at 3 rad to either side, nearer to the end that is -3."""
+    chain = Chain("one", (Joint("turn", lower=-3.0, upper=3.0),), tip=translation(1.0, 0.0, 0.0))
+    target = Targets(0.9 * np.array([[math.cos(-3.12), math.sin(-3.12), 0.0]]))
+    assert random_starts(chain, 1, 0)[0, 0] > 0.0  # it comes to the farther end, as the start does
+    found = solve_iteratively(chain, target, start=np.array([1.0]), every=every)
+    miss = math.hypot(0.9 * math.cos(3.12) - math.cos(3.0), 0.9 * math.sin(3.12) - math.sin(3.0))
+    assert found.reasons.tolist() == [[f"no solution in 20 restarts; nearest: {miss:.3f} m away"]]
+
+
 def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() -> None:
     arm = planar()
     targets = Targets(np.array([[0.903, 0.0, 0.0], [0.91, 0.0, 0.0], [0.5, 0.1, 0.0]]))

@@ -1,0 +1,70 @@
+"""How a result shows itself: one line at a prompt, headline, notes and table in a notebook."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import pandas as pd
+import pytest
+
+from urmpipe_models.display import HEAD, LONGEST, Shown, line_of, number_of
+
+
+@dataclass
+class Doubt:
+    """What a person should know."""
+
+    message: str
+
+
+@dataclass(repr=False)
+class Shelf(Shown):
+    """A result of so many rows."""
+
+    headline: str
+    rows: int = 0
+    warnings: tuple[Doubt, ...] = ()
+
+    def _headline(self) -> str:
+        return self.headline
+
+    def to_frame(self) -> pd.DataFrame:
+        return pd.DataFrame({"book": range(1000, 1000 + self.rows)})
+
+
+def warned(*messages: str) -> tuple[Doubt, ...]:
+    return tuple(Doubt(message) for message in messages)
+
+
+def test_the_line_has_the_headline_and_the_number_of_warnings() -> None:
+    assert repr(Shelf("three\nbooks")) == "<Shelf three\\nbooks>"
+    assert repr(Shelf("books", warnings=warned("one"))) == "<Shelf books, 1 warning>"
+    assert repr(Shelf("books", warnings=warned("one", "two"))) == "<Shelf books, 2 warnings>"
+
+
+@pytest.mark.parametrize(("warnings", "ending"), [((), ">"), (warned("one"), ", 1 warning>")])
+def test_what_does_not_fit_into_the_line_is_cut(warnings: tuple[Doubt, ...], ending: str) -> None:
+    room = LONGEST - len("<Shelf ") - len(ending)
+    assert repr(Shelf("x" * room, warnings=warnings)) == f"<Shelf {'x' * room}{ending}"
+    assert repr(Shelf("x" * (room + 1), warnings=warnings)) == f"<Shelf {'x' * (room - 3)}...{ending}"
+
+
+def test_a_notebook_shows_headline_notes_and_the_head_of_the_table() -> None:
+    html = Shelf("a<b\n", 2, warned("c<d\n", "e"))._repr_html_()
+    shown, table = html.split("<table", 1)
+    assert shown == "<p><b>Shelf</b> a&lt;b\\n</p><ul><li>c&lt;d\\n</li><li>e</li></ul>"
+    assert table.endswith("</table>")
+    assert Shelf("books", 2)._repr_html_().startswith("<p><b>Shelf</b> books</p><table")
+
+
+def test_a_table_is_cut_after_its_head_and_says_so() -> None:
+    whole, cut = Shelf("books", HEAD)._repr_html_(), Shelf("books", HEAD + 1)._repr_html_()
+    assert whole.endswith("</table>")
+    assert cut == whole + f"<p>{HEAD} of {HEAD + 1} rows of to_frame()</p>"
+    cells = "".join(f"<tr><td>{1000 + row}</td></tr>" for row in range(HEAD))
+    assert f"<tbody>{cells}</tbody>" in "".join(whole.split())
+
+
+def test_numbers_and_facts_are_listed() -> None:
+    assert [number_of(count, "row") for count in (0, 1, 2)] == ["0 rows", "1 row", "2 rows"]
+    assert line_of("log", "urm6", "", None, number_of(2, "row")) == "log: urm6, 2 rows"
