@@ -10,16 +10,11 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-import click
 import numpy as np
 import pytest
-from click.shell_completion import ShellComplete
 
 import urmpipe
 from urmpipe.api.simulate import simulate
-from urmpipe.commands.simulate import simulate as command
-from urmpipe.main import cli
-from urmpipe.options.types import UNIT
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.simulations.simulation import Simulation
@@ -319,28 +314,6 @@ def test_an_fmu_that_fails_at_once_leaves_an_empty_recording(following: Path, tm
     read = urmpipe.read_recording(tmp_path / "run.rrd")
     assert isinstance(read, Simulation)
     assert read.failed == result.failed
-
-
-def test_names_complete_in_the_shell() -> None:
-    context, argument = click.Context(command), command.params[0]
-    assert argument.type.shell_complete(context, argument, "six")[0].value == "six-drives"
-    units = UNIT.shell_complete(context, argument, "dc")
-    assert [(one.value, one.type) for one in units] == [("dc_drive", "plain"), ("dc", "file")]
-
-
-@pytest.mark.parametrize(
-    ("line", "begun", "offered"),
-    [
-        (["simulate", "log-to-delta", "--set"], "r", ["reference=", "robot="]),
-        (["simulate", "--set"], "", []),
-        (["simulate", "nosuch", "--set"], "", []),
-        (["fmu", "build", "kinematic_chain", "-s"], "", ["points=", "sensors=", "rates="]),
-        (["fmu", "build", "log_source", "--option"], "c", ["columns="]),
-    ],
-)
-def test_what_is_set_completes_in_the_shell(line: list[str], begun: str, offered: list[str]) -> None:
-    complete = ShellComplete(cli, {}, "urmpipe", "_URMPIPE_COMPLETE")
-    assert [one.value for one in complete.get_completions(line, begun)] == offered
 
 
 def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:

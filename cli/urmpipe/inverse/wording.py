@@ -162,7 +162,13 @@ def near_singular_warnings(
 
 
 def start_warnings(chain: Chain, start: FloatArray | None, given_by: str = "--start") -> Iterator[LogWarning]:
-    """Yield a warning of a pose, shape (joints,), that is hardly in rad, and by which option it was given."""
+    """Yield a warning of a pose that is hardly in rad.
+
+    Args:
+        chain: The arm.
+        start: The pose in [rad] or [m], shape (joints,).
+        given_by: The option by which it was given.
+    """
     if start is None:
         return
     found = [

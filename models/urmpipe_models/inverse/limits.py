@@ -57,11 +57,12 @@ def in_nearest_turn(chain: Chain, q: FloatArray, near: FloatArray | float) -> tu
     Args:
         chain: The arm.
         q: In [rad] or [m], shape (..., joints).
-        near: Of the turns that are allowed the nearest to it is taken, in [rad] or [m], of a shape that
-            broadcasts to that of q.
+        near: Of the turns that are allowed the nearest to it is taken, in [rad] or [m], shape (..., joints)
+            or (joints,).
 
     Returns:
-        Both of the shape of q; what is outside of its limits is put on the nearest one.
+        In [rad] or [m] and [-], shape (..., joints) both; what is outside of its limits is put on the nearest
+        one.
     """
     lower, upper = limits_of(chain)
     least = np.ceil((lower - LIMIT_ROUNDING - q) / TURN)
