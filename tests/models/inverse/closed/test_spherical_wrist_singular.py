@@ -221,6 +221,35 @@ def test_a_wrist_nearer_to_axis_1_than_the_offset_is_told_with_figures() -> None
     assert solutions.reason(0) == "the wrist centre is 0.050 m from axis 1, allowed: 0.150 m or more"
 
 
+@pytest.mark.parametrize(
+    ("distance", "said"),
+    [
+        (0.95, "0.950 m from axis 2, allowed: 0.100 to 0.900 m"),
+        (0.9 + 2e-5, "0.900020 m from axis 2, allowed: 0.100000 to 0.900000 m"),
+        (0.1 - 2e-4, "0.09980 m from axis 2, allowed: 0.10000 to 0.90000 m"),
+        (0.05, "0.050 m from axis 2, allowed: 0.100 to 0.900 m"),
+    ],
+)
+def test_a_wrist_out_of_reach_of_the_links_is_told_from_axis_2(distance: float, said: str) -> None:
+    """Links of 0.5 and 0.4 m in a plane 0.15 m beside axis 1; as many digits as tell the figures apart."""
+    rows = [
+        DHRow(d=0.4, alpha=math.pi / 2),
+        DHRow(d=0.15, a=0.5),
+        DHRow(alpha=math.pi / 2),
+        DHRow(d=0.4, alpha=-math.pi / 2),
+        DHRow(alpha=math.pi / 2),
+        DHRow(),
+    ]
+    places = [
+        [math.hypot(0.15, distance), 0.0, 0.4],
+        [math.hypot(0.15, 0.6 * distance), 0.0, 0.4 + 0.8 * distance],
+    ]
+    found = inverse_of(dh_chain("beside", rows)).solve(
+        Targets(np.array(places), np.tile(np.eye(3), (2, 1, 1)))
+    )
+    assert [found.reason(0), found.reason(1)] == [f"the wrist centre is {said}"] * 2
+
+
 def test_a_wrist_nearer_than_a_slide_can_draw_it_is_told_with_figures() -> None:
     """The slide passes the point where axes 1 and 2 meet."""
     rows = [
