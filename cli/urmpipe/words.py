@@ -84,6 +84,7 @@ SPELLINGS = {
     "--tool": Spelling("tool", _FRAME),
     "--tsp": Spelling("tsp", rf"{_SHOWN}|[0-9][0-9.e-]*"),
     "--unit": Spelling("units", r"[^';,()=]*=[A-Za-z]\w*|(?:rad|deg|mm|m|s|ms|us|ns)(?![\w:])", "units"),
+    "--within-pi": Spelling("within_pi"),
     "--write-map": Spelling("write_map", _SHOWN),
     "-o": Spelling("output", _SHOWN),
 }

@@ -82,7 +82,7 @@ def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) ->
     assert run(["report", "now.rrd", "-q"]) == 0
     page = Path("now.html").read_text(encoding="utf-8")
     assert "<title>FAIL: slack-against-wanted" in page
-    assert "within tolerance, but worse than the baseline" in page
+    assert ", by the joints on both sides, but worse than the baseline good-against-wanted" in page
     assert "Against the baseline good-against-wanted: " in page
 
 
