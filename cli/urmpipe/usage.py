@@ -96,6 +96,10 @@ def usage_finding(error: click.UsageError) -> Finding:
             said = f"found no {_told(param)}, allowed: {_usage(ctx)}"
         case click.BadParameter(param=click.Parameter() as param):
             return place_of(ctx, param, error.message)
+        case click.UsageError() if ctx and "unexpected extra" in error.message:  # told by its words alone
+            found = error.message.partition("(")[2].rstrip(")")
+            robot = "; a robot is named with --robot" if _takes(ctx, "--robot") else ""
+            said = f"found {found} besides the rest, allowed: {_usage(ctx)}{robot}"
         case _:
             said = error.format_message()
     return Finding(said if ctx is None or "allowed: " in said else f"{said}; see {ctx.command_path} --help")
@@ -127,6 +131,11 @@ def _value(ctx: click.Context | None, name: str) -> str:
     option = next((one for one in params if name in one.opts), None)
     told = option.make_metavar(ctx) if ctx and option else "VALUE"
     return told[1:-1] if told[0] == "[" and told[-1] == "]" else told  # of a choice
+
+
+def _takes(ctx: click.Context, option: str) -> bool:
+    """Return whether a command has an option."""
+    return any(option in param.opts for param in ctx.command.params)
 
 
 def _usage(ctx: click.Context | None) -> str:

@@ -226,3 +226,10 @@ def test_errors_as_json(capsys: Captured) -> None:
     assert run(["ik", "targets.csv", "--json"]) == 2
     (error,) = json.loads(capsys.readouterr().out)["errors"]
     assert error["message"].startswith("found no robot; allowed: --robot NAME|FILE")
+
+
+def test_a_robot_among_the_operands_is_told_by_its_option(capsys: Captured) -> None:
+    assert refused(capsys, "arm6", "targets.csv") == [
+        "error: found targets.csv besides the rest, allowed: urmpipe ik [OPTIONS] TARGETS|PATH; a robot is"
+        " named with --robot"
+    ]

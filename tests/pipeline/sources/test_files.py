@@ -57,6 +57,22 @@ def test_containers_by_suffix_and_by_their_first_bytes(wrong: Wrong, suffix: str
         assert wrong(content, name=name) == [f"{name}: found {CONTAINERS[suffix].format(name=name)}"]
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("arm.urdf", "the model of a robot, allowed: a text table; a robot is named with --robot arm.urdf"),
+        ("arm.csv", "the model of a robot, allowed: a text table; a robot is named with --robot arm.csv"),
+        (
+            "arm.toml",
+            "a TOML file, allowed: a text table; a robot is named with --robot arm.toml, a map with --map"
+            " arm.toml",
+        ),
+    ],
+)
+def test_a_robot_is_no_log(wrong: Wrong, name: str, said: str) -> None:
+    assert wrong(b'<robot name="arm">\n', name=name) == [f"{name}: found {said}"]
+
+
 def test_a_json_array_is_known_by_its_first_bytes(wrong: Wrong) -> None:
     assert wrong(b'[{"t": 0, "q": [1, 2]}]') == [
         'log.csv: found a JSON array, allowed: a text table; python -c "import pandas;'
