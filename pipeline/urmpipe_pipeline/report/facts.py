@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.causes import causes
+from urmpipe_pipeline.comparison.change_wording import since_words
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Stretch
 from urmpipe_pipeline.comparison.trajectory import Sync
@@ -20,7 +21,6 @@ from urmpipe_pipeline.comparison.wording import (
     tool_option,
 )
 from urmpipe_pipeline.inverse.verdict import reached
-from urmpipe_pipeline.report.baseline_table import worse_words
 from urmpipe_pipeline.runs.results import Run
 
 
@@ -90,7 +90,7 @@ def made(comparison: Comparison) -> str:
 
 def _since_baseline(comparison: Comparison) -> str:
     """Return what is worse than the baseline; nothing without one."""
-    return "" if comparison.baseline is None else worse_words(comparison.baseline)
+    return "" if comparison.baseline is None else since_words(comparison.baseline)
 
 
 def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact, ...]:
