@@ -90,7 +90,8 @@ def compare(
         sync: How the clocks are put together: start, auto, or t_reference - t_log in [s].
         align: How a log is moved in space first: none, start, rigid or tool.
         baseline: An earlier comparison, to tell what changed since.
-        noise: Changes since then that mean nothing, as `tolerance`; default: 1 um and 1 urad.
+        noise: Changes since then that mean nothing, in [m], or in [m] and [rad] by kind; default: 1 um and
+            1 urad.
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write.
         junit: A JUnit file (XML) to write.
