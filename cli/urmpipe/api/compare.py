@@ -27,7 +27,7 @@ from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.doubts import EXCHANGED, large_noises
+from urmpipe_pipeline.comparison.doubts import EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.comparison.junit import write_junit
 from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
@@ -90,7 +90,8 @@ def compare(
         sync: How the clocks are put together: start, auto, or t_reference - t_log in [s].
         align: How a log is moved in space first: none, start, rigid or tool.
         baseline: An earlier comparison, to tell what changed since.
-        noise: Changes since then that mean nothing, as `tolerance`; default: 1 um and 1 urad.
+        noise: Changes since then that mean nothing, in [m], or in [m] and [rad] by kind; default: 1 um and
+            1 urad.
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write.
         junit: A JUnit file (XML) to write.
@@ -118,7 +119,7 @@ def compare(
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
         made = made or _compared(operands, given, options)
         if earlier is not None:
-            made = replace(made, warnings=(*made.warnings, *large_noises(level, made.tolerance)))
+            made = _with_noise(made, level)
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         if told is not None:
@@ -237,12 +238,17 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
     return result
 
 
+def _with_noise(made: Comparison, noise: Mapping[str, float]) -> Comparison:
+    """Return a comparison with the doubts about a noise, and without those about one of an earlier time."""
+    others = [one for one in made.warnings if one.kind != LARGE_NOISE]
+    return replace(made, warnings=(*others, *large_noises(noise, made.tolerance)))
+
+
 def _refuse_doubts(strict: bool, result: Comparison) -> None:
     """Raise a `LogError` with the warnings of the logs and the comparison, if they are to be errors."""
     of_logs = [w.of(one.name) for one in result.runs for w in one.run.warnings]
-    doubts = [
-        w for w in result.warnings if w.kind not in (LACKING_TOOL, BEYOND, EXCHANGED)
-    ]  # those explain a result
+    explaining = (LACKING_TOOL, BEYOND, EXCHANGED)  # a result, and no doubts about it
+    doubts = [w for w in result.warnings if w.kind not in explaining]
     refuse_warnings(strict, (*of_logs, *doubts))
 
 

@@ -14,6 +14,7 @@ from urmpipe_pipeline.comparison.change_wording import (
     WORDS,
     samples_words,
     share_words,
+    since_words,
     statistic_words,
 )
 from urmpipe_pipeline.comparison.symbols import symbol
@@ -48,11 +49,8 @@ def print_worse(console: Console, found: BaselineComparison) -> None:
 
 def _print_verdict(console: Console, found: BaselineComparison) -> None:
     """Print whether anything is worse, and how much of it."""
-    number = len(found.worse)
-    worse = f"{number} {'quantity' if number == 1 else 'quantities'} worse"
-    gone = f", {len(found.gone)} gone" if found.gone else ""
-    said = "nothing worse" if found.verdict == "pass" else worse + gone
-    console.print(judged_line(found.verdict, f"against the baseline {found.name}: {said}"), soft_wrap=True)
+    said = f"against the baseline {found.name}: {since_words(found)}"
+    console.print(judged_line(found.verdict, said), soft_wrap=True)
 
 
 def _how(change: Change) -> str:

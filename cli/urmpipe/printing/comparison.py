@@ -37,7 +37,7 @@ def print_comparison(result: Comparison) -> None:
     for run in detailed[-SHOWN:]:
         title = f"{run.name} against {result.reference.name}"
         print_columns(console, title, list(_statistics(run)))
-        for line in facts(run):
+        for line in facts(run, result.reference):
             console.print(f"  {line}", soft_wrap=True)
     if left := len(ranked) - len(detailed[-SHOWN:]):
         console.print(f"Statistics of {text.counted(left, 'more log')}: --csv FILE, --json or the report.")

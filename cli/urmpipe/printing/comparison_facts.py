@@ -9,6 +9,7 @@ import numpy as np
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.wording import (
     alignment_words,
     correlation,
@@ -19,7 +20,7 @@ from urmpipe_pipeline.comparison.wording import (
 )
 
 
-def facts(run: Deviation) -> Iterator[str]:
+def facts(run: Deviation, reference: Trajectory) -> Iterator[str]:
     """Yield what is to be known of how a log was compared, a line each."""
     arm = f", robot {run.run.robot.name}" if run.run.robot else ""
     yield f"{text.counted(len(run.sample), 'sample')} compared over {text.seconds(run.duration)} s{arm}"
@@ -40,7 +41,7 @@ def facts(run: Deviation) -> Iterator[str]:
     yield from _sliding(run)
     if run.speed_correlation is not None:
         yield f"the norm goes with the speed by r = {correlation(run.speed_correlation)}"
-    yield from (f"looks like: {cause}" for cause in causes(run))
+    yield from (f"looks like: {cause}" for cause in causes(run, reference))
 
 
 def _place(run: Deviation) -> Iterator[str]:

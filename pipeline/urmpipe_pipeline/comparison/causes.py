@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections.abc import Iterator
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation
+from urmpipe_pipeline.comparison.trajectory import Trajectory
 
 IN_SPACE = 0.1
 """Share of the largest norm that a log may be off the path by, and still be late rather than elsewhere."""
@@ -16,29 +17,47 @@ IN_SPACE = 0.1
 STEADY = 0.1
 """Share of its mean that a joint's deviation may spread by (std), and still be constant."""
 
+MOVED = 10.0
+"""What a joint that is off by 1 rad or 1 m moves at most, in [m] or [rad]: no arm reaches further. What is
+off by more has another cause, whatever rounding left of the joint."""
 
-def causes(run: Deviation) -> Iterator[str]:
+
+def causes(run: Deviation, reference: Trajectory) -> Iterator[str]:
     """Yield what a log that is out of tolerance looks like, a sentence each; nothing of one that passes.
 
-    Late or early: off the reference at the same time, but at most a tenth of that off its path. The zero of a
-    joint: its deviation is the same throughout, and no joint's is larger.
+    Late or early: out of a tolerance of position at the same time, but off the path by at most a tenth of
+    that. The zero of a joint: its deviation is the same throughout, no joint's is larger, and it is large
+    enough for what decides.
+
+    Args:
+        run: The deviation of the log.
+        reference: What it was held against.
     """
     if run.verdict == "fail":
-        yield from _late(run)
+        yield from _late(run, reference)
         yield from _zeros(run)
 
 
-def _late(run: Deviation) -> Iterator[str]:
+def _late(run: Deviation, reference: Trajectory) -> Iterator[str]:
     norm, path = run.statistics["norm"], run.statistics["path"]
-    if norm.max > 0.0 and path.max <= IN_SPACE * norm.max and run.decisive.kind != "path":
-        remedy = "; --sync auto finds an offset of the clocks" if run.sync.mode == "start" else ""
+    position = (run.statistics[axis] for axis in AXES)
+    beyond = any(one.tolerance is not None and one.max > one.tolerance for one in position)
+    if beyond and path.max <= IN_SPACE * norm.max and path.verdict != "fail":
+        remedy = "; --sync auto finds an offset of the clocks" if _has_own_clock(run, reference) else ""
         most, least = text.quantity(norm.max, "m"), text.quantity(path.max, "m")
         yield f"on the path but not in time (‖Δ‖ {most}, path {least}): late or early{remedy}"
+
+
+def _has_own_clock(run: Deviation, reference: Trajectory) -> bool:
+    """Tell whether an offset may be looked for: not in one file, nor between targets without times."""
+    return run.sync.mode == "start" and run.run.log.files != reference.files and not run.run.single_poses
 
 
 def _zeros(run: Deviation) -> Iterator[str]:
     for unit in ("rad", "m"):
         one = run.furthest_joint(unit)
-        if one is not None and one.max > 0.0 and one.std <= STEADY * abs(one.mean):
+        if one is None or MOVED * one.max < run.decisive.max:
+            continue
+        if one.max > 0.0 and one.std <= STEADY * abs(one.mean):
             mean = f"{text.quantity(one.mean, unit)}, std {text.quantity(one.std, unit)}"
             yield f"{one.quantity} is off by the same throughout (reference - log = {mean}): another zero?"

@@ -16,6 +16,9 @@ from urmpipe_pipeline.runs.results import Run
 EXCHANGED = "path-as-log"
 """The kind of a doubt about the order of what was given: it says nothing against a log."""
 
+LARGE_NOISE = "large-noise"
+"""The kind of a doubt about the noise of a baseline: another baseline has its own."""
+
 AT_REST = 3e-4
 """What moves by less in [m] or [rad] rests: three times what a UR5e at rest was logged to span in 25 s,
 0.10 mrad and 0.10 mm."""
@@ -88,7 +91,7 @@ def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> 
             unit, other = ("rad", "deg") if "rad" in UNITS[kind] else ("m", "mm")
             said = f"a noise of {text.limit(level, unit)} {other} ({kind}) reaches the tolerance of"
             why = f"{text.limit(allowed, unit)} {other}: nothing within it can be worse than the baseline"
-            yield LogWarning("large-noise", f"{said} {why}; a number without a unit is in {unit}")
+            yield LogWarning(LARGE_NOISE, f"{said} {why}; a number without a unit is in {unit}")
 
 
 def exchanged(reference: Run, runs: Iterable[Run]) -> Iterator[LogWarning]:

@@ -32,10 +32,10 @@ def used_words(statistics: Statistics) -> str:
         return ""
     if statistics.missing:
         return f"no value at {statistics.missing} of {(statistics.samples or 0) + statistics.missing} samples"
-    return share_words(share)
+    return portion_words(share)
 
 
-def share_words(share: float) -> str:
+def portion_words(share: float) -> str:
     """Return a share of a tolerance: "71.0 % of the tolerance", "1.2 times the tolerance"."""
     return f"{percent(share)} of the tolerance" if share <= 1.0 else f"{_times(share)} times the tolerance"
 

@@ -11,7 +11,7 @@ from urmpipe_pipeline.comparison.alignment import tool_with
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics, Stretch
-from urmpipe_pipeline.comparison.symbols import SYMBOLS, allowed_words, share_words, size_of, used_words
+from urmpipe_pipeline.comparison.symbols import SYMBOLS, allowed_words, portion_words, size_of, used_words
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 
 NAMED = 3
@@ -32,8 +32,18 @@ def verdict_words(comparisons: Sequence[Comparison]) -> str:
     points = {_points(one) for one in comparisons}
     said += points.pop() if len(points) == 1 else ""
     said += part_words([one.covered(run) for one in comparisons for run in one.runs])
+    return said + _since(comparisons, failed=bool(failed))
+
+
+def _since(comparisons: Sequence[Comparison], *, failed: bool) -> str:
+    """Return that comparisons are worse than their baselines; of one alone only if it is within tolerance."""
     worse = [one.baseline.name for one in comparisons if one.baseline and one.baseline.verdict == "fail"]
-    return said if failed or not worse else f"{said}, but worse than the baseline {worse[0]}"
+    if not worse:
+        return ""
+    if len(comparisons) == 1:
+        return "" if failed else f", but worse than the baseline {worse[0]}"
+    than = "is worse than its baseline" if len(worse) == 1 else "are worse than their baselines"
+    return f", {'and' if failed else 'but'} {len(worse)} of {len(comparisons)} comparisons {than}"
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:
@@ -50,9 +60,10 @@ def _points(one: Comparison) -> str:
     """Return by which tool centre points a log is held against others; nothing if a path is the reference."""
     if not one.reference.joints:
         return ""
-    recorded = one.provenance.options.get("tcp") == "recorded"
-    sides = "on both sides" if all(run.run.log.joints for run in one.runs) else "of the reference"
-    return f", {'as recorded' if recorded else 'by the joints'} {sides}"
+    if one.provenance.options.get("tcp") == "recorded":
+        return ", as recorded on both sides"
+    every = all(run.run.log.joints for run in one.runs)
+    return f", by the joints {'on both sides' if every else 'of the reference'}"
 
 
 def decided_words(one: Statistics) -> str:
@@ -72,7 +83,7 @@ def amount_words(one: Statistics) -> str:
     Where a quantity with a tolerance lacks values, that: "angle has no value at 3 of 40 samples".
     """
     if _lacks(one):
-        return f"{size_of(one)} has no value at {one.missing} of {(one.samples or 0) + one.missing} samples"
+        return f"{size_of(one)} has {used_words(one)}"
     return f"{size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
 
 
@@ -129,8 +140,8 @@ def meter_words(one: DeltaVerdict) -> str:
 
 
 def meter_used(one: DeltaVerdict) -> str:
-    """Return how much of its tolerance a delta meter uses up; nothing of no value and where it is 0."""
-    return "" if one.used is None or math.isinf(one.used) else share_words(one.used)
+    """Return how much of its tolerance a delta meter uses up; nothing without a value, or if 0 is allowed."""
+    return "" if one.used is None or math.isinf(one.used) else portion_words(one.used)
 
 
 def meter_amount(one: DeltaVerdict) -> str:

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison, Change, Difference
 from urmpipe_pipeline.comparison.deviation import Statistics
+from urmpipe_pipeline.json_values import flat
 
 
 def baseline_data(found: BaselineComparison | None) -> dict[str, Any] | None:
@@ -20,9 +20,9 @@ def baseline_data(found: BaselineComparison | None) -> dict[str, Any] | None:
         "recording": found.recording,
         "noise": dict(found.noise),
         "changes": [_change(one) for one in found.changes],
-        "new": [_flat(one) for one in found.new],
-        "gone": [_flat(one) for one in found.gone],
-        "differences": [_flat(one) for one in found.differences],
+        "new": [flat(one) for one in found.new],
+        "gone": [flat(one) for one in found.gone],
+        "differences": [flat(one) for one in found.differences],
     }
 
 
@@ -42,7 +42,7 @@ def baseline_from(data: Mapping[str, Any] | None) -> BaselineComparison | None:
 
 
 def _change(one: Change) -> dict[str, Any]:
-    return {**_flat(one), "before": _flat(one.before), "now": _flat(one.now)}
+    return {**flat(one), "before": flat(one.before), "now": flat(one.now)}
 
 
 def _change_from(data: Mapping[str, Any]) -> Change:
@@ -54,7 +54,3 @@ def _change_from(data: Mapping[str, Any]) -> Change:
         "periods": (periods[0], periods[1]),
     }
     return Change(**{**data, **told})
-
-
-def _flat(item: Change | Statistics | Absent | Difference) -> dict[str, Any]:
-    return {field.name: getattr(item, field.name) for field in fields(item)}

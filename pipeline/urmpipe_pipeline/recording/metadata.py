@@ -8,16 +8,16 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
-from dataclasses import fields
 from itertools import groupby
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.json_values import flat
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording.baseline_data import baseline_data, baseline_from
 from urmpipe_pipeline.recording.entities import (
@@ -30,9 +30,6 @@ from urmpipe_pipeline.recording.entities import (
 )
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
 
 
 def to_json(result: Run | Comparison, blocks: list[Block]) -> str:
@@ -247,11 +244,6 @@ def files_from(data: list[dict[str, Any]]) -> tuple[SourceFile, ...]:
 def warnings_from(data: list[dict[str, Any]]) -> tuple[LogWarning, ...]:
     """Return the warnings that a JSON list tells of."""
     return tuple(LogWarning(**one) for one in data)
-
-
-def flat(item: DataclassInstance) -> dict[str, Any]:
-    """Return a dataclass of plain values as a dictionary, without the deep copies of `asdict`."""
-    return {field.name: getattr(item, field.name) for field in fields(item)}
 
 
 def _plain(value: Any) -> Any:

@@ -55,7 +55,7 @@ def _of_run(run: Run) -> Iterator[str]:
     yield f"{files}, {done} {shown(run.log.source)}: {rows}. {robot}"
     yield ""
     if run.single_poses:
-        missing = " Rows that are not reached show no arm." if not solved(run) else ""
+        missing = " Rows that are not reached show no arm." if reached(run) < run.log.rows else ""
         yield f"Without times: the timeline counts rows, t = 0 s is row 1.{missing}"
     else:
         every = f", one in {1e3 * run.tsp:.6g} ms" if len(run.t_ns) > 1 else ""

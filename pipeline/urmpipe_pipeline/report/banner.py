@@ -110,7 +110,8 @@ def solved_banner(runs: Sequence[Run]) -> Banner:
     """
     state = "pass" if all(map(solved, runs)) else "fail"
     facts = (Fact("Warnings", str(sum(len(run.warnings) for run in runs))),)
-    said = " ".join(f"{fault}." for run in runs for fault in faults(run))
+    told = ((f"{run.name}: " if len(runs) > 1 else "", fault) for run in runs for fault in faults(run))
+    said = " ".join(f"{of}{fault}." for of, fault in told)
     return Banner(state, state.upper(), reached_words(runs), facts, said)
 
 

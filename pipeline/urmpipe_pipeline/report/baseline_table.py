@@ -3,12 +3,10 @@
 from __future__ import annotations
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.change import BaselineComparison, Change, Worse
+from urmpipe_pipeline.comparison.change import BaselineComparison, Change
+from urmpipe_pipeline.comparison.change_wording import WORDS, share_pair, since_words, statistic_pair
 from urmpipe_pipeline.comparison.symbols import symbol
 from urmpipe_pipeline.report.tables import MOST, Cell, Table, numbers, without_empty_columns, words
-
-SAID: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "share out", "samples": "samples"}
-"""What people call what may be worse."""
 
 
 def baseline_table(found: BaselineComparison) -> Table:
@@ -24,42 +22,25 @@ def baseline_table(found: BaselineComparison) -> Table:
     return without_empty_columns(Table(_title(found), columns, rows, note=_note(found, len(changed))))
 
 
-def worse_words(found: BaselineComparison) -> str:
-    """Return how much is worse than the baseline: "5 quantities worse, run 3 gone"."""
-    count = len(found.worse)
-    said = [f"{count} {'quantity' if count == 1 else 'quantities'} worse"] if count else []
-    if found.gone:
-        said.append(f"{', '.join(map(str, found.gone))} gone")
-    return ", ".join(said) or "nothing worse"
-
-
 def _title(found: BaselineComparison) -> str:
-    return f"Against the baseline {found.name}: {worse_words(found)}"
+    return f"Against the baseline {found.name}: {since_words(found)}"
 
 
 def _row(one: Change) -> tuple[Cell, ...]:
     before, now, unit = one.before, one.now, one.now.unit
     told = {*one.worse, *one.better}
-    shares = (before.share_out, now.share_out) if "share_out" in told else (None, None)
+    shares = share_pair(one) if "share_out" in told else (text.NOTHING, text.NOTHING)
     counts = (before.samples, now.samples) if "samples" in told else (None, None)
     return (
         Cell(one.run),
         Cell(f"{symbol(now)} [{text.SHOWN[unit][0]}]"),
-        Cell(", ".join(SAID[name] for name in one.worse) or text.NOTHING, most=True),
-        Cell(", ".join(SAID[name] for name in one.better) or text.NOTHING),
-        *(_number(value, other, one) for value, other in ((before.max, now.max), (now.max, before.max))),
-        *(_number(value, other, one) for value, other in ((before.rms, now.rms), (now.rms, before.rms))),
-        *(Cell(text.NOTHING if share is None else text.percent(share)) for share in shares),
+        Cell(", ".join(WORDS[name] for name in one.worse) or text.NOTHING, most=True),
+        Cell(", ".join(WORDS[name] for name in one.better) or text.NOTHING),
+        *map(Cell, (*statistic_pair(one, "max"), *statistic_pair(one, "rms"), *shares)),
         *(Cell(text.NOTHING if count is None else str(count)) for count in counts),
         Cell(text.number(one.largest, unit)),
         Cell(text.NOTHING if one.t_largest is None else text.seconds(one.t_largest)),
     )
-
-
-def _number(value: float, other: float, one: Change) -> Cell:
-    """Return a statistic, with more digits where they tell a change beyond the noise."""
-    against = other if abs(value - other) > one.noise else None
-    return Cell(text.number(value, one.now.unit, against))
 
 
 def _note(found: BaselineComparison, changed: int) -> str:

@@ -9,9 +9,10 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.causes import causes
+from urmpipe_pipeline.comparison.change_wording import since_words
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Stretch
-from urmpipe_pipeline.comparison.trajectory import Sync
+from urmpipe_pipeline.comparison.trajectory import Sync, Trajectory
 from urmpipe_pipeline.comparison.wording import (
     correlation,
     out_words,
@@ -20,7 +21,6 @@ from urmpipe_pipeline.comparison.wording import (
     tool_option,
 )
 from urmpipe_pipeline.inverse.verdict import reached
-from urmpipe_pipeline.report.baseline_table import worse_words
 from urmpipe_pipeline.runs.results import Run
 
 
@@ -90,26 +90,26 @@ def made(comparison: Comparison) -> str:
 
 def _since_baseline(comparison: Comparison) -> str:
     """Return what is worse than the baseline; nothing without one."""
-    return "" if comparison.baseline is None else worse_words(comparison.baseline)
+    return "" if comparison.baseline is None else since_words(comparison.baseline)
 
 
-def deviation_facts(deviation: Deviation, reference_samples: int) -> tuple[Fact, ...]:
+def deviation_facts(deviation: Deviation, reference: Trajectory) -> tuple[Fact, ...]:
     """Return how a log was put together with the reference in time and space, and what stood out.
 
     Args:
         deviation: The compared log.
-        reference_samples: Samples of the whole reference.
+        reference: What it was held against.
     """
     outside = out_words(int(np.count_nonzero(deviation.outside)), len(deviation.sample))
     return _told(
         Fact("Clocks", sync_value(deviation.sync), _sync_note(deviation.sync)),
-        Fact("Left out", _left_out(deviation, reference_samples), "no counterpart, or no value"),
+        Fact("Left out", _left_out(deviation, len(reference.t_ns)), "no counterpart, or no value"),
         Fact("Alignment", alignment_value(deviation), _alignment_note(deviation)),
         Fact("Turns", _turns(deviation), "counted apart at the start: taken out of the joints' deviation"),
         Fact("Out of tolerance", outside),
         Fact("Longest stretch out", stretch(deviation.longest_out)),
         Fact("r(‖Δ‖, speed)", speed_correlation(deviation), "1: they grow together; 0: they are unrelated"),
-        *(Fact("Looks like", cause) for cause in causes(deviation)),
+        *(Fact("Looks like", cause) for cause in causes(deviation, reference)),
     )
 
 

@@ -10,6 +10,7 @@ from typing import TypeAlias
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.wording import tolerance_words
 from urmpipe_pipeline.inverse.verdict import verdict_of
 from urmpipe_pipeline.report import (
@@ -251,9 +252,9 @@ def _comparison_part(comparison: Comparison, ident: str, beside: bool) -> Part:
             log_tables.provenance_table(comparison.provenance),
         ),
     )
-    samples = len(comparison.reference.t_ns)
     logs = (
-        _deviation_part(run, f"{ident}-{k}", samples) for k, run in enumerate(comparison.ranking, start=1)
+        _deviation_part(run, f"{ident}-{k}", comparison.reference)
+        for k, run in enumerate(comparison.ranking, start=1)
     )
     warnings = (log_tables.warnings_table(comparison),) if comparison.warnings else ()
     return Part(
@@ -266,7 +267,7 @@ def _comparison_part(comparison: Comparison, ident: str, beside: bool) -> Part:
     )
 
 
-def _deviation_part(deviation: Deviation, ident: str, reference_samples: int) -> Part:
+def _deviation_part(deviation: Deviation, ident: str, reference: Trajectory) -> Part:
     """Return the part of one compared log."""
     return Part(
         deviation.name,
@@ -279,7 +280,7 @@ def _deviation_part(deviation: Deviation, ident: str, reference_samples: int) ->
         ident,
         deviation.verdict,
         (*run_facts(deviation.run), Fact("Compared", text.counted(len(deviation.sample), "sample"))),
-        deviation_facts(deviation, reference_samples),
+        deviation_facts(deviation, reference),
     )
 
 

@@ -64,7 +64,8 @@ def side_by_side(comparisons: Sequence[Comparison], links: Sequence[Sequence[str
 def _beside(comparison: Comparison, run: Deviation, link: str) -> tuple[Cell, ...]:
     name, verdict, _, *sizes = _how_far_row(run, link, comparison.covered(run))
     baseline = comparison.baseline
-    worse = sum(one.run == run.name for one in baseline.worse) if baseline else 0
+    lost = [*(one.run for one in baseline.worse), *(one.run for one in baseline.gone)] if baseline else []
+    worse = lost.count(run.name)
     return (
         name,
         Cell(str(comparison.recording or text.NOTHING)),

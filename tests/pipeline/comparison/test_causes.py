@@ -12,8 +12,13 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.runs.ghosts import Goals
 
 Compared = Callable[..., Comparison]
+
+WANTED = Trajectory("wanted", np.zeros(1, dtype=np.int64), np.zeros((1, 3)))
+NO_TIMES = Goals(np.zeros(1, dtype=np.int64), np.zeros((1, 3)), None, ("",))
 
 T = 0.005 * np.arange(1000)
 
@@ -34,7 +39,7 @@ def off_by_zero(arms: Compared) -> Deviation:
 def test_a_joint_that_is_off_by_the_same_throughout_is_named(off_by_zero: Deviation) -> None:
     assert off_by_zero.verdict == "fail"
     one = list(off_by_zero.joint_statistics.values())[1]
-    assert list(causes(off_by_zero)) == [
+    assert list(causes(off_by_zero, WANTED)) == [
         f"{one.quantity} is off by the same throughout (reference - log = {np.degrees(one.mean):.4f} deg,"
         f" std {np.degrees(one.std):.4f} deg): another zero?"
     ]
@@ -44,14 +49,44 @@ def test_a_joint_that_is_off_by_the_same_throughout_is_named(off_by_zero: Deviat
 def test_a_joint_that_comes_and_goes_has_no_other_zero(arms: Compared) -> None:
     q: FloatArray = np.zeros((1000, 6))
     q[:, 1] = 0.01 + 0.005 * np.sin(T)
-    assert list(causes(arms({"log": q}).runs[0])) == []
+    assert list(causes(arms({"log": q}).runs[0], WANTED)) == []
+
+
+def test_what_rounding_left_of_a_joint_that_stands_still_is_no_zero(arms: Compared) -> None:
+    q: FloatArray = np.zeros((1000, 6))
+    q[:, 3] = 2.7e-6  # pi as 3.14159
+    (run,) = arms({"log": q}).runs
+    assert list(causes(with_maxima(run, x=0.02), WANTED)) == []
+    q[:, 3] = 0.0027
+    (run,) = arms({"log": q}).runs
+    (said,) = causes(with_maxima(run, x=0.02), WANTED)
+    assert said.startswith("q4 is off by the same throughout")
 
 
 def test_a_log_on_the_path_but_not_in_time_is_late_or_early(paths: Compared) -> None:
     run = paths({"log": np.full((100, 3), 0.004)}).runs[0]
     said = "on the path but not in time (‖Δ‖ 81.2000 mm, path 0.0530 mm): late or early"
     late = with_maxima(run, norm=0.0812, path=5.3e-5)
-    assert list(causes(late)) == [f"{said}; --sync auto finds an offset of the clocks"]
-    assert list(causes(replace(late, sync=replace(late.sync, mode="auto")))) == [said]
-    assert list(causes(with_maxima(run, norm=0.0812, path=0.0082))) == []
-    assert list(causes(replace(late, verdict="pass"))) == []
+    assert list(causes(late, WANTED)) == [f"{said}; --sync auto finds an offset of the clocks"]
+    assert list(causes(replace(late, sync=replace(late.sync, mode="auto")), WANTED)) == [said]
+    assert list(causes(with_maxima(run, norm=0.0812, path=0.0082), WANTED)) == []
+    assert list(causes(replace(late, verdict="pass"), WANTED)) == []
+
+
+def test_no_offset_is_looked_for_where_there_is_none(paths: Compared) -> None:
+    late = with_maxima(paths({"log": np.full((100, 3), 0.004)}).runs[0], norm=0.0812, path=5.3e-5)
+    for run, reference in (
+        (late, replace(WANTED, files=late.run.log.files)),
+        (replace(late, run=replace(late.run, goals=NO_TIMES)), WANTED),
+    ):
+        (said,) = causes(run, reference)
+        assert said.endswith(": late or early")
+
+
+def test_only_a_log_that_is_out_of_a_tolerance_of_position_is_late(paths: Compared) -> None:
+    run = paths({"log": np.full((100, 3), 0.004)}).runs[0]
+    turned = with_maxima(run, x=0.0, y=0.0, z=0.0, norm=1e-16, path=0.0)
+    assert list(causes(turned, WANTED)) == []
+    late = with_maxima(run, norm=0.0812, path=5.3e-5)
+    off = replace(late.statistics["path"], tolerance=5e-5, verdict="fail")
+    assert list(causes(replace(late, statistics=late.statistics | {"path": off}), WANTED)) == []

@@ -16,6 +16,7 @@ from urmpipe_models.orientation import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import AXIS_COLOURS, rgb
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.layout import opening_time
@@ -124,6 +125,8 @@ def test_rows_without_an_arm_are_told() -> None:
     counts = "Without times: the timeline counts rows, t = 0 s is row 1."
     places = np.array([[0.3, 0.2, 0.4], [0.3, 0.3, 0.4]])
     assert counts in summary(solved_at(places, [False, False])).splitlines()
+    jump = replace(solved_at(places, [False, False]), warnings=(LogWarning("jump", "1 jump"),))
+    assert counts in summary(jump).splitlines()
     told = summary(solved_at(places, [True, False])).splitlines()
     assert f"{counts} Rows that are not reached show no arm." in told
 

@@ -72,6 +72,37 @@ def test_a_banner_of_logs_within_tolerance_says_that_they_are_worse_than_the_bas
     assert said.headline == f"shifted within tolerance against {PATH}, but worse than the baseline before"
 
 
+def test_a_banner_of_some_comparisons_counts_those_that_are_worse_than_their_baselines(
+    comparison: Comparison,
+) -> None:
+    gone = BaselineComparison("before", None, {}, (), (), (Absent("old"),), ())
+    good = replace(comparison, runs=comparison.runs[:1])
+    bad = replace(comparison, runs=comparison.runs[1:])
+    worse = replace(good, baseline=gone)
+    every, one = (
+        f"both logs within tolerance against {PATH}",
+        f"1 of 2 logs (joint-off) out of tolerance against {PATH}",
+    )
+    for some, said in (
+        ([good, worse], f"{every}, but 1 of 2 comparisons is worse than its baseline"),
+        ([worse, worse], f"{every}, but 2 of 2 comparisons are worse than their baselines"),
+        ([bad, worse], f"{one}, and 1 of 2 comparisons is worse than its baseline"),
+        ([good, bad], one),
+    ):
+        found = comparison_banner(some, [["#a"], ["#b"]])
+        assert (found.headline, found.word) == (said, "FAIL")
+
+
+def test_what_was_recorded_is_on_both_sides_also_of_a_path(comparison: Comparison) -> None:
+    options = {**comparison.provenance.options, "tcp": "recorded"}
+    run = comparison.runs[0]
+    path = replace(run, run=replace(run.run, log=replace(run.run.log, joints=())))
+    recorded = replace(comparison, runs=(path,), provenance=replace(comparison.provenance, options=options))
+    assert comparison_banner([recorded], [["#a"]]).headline == (
+        "shifted within tolerance against path, as recorded on both sides"
+    )
+
+
 def test_a_banner_of_some_comparisons_counts_their_logs(
     comparison: Comparison, everything: Comparison
 ) -> None:

@@ -43,7 +43,7 @@ TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
     ],
 )
 def test_clocks_are_explained(comparison: Comparison, sync: Sync, value: str, note: str) -> None:
-    found = facts.deviation_facts(replace(comparison.runs[0], sync=sync), 3000)
+    found = facts.deviation_facts(replace(comparison.runs[0], sync=sync), comparison.reference)
     assert (found[0].name, found[0].value, found[0].note) == ("Clocks", value, note)
 
 
@@ -66,7 +66,7 @@ def test_clocks_are_explained(comparison: Comparison, sync: Sync, value: str, no
 def test_alignments_are_explained(
     comparison: Comparison, alignment: Alignment, value: str, note: str
 ) -> None:
-    found = facts.deviation_facts(replace(comparison.runs[0], alignment=alignment), 3000)
+    found = facts.deviation_facts(replace(comparison.runs[0], alignment=alignment), comparison.reference)
     (told,) = [fact for fact in found if fact.name == "Alignment"]
     assert (told.value, told.note) == (value, note)
 
@@ -94,16 +94,18 @@ def test_the_tool_option_repeats_a_tool_on_top_of_one_that_is_there() -> None:
 
 def test_what_is_left_out_is_counted_on_both_sides(everything: Comparison) -> None:
     deviation = next(run for run in everything.runs if run.name == "shifted")
-    told = facts.deviation_facts(deviation, len(everything.reference.t_ns))
+    told = facts.deviation_facts(deviation, everything.reference)
     (left,) = [fact.value for fact in told if fact.name == "Left out"]
     assert left == "100 of 3000 samples, 100 of 3000 of the reference"
 
 
 def test_turns_counted_apart_are_told(comparison: Comparison) -> None:
     deviation = replace(comparison.runs[0], joint_turns=(0, 1, 0, -2, 0, 0))
-    told = {fact.name: fact.value for fact in facts.deviation_facts(deviation, 3000)}
+    told = {fact.name: fact.value for fact in facts.deviation_facts(deviation, comparison.reference)}
     assert told["Turns"] == "phi2 +1, phi4 -2"
-    assert "Turns" not in {fact.name for fact in facts.deviation_facts(comparison.runs[0], 3000)}
+    assert "Turns" not in {
+        fact.name for fact in facts.deviation_facts(comparison.runs[0], comparison.reference)
+    }
 
 
 def test_a_stretch_of_one_sample_has_no_length() -> None:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.baseline import against_baseline
+from urmpipe_pipeline.comparison.change import Absent
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.report.verdict_tables import side_by_side
@@ -63,6 +64,9 @@ def test_what_is_worse_than_its_baseline_is_counted(comparison: Comparison) -> N
     at = [column.title for column in table.columns].index("Worse than its baseline")
     told = [row[at].text for row in table.rows]
     assert told == [text.NOTHING, f"in {len(held.baseline.worse)} quantities"]
+    gone = replace(held.baseline, changes=(), gone=(Absent("log", "angle"), Absent("other")))
+    table = side_by_side([october, replace(held, baseline=gone)], [["#a"], ["#b"]])
+    assert [row[at].text for row in table.rows] == [text.NOTHING, "in 1 quantity"]
 
 
 def test_a_comparison_alone_is_as_it_was(comparison: Comparison) -> None:

@@ -13,6 +13,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import targets_of
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.report import gallery
 from urmpipe_pipeline.report.banner import solved_banner
 from urmpipe_pipeline.report.facts import run_facts
@@ -49,6 +50,12 @@ def test_the_banner_counts_the_targets_that_are_reached(run: Run) -> None:
     solved = replace(run, log=replace(run.log, q=np.zeros((3, 6))))
     said = lay_out([solved]).banner
     assert (said.state, said.word, said.headline) == ("pass", "PASS", "poses: ur5e reaches 3 targets")
+
+
+def test_of_several_files_each_jump_is_told_with_its_file(run: Run) -> None:
+    jump = replace(run, name="path", warnings=(LogWarning("jump", "1 jump: q1 by 90 deg", 2),))
+    assert solved_banner([jump]).detail == "1 jump: q1 by 90 deg."
+    assert solved_banner([run, jump]).detail == "path: 1 jump: q1 by 90 deg."
 
 
 def test_targets_and_logs_are_both_told_of(run: Run) -> None:
