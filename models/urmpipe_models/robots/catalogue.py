@@ -26,7 +26,7 @@ def load_robot(
     """Return a robot of the catalogue, or of a .toml or .urdf file.
 
     Args:
-        name_or_path: The robot's name, or its file.
+        name_or_path: The robot's name, in capitals or not, or its file.
         base_link: Link of a URDF where the chain begins; its root by default.
         tip_link: Link of a URDF where the chain ends; see `read_urdf`.
 
@@ -43,8 +43,8 @@ def load_robot(
     if suffix == ".toml":
         return read_robot_file(path)
     names = robot_names()
-    if str(name_or_path) in names:
-        return read_robot_file(ROBOTS / f"{name_or_path}.toml")
+    if (name := str(name_or_path).lower()) in names:
+        return read_robot_file(ROBOTS / f"{name}.toml")
     hint = did_you_mean(str(name_or_path), names)
     raise RobotError(
         f"unknown robot {shown(str(name_or_path))}{hint};"

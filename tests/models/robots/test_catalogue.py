@@ -142,6 +142,10 @@ def test_the_start_lies_within_the_joint_ranges(name: str) -> None:
         assert joint.lower <= value <= joint.upper
 
 
+def test_a_name_is_known_as_data_sheets_write_it() -> None:
+    assert load_robot("UR5e") == load_robot("ur5e")
+
+
 def test_an_unknown_name_gets_the_nearest_and_all_others() -> None:
     with pytest.raises(RobotError) as caught:
         load_robot("urm66")
