@@ -92,7 +92,8 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
     show_default=True,
     type=SYNC,
     metavar="start|auto|SECONDS",
-    help="Start both together, find the offset by the motion, or t_reference = t_log + SECONDS.",
+    help="Start both together, find the offset by the motion, or t_reference = t_log + SECONDS (below 0 for a"
+    " late log).",
 )
 @click.option(
     "--align",
