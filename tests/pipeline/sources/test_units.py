@@ -303,6 +303,8 @@ def test_a_unit_given_for_all_joints_against_their_names_is_told(read: Read) -> 
 
 def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None:
     assert read("t,a,b\n0,1,2\n0.1,1,2\n", joints=[3, 2], time=1, units={2: "deg"}).joints == ("b", "a")
+    once: Any = (f"q{k}" for k in (1, 2))
+    assert ReadOptions(joints=once).joints == ("q1", "q2")
     with pytest.raises(OptionError) as caught:
         ReadOptions(joints="q1", position=3, units="deg", interval=2.0)  # type: ignore[arg-type]
     columns = "allowed: columns by name or number, such as ['q1', 'q2'] or [2, 3]"
