@@ -233,7 +233,7 @@ class _System:
                 self.faults.append(f"{where}.{key}: not found, allowed: a text")
         log, column = self._text(table, where, "log", ""), self._text(table, where, "column", "")
         interpolate = self._flag(table, where, "interpolate")
-        known = log if column else ""
+        known = log if column and port != NOWHERE else ""
         return LogInput(destination=port, log=known, column=column, interpolate=interpolate)
 
     def _port(self, where: str, text: str) -> Port:
