@@ -42,6 +42,7 @@ robot = "urm7"
 "lag.u" = { log = "missing.csv", column = "u" }
 "lag.v" = { log = "voltage.csv" }
 "lagg.u" = { log = "missing.csv", column = "u" }
+"lag.w" = { log = "$voltage", column = "u" }
 """
 
 TOLD = [
@@ -57,6 +58,8 @@ TOLD = [
     "30: inputs.lag.v.column: not found",
     "30: inputs.lag.v: input of lag: found 'v'",
     "31: inputs.lagg.u: block found 'lagg' (did you mean lag?)",
+    "32: inputs.lag.w.log: found '$voltage'",
+    "32: inputs.lag.w: input of lag: found 'w'",
 ]
 
 
