@@ -14,6 +14,7 @@ from urmpipe_fmus.cosim.places import placed
 from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
 from urmpipe_fmus.units import unit_name
 from urmpipe_models.errors import CosimulationError, Finding, shown
+from urmpipe_models.files.missing import meant_by
 from urmpipe_models.files.toml_text import parse_toml
 from urmpipe_models.names import did_you_mean, not_among
 
@@ -113,8 +114,9 @@ def _path_of(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.is_file():
         return path
-    found = f"found {shown(str(name_or_path))}{did_you_mean(str(name_or_path), system_names())}"
-    raise CosimulationError(f"system: {found}, allowed: a TOML file, or one of {', '.join(system_names())}")
+    meant = did_you_mean(str(name_or_path), system_names()) or meant_by(path, (".toml",))
+    allowed = f"a TOML file, or one of {', '.join(system_names())}"
+    raise CosimulationError(f"system: found {shown(str(name_or_path))}{meant}, allowed: {allowed}")
 
 
 def _parsed(path: Path) -> dict[str, Any]:
