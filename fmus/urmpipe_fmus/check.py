@@ -19,6 +19,7 @@ from urmpipe_fmus.fmu_process import command, ending, environment
 from urmpipe_fmus.platforms import platforms_here
 from urmpipe_fmus.python_fmu.place import why_not_in
 from urmpipe_models.errors import Finding, FmuError
+from urmpipe_models.files.missing import meant_by
 
 STEPS = 20
 """So many steps are tried, less if the default experiment is shorter."""
@@ -140,13 +141,15 @@ def _described(path: Path) -> Any:
     from fmpy import read_model_description
 
     try:
+        if path.is_dir():  # which Windows only says may not be read
+            raise _refused(path, f"found a folder, allowed: {AN_FMU}")
         with zipfile.ZipFile(path) as archive:
             if "modelDescription.xml" not in archive.namelist():
                 raise _refused(path, f"found a zip without modelDescription.xml, allowed: {AN_FMU}")
             root = ET.fromstring(archive.read("modelDescription.xml"))
-    except (FileNotFoundError, IsADirectoryError) as error:
-        found = "a folder" if path.is_dir() else "no such file"
-        raise _refused(path, f"found {found}, allowed: {AN_FMU}") from error
+    except FileNotFoundError as error:
+        meant = meant_by(path, (".fmu",))
+        raise _refused(path, f"found no such file{meant}, allowed: {AN_FMU}") from error
     except OSError as error:
         raise _refused(path, f"cannot be read: {error.strerror or error}") from error
     except (zipfile.BadZipFile, zlib.error) as error:

@@ -110,8 +110,8 @@ class Variable(ABC):
         """Yield why a unit is none that a model's equations can be written in: 1 deg/s is not 1 rad/s."""
         in_si = coherent(self.unit)
         if not same_unit(self.unit, in_si):
-            shown = f", with display_unit={self.unit!r} to show it so" if not self.display_unit else ""
-            yield f"found unit {self.unit!r}, allowed: values in SI, unit={in_si!r}{shown}"
+            as_well = f", with display_unit={self.unit!r} to show it so" if not self.display_unit else ""
+            yield f"found unit {self.unit!r}, allowed: values in SI, unit={in_si!r}{as_well}"
 
     def refusals(self, value: float) -> Iterator[str]:
         """Yield why one of its scalars cannot take a value: not finite, out of range, no integer."""

@@ -223,7 +223,8 @@ def rpy_of(rotation: tuple[Vector, Vector, Vector]) -> tuple[float, float, float
     """Return rx, ry, rz in [rad] such that `from_rpy` gives the constant R back to 1e-15.
 
     Unlike `euler_zyx` it needs no singular case: rx is taken from what rz leaves, so that the
-    product is R for whatever rz the rounding of a11 and a21 suggests. Half a turn is pi, not -pi.
+    product is R for whatever rz the rounding of a11 and a21 suggests. At a zero of either sign half
+    a turn is pi, not -pi.
     """
     (a11, a12, a13), (a21, a22, a23), (a31, _, _) = rotation
     rz = float(np.arctan2(a21 + 0.0, a11))  # + 0.0: see `euler_zyx`

@@ -41,6 +41,8 @@ robot = "urm7"
 [inputs]
 "lag.u" = { log = "missing.csv", column = "u" }
 "lag.v" = { log = "voltage.csv" }
+"lagg.u" = { log = "missing.csv", column = "u" }
+"lag.w" = { log = "$voltage", column = "u" }
 """
 
 TOLD = [
@@ -55,6 +57,9 @@ TOLD = [
     "29: inputs.lag.u: missing.csv: found no such file",
     "30: inputs.lag.v.column: not found",
     "30: inputs.lag.v: input of lag: found 'v'",
+    "31: inputs.lagg.u: block found 'lagg' (did you mean lag?)",
+    "32: inputs.lag.w.log: found '$voltage'",
+    "32: inputs.lag.w: input of lag: found 'w'",
 ]
 
 

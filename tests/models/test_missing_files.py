@@ -58,3 +58,12 @@ def test_a_missing_folder_is_told_with_the_one_above_it(folder: Path) -> None:
     assert meant_by(Path("plot/raw/log.csv")) == f": {folder} has no folder plot (did you mean plots?)"
     assert meant_by(Path("plots/raw/log.csv")) == ": plots has no folder raw"
     assert meant_by(folder / "raw" / "log.csv") == f": {folder} has no folder raw"
+
+
+def test_a_link_to_nothing_is_not_meant_by_its_own_name(folder: Path) -> None:
+    link = folder / "gone.csv"
+    try:
+        link.symlink_to(folder / "nothing.csv")
+    except OSError:
+        pytest.skip("no links can be made here")
+    assert meant_by(Path("gone.csv")) == ""

@@ -7,6 +7,7 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import NamedTuple
 
+from urmpipe_fmus.cosim.checks import Start
 from urmpipe_fmus.cosim.interface import ELEMENT, Interface
 from urmpipe_fmus.cosim.plan import Plan
 from urmpipe_fmus.cosim.system import Block
@@ -189,11 +190,18 @@ def _pace(plan: Plan, block: Block) -> _Pace:
 
 def _value(plan: Plan, block: str, pin: Pin) -> str:
     """Return what an input has all the time that nothing is connected with; of an array two elements."""
-    given = {start.variable.name: start.value for start in plan.starts[block]}
-    elements = plan.interfaces[block].elements(pin.name)
-    values = [given.get(one.name, one.start or 0.0) for one in elements]
-    shown = [f"{float(one):.6g}" if elements[0].type == "Real" else str(one) for one in values]
+    given = {start.variable.name: _spelled(start) for start in plan.starts[block]}
+    shown = [given[one.name] for one in plan.interfaces[block].elements(pin.name)]
     return shown[0] if len(set(shown)) == 1 else f"{shown[0]}, {shown[1]}{', …' * (len(shown) > 2)}"
+
+
+def _spelled(start: Start) -> str:
+    """Return a start value as a system file spells it, a Real in six digits."""
+    if isinstance(start.value, str):
+        return start.value
+    if start.variable.type == "Boolean":
+        return "true" if start.value else "false"
+    return f"{start.value:.6g}" if start.variable.type == "Real" else f"{start.value:.0f}"
 
 
 def _log_names(logs: Collection[str], blocks: Collection[str]) -> dict[str, str]:

@@ -186,9 +186,7 @@ def _fmu_of(unit: Unit) -> Path:
 
 def _column(one: LogInput, column: Callable[[LogInput], LogColumn] | None) -> LogColumn:
     if column is None:
-        raise CosimulationError(
-            f"inputs.{one.destination}: found the log {one.log}, but nothing to read it with"
-        )
+        raise CosimulationError(f"found the log {one.log}, but nothing to read it with")
     return column(one)
 
 

@@ -76,7 +76,7 @@ class LogInput:
 
     Attributes:
         destination: The input.
-        log: The file; empty where the system file does not tell it rightly.
+        log: The file; empty where the system file tells the input wrongly.
         column: Name of the column.
         interpolate: Linearly between rows; else each row is held until the next.
     """

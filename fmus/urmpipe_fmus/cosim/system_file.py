@@ -14,6 +14,7 @@ from urmpipe_fmus.cosim.places import placed
 from urmpipe_fmus.cosim.system import SYSTEMS, TOLERANCE, Block, Connection, LogInput, Port, System
 from urmpipe_fmus.units import unit_name
 from urmpipe_models.errors import CosimulationError, Finding, shown
+from urmpipe_models.files.missing import meant_by
 from urmpipe_models.files.toml_text import parse_toml
 from urmpipe_models.names import did_you_mean, not_among
 
@@ -96,14 +97,14 @@ def read_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
     rest = {key: value for key, value in {**table, **here}.items() if key != "arguments"}
     faults += unknown(rest, values)
     system = _System(path, replaced(rest, values), values, faults).read()
-    unread = {name for name in system.by_name if any(_is_of(name, fault) for fault in faults)}
+    unread = {name for name in system.by_name if any(_is_of(f"blocks.{name}", fault) for fault in faults)}
     found = placed(path, str(name_or_path), faults) if faults else ()
     return replace(system, faults=found, unread=frozenset(unread))
 
 
-def _is_of(block: str, fault: str) -> bool:
-    """Return whether a fault stands in a block."""
-    return fault.startswith((f"blocks.{block}.", f"blocks.{block}: "))
+def _is_of(table: str, fault: str) -> bool:
+    """Return whether a fault is one of a table, such as `blocks.drive`."""
+    return fault.startswith((f"{table}.", f"{table}: "))
 
 
 def _path_of(name_or_path: str | Path) -> Path:
@@ -113,8 +114,9 @@ def _path_of(name_or_path: str | Path) -> Path:
     path = Path(name_or_path)
     if path.is_file():
         return path
-    found = f"found {shown(str(name_or_path))}{did_you_mean(str(name_or_path), system_names())}"
-    raise CosimulationError(f"system: {found}, allowed: a TOML file, or one of {', '.join(system_names())}")
+    meant = did_you_mean(str(name_or_path), system_names()) or meant_by(path, (".toml",))
+    allowed = f"a TOML file, or one of {', '.join(system_names())}"
+    raise CosimulationError(f"system: found {shown(str(name_or_path))}{meant}, allowed: {allowed}")
 
 
 def _parsed(path: Path) -> dict[str, Any]:
@@ -233,8 +235,8 @@ class _System:
                 self.faults.append(f"{where}.{key}: not found, allowed: a text")
         log, column = self._text(table, where, "log", ""), self._text(table, where, "column", "")
         interpolate = self._flag(table, where, "interpolate")
-        known = log if column else ""
-        return LogInput(destination=port, log=known, column=column, interpolate=interpolate)
+        wrong = any(_is_of(where, fault) for fault in self.faults)
+        return LogInput(destination=port, log="" if wrong else log, column=column, interpolate=interpolate)
 
     def _port(self, where: str, text: str) -> Port:
         """Return the port that a text `block.variable` names, `NOWHERE` if there is no such block."""

@@ -24,12 +24,13 @@ def meant_by(path: Path, suffixes: Collection[str] = ()) -> str:
         path: The file.
         suffixes: How files of its kind end; of several that may be meant, only such are named, if any is.
     """
-    missing = next((one for one in reversed(path.parents) if not one.is_dir()), None)
+    missing = next((one for one in reversed(path.parents) if one.name and not one.is_dir()), None)
     if missing is not None:
         above = Path.cwd() if missing.parent == Path() else missing.parent
         folders = [one for one in map(missing.with_name, _like(missing)) if one.is_dir()]
         return f": {above} has no folder {missing.name}{_asked(folders[:MOST_TOLD])}"
-    alike = [] if path.exists() else [path.with_name(name) for name in _like(path)]
+    there = path.exists() or path.is_symlink()  # a link to what is not there
+    alike = [] if there else [path.with_name(name) for name in _like(path)]
     of_kind = [one for one in alike if one.suffix.lower() in suffixes]
     return _asked((of_kind or alike)[:MOST_TOLD])
 

@@ -64,11 +64,11 @@ class JointMotion:
 def largest_steps(q: FloatArray) -> FloatArray:
     """Return the largest step of each column from row to row; NaN if a value is missing.
 
-    Returns:
-        In [rad] or [m], shape (joints,).
-
     Args:
         q: In [rad] or [m], shape (n, joints), n > 1.
+
+    Returns:
+        In [rad] or [m], shape (joints,).
     """
     blocks = row_blocks(len(q) - 1)
     steps = [over_rows(np.maximum, np.abs(q[1:][block] - q[:-1][block])) for block in blocks]

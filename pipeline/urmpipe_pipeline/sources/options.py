@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, fields, replace
 from numbers import Real
 from typing import Any
@@ -63,6 +63,9 @@ class ReadOptions:
         Raises:
             OptionError: With everything that is of a wrong kind.
         """
+        for one in fields(self):
+            if isinstance(value := getattr(self, one.name), Iterator):  # can be looked through only once
+                object.__setattr__(self, one.name, tuple(value))
         wrong = [
             f"{one.name}: found {shown(value)}, allowed: {allowed}"
             for one in fields(self)
@@ -92,7 +95,7 @@ def _is_number(value: Any) -> bool:
 
 
 def _is_column(value: Any) -> bool:
-    return _is_text(value) or (isinstance(value, Real) and not isinstance(value, bool))
+    return _is_text(value) or _is_number(value)
 
 
 def _are(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:

@@ -89,7 +89,7 @@ class GonWords:
     Attributes:
         words: What means nothing else.
         or_degrees: What may mean degrees, too, in lower case.
-        degrees: How degrees are written alone.
+        degrees: Those of them that are written so for degrees alone.
         beside: What stands in the name of a German column.
     """
 
@@ -108,6 +108,14 @@ class GonWords:
         word = _PER_SECOND.sub("", unit.strip())
         german = word in self.degrees or self.beside.search(name)
         return word.lower() in self.or_degrees and not german
+
+    def about(self, unit: str) -> tuple[str, str]:
+        """Return what is said behind a unit that may be the gon, and what at the end; nothing of others."""
+        word = _PER_SECOND.sub("", unit.strip().lower())
+        if word not in self.words | self.or_degrees:
+            return "", ""
+        either = ", which is deg in German and gon elsewhere" if word in self.or_degrees else ""
+        return either, "; 1 gon is 0.9 deg: multiply values in gon by 0.9"
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,14 +152,6 @@ class Vocabulary:
         if base is None or rate is None:
             return base
         return base.per_second(2 if rate["power"] else 1)
-
-    def about_gon(self, text: str) -> tuple[str, str]:
-        """Return what is said behind a unit that may be the gon, and what at the end; nothing of others."""
-        word = _PER_SECOND.sub("", text.strip().lower())
-        if word not in self.gon.words | self.gon.or_degrees:
-            return "", ""
-        either = ", which is deg in German and gon elsewhere" if word in self.gon.or_degrees else ""
-        return either, "; 1 gon is 0.9 deg: multiply values in gon by 0.9"
 
     def spelled(self, quantity: Quantity) -> list[str]:
         """Return the names of the units of a quantity."""

@@ -12,7 +12,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from foreign_fmus import INTEGRATOR, Foreign, Scalar, gain, planned
+from foreign_fmus import COUNTER, INTEGRATOR, Foreign, Scalar, gain, planned
 from urmpipe_fmus.cosim import LogColumn, LogInput, Plan, Port, system_svg
 from urmpipe_fmus.cosim.diagram import Box, Diagram, Pin, Wire, diagram
 from urmpipe_fmus.cosim.layout import Layout
@@ -201,6 +201,15 @@ def test_what_is_held_is_dashed_and_what_never_changes_has_its_value() -> None:
         "Dashed: held between two samples, or two rows of a log.",
         "name = value: an input that nothing changes.",
     ]
+
+
+def test_whole_numbers_and_truths_that_never_change_are_spelled_as_in_a_system_file() -> None:
+    for by, on, said in (
+        (2_000_000, True, ["by = 2000000", "on = true"]),
+        (-1, False, ["by = -1", "on = false"]),
+    ):
+        shown = diagram(planned({"n": COUNTER}, {}, {"n": {"by": by, "on": on}}))
+        assert [pin.label for pin in shown.boxes["n"].left] == said
 
 
 def test_the_log_of_a_source_is_named_with_how_it_is_read() -> None:

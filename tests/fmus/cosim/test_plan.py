@@ -105,6 +105,9 @@ def test_an_input_has_one_source() -> None:
     assert told(
         {"a": gain(), "b": gain()}, {"b.u": "a.y"}, {"a": {"u": 1.0}}, [ask], column=lambda one: column
     ) == ["b.u: found two sources, a.y and the log, allowed: one"]
+    assert told({"b": gain()}, {}, {}, [ask]) == [
+        "inputs.b.u: found the log run.csv, but nothing to read it with"
+    ]
     every = {f"arm.phi[{i}]": "i.y" for i in range(1, 12)}
     arms = {"arm": ARM, "other": ARM, "i": INTEGRATOR}
     assert told(arms, {**every, "other.phi": "other.p", "i.u": "i.y"}) == [

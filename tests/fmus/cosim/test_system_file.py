@@ -266,7 +266,7 @@ a.u = 7
     ]
 
 
-def test_what_is_no_toml_or_no_file_is_told(tmp_path: Path) -> None:
+def test_what_is_no_toml_or_no_file_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     for text, line, told in (
         ("[blocks.a]\n[system\n", 2, "not valid TOML: Expected ']' at the end of a table declaration"),
         (
@@ -292,6 +292,13 @@ def test_what_is_no_toml_or_no_file_is_told(tmp_path: Path) -> None:
         load_system("no-such-system")
     assert str(caught.value) == (
         f"system: found 'no-such-system', allowed: a TOML file, or one of {', '.join(system_names())}"
+    )
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(CosimulationError) as caught:
+        load_system("bed.toml")
+    assert str(caught.value) == (
+        "system: found 'bed.toml' (did you mean bad.toml?),"
+        f" allowed: a TOML file, or one of {', '.join(system_names())}"
     )
     assert said(tmp_path / "bad.toml", "blocks = 3\n[system]\nstep = 1\n") == [
         "blocks: found 3, allowed: a table",

@@ -265,6 +265,7 @@ def test_files_that_are_no_fmus_are_refused_with_their_name(make: Make, tmp_path
     allowed = ", allowed: an FMU, such as urmpipe fmu build makes of a unit"
     for path, said in (
         (missing, f"found no such file{allowed}"),
+        (tmp_path / "text.zip", f"found no such file (did you mean {text}?){allowed}"),
         (tmp_path, f"found a folder{allowed}"),
         (text, f"found no zip, as an FMU is one{allowed}"),
         (empty, f"found a zip without modelDescription.xml{allowed}"),

@@ -150,6 +150,14 @@ def test_a_counter_and_what_stands_still_are_not_named_as_a_time(read: Read, col
     )
 
 
+@pytest.mark.parametrize("name", ["way [mm]", "pulses [counts]", "turn_deg"])
+def test_what_has_another_unit_is_not_named_as_a_time(read: Read, name: str) -> None:
+    log = read(f"{name},q1 [rad],q2 [rad]\n0.5,0.1,1\n1.25,0.2,1\n1.5,0.3,1\n", joints=[2, 3])
+    assert [one.message for one in log.warnings] == [
+        "no time column: the rows are taken as 5 ms apart; --period S says otherwise"
+    ]
+
+
 def test_the_time_as_the_user_says(read: Read, wrong: Wrong) -> None:
     text = "a,b,q1\n0,0.5,1\n0,0.6,2\n"
     assert read(text, time="b").t_ns.tolist() == [0, 100_000_000]

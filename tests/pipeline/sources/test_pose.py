@@ -319,6 +319,7 @@ def test_two_recorded_tcps_are_said(read: Read) -> None:
         ("fx", "tx", "ty"),
         ("tcp_x [deg]", "tcp_y [deg]", "tcp_a"),
         ("tcp_x", "load", "power"),
+        ("cpu_pct_1", "cpu_pct_2", "duty_pct_3"),  # per cent
     ],
 )
 def test_what_a_tool_has_besides_its_place_is_no_tcp(read: Read, names: tuple[str, ...]) -> None:

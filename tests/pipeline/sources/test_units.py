@@ -165,6 +165,10 @@ def test_a_line_of_units_that_are_not_known(read: Read, wrong: Wrong) -> None:
     said = "found the unit 'counts', allowed: rad, deg, m, mm, cm; say which with --unit J1=deg"
     assert wrong(text) == [f"log.csv, column J1: {said}"]
     assert read(text, units={"": "deg"}).units == {"t": "s", "J1": "deg", "J2": "deg"}
+    powers = read("t,J1,tau1,M,n\n[s],[rad],[Nm],[kg m2/s2],(1/min)\n0,30,1,1,1\n0.1,31,1,1,1\n")
+    assert (powers.joints, powers.units) == (("J1",), {"t": "s", "J1": "rad"})
+    numbered = read("a,b,c\n[t0],[q1],[q2]\n0,30,1\n0.1,31,1\n", joints=("2", "3"), units={"": "deg"})
+    assert numbered.joints == ("[q1]", "[q2]")
     named = read("of today\n[t],[q],[p]\n0,30,1\n0.1,31,1\n", joints=("2", "3"), units={"": "deg"})
     assert named.joints == ("[q]", "[p]")
 
@@ -303,6 +307,8 @@ def test_a_unit_given_for_all_joints_against_their_names_is_told(read: Read) -> 
 
 def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None:
     assert read("t,a,b\n0,1,2\n0.1,1,2\n", joints=[3, 2], time=1, units={2: "deg"}).joints == ("b", "a")
+    once: Any = (f"q{k}" for k in (1, 2))
+    assert ReadOptions(joints=once).joints == ("q1", "q2")
     with pytest.raises(OptionError) as caught:
         ReadOptions(joints="q1", position=3, units="deg", interval=2.0)  # type: ignore[arg-type]
     columns = "allowed: columns by name or number, such as ['q1', 'q2'] or [2, 3]"

@@ -175,7 +175,8 @@ def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | Non
 def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Column]) -> Column | None:
     """Return the first column without a role that runs like a clock, whatever its name; None without one.
 
-    It is told, not taken: a way or a counter of pulses increases from row to row as well.
+    It is told, not taken: a way or a counter of pulses increases from row to row as well. One with another
+    unit than that of a time is none.
 
     Args:
         columns: The table's columns.
@@ -183,7 +184,8 @@ def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Colu
         used: The columns that have a role.
     """
     free = (one for one in columns if one not in used and not one.text)
-    return next((one for one in free if _runs_like_a_clock(layout.cells(one.index), layout)), None)
+    may_be = (one for one in free if not one.unit_text or (one.unit and one.unit.quantity == "time"))
+    return next((one for one in may_be if _runs_like_a_clock(layout.cells(one.index), layout)), None)
 
 
 def _runs_like_a_clock(cells: Sequence[str], layout: Layout) -> bool:

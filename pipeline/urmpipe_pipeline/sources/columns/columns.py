@@ -141,7 +141,7 @@ def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Un
     """
     given = {}
     for text, unit_text in options.units.items():
-        unit, (either, remedy) = vocabulary().unit(unit_text), vocabulary().about_gon(unit_text)
+        unit, (either, remedy) = vocabulary().unit(unit_text), vocabulary().gon.about(unit_text)
         quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
         if unit is None or unit.quantity not in quantities or remedy:
             allowed = ", ".join(name for quantity in quantities for name in vocabulary().spelled(quantity))

@@ -11,7 +11,7 @@ from urmpipe_pipeline.sources.vocabulary import vocabulary
 
 TCP_NOT_READ = "tcp-not-read"
 
-_NEAR = re.compile(r"(tcp|tpc|ctp|pct|tool|tip|eef|endeff|werkzeug)|(?:^|_)ee(?:_|$)")
+_NEAR = re.compile(r"(tcp|tpc|ctp|tool|tip|eef|endeff|werkzeug)|(?:^|_)ee(?:_|$)")
 """Words for a tool centre point, misspelled ones among them, anywhere in a name."""
 
 _ENTRY = re.compile(r"[xyz\d]$")

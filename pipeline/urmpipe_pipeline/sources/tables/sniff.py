@@ -38,8 +38,9 @@ SAMPLED_LINES = 250
 _NAMES = {",": "comma", ";": "semicolon", "\t": "tab", SPACE: "spaces", "|": "bar", ".": "point"}
 _SIGNS = {name: sign for sign, name in _NAMES.items()} | {"\\t": "\t", "space": SPACE, "pipe": "|"}
 
-_BRACKETED = re.compile(r"\[[^\]\d]*\]|\([^)\d]*\)")
-"""A unit in brackets; one with a number is an index."""
+_UNIT = r"(?:[^\])\d]|(?<=[sm^])[23]|1(?=/))*"
+_BRACKETED = re.compile(rf"\[{_UNIT}\]|\({_UNIT}\)")
+"""A unit in brackets, such as [rad/s^2] or (1/min); with another number it is an index."""
 
 _TOLD = re.compile(r'"?sep=([,;|\t])"?', re.IGNORECASE)
 

@@ -16,16 +16,9 @@ from urmpipe_models.orientation import RotationForm, angles
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.option_text import option
+from urmpipe_pipeline.sources.units.gon import GonDoubt
 from urmpipe_pipeline.sources.units.kinematic_units import KinematicUnits
-from urmpipe_pipeline.sources.units.unit_evidence import (
-    FULL_TURN_DEG,
-    FULL_TURN_GON,
-    Bounds,
-    degrees_evidence,
-    peak,
-    radians_evidence,
-    steps_of,
-)
+from urmpipe_pipeline.sources.units.unit_evidence import Bounds, degrees_evidence, peak, radians_evidence
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Quantity, Unit, vocabulary
 
 GIVEN = "given as an option"
@@ -46,6 +39,7 @@ class UnitFinder:
         source: The source, if it is known.
         file: The file, for errors.
         kinematic: The units that the kinematics single out, if they do.
+        gon: The columns in degrees that may be in gon.
     """
 
     given: Mapping[int, Unit]
@@ -55,8 +49,12 @@ class UnitFinder:
     _assumed: list[LogWarning] = field(default_factory=list)
     _doubted: dict[tuple[Unit, Unit, str], list[Column]] = field(default_factory=dict)
     _overruled: dict[Unit, list[Column]] = field(default_factory=dict)
-    _maybe_gon: list[Column] = field(default_factory=list)
     _noted: dict[tuple[str, str], list[str]] = field(default_factory=dict)
+    gon: GonDoubt = field(init=False)
+
+    def __post_init__(self) -> None:
+        """Begin without a doubt."""
+        self.gon = GonDoubt(self.given, self.file)
 
     @property
     def inferences(self) -> list[Inference]:
@@ -69,17 +67,7 @@ class UnitFinder:
     @property
     def warnings(self) -> list[LogWarning]:
         """What was assumed, and what contradicts the kinematics or the names of the columns."""
-        return [*self._assumed, *self.gon_or_degrees, *self._contradictions(), *self._against_names()]
-
-    @property
-    def gon_or_degrees(self) -> list[LogWarning]:
-        """The columns of a unit that was taken as degrees, and may be the gon."""
-        if not self._maybe_gon:
-            return []
-        names = ", ".join(column.name for column in self._maybe_gon)
-        said = f"{names}: {self._maybe_gon[0].unit_text} is taken as deg, as in German; elsewhere it is gon"
-        hint = "--unit deg says that it is right, values in gon are to be multiplied by 0.9"
-        return [LogWarning("gon-or-deg", f"{said}, 0.9 deg: {hint}")]
+        return [*self._assumed, *self.gon.warnings, *self._contradictions(), *self._against_names()]
 
     def joints(
         self, columns: Sequence[Column], values: FloatArray, t_ns: IntArray | None, robot: Chain | None
@@ -111,7 +99,7 @@ class UnitFinder:
             found = [unit if j in turns else other for j, other in enumerate(found)]
         if self.kinematic is None:
             self._refuse_contradictions(columns, told_units, values, t_ns, robot)
-            self._doubt_degrees(columns, values)
+            self.gon.note_unless_wrapped(columns, values)
         metre = vocabulary().units["m"]
         return [metre if unit is None else unit for unit in found]
 
@@ -162,29 +150,8 @@ class UnitFinder:
                 message = f"found the unit {own.name}, allowed: {names}"
                 raise LogError(Finding(message, self.file, column=column.header))
             units.append(own)
-        self._maybe_gon += self._gon_by_name(columns)
+        self.gon.note(columns)
         return units
-
-    def _gon_by_name(self, columns: Sequence[Column]) -> list[Column]:
-        """Return the columns whose names alone tell a unit that is deg or gon."""
-        named = [one for one in columns if one.unit_text and not {0, one.number} & set(self.given)]
-        return [one for one in named if vocabulary().gon.doubted(one.unit_text or "", one.key)]
-
-    def _doubt_degrees(self, columns: Sequence[Column], values: FloatArray) -> None:
-        """Note the joints in deg or gon, unless their wraps tell degrees; raise if these tell gon.
-
-        Raises:
-            LogError: With the steps of a full turn in gon.
-        """
-        doubted = self._gon_by_name(columns)
-        own = values[:, [column in doubted for column in columns]]
-        if not doubted or steps_of(FULL_TURN_DEG, own):
-            return
-        if turned := steps_of(FULL_TURN_GON, own):
-            said = f"found {', '.join(one.name for one in doubted)} in {doubted[0].unit_text} and {turned}"
-            hint = "a full turn in gon, allowed: rad, deg; multiply the values by 0.9, which are deg then"
-            raise LogError(Finding(f"{said}, {hint}", self.file))
-        self._maybe_gon += doubted
 
     def _told(self, column: Column, kind: JointKind | None) -> Unit | None:
         """Return the unit that the user, the column's name or the source tells."""
@@ -253,7 +220,7 @@ class UnitFinder:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
             message = f"found the unit {shown(column.unit_text)}, allowed: rad, deg, m, mm, cm"
-            _, gon = vocabulary().about_gon(column.unit_text)
+            _, gon = vocabulary().gon.about(column.unit_text)
             hint = gon or f"; say which with {option('--unit', f'{column.name}={likely}')}"
             raise LogError(Finding(f"{message}{hint}", self.file, column=column.header))
         return column.unit
