@@ -6,10 +6,10 @@ from collections.abc import Mapping
 from typing import Any
 
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.json_values import flat
 from urmpipe_pipeline.recording.entities import Block
 from urmpipe_pipeline.recording.metadata import (
     document,
-    flat,
     provenance_data,
     provenance_from,
     robot_data,
