@@ -163,7 +163,13 @@ def test_fri_text(
     assert not log.warnings
 
 
-@pytest.mark.parametrize("name", ["README.md", "panda-matlab-ascii/frankaEmikaPanda.urdf"])
-def test_text_that_is_no_log(name: str) -> None:
-    with pytest.raises(LogError, match=r"cells, allowed: a table$"):
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("README.md", r"cells, allowed: a table$"),
+        ("panda-matlab-ascii/frankaEmikaPanda.urdf", r"found the model of a robot, allowed: a text table; "),
+    ],
+)
+def test_text_that_is_no_log(name: str, said: str) -> None:
+    with pytest.raises(LogError, match=said):
         read_log([LOGS / name])
