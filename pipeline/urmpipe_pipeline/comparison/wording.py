@@ -36,14 +36,15 @@ def verdict_words(comparisons: Sequence[Comparison]) -> str:
 
 
 def _since(comparisons: Sequence[Comparison], *, failed: bool) -> str:
-    """Return that comparisons are worse than their baselines; of one alone only if it is within tolerance."""
+    """Return that comparisons are worse than their baselines."""
     worse = [one.baseline.name for one in comparisons if one.baseline and one.baseline.verdict == "fail"]
     if not worse:
         return ""
+    joined = ", and" if failed else ", but"
     if len(comparisons) == 1:
-        return "" if failed else f", but worse than the baseline {worse[0]}"
+        return f"{joined} worse than the baseline {worse[0]}"
     than = "is worse than its baseline" if len(worse) == 1 else "are worse than their baselines"
-    return f", {'and' if failed else 'but'} {len(worse)} of {len(comparisons)} comparisons {than}"
+    return f"{joined} {len(worse)} of {len(comparisons)} comparisons {than}"
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import pytest
+
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -62,14 +64,20 @@ def test_a_banner_names_the_joint_that_is_furthest_off(comparison: Comparison) -
     assert told["Joint furthest off"] == f"phi2: {text.quantity(joint.max, 'rad')}"
 
 
-def test_a_banner_of_logs_within_tolerance_says_that_they_are_worse_than_the_baseline(
-    comparison: Comparison,
+@pytest.mark.parametrize(
+    ("which", "said"),
+    [
+        (0, f"shifted within tolerance against {PATH}, but worse than the baseline before"),
+        (1, f"joint-off out of tolerance against {PATH}, and worse than the baseline before"),
+    ],
+)
+def test_a_banner_says_that_a_comparison_is_worse_than_its_baseline(
+    comparison: Comparison, which: int, said: str
 ) -> None:
     gone = BaselineComparison("before", None, {}, (), (), (Absent("old"),), ())
-    held = replace(comparison, runs=comparison.runs[:1], baseline=gone)
-    said = comparison_banner([held], [["#a"]])
-    assert (said.state, said.word) == ("fail", "FAIL")
-    assert said.headline == f"shifted within tolerance against {PATH}, but worse than the baseline before"
+    held = replace(comparison, runs=(comparison.runs[which],), baseline=gone)
+    found = comparison_banner([held], [["#a"]])
+    assert (found.state, found.word, found.headline) == ("fail", "FAIL", said)
 
 
 def test_a_banner_of_some_comparisons_counts_those_that_are_worse_than_their_baselines(
