@@ -7,6 +7,7 @@ from pathlib import Path
 import pytest
 from survey.contributing import BEGIN, END, show, shown
 from survey.house import House, survey
+from survey.mutation_score import mutation_score
 from survey.tables import full, summary
 
 from measured_tree import function, measured
@@ -46,7 +47,24 @@ def test_every_bound_is_tested(house: House) -> None:
 
 def test_contributing_shows_the_table_of_this_tree(house: House) -> None:
     page = ROOT / "CONTRIBUTING.md"
-    assert shown(page) == summary(house), "renew it: python benchmarks/house.py --write"
+    score = mutation_score(ROOT / "benchmarks" / "results" / "mutation.md")
+    assert shown(page) == [*summary(house), "", score], "renew it: python benchmarks/house.py --write"
+
+
+def test_the_mutation_score_is_the_one_that_was_measured_last(tmp_path: Path) -> None:
+    results = tmp_path / "mutation.md"
+    results.write_text(
+        "# Mutation score\n\nMeasured 2026-01-02 on 2 cores.\n\n"
+        "## Models and so on: 94.9 % (94 to 96 %), raw\n\n## Inverse: 89.4 % (84 to 95 %)\n",
+        encoding="utf-8",
+    )
+    assert mutation_score(results) == (
+        "Mutation score, by `benchmarks/mutation.py` on 2026-01-02, with the 95 % interval: models and so on"
+        " 94.9 % (94 to 96 %); inverse 89.4 % (84 to 95 %)."
+    )
+    results.write_text("# Mutation score\n", encoding="utf-8")
+    with pytest.raises(ValueError, match=r"^mutation.md has no score: run"):
+        mutation_score(results)
 
 
 def test_the_same_tree_gives_the_same_page(tmp_path: Path) -> None:
