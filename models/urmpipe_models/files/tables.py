@@ -44,7 +44,7 @@ class Table:
 
     def text(self, key: str, default: str | None = None) -> str:
         """Return a string; without a default the key is required."""
-        value = self._get(key, "a text", default)
+        value = self._get(key, default)
         if isinstance(value, str):
             return value
         self._refuse(key, value, "a text")
@@ -52,7 +52,7 @@ class Table:
 
     def choice(self, key: str, allowed: Sequence[str], default: str | None = None) -> str:
         """Return one of the allowed strings; without a default the key is required."""
-        value = self._get(key, _one_of(allowed), default)
+        value = self._get(key, default)
         if value in allowed:
             return str(value)
         self._refuse(key, value, _one_of(allowed) + did_you_mean(str(value), allowed))
@@ -63,7 +63,7 @@ class Table:
         if default is not None and not self.has(key):
             return default
         allowed = "a number" if infinite else "a finite number"
-        value = self._get(key, allowed, None)
+        value = self._get(key)
         if _is_number(value, infinite):
             return float(value)
         self._refuse(key, value, allowed)
@@ -74,7 +74,7 @@ class Table:
     ) -> tuple[float, ...]:
         """Return finite numbers, `count` of them (or any); without a default the key is required."""
         allowed = "a list of finite numbers" if count is None else f"{count} finite numbers"
-        value = self._get(key, allowed, default)
+        value = self._get(key, default)
         if isinstance(value, (list, tuple)) and count in {None, len(value)}:
             if all(_is_number(item) for item in value):
                 return tuple(float(item) for item in value)
@@ -87,7 +87,7 @@ class Table:
 
     def texts(self, key: str) -> tuple[str, ...]:
         """Return a list of strings; the key is required."""
-        value = self._get(key, "a list of texts", None)
+        value = self._get(key)
         if isinstance(value, (list, tuple)) and all(isinstance(item, str) for item in value):
             return tuple(value)
         self._refuse(key, value, "a list of texts")
@@ -95,7 +95,7 @@ class Table:
 
     def mapping(self, key: str) -> dict[str, str]:
         """Return a table of strings under any keys, an empty one where it is missing."""
-        value = self._get(key, "a table of texts", {})
+        value = self._get(key, {})
         if isinstance(value, Mapping) and all(isinstance(item, str) for item in value.values()):
             return dict(value)
         self._refuse(key, value, "a table of texts")
@@ -103,7 +103,7 @@ class Table:
 
     def spread(self, key: str, count: int, default: float) -> tuple[float, ...]:
         """Return `count` numbers, infinities included; one number in the file stands for all of them."""
-        value = self._get(key, "", default)
+        value = self._get(key, default)
         if _is_number(value, infinite=True):
             return (float(value),) * count
         if _are_numbers(value, count, infinite=True):
@@ -113,7 +113,7 @@ class Table:
 
     def rows(self, key: str) -> Rows3:
         """Return the three rows of a 3x3 matrix; the key is required."""
-        value = self._get(key, "three rows of three finite numbers", None)
+        value = self._get(key)
         rows = value if isinstance(value, (list, tuple)) else ()
         if len(rows) == 3 and all(_are_numbers(row, 3) for row in rows):
             return tuple(tuple(float(item) for item in row) for row in rows)
@@ -122,7 +122,7 @@ class Table:
 
     def table(self, key: str) -> Table:
         """Return the table under a key, an empty one where it is missing."""
-        value = self._get(key, "a table", {})
+        value = self._get(key, {})
         if not isinstance(value, Mapping):
             self._refuse(key, value, "a table")
             value = {}
@@ -130,7 +130,7 @@ class Table:
 
     def tables(self, key: str) -> list[Table]:
         """Return the tables of a list; the key is required."""
-        value = self._get(key, "a list of tables", None)
+        value = self._get(key)
         if not isinstance(value, (list, tuple)) or not all(isinstance(item, Mapping) for item in value):
             self._refuse(key, value, "a list of tables")
             return []
@@ -147,7 +147,7 @@ class Table:
                 allowed = ", ".join(dict.fromkeys(self._known))
                 self.fault(key, f"unknown{hint}; allowed: {allowed}")
 
-    def _get(self, key: str, allowed: str, default: Any) -> Any:
+    def _get(self, key: str, default: Any = None) -> Any:
         """Return what a key holds, its default, or that it is missing."""
         self._known.append(key)
         if key in self._data:
