@@ -50,6 +50,12 @@ def test_the_ramp_goes_with_its_speed_all_the_way() -> None:
     np.testing.assert_array_equal(found.acceleration, np.zeros(5))
 
 
+def test_the_way_of_a_ramp_is_what_lies_between_its_ends() -> None:
+    found = ramp(np.array([0.5, 0.75, 1.0]), 0.0, 3.0, 1.0, 2.0)
+    np.testing.assert_array_equal(found.position, [2.0, 1.5, 1.0])
+    np.testing.assert_array_equal(found.velocity, [-2.0, -2.0, 0.0])
+
+
 def test_the_trapezoid_at_its_corners_and_midway() -> None:
     # 4 rad with 2 rad/s and 4 rad/s2: 0.5 s up over 0.5 rad, 1.5 s level over 3 rad, 0.5 s down.
     t = 1.0 + np.array([-0.5, 0.0, 0.25, 0.5, 1.25, 2.0, 2.25, 2.5, 9.0])
