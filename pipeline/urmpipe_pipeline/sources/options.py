@@ -102,6 +102,7 @@ def _are(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     """Return what tells whether a value is a list of such; a text and a table are none."""
 
     def fit(value: Any) -> bool:
+        """Return whether a value is a list of which each item fits."""
         alone = isinstance(value, (str, Mapping)) or hasattr(value, "columns")
         return not alone and isinstance(value, Iterable) and all(map(fits, value))
 

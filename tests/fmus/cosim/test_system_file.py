@@ -215,6 +215,15 @@ def test_a_step_is_told_in_s_or_with_its_unit(tmp_path: Path, told: str, step: f
     assert load_system(tmp_path / "a.toml").step == pytest.approx(step, rel=1e-15)  # a product's rounding
 
 
+def places_of_faults(path: Path, text: str) -> list[tuple[str, int | None]]:
+    """Return the key and the line of each fault of a system file, in the order in which they are told."""
+    path.write_text(text, encoding="utf-8")
+    with pytest.raises(CosimulationError) as caught:
+        load_system(path)
+    assert {one.file for one in caught.value.findings} == {str(path)}
+    return [(one.message.partition(": ")[0], one.line) for one in caught.value.findings]
+
+
 def test_what_is_wrong_is_told_with_its_line(tmp_path: Path) -> None:
     text = """# a system
 [system]
@@ -228,18 +237,13 @@ unit = "x"
 "a.u" = "z.y"
 a.v = 7
 """
-    (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(CosimulationError) as caught:
-        load_system(tmp_path / "bad.toml")
-    places = [(one.message.partition(": ")[0], one.line) for one in caught.value.findings]
-    assert places == [
+    assert places_of_faults(tmp_path / "bad.toml", text) == [
         ("blocks.a.start", 6),
         ("blocks.b c", 7),
         ("system.step", 3),
         ("connections.a.u", 10),
         ("connections.a.v", 11),
     ]
-    assert {one.file for one in caught.value.findings} == {str(tmp_path / "bad.toml")}
 
 
 def test_dotted_keys_have_the_line_of_their_own(tmp_path: Path) -> None:
@@ -252,11 +256,7 @@ c.start = 3
 [connections]
 a.u = 7
 """
-    (tmp_path / "bad.toml").write_text(text, encoding="utf-8")
-    with pytest.raises(CosimulationError) as caught:
-        load_system(tmp_path / "bad.toml")
-    places = [(one.message.partition(": ")[0], one.line) for one in caught.value.findings]
-    assert places == [
+    assert places_of_faults(tmp_path / "bad.toml", text) == [
         ("blocks.a", 3),
         ("blocks.a.fmu", 3),
         ("blocks.c", 6),
