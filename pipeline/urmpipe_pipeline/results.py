@@ -14,6 +14,8 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.runs import presenter as runs
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations import presenter as simulations
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,6 +36,7 @@ class Kind:
 KINDS: tuple[Kind, ...] = (
     Kind("run", Run, runs.present),
     Kind("comparison", Comparison, comparison.present),
+    Kind("simulation", Simulation, simulations.present),
 )
 """Every kind."""
 
