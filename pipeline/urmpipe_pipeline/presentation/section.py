@@ -157,6 +157,11 @@ def no_blocks() -> tuple[Block, ...]:
     return ()
 
 
+def no_figures() -> tuple[Figure, ...]:
+    """Return no figures: the default of a section."""
+    return ()
+
+
 def no_events() -> tuple[Event, ...]:
     """Return no events: the default of a section."""
     return ()
@@ -171,7 +176,9 @@ class Section:
         verdict: pass, fail or None.
         facts: What it is about; of a judged section the first is what decided, a value with its limit.
         tables: What is read first.
-        blocks: Returns figures and further tables in order; called only where they are shown.
+        figures: Returns its plots, for the viewer and a page, in order; called only where they are shown.
+        blocks: Returns what only a page has room for, in order behind the figures: paths in space, what
+            takes long to compute, long tables, texts; called only there.
         checks: What was judged. With checks or properties a section is a test suite of JUnit.
         properties: Of that suite: names and plain values.
         events: Returns them in any order; called only where they are shown.
@@ -187,6 +194,7 @@ class Section:
     verdict: Verdict = None
     facts: tuple[Fact, ...] = ()
     tables: tuple[Table, ...] = ()
+    figures: Callable[[], Iterable[Figure]] = no_figures
     blocks: Callable[[], Iterable[Block]] = no_blocks
     checks: tuple[Check, ...] = ()
     properties: Mapping[str, Any] = field(default_factory=dict)
