@@ -9,7 +9,11 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from urmpipe_pipeline.comparison import presenter as comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.section import Presentation
+from urmpipe_pipeline.runs import presenter as runs
+from urmpipe_pipeline.runs.results import Run
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,7 +31,10 @@ class Kind:
     present: Callable[[Any], Presentation]
 
 
-KINDS: tuple[Kind, ...] = ()
+KINDS: tuple[Kind, ...] = (
+    Kind("run", Run, runs.present),
+    Kind("comparison", Comparison, comparison.present),
+)
 """Every kind."""
 
 
