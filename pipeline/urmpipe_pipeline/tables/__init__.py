@@ -1,0 +1,1 @@
+"""Tables for other programs: JUnit XML and CSV of what a presentation holds."""
