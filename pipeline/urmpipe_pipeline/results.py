@@ -9,6 +9,8 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.section import Presentation
 
 
@@ -20,15 +22,22 @@ class Kind:
         name: What a recording calls it.
         cls: Its dataclass.
         present: Returns what a result of it shows.
+        exports: Returns what can leave of a result of it; None where nothing can.
     """
 
     name: str
     cls: type
     present: Callable[[Any], Presentation]
+    exports: Callable[[Any], Exports] | None = None
 
 
 KINDS: tuple[Kind, ...] = ()
 """Every kind."""
+
+
+def is_result(value: Any) -> bool:
+    """Tell whether a value is a result of any kind."""
+    return any(kind.cls is type(value) for kind in KINDS)
 
 
 def kind_of(result: Any) -> Kind:
@@ -39,3 +48,15 @@ def kind_of(result: Any) -> Kind:
 def present(result: Any) -> Presentation:
     """Return what a result shows."""
     return kind_of(result).present(result)
+
+
+def exports(result: Any) -> Exports:
+    """Return what can leave of a result.
+
+    Raises:
+        OptionError: If nothing can.
+    """
+    kind = kind_of(result)
+    if kind.exports is None:
+        raise OptionError(f"a {kind.name} has no tables")
+    return kind.exports(result)

@@ -11,7 +11,7 @@ import pytest
 
 import urmpipe as package
 from urmpipe.commands.export import export as command
-from urmpipe_pipeline.export import FORMATS
+from urmpipe_pipeline.tables import FORMATS
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""

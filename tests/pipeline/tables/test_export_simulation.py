@@ -15,11 +15,13 @@ from pyarrow.csv import read_csv
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
+from exported import export_result
 from urmpipe_models.errors import OptionError, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_pipeline.comparison.compare import Tcp
-from urmpipe_pipeline.export import ExportOptions, Format, Rows, export_result
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.tables import ExportOptions, Format
+from urmpipe_pipeline.tables import RowNames as Rows
 
 MakeSimulation = Callable[..., Simulation]
 

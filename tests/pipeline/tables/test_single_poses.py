@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from exported import export_result
 from urmpipe_models.inverse.targets import targets_of
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.export import ExportOptions, Format, export_result
-from urmpipe_pipeline.export.mat_file import run_fields
 from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.tables import ExportOptions, Format
+from urmpipe_pipeline.tables.mat_file import run_fields
 
 
 @pytest.fixture

@@ -15,7 +15,9 @@ from scipy.io import savemat
 
 from urmpipe_models.errors import OptionError, OutputError, RecordingError, UrmpipeError
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.export import (
+from urmpipe_pipeline.presentation.exports import Times
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.tables import (
     FORMATS,
     ExportOptions,
     Format,
@@ -25,11 +27,9 @@ from urmpipe_pipeline.export import (
     mat_file,
     parquet_file,
 )
-from urmpipe_pipeline.export.identity import is_export
-from urmpipe_pipeline.export.lines import differences, texts, write_lines
-from urmpipe_pipeline.export.times import Times
-from urmpipe_pipeline.export.write import write_all
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.tables.identity import is_export
+from urmpipe_pipeline.tables.lines import differences, texts, write_lines
+from urmpipe_pipeline.tables.write import write_all
 
 
 def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:

@@ -10,7 +10,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_pipeline.export.times import DAY, EXPONENTS, Times, shares
+from urmpipe_pipeline.tables.times import DAY, EXPONENTS, Times, shares
 
 NS = st.integers(-(2**62) + 1, 2**62 - 1)
 
