@@ -45,11 +45,9 @@ def run_poses(run: Run, rows: str) -> list[Poses]:
     """
     if run.robot is None or not run.log.joints:
         lacks = "robot" if run.log.joints else "joints"
-        hints = (
-            Hint("robot", does="at `ingest` gives it"),
-            Hint("tcp", "recorded", "takes what it recorded"),
-        )
-        raise _lacking(run, f"no {lacks}, so no pose", *hints)
+        at_ingest = Hint("robot", does="gives it", call="ingest")
+        recorded = Hint("tcp", "recorded", "takes what the log recorded")
+        raise _lacking(run, f"no {lacks}, so no pose", at_ingest, recorded)
     t_ns, q = (run.t_ns, run.q) if rows == "grid" else (run.log.t_ns, run.log.q)
     return [poses_by_kinematics("", run.robot, run.log.clock_start_ns + t_ns, q, _where(run))]
 
