@@ -7,12 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from exported import export_result
 from urmpipe_models.inverse.targets import targets_of
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.export import ExportOptions, Format, export_result
-from urmpipe_pipeline.export.mat_file import run_fields
+from urmpipe_pipeline import results
 from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.tables import ExportOptions, Format
 
 
 @pytest.fixture
@@ -37,6 +38,7 @@ def test_a_table_of_single_poses_counts_rows_and_has_nothing_per_second(run: Run
 
 
 def test_a_mat_file_of_single_poses_has_no_times_and_nothing_per_second(run: Run) -> None:
-    fields = run_fields(run, {})
+    rows = results.exports(run).rows["grid"]
+    fields = rows.fields(rows.table(True))
     assert [name for name in ("t", "clock_ns", "qd", "qdd", "v", "a") if fields[name].size] == []
     np.testing.assert_array_equal(fields["q"], run.q)
