@@ -5,19 +5,22 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from urmpipe_models.messages import hint_words
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline import text
-from urmpipe_pipeline.presentation.section import Cell, Judged, Place, Ref, Value
+from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Value
 
 FINEST = 15
 """Digits of a share at most: more are not in it."""
 
 
-def written(cell: Cell, *, unit: bool = False) -> str:
+def written(cell: Cell, *, unit: bool = False, voice: Voice = "command line") -> str:
     """Return a cell as people read it.
 
     Args:
         cell: What is shown.
         unit: Whether its unit stands behind it; in a table it stands in the head.
+        voice: Who reads it: how parameters are spelled.
     """
     match cell:
         case None | "":
@@ -26,6 +29,8 @@ def written(cell: Cell, *, unit: bool = False) -> str:
             return cell
         case Ref():
             return cell.title
+        case Advice():
+            return "; ".join(filter(None, (cell.words, *hint_words(cell.hints, voice)))) or text.NOTHING
         case Judged():
             return text.NOTHING if cell.verdict is None else cell.verdict.upper()
         case Place():
