@@ -71,8 +71,8 @@ class Comparison(Shown):
     @property
     def own_warnings(self) -> tuple[LogWarning, ...]:
         """The warnings that are about no single log."""
-        names = tuple(f"{run.name}: " for run in self.runs)
-        return tuple(one for one in self.warnings if not one.message.startswith(names))
+        of_logs = {one for run in self.runs for one in self.warnings_of(run)}
+        return tuple(one for one in self.warnings if one not in of_logs)
 
     @property
     def ranking(self) -> tuple[Deviation, ...]:

@@ -23,20 +23,19 @@ def written(cell: Cell, *, unit: bool = False, voice: Voice = "command line") ->
         voice: Who reads it: how parameters are spelled.
     """
     match cell:
-        case None | "":
-            return text.NOTHING
-        case str():
-            return cell
-        case Ref():
-            return cell.title
-        case Advice():
-            return "; ".join(filter(None, (cell.words, *hint_words(cell.hints, voice)))) or text.NOTHING
-        case Judged():
-            return text.NOTHING if cell.verdict is None else cell.verdict.upper()
-        case Place():
-            return f"({text.point(cell.position)})" + (" m" if unit else "")
         case Value():
             return _number(cell, unit=unit)
+        case Place():
+            return f"({text.point(cell.position)})" + (" m" if unit else "")
+        case Advice():
+            said = "; ".join(filter(None, (cell.words, *hint_words(cell.hints, voice))))
+        case Judged():
+            said = (cell.verdict or "").upper()
+        case Ref():
+            said = cell.title
+        case _:
+            said = cell or ""
+    return said or text.NOTHING
 
 
 def unit_of(cells: Iterable[Cell]) -> str:

@@ -195,7 +195,7 @@ def _events(simulation: Simulation) -> Iterator[Event]:
         level: Level = "error" if one.verdict == "fail" else "info"
         yield Event(int(simulation.t_ns[one.sample]), f"{one.block} decides: {meter_words(one)}", level)
     for warning in simulation.warnings:
-        yield Event(None, f"{warning.kind}: {warning.message}", "warning")
+        yield Event(None, warning, "warning")
     if simulation.failed is not None:
         at = int(simulation.t_ns[-1]) if len(simulation.t_ns) else None
         yield Event(at, f"failed: {simulation.failed}", "error")
