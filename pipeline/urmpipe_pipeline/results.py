@@ -9,7 +9,10 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
+from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.section import Presentation
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,15 +22,15 @@ class Kind:
     Attributes:
         name: What a recording calls it.
         cls: Its dataclass.
-        present: Returns what a result of it shows.
+        present: Returns what a result of it shows; None of a kind that is only stored.
     """
 
     name: str
     cls: type
-    present: Callable[[Any], Presentation]
+    present: Callable[[Any], Presentation] | None = None
 
 
-KINDS: tuple[Kind, ...] = ()
+KINDS: tuple[Kind, ...] = (Kind("run", Run), Kind("comparison", Comparison), Kind("simulation", Simulation))
 """Every kind."""
 
 
@@ -38,4 +41,7 @@ def kind_of(result: Any) -> Kind:
 
 def present(result: Any) -> Presentation:
     """Return what a result shows."""
-    return kind_of(result).present(result)
+    kind = kind_of(result)
+    if kind.present is None:
+        raise TypeError(f"found a {kind.name}, allowed: a kind with a presenter")
+    return kind.present(result)
