@@ -122,8 +122,8 @@ class Figure:
         alt: What it shows, for who does not see it.
         views: At least one.
         instants: Times in [ns] at which a line goes through all panels, with a word each.
-        opened: Number of the view that the viewer opens.
-        share: Height of its row in the viewer relative to others.
+        opened: Number of the view that the viewer opens; None: all of them, one below the other.
+        share: Height of its row in the viewer relative to others; of each row if all views are open.
     """
 
     title: str
@@ -131,7 +131,7 @@ class Figure:
     alt: str
     views: tuple[View, ...]
     instants: Mapping[int, str] = field(default_factory=dict)
-    opened: int = 0
+    opened: int | None = 0
     share: float = 1.0
 
 
