@@ -92,8 +92,9 @@ def form_of(hint: Any) -> Form:
         return _plain_type(hint or types.NoneType)
     if hint is Path:
         return Form("Path", _is(Path), _is(str), lambda value, at: str(value), lambda tree, at: Path(tree))
-    if is_dataclass(hint):
+    if isinstance(hint, type) and is_dataclass(hint):
         return _record(hint)
+    makers: dict[Any, Callable[[tuple[Any, ...]], Form]]
     makers = {Literal: _choice, Union: _one_of, types.UnionType: _one_of, np.ndarray: _array, list: _list,
               tuple: _tuple, dict: _table, Mapping: _table}  # fmt: skip
     if origin not in makers:
@@ -199,7 +200,7 @@ def _items(kind: type, inner: tuple[Any, ...]) -> Form:
         return kind(_made(cls, dict(zip(known, row, strict=True)), at) for row in rows)
 
     def fits(tree: Any) -> bool:
-        return isinstance(tree, list) or (isinstance(tree, dict) and COLUMNS in tree)
+        return isinstance(tree, list) or (isinstance(tree, dict) and tree.keys() == {COLUMNS, COUNT})
 
     return Form(text, _is(tuple, list), fits, to_json, from_json, form.classes)
 
@@ -255,7 +256,7 @@ def _table(inner: tuple[Any, ...]) -> Form:
     return Form(f"dict[str, {form.text}]", _is(Mapping), _is(dict), to_json, from_json, form.classes)
 
 
-def _record(cls: type) -> Form:
+def _record(cls: type[Any]) -> Form:
     """Return the form of a dataclass: its fields by their names."""
 
     def to_json(value: Any, at: Out) -> Any:
@@ -282,11 +283,20 @@ def _made(cls: type, told: Mapping[str, Any], at: In) -> Any:
 
 
 def _one_of(inner: tuple[Any, ...]) -> Form:
-    """Return the form of a union: of several dataclasses in it, each tells the name of its class."""
+    """Return the form of a union: of several dataclasses in it, each tells the name of its class.
+
+    Lists of this and lists of that are one list of this or that: an empty one is of both.
+    """
+    lists = [get_args(one)[0] for one in inner if get_origin(one) is list]
+    if len(lists) > 1:
+        others = [one for one in inner if get_origin(one) is not list]
+        return form_of(Union[(*others, list[Union[tuple(lists)]])])  # type: ignore[misc]  # noqa: UP007
     named = sum(is_dataclass(one) for one in inner) > 1
     forms = [_named(form_of(one)) if named and is_dataclass(one) else form_of(one) for one in inner]
+    forms.sort(key=lambda form: form.fits({}))  # an object may stand for a long list or an array
     text = " or ".join(form.text for form in forms)
-    for probe in ("", [], {}, {ARRAY: ""}, {COLUMNS: {}}):
+    probes: tuple[Any, ...] = ("", [], {}, {ARRAY: ""})
+    for probe in probes:
         if sum(form.fits(probe) for form in forms) > 1:
             raise TypeError(f"found a field of type {text}, allowed: what JSON tells apart")
 
