@@ -43,6 +43,11 @@ class Column:
     t_ns: NDArray[np.int64] | None
     plotted: bool
 
+    @property
+    def rows(self) -> int:
+        """How many rows it has; a single value is one."""
+        return len(self.values) if self.values.ndim else 1
+
 
 @dataclass(frozen=True, slots=True)
 class Place:
@@ -62,12 +67,12 @@ class Out(Place):
     Attributes:
         clock: The nearest times above it.
         columns: All arrays so far.
-        paths: Their paths by `id`: an array that stands in two places is kept once.
+        paths: Their paths by `id`, and that of their times: an array that stands in two places is kept once.
     """
 
     clock: Any
     columns: list[Column]
-    paths: dict[int, str]
+    paths: dict[tuple[int, int], str]
 
     def below(self, part: str, clock: Any = None) -> Out:
         """Return the place of a part, which may have times of its own."""
@@ -77,13 +82,15 @@ class Out(Place):
         """Keep an array, and return what stands for it."""
         if not values.dtype.isnative:
             raise self.wrong(values.dtype, "the order of bytes of this computer")
-        if values.size and id(values) not in self.paths:
-            self.paths[id(values)] = self.path
-            clock = None if self.clock is values else self.clock
-            timed = clock is not None and values.shape[:1] == clock.shape
+        clock = None if self.clock is values else self.clock
+        if clock is not None and values.shape[:1] != clock.shape:
+            clock = None
+        key = id(values), id(clock)
+        if values.size and key not in self.paths:
+            self.paths[key] = self.path
             rows = plotted and values.dtype == np.float64 and values.ndim in (1, 2)
-            self.columns.append(Column(self.path, values, clock if timed else None, rows))
-        return {ARRAY: self.paths.get(id(values)), SHAPE: list(values.shape), DTYPE: values.dtype.str}
+            self.columns.append(Column(self.path, values, clock, rows))
+        return {ARRAY: self.paths.get(key), SHAPE: list(values.shape), DTYPE: values.dtype.str}
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -17,12 +17,16 @@ class Encoded:
     Attributes:
         tree: All but its arrays, as JSON has it.
         columns: Its arrays.
-        entities: The path of each array by its `id`; an array that stands in two places has one.
+        entities: The path of each array by its `id` and that of its times; see `entity_of`.
     """
 
     tree: Any
     columns: tuple[Column, ...]
-    entities: dict[int, str]
+    entities: Mapping[tuple[int, int], str]
+
+    def entity_of(self, array: Any, t_ns: Any = None) -> str:
+        """Return the path of an array on some times; empty for one that has no values, which is not kept."""
+        return self.entities.get((id(array), id(t_ns)), "")
 
 
 def encode(result: Any) -> Encoded:

@@ -15,7 +15,7 @@ from typing import Any, Literal, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
 
-from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.errors import RecordingError, UrmpipeError
 from urmpipe_pipeline.recording.array_form import (
     ARRAY,
     KINDS,
@@ -191,13 +191,13 @@ def _items(kind: type, inner: tuple[Any, ...]) -> Form:
         told, count = tree[COLUMNS], tree.get(COUNT)
         if form.plain:
             return kind(_column(form, told, count, at))
-        if not _flat(form) or not isinstance(told, dict):
+        parts = parts_of(form.classes[0]) if _flat(form) and isinstance(told, dict) else {}
+        known = {name: part for name, part in parts.items() if name in told}
+        if not known:
             raise at.wrong(told, "columns of plain values")
-        (cls,) = form.classes
-        known = {name: part for name, part in parts_of(cls).items() if name in told}
         columns = [_column(part, told[name], count, at.below(name)) for name, part in known.items()]
-        rows = zip(*columns, strict=True) if columns else [()] * count
-        return kind(_made(cls, dict(zip(known, row, strict=True)), at) for row in rows)
+        rows = (dict(zip(known, row, strict=True)) for row in zip(*columns, strict=True))
+        return kind(_made(form.classes[0], row, at) for row in rows)
 
     def fits(tree: Any) -> bool:
         return isinstance(tree, list) or (isinstance(tree, dict) and tree.keys() == {COLUMNS, COUNT})
@@ -216,11 +216,13 @@ def _column(form: Form, tree: Any, count: Any, at: In) -> list[Any]:
     return values
 
 
+def _is_record(form: Form) -> bool:
+    return len(form.classes) == 1 and form is form_of(form.classes[0])
+
+
 def _flat(form: Form) -> bool:
     """Tell whether a form is that of a record of plain values."""
-    if len(form.classes) != 1 or form is not form_of(form.classes[0]):
-        return False
-    return all(part.plain for part in parts_of(form.classes[0]).values())
+    return _is_record(form) and all(part.plain for part in parts_of(form.classes[0]).values())
 
 
 def _row(inner: tuple[Any, ...]) -> Form:
@@ -256,7 +258,7 @@ def _table(inner: tuple[Any, ...]) -> Form:
     return Form(f"dict[str, {form.text}]", _is(Mapping), _is(dict), to_json, from_json, form.classes)
 
 
-def _record(cls: type[Any]) -> Form:
+def _record(cls: Any) -> Form:
     """Return the form of a dataclass: its fields by their names."""
 
     def to_json(value: Any, at: Out) -> Any:
@@ -278,6 +280,8 @@ def _made(cls: type, told: Mapping[str, Any], at: In) -> Any:
         raise at.wrong(None, f"the field {missing[0]} of {cls.__name__}")
     try:
         return cls(**told)
+    except RecordingError:  # an array that is read as it is used
+        raise
     except (UrmpipeError, ArithmeticError, AttributeError, LookupError, TypeError, ValueError) as error:
         raise CodecError(f"{at.path or '/'}: {error}") from error
 
@@ -292,7 +296,9 @@ def _one_of(inner: tuple[Any, ...]) -> Form:
         others = [one for one in inner if get_origin(one) is not list]
         return form_of(Union[(*others, list[Union[tuple(lists)]])])  # type: ignore[misc]  # noqa: UP007
     named = sum(is_dataclass(one) for one in inner) > 1
-    forms = [_named(form_of(one)) if named and is_dataclass(one) else form_of(one) for one in inner]
+    forms = [form_of(one) for one in inner]
+    if named:
+        forms = [_named(form) if _is_record(form) else form for form in forms]
     forms.sort(key=lambda form: form.fits({}))  # an object may stand for a long list or an array
     text = " or ".join(form.text for form in forms)
     probes: tuple[Any, ...] = ("", [], {}, {ARRAY: ""})
