@@ -1,0 +1,211 @@
+"""The words and tables of a result: facts, tables, checks, events, in sections."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, TypeAlias
+
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.presentation.figure import Drawing, Figure, SpaceFigure, Text
+from urmpipe_pipeline.presentation.scene import Scene
+
+Verdict: TypeAlias = Literal["pass", "fail"] | None
+
+
+@dataclass(frozen=True, slots=True)
+class Value:
+    """A number; how many digits of it are shown, and in which unit, is decided where it is rendered.
+
+    Attributes:
+        number: In `unit`; None where there is no value.
+        unit: SI ("m", "rad", "s", "m/s"), "%" of a share 0..1, "1" of a ratio, "" of a count.
+        limit: What it is held against, in `unit`.
+        verdict: How it came out.
+        used: Share of the limit that is used up, 0 or more.
+        signed: Whether a plus sign is shown.
+        most: Whether it stands out of its column.
+    """
+
+    number: float | int | None
+    unit: str = ""
+    limit: float | None = None
+    verdict: Verdict = None
+    used: float | None = None
+    signed: bool = False
+    most: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Place:
+    """A point x, y, z in [m]."""
+
+    position: tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Judged:
+    """A verdict as the cell of a table."""
+
+    verdict: Verdict
+
+
+@dataclass(frozen=True, slots=True)
+class Ref:
+    """The title of a section: where links are possible, it leads there."""
+
+    title: str
+
+
+Cell: TypeAlias = Value | Place | Judged | Ref | str | None
+
+
+@dataclass(frozen=True, slots=True)
+class Fact:
+    """A name and a value.
+
+    Attributes:
+        name: What it is of.
+        value: What it is; nothing is shown of None and of an empty text.
+        help: What that means, for who meets it for the first time.
+        brief: Whether it is shown where there is little room: terminal, card, summary.
+    """
+
+    name: str
+    value: Cell
+    help: str = ""
+    brief: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Column:
+    """A column of a table.
+
+    Attributes:
+        key: Its name in CSV.
+        title: Its head, without a unit: that comes from its values.
+        cells: One a row.
+        brief: Whether it is shown where there is little room.
+    """
+
+    key: str
+    title: str
+    cells: Sequence[Cell]
+    brief: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Table:
+    """Columns of equal length; the first names the rows. A column without any value is not shown.
+
+    Attributes:
+        title: Its heading.
+        columns: From the left.
+        note: A line under it.
+        brief: Whether it is shown where there is little room.
+        folded: Whether a page opens it only on request.
+    """
+
+    title: str
+    columns: tuple[Column, ...]
+    note: str = ""
+    brief: bool = True
+    folded: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class Check:
+    """One judgement: a test case of JUnit.
+
+    Attributes:
+        name: What is judged, unique within `about` and its section.
+        verdict: pass or fail.
+        words: Why it fails; one line.
+        about: Its class in JUnit; by default the title of its section.
+        kind: What fails, such as "out-of-tolerance".
+    """
+
+    name: str
+    verdict: Literal["pass", "fail"]
+    words: str = ""
+    about: str = ""
+    kind: str = "out-of-tolerance"
+
+
+@dataclass(frozen=True, slots=True)
+class Event:
+    """Something that happened at a time, or (`t_ns` None) that holds for all of it."""
+
+    t_ns: int | None
+    words: str
+    level: Literal["info", "warning", "error"] = "info"
+
+
+Block: TypeAlias = Table | Figure | SpaceFigure | Drawing | Text
+
+
+def no_blocks() -> tuple[Block, ...]:
+    """Return no blocks: the default of a section."""
+    return ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Section:
+    """A part of a result under a heading.
+
+    Attributes:
+        title: The heading.
+        verdict: pass, fail or None.
+        facts: What it is about.
+        tables: What is read first.
+        blocks: Returns figures and further tables in order; called only where they are shown.
+        checks: What was judged: a test suite of JUnit, if there is any.
+        properties: Of that suite: names and plain values.
+        events: In any order.
+        warnings: What a person should know.
+        notice: What must not be overseen.
+        sections: The parts below it.
+    """
+
+    title: str
+    verdict: Verdict = None
+    facts: tuple[Fact, ...] = ()
+    tables: tuple[Table, ...] = ()
+    blocks: Callable[[], Iterable[Block]] = no_blocks
+    checks: tuple[Check, ...] = ()
+    properties: Mapping[str, Any] = field(default_factory=dict)
+    events: tuple[Event, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
+    notice: str = ""
+    sections: tuple[Section, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Presentation:
+    """All that a result shows.
+
+    Attributes:
+        name: Of the result.
+        headline: How it came out, one sentence without the verdict's word.
+        verdict: pass, fail or None.
+        word: What stands for the verdict where there is none, such as "ingested".
+        facts: The few facts that explain the headline.
+        body: Everything else.
+        opens_at_ns: Where the viewer opens in [ns].
+        scene: Returns the 3D view; called only where it is drawn.
+        line: The result's row among several: heads and cells.
+        rows: Returns what `--csv` writes.
+        created: When it was made (ISO 8601), for JUnit; empty where that is not known.
+    """
+
+    name: str
+    headline: str
+    verdict: Verdict
+    facts: tuple[Fact, ...]
+    body: Section
+    word: str = ""
+    opens_at_ns: int = 0
+    scene: Callable[[], Scene | None] | None = None
+    line: Mapping[str, Cell] = field(default_factory=dict)
+    rows: Callable[[], Table] | None = None
+    created: str = ""
