@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.section import Cell, Judged, Place, Ref, Value
+
+FINEST = 15
+"""Digits of a share at most: more are not in it."""
 
 
 def written(cell: Cell, *, unit: bool = False) -> str:
@@ -55,11 +59,23 @@ def _number(value: Value, *, unit: bool) -> str:
 
 def _digits(value: Value, number: float) -> str:
     if value.unit in text.SHOWN:
-        return text.number(number, value.unit, value.limit)
+        exact = value.given and math.isfinite(number)
+        return text.limit(number, value.unit) if exact else text.number(number, value.unit, value.limit)
     if value.unit == "%":
-        return text.percent(number)
+        return _percent(number, value.limit)
+    if value.unit == "1":
+        return f"{round(number, 3) + 0.0:.3f}"  # + 0.0: no -0.000
     if value.unit == "s":
         return text.seconds(number)
     if isinstance(value.number, int):
         return str(value.number)
     return f"{number:.6g}"
+
+
+def _percent(share: float, against: float | None) -> str:
+    """Return a share in [%], with as many digits as tell it from what it is held against."""
+    shown = text.percent(share)
+    if against is None or against == share or float(shown[:-1]) != float(text.percent(against)[:-1]):
+        return shown
+    digits = next((n for n in range(3, FINEST) if f"{share:.{n}g}" != f"{against:.{n}g}"), FINEST)
+    return f"{100.0 * share:.{digits}g} %"

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.presentation.scene import Path, Spot
+from urmpipe_pipeline.presentation.scene import BoolArray, Path, Spot
 
 Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]
 
@@ -23,6 +23,7 @@ class Line:
         dashed: True for what was asked for, beside what was measured.
         steps: True for what changes only from one row to the next.
         points: True for rows that nothing joins.
+        t_ns: Time of each row in [ns], shape (n,), where it is not the panel's.
     """
 
     values: FloatArray
@@ -31,6 +32,7 @@ class Line:
     dashed: bool = False
     steps: bool = False
     points: bool = False
+    t_ns: IntArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +102,7 @@ class Panel:
     over: Over | None = None
     logarithmic: bool = False
     small: bool = False
-    tinted: FloatArray | None = None
+    tinted: BoolArray | None = None
     share: float = 1.0
 
 
@@ -122,8 +124,8 @@ class Figure:
         alt: What it shows, for who does not see it.
         views: At least one.
         instants: Times in [ns] at which a line goes through all panels, with a word each.
-        opened: Number of the view that the viewer opens.
-        share: Height of its row in the viewer relative to others.
+        opened: Number of the view that the viewer opens; None: all of them, one below the other.
+        share: Height of its row in the viewer relative to others; of each row if all views are open.
     """
 
     title: str
@@ -131,7 +133,7 @@ class Figure:
     alt: str
     views: tuple[View, ...]
     instants: Mapping[int, str] = field(default_factory=dict)
-    opened: int = 0
+    opened: int | None = 0
     share: float = 1.0
 
 

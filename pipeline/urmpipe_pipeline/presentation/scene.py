@@ -55,6 +55,7 @@ class Path:
         sample: Row numbers, shape (n,): broken where one is missing; None: none is missing.
         kept: Rows that are drawn in any case.
         vanishes: True if there is no moving point where there is no position.
+        line: False if only the moving point is drawn: nothing joins its places, or another path is its line.
     """
 
     name: str
@@ -68,6 +69,7 @@ class Path:
     sample: IntArray | None = None
     kept: tuple[int, ...] = ()
     vanishes: bool = False
+    line: bool = True
 
 
 @dataclass(frozen=True, slots=True)
@@ -109,7 +111,7 @@ class Scene:
     """What the 3D view shows.
 
     Attributes:
-        title: Whose arm it is, and what else must be said of the view.
+        title: The name of the view: whose arm it is, and what else must be said of it.
         arms: The moving arm first, ghosts behind it.
         paths: From the back to the front.
         spots: Places with a word.

@@ -11,6 +11,7 @@ from urmpipe_pipeline.presentation.figure import Drawing, Figure, SpaceFigure, T
 from urmpipe_pipeline.presentation.scene import Scene
 
 Verdict: TypeAlias = Literal["pass", "fail"] | None
+Level: TypeAlias = Literal["info", "warning", "error"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -24,6 +25,7 @@ class Value:
         verdict: How it came out.
         used: Share of the limit that is used up, 0 or more.
         signed: Whether a plus sign is shown.
+        given: True for what was given, not measured: it is written with no more digits than it has.
         most: Whether it stands out of its column.
     """
 
@@ -33,6 +35,7 @@ class Value:
     verdict: Verdict = None
     used: float | None = None
     signed: bool = False
+    given: bool = False
     most: bool = False
 
 
@@ -52,9 +55,15 @@ class Judged:
 
 @dataclass(frozen=True, slots=True)
 class Ref:
-    """The title of a section: where links are possible, it leads there."""
+    """The title of a section: where links are possible, it leads there.
+
+    Attributes:
+        title: That of the section.
+        colour: As #rrggbb, in which the section's subject is drawn everywhere; empty if it has none.
+    """
 
     title: str
+    colour: str = ""
 
 
 Cell: TypeAlias = Value | Place | Judged | Ref | str | None
@@ -83,7 +92,7 @@ class Column:
 
     Attributes:
         key: Its name in CSV.
-        title: Its head, without a unit: that comes from its values.
+        title: Its head, without a unit: that comes from its values; where they differ, each cell has its own.
         cells: One a row.
         brief: Whether it is shown where there is little room.
     """
@@ -138,7 +147,7 @@ class Event:
 
     t_ns: int | None
     words: str
-    level: Literal["info", "warning", "error"] = "info"
+    level: Level = "info"
 
 
 Block: TypeAlias = Table | Figure | SpaceFigure | Drawing | Text
@@ -149,6 +158,16 @@ def no_blocks() -> tuple[Block, ...]:
     return ()
 
 
+def no_figures() -> tuple[Figure, ...]:
+    """Return no figures: the default of a section."""
+    return ()
+
+
+def no_events() -> tuple[Event, ...]:
+    """Return no events: the default of a section."""
+    return ()
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Section:
     """A part of a result under a heading.
@@ -156,28 +175,36 @@ class Section:
     Attributes:
         title: The heading.
         verdict: pass, fail or None.
-        facts: What it is about.
+        facts: What it is about; of a judged section the first is what decided.
         tables: What is read first.
-        blocks: Returns figures and further tables in order; called only where they are shown.
-        checks: What was judged: a test suite of JUnit, if there is any.
+        figures: Returns its plots, for the viewer and a page, in order; called only where they are shown.
+        blocks: Returns what only a page has room for, in order behind the figures: paths in space, what
+            takes long to compute, long tables, texts; called only there.
+        checks: What was judged. With checks or properties a section is a test suite of JUnit.
         properties: Of that suite: names and plain values.
-        events: In any order.
+        events: Returns them in any order; called only where they are shown.
         warnings: What a person should know.
         notice: What must not be overseen.
         sections: The parts below it.
+        rank: Its place among its neighbours where they are read from best to worst, or by importance, 0 the
+            first; JUnit and the viewer's tabs keep the order given.
+        opened: Whether the viewer shows it first among its neighbours.
     """
 
     title: str
     verdict: Verdict = None
     facts: tuple[Fact, ...] = ()
     tables: tuple[Table, ...] = ()
+    figures: Callable[[], Iterable[Figure]] = no_figures
     blocks: Callable[[], Iterable[Block]] = no_blocks
     checks: tuple[Check, ...] = ()
     properties: Mapping[str, Any] = field(default_factory=dict)
-    events: tuple[Event, ...] = ()
+    events: Callable[[], Iterable[Event]] = no_events
     warnings: tuple[LogWarning, ...] = ()
     notice: str = ""
     sections: tuple[Section, ...] = ()
+    rank: int = 0
+    opened: bool = False
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -193,7 +220,8 @@ class Presentation:
         body: Everything else.
         opens_at_ns: Where the viewer opens in [ns].
         scene: Returns the 3D view; called only where it is drawn.
-        line: The result's row among several: heads and cells.
+        lines: Its rows among those of several results, by their heads; the first cell names a row, and rows
+            of one name stand below each other.
         rows: Returns what `--csv` writes.
         created: When it was made (ISO 8601), for JUnit; empty where that is not known.
     """
@@ -206,6 +234,6 @@ class Presentation:
     word: str = ""
     opens_at_ns: int = 0
     scene: Callable[[], Scene | None] | None = None
-    line: Mapping[str, Cell] = field(default_factory=dict)
+    lines: tuple[Mapping[str, Cell], ...] = ()
     rows: Callable[[], Table] | None = None
     created: str = ""
