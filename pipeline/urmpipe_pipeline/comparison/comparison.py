@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +45,7 @@ class Comparison(Shown):
     tolerance: Mapping[str, float]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
-    recording: Path | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
     baseline: BaselineComparison | None = None
 
     @property
