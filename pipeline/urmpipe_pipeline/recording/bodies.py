@@ -12,7 +12,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.visual import Visual
 from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.orientation import quaternions
-from urmpipe_pipeline.runs.meshes import drawable
+from urmpipe_pipeline.meshes import drawable
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -12,7 +12,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_pipeline.palette import ghost_colour
 from urmpipe_pipeline.recording.entities import Place, branch_entity, branch_keys, printable
-from urmpipe_pipeline.recording.ghost_names import name_places, placed_names
+from urmpipe_pipeline.recording.views.label_places import name_places, placed_names
 from urmpipe_pipeline.recording.ways import Gone, thinned
 from urmpipe_pipeline.runs.ghosts import Ghost
 from urmpipe_pipeline.runs.results import Run

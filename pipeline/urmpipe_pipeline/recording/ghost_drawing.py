@@ -14,8 +14,8 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.recording.columns import time_columns
 from urmpipe_pipeline.recording.ghost_arms import GhostArm
-from urmpipe_pipeline.recording.ghost_names import name_places
 from urmpipe_pipeline.recording.goal_marks import GoalMarks
+from urmpipe_pipeline.recording.views.label_places import name_places
 from urmpipe_pipeline.recording.ways import Gone
 
 if TYPE_CHECKING:

@@ -16,13 +16,13 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
-from urmpipe_pipeline.recording.eye import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.ghost_arms import fullest_time
 from urmpipe_pipeline.recording.plots import Plots, decisive_plot
 from urmpipe_pipeline.recording.scene import Scene
 from urmpipe_pipeline.recording.simulation_layout import simulation_plots, simulation_words
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.summary import summary
+from urmpipe_pipeline.recording.views.camera import EYE, eye_distance, seen
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
 

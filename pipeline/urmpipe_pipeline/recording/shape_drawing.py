@@ -10,10 +10,10 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.visual import Box, Capsule, Colour, Cylinder, Mesh, Visual
 from urmpipe_models.orientation import quaternions
+from urmpipe_pipeline.meshes import MEDIA_TYPES
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, rgb
 from urmpipe_pipeline.recording.bodies import Body
 from urmpipe_pipeline.recording.entities import entity_path, printable
-from urmpipe_pipeline.runs.meshes import MEDIA_TYPES
 
 if TYPE_CHECKING:
     from rerun import AsComponents, RecordingStream, TimeColumn

@@ -30,7 +30,7 @@ from urmpipe_pipeline.recording.enlarged import LEAST_SEEN
 from urmpipe_pipeline.recording.scene import Mark, scene_of
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.runs.ingest import kinematics
-from urmpipe_pipeline.runs.meshes import drawable, missing_visuals
+from urmpipe_pipeline.meshes import drawable, missing_visuals
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
