@@ -21,6 +21,7 @@ from urmpipe_pipeline.comparison.wording import (
     tool_option,
 )
 from urmpipe_pipeline.inverse.verdict import reached
+from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.runs.results import Run
 
 
@@ -109,7 +110,7 @@ def deviation_facts(deviation: Deviation, reference: Trajectory) -> tuple[Fact, 
         Fact("Out of tolerance", outside),
         Fact("Longest stretch out", stretch(deviation.longest_out)),
         Fact("r(‖Δ‖, speed)", speed_correlation(deviation), "1: they grow together; 0: they are unrelated"),
-        *(Fact("Looks like", cause) for cause in causes(deviation, reference)),
+        *(Fact("Looks like", written(cause)) for cause in causes(deviation, reference)),
     )
 
 
