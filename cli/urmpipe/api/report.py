@@ -13,7 +13,7 @@ from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.inverse.verdict import verdict_of
-from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
 

@@ -24,7 +24,7 @@ from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.wording import amount_words
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.recording.bodies import bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import LEAST_SEEN
 from urmpipe_pipeline.recording.scene import Mark, scene_of

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING, TypeAlias
 
 from urmpipe_pipeline.presentation.figure import Figure, Text
 from urmpipe_pipeline.presentation.section import Event, Presentation, Section
+from urmpipe_pipeline.recording.sending import keys, shown_path
 from urmpipe_pipeline.recording.views.events import events_view
 from urmpipe_pipeline.recording.views.plots import EntityOf, Plots, whole_time
 from urmpipe_pipeline.recording.views.scene_drawing import scene_view
-from urmpipe_pipeline.recording.views.sending import keys, shown_path
 from urmpipe_pipeline.recording.views.summary import summary
 from urmpipe_pipeline.text import encodable
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.section import Event
-from urmpipe_pipeline.recording.views.sending import times_at
+from urmpipe_pipeline.recording.sending import times_at
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -34,7 +34,7 @@ def events_view(stream: RecordingStream, events: Sequence[Event], entity: str, f
     ordered = sorted(events, key=lambda one: first_ns if one.t_ns is None else one.t_ns)
     heads = ["" if one.t_ns is None else f"{one.t_ns / 1e9:.4f} s  " for one in ordered]
     at = np.array([first_ns if one.t_ns is None else one.t_ns for one in ordered], dtype=np.int64)
-    lines = [head + text.encodable(one.words) for head, one in zip(heads, ordered, strict=True)]
+    lines = [head + _words(one) for head, one in zip(heads, ordered, strict=True)]
     columns = rr.TextLog.columns(text=lines, level=[LEVELS[one.level] for one in ordered])
     stream.send_columns(entity, times_at(at, np.arange(len(at))), columns)
     shown = rrb.TextLogColumns(
@@ -42,3 +42,8 @@ def events_view(stream: RecordingStream, events: Sequence[Event], entity: str, f
         text_log_columns=["LogLevel", "Body"],
     )
     return rrb.TextLogView(origin="/", contents=entity, name="Events, at t [s]", columns=shown)
+
+
+def _words(one: Event) -> str:
+    said = one.words if isinstance(one.words, str) else f"{one.words.kind}: {one.words.words('command line')}"
+    return text.encodable(said)

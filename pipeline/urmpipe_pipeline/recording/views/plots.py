@@ -14,7 +14,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Panel, Shape, View
-from urmpipe_pipeline.recording.views.sending import scalar_column, times_at
+from urmpipe_pipeline.recording.sending import scalar_column, times_at
 from urmpipe_pipeline.text import SHOWN, encodable
 
 if TYPE_CHECKING:
@@ -22,8 +22,8 @@ if TYPE_CHECKING:
     from rerun.blueprint import TimeSeriesView
     from rerun.encodings import TimeRange
 
-EntityOf: TypeAlias = Callable[[FloatArray], str | None]
-"""Returns where an array of the result stands as scalars in its own unit; None if it is drawn only."""
+EntityOf: TypeAlias = Callable[[FloatArray, "IntArray | None"], str | None]
+"""Returns where an array of the result stands on its times, as scalars in SI; None if it is drawn only."""
 
 LONG = 50_000
 """Rows that the viewer still draws whole at once; of more an overview is shown first."""
@@ -144,7 +144,7 @@ class Plots:
         rows, factor = len(line.values), factor_of(panel)
         single = line.points or rows == 1 or t_ns is None
         look = _Look(tuple(map(encodable, line.names)), line.colours, points=single, steps=line.steps)
-        stored = self.entity_of(line.values)
+        stored = self.entity_of(line.values, t_ns)
         drawn.legend |= len(line.names) > 1
         drawn.rows = max(drawn.rows, rows)
         if stored is not None and factor == 1.0 and rows <= LONG:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, NEUTRAL_COLOUR, REFERENCE_COLOUR, rgb
 from urmpipe_pipeline.presentation.scene import Scene, Spot
+from urmpipe_pipeline.recording.sending import ROOT, keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.camera import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.views.geometry import (
     DrawnArm,
@@ -27,7 +28,6 @@ from urmpipe_pipeline.recording.views.geometry import (
     extent,
     opens_row,
 )
-from urmpipe_pipeline.recording.views.sending import ROOT, keys, shown_path, times_at
 from urmpipe_pipeline.recording.views.shapes import draw_body, hide_body, lacks_shapes
 from urmpipe_pipeline.text import encodable
 

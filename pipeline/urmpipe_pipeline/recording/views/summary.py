@@ -8,27 +8,24 @@ from collections.abc import Iterable, Iterator, Sequence
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.digits import unit_of, written
-from urmpipe_pipeline.presentation.section import Fact, Presentation, Section, Table
+from urmpipe_pipeline.presentation.section import Fact, Judged, Presentation, Section, Table
 
 ROWS = 12
-"""Rows of a table that are shown; the others are counted."""
+"""Rows of a table of verdicts that are shown; the others are counted. Of other tables only short ones are."""
 
 LISTED = 4
 """Warnings that are listed; the others are counted."""
-
-SECTIONS = 8
-"""Sections whose facts are told; of more, the verdicts stand in a table."""
 
 
 def summary(shown: Presentation) -> str:
     """Return a presentation in a few lines of Markdown."""
     word = (shown.verdict or shown.word).upper()
     head = f"{word}: {plain(shown.headline)}" if word else plain(shown.headline)
-    lines = [f"### {head}", *_facts(shown.facts, strong=True), *_section(shown.body)]
-    judged = [one for one in shown.body.sections if one.facts]
-    for one in judged[:SECTIONS] if len(judged) > 1 else judged:
-        told = list(_facts(one.facts))
-        lines += ["", f"**{plain(one.title)}**", *told] if len(judged) > 1 else told
+    lines = [f"### {head}", *_facts(shown.facts, strong=True)]
+    told = {one.name for one in shown.facts}
+    lines += _section(shown.body, told)
+    if len(shown.body.sections) == 1:
+        lines += _section(shown.body.sections[0], told)
     lines += _warnings(list(_all_warnings(shown.body)))
     lines += ["", _where_to_go(shown)]
     return "\n".join(lines)
@@ -43,14 +40,21 @@ def _where_to_go(shown: Presentation) -> str:
     return f"{at}Everything else: `urmpipe report` with this file."
 
 
-def _section(section: Section) -> Iterator[str]:
-    yield from _facts(section.facts)
+def _section(section: Section, told: set[str]) -> Iterator[str]:
+    """Yield the facts that were not told yet, and the tables."""
+    yield from _facts([one for one in section.facts if one.name not in told])
     if section.notice:
         yield from ("", f"**{plain(section.notice)}**")
     for table in section.tables:
-        if table.brief and table.columns and len(table.columns[0].cells):
+        if table.brief and table.columns and _fits(table):
             yield ""
             yield from _table(table)
+
+
+def _fits(table: Table) -> bool:
+    """Tell whether a table is short, or is one of verdicts, which is cut."""
+    verdicts = any(isinstance(cell, Judged) for one in table.columns for cell in one.cells)
+    return 0 < len(table.columns[0].cells) <= ROWS or verdicts
 
 
 def _facts(facts: Sequence[Fact], *, strong: bool = False) -> Iterator[str]:
@@ -73,7 +77,7 @@ def _table(table: Table) -> Iterator[str]:
     ]
     heads = (f"{one.title} [{unit}]" if (unit := unit_of(one.cells)) else one.title for one in columns)
     yield _row(heads)
-    yield _row("---" for _ in columns)
+    yield f"|{' --- |' * len(columns)}"
     for cells in zip(*(one.cells[:ROWS] for one in columns), strict=True):
         yield _row(map(written, cells))
     if (left := len(columns[0].cells) - ROWS) > 0:

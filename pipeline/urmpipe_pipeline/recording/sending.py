@@ -34,10 +34,18 @@ def keys(names: Sequence[str]) -> list[str]:
     return unique([re.sub(r"[\s\\]+\Z", "", encodable(name)) or "unnamed" for name in names])
 
 
-def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
-    """Return the times of some rows on the timeline t; on the timeline row where there are none.
+def times_column(t_ns: IntArray) -> TimeColumn:
+    """Return times in integer [ns], shape (n,), on the timeline t.
 
     Rerun truncates seconds given as floats, which puts some times off by a nanosecond; integers are exact.
+    """
+    import rerun as rr
+
+    return rr.TimeColumn("t", duration=np.asarray(t_ns).astype("timedelta64[ns]"))
+
+
+def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
+    """Return the times of some rows on the timeline t; on the timeline row where there are none.
 
     Args:
         t_ns: Times of all rows in integer [ns], shape (n,); None without times.
@@ -47,7 +55,7 @@ def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
 
     if t_ns is None:
         return [rr.TimeColumn("row", sequence=rows)]
-    return [rr.TimeColumn("t", duration=np.asarray(t_ns)[rows].astype("timedelta64[ns]"))]
+    return [times_column(np.asarray(t_ns)[rows])]
 
 
 def scalar_column(values: FloatArray) -> ComponentColumn:
