@@ -39,7 +39,8 @@ from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.operands import load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
-from urmpipe_pipeline.recording import is_recording, read_recording
+from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.runs.results import Run
