@@ -151,8 +151,7 @@ def _poses(plan: Plan, rows: Rows, form: RotationForm | None) -> _Poses:
     shown = f"{form}{'' if units[0] == PURE else f' in {units[0].name}'}"
     found = Inference(f"form of {listed(columns)}", shown, "their names, or as given")
     ordered = {row: faults[row] for row in sorted(faults)}
-    doubts = (*warnings, *assumed, *finder.gon.warnings)
-    return _Poses(position, rotation, ordered, (*finder.inferences, found), doubts)
+    return _Poses(position, rotation, ordered, (*finder.inferences, found), (*warnings, *assumed))
 
 
 def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[list[Unit], list[LogWarning]]:
