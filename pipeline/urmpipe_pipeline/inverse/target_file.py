@@ -18,8 +18,8 @@ from urmpipe_pipeline.sources.clocks.clock import even_clock
 from urmpipe_pipeline.sources.columns.columns import columns_of, listed
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
+from urmpipe_pipeline.sources.tables.block_parser import release_memory
 from urmpipe_pipeline.sources.tables.opening import PATH, open_tables
-from urmpipe_pipeline.sources.tables.table import release_memory
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.targets.row_faults import Rows, read_rows
 from urmpipe_pipeline.sources.targets.sniff_targets import sniff_targets

@@ -13,8 +13,8 @@ from urmpipe_pipeline.sources.assemble import assemble
 from urmpipe_pipeline.sources.content import read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import make_plan
+from urmpipe_pipeline.sources.tables.block_parser import release_memory
 from urmpipe_pipeline.sources.tables.opening import open_tables
-from urmpipe_pipeline.sources.tables.table import release_memory
 from urmpipe_pipeline.sources.tables.text import fingerprint
 
 
