@@ -12,7 +12,7 @@ from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.types import OneOf
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.export import Exported
+    from urmpipe_pipeline.tables import Exported
 
 
 @click.command(short_help="Write a recording as CSV, Parquet, MAT or TUM.")
