@@ -16,8 +16,9 @@ from urmpipe_pipeline.comparison.matching import Matched, joints_apart, lacking
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.statistics import Measured, correlation, describe, overall
 from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.gaps import apart
 from urmpipe_pipeline.joint_log import seconds
-from urmpipe_pipeline.runs.grid import apart, interpolate
+from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.results import Run
 
 KINDS: tuple[Kind, ...] = ("axis", "axis", "axis", "norm")

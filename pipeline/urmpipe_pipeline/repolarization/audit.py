@@ -27,8 +27,8 @@ ALL = "; ingest --audit FILE.csv lists all"
 MOST = 10_000
 """Entries of a kind that are no wraps: a log with more of them is none of joints; a warning counts all."""
 
-GAP = 1.5
-"""Two values of a joint further apart than this many median periods have a gap between them."""
+MISSED = 1.5
+"""Two values of a joint further apart than this many median periods have missed rows between them."""
 
 NEAR = 3.0
 """A step misses 4 pi by no more than this times what the joint moves at its largest speed."""
@@ -220,12 +220,12 @@ def _ambiguous(
     rows, joints = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     speeds = np.zeros(len(periods))
     usual = (
-        float(np.median(steps)) if len(steps) and steps.max() > GAP * steps.min() else steps.max(initial=0)
+        float(np.median(steps)) if len(steps) and steps.max() > MISSED * steps.min() else steps.max(initial=0)
     )
-    wide = np.flatnonzero(steps > GAP * usual)
+    wide = np.flatnonzero(steps > MISSED * usual)
     sparse = _sparse(log)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
-        after, before = _wide_steps(log, j, GAP * usual) if sparse[j] else (wide + 1, wide)
+        after, before = _wide_steps(log, j, MISSED * usual) if sparse[j] else (wide + 1, wide)
         if not len(after):
             continue
         odd = fixed.unexplained[fixed.unexplained[:, 1] == j, 0]
