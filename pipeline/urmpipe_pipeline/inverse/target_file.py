@@ -18,7 +18,6 @@ from urmpipe_pipeline.sources.clocks.clock import even_clock
 from urmpipe_pipeline.sources.columns.columns import columns_of, listed
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
-from urmpipe_pipeline.sources.tables.block_parser import release_memory
 from urmpipe_pipeline.sources.tables.opening import PATH, open_tables
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.targets.row_faults import Rows, read_rows
@@ -100,7 +99,6 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
     rows = read_rows(plan)
     poses = _poses(plan, rows, form)
     t_ns, start, said, noticed = _times(rows, tsp, asked.period)
-    release_memory()
     return TargetFile(
         file=fingerprint(Path(file)),
         row=np.arange(1, len(rows.values) + 1),

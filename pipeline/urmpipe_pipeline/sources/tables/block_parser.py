@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import math
 from collections.abc import Sequence
 from dataclasses import replace
@@ -67,17 +66,6 @@ def parse_block(
         cells = tuple(_text_cells(table, layout, part) for part in texts)
         return replace(numbers, texts=cells, left_out=left_out)
     return None
-
-
-def release_memory() -> None:
-    """Give what the parser needed back to the system, before the arrays to come need as much.
-
-    glibc keeps what threads have freed, here some 80 MB of a million rows; elsewhere nothing is done.
-    """
-    try:
-        ctypes.CDLL("libc.so.6").malloc_trim(0)
-    except (OSError, AttributeError):
-        return
 
 
 @lru_cache
