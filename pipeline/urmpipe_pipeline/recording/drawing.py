@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import rgb
@@ -11,9 +11,10 @@ from urmpipe_pipeline.recording.codec import Encoded
 from urmpipe_pipeline.recording.columns import block_columns
 from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, blocks, places_of, printable
 from urmpipe_pipeline.recording.events import draw_comparison_events, draw_log_events
+from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
 from urmpipe_pipeline.recording.marks import MARK_SIZE, draw_meter_worst, draw_repolarizations, draw_worst
 from urmpipe_pipeline.recording.overview import overviews
-from urmpipe_pipeline.recording.scene import Scene
+from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.scene_drawing import draw_scene
 from urmpipe_pipeline.recording.series import series_lines
 from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE, simulation_blocks
@@ -27,12 +28,23 @@ if TYPE_CHECKING:
     from rerun import RecordingStream
 
 
-def draw(stream: RecordingStream, result: Result, encoded: Encoded, scene: Scene) -> None:
-    """Send everything that is there to be looked at."""
+def draw(stream: RecordingStream, result: Any, encoded: Encoded) -> int:
+    """Send everything that is there to be looked at, and return where the viewer should stand in [ns].
+
+    Args:
+        stream: Where to.
+        result: What is recorded.
+        encoded: Its arrays, and where they stand.
+    """
     import rerun as rr
 
+    if not isinstance(result, (Run, Comparison, Simulation)):
+        return 0
+    scene = scene_of(result)
+    stream.send_blueprint(viewer_layout(result, scene, encoded))
     found = simulation_blocks(result, encoded) if isinstance(result, Simulation) else blocks(result, encoded)
-    every = list({block.entity: block for block in found}.values())
+    # What stands in two places is kept once: it has the names and colours of the first.
+    every = list({block.entity: block for block in reversed(found)}.values())
     words = simulation_summary(result) if isinstance(result, Simulation) else summary(result)
     stream.log(SUMMARY, rr.TextDocument(words, media_type="text/markdown"), static=True)
     few = list(overviews(result, every, encoded))
@@ -47,6 +59,7 @@ def draw(stream: RecordingStream, result: Result, encoded: Encoded, scene: Scene
     else:
         _draw_comparison(stream, result)
     draw_scene(stream, scene)
+    return opening_time(result)
 
 
 def _lone(result: Result) -> bool:

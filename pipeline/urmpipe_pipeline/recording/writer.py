@@ -16,10 +16,8 @@ from urmpipe_pipeline.recording.columns import column_rows
 from urmpipe_pipeline.recording.drawing import draw
 from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.recording.identity import APPLICATION_ID
-from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
-from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import PROPERTY, SLICE, document
-from urmpipe_pipeline.recording.verify import verify
+from urmpipe_pipeline.recording.verify import verified, verify
 from urmpipe_pipeline.results import kind_of
 
 if TYPE_CHECKING:
@@ -95,7 +93,7 @@ def _stream_into(part: Path) -> Iterator[RecordingStream]:
 def _send(
     stream: RecordingStream, folder: Path, every: Sequence[Column], progress: Callable[[float], None] | None
 ) -> None:
-    """Send the arrays in slices, the first and the last row first: verifying then need not read all.
+    """Send the arrays in slices, those with a row to verify first: reading back then need not read all.
 
     Args:
         stream: Where to.
@@ -118,9 +116,9 @@ def _send(
 
 
 def _starts(rows: int) -> list[int]:
-    """Return where the slices of an array begin: the first, the last, then all between."""
-    first, *others = range(0, rows, SLICE)
-    return [first, *others[-1:], *others[:-1]]
+    """Return where the slices of an array begin: first those with a row to verify."""
+    early = dict.fromkeys(row - row % SLICE for row in verified(rows))
+    return [*early, *(start for start in range(0, rows, SLICE) if start not in early)]
 
 
 def _refuse_full_disk(folder: Path) -> None:
@@ -133,8 +131,6 @@ def _describe(stream: RecordingStream, result: Any, encoded: Encoded, metadata: 
     """Send what is no array: the metadata, the viewer's layout, and what is there to be looked at."""
     import rerun as rr
 
-    scene = scene_of(result)
     stream.send_recording_name(printable(result.name))
-    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, opens_at_ns=opening_time(result)))
-    stream.send_blueprint(viewer_layout(result, scene, encoded))
-    draw(stream, result, encoded, scene)
+    opens_at_ns = draw(stream, result, encoded)
+    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, opens_at_ns=opens_at_ns))

@@ -24,6 +24,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run
 from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.recording.codec import encode
 from urmpipe_pipeline.recording.entities import places_of
 from urmpipe_pipeline.recording.ghost_arms import POSES, bones_of
 from urmpipe_pipeline.recording.ghost_drawing import capsules
@@ -215,12 +216,13 @@ def test_single_poses_are_points_without_speeds(make_solved: MakeSolved, tmp_pat
     ):  # fmt: skip
         run = make_solved(timed=timed)
         path = write_recording(run, tmp_path / f"{timed}.rrd")
-        names = static(path, "/joints/repolarized", f"{style}:names")
+        solved = encode(run).entity_of(run.q, run.t_ns)
+        names = static(path, solved, f"{style}:names")
         assert tuple(names) == run.log.joints
         stream = RrdReader(path).store().stream()
-        drawn = stream.filter(content="/joints/repolarized", components=f"{other}:names")
+        drawn = stream.filter(content=solved, components=f"{other}:names")
         assert list(drawn) == []
-        plots, (place,) = Plots(run), places_of(run)
-        titles = [str(view.name) for view in (*plots.speed(run, place), *plots.motion(run, place))]
+        plots, (place,) = Plots(run, encode(run)), places_of(run)
+        titles = [str(view.name) for view in (*plots.speed(run, place), *plots.motion(run))]
         assert sum("/s" in title for title in titles) == speeds
         assert "TCP [m]" in titles
