@@ -201,7 +201,7 @@ def test_tables_and_figures_are_told_to_a_screen_reader(
     assert all(attrs.get("scope") in ("col", "row") for attrs, _ in heads)
     plots = [attrs for tag, attrs, _ in page.elements if (attrs.get("class") or "").startswith("plot")]
     assert len(plots) == len(lay_out([present(comparison), present(bare_run)]).figures)
-    assert all(attrs["role"] == "img" and len(attrs["aria-label"] or "") > 25 for attrs in plots)
+    assert all(attrs["role"] == "img" and len(attrs["aria-label"] or "") > 40 for attrs in plots)
     assert len(page.all("figcaption")) == len(plots)
     assert page.all("noscript")
 
