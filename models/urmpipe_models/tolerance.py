@@ -1,4 +1,4 @@
-"""What deviation is allowed where nothing else is said."""
+"""The deviation that is allowed unless another one is given."""
 
 DEFAULT_TOLERANCE = 0.0035
-"""Largest deviation allowed on an axis in [m]. Source: [UrmArm2021]_ section 2.4."""
+"""Largest deviation allowed along x, y and z each in [m], +-3.5 mm. Source: [UrmArm2021]_ section 2.4."""

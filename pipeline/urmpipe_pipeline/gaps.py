@@ -1,35 +1,38 @@
-"""What a gap is: rows that lie further apart than the others, between which nothing is known."""
+"""Gaps: rows of a log that are further apart than its others."""
 
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-from urmpipe_models.arrays import IntArray
+from urmpipe_models.arrays import BoolArray, IntArray
 
 GAP = 3.0
-"""Two rows further apart than this many median periods have a gap between them."""
+"""Two rows further apart than this many median periods have a gap between them, in which nothing is known."""
+
+MISSED_SAMPLE = 1.5
+"""Two values of a joint further apart than this many median periods lack one between them; a joint may turn
+unseen there."""
 
 
-def apart(known_ns: IntArray) -> NDArray[np.bool_]:
-    """Tell which times are followed by a gap.
+def gaps_behind(t_ns: IntArray) -> BoolArray:
+    """Return which rows have a gap behind them.
 
     Args:
-        known_ns: Rising times in [ns], shape (n,).
+        t_ns: Times in integer [ns], shape (n,).
 
     Returns:
-        Shape (n - 1,).
+        One entry a step from row to row, shape (n - 1,).
     """
-    step = np.diff(known_ns)
+    step = np.diff(t_ns)
     return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
 
 
-def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> NDArray[np.bool_]:
-    """Tell which times lie strictly inside a gap between two known ones.
+def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> BoolArray:
+    """Return which times lie strictly inside a gap between two known ones.
 
     Args:
-        at_ns: Times in [ns], shape (n,).
-        known_ns: Rising times in [ns], shape (k,).
+        at_ns: Times in integer [ns], shape (n,).
+        known_ns: Rising times in integer [ns], shape (k,).
 
     Returns:
         Shape (n,).
@@ -37,5 +40,5 @@ def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> NDArray[np.bool_]:
     if len(known_ns) < 2:
         return np.zeros(len(at_ns), dtype=np.bool_)
     after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)
-    wide = apart(known_ns)[after - 1]
+    wide = gaps_behind(known_ns)[after - 1]
     return np.asarray(wide & (at_ns > known_ns[after - 1]) & (at_ns < known_ns[after]))

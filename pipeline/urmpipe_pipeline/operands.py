@@ -9,7 +9,8 @@ from pathlib import Path
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import is_recording, read_recording
+from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot

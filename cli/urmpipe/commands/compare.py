@@ -179,10 +179,11 @@ def compare(
 
 def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:
     """Print a comparison, and what was written."""
-    from urmpipe.printing.comparison import print_comparison
+    from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_pipeline.results import present
 
-    print_comparison(result)
+    print_presentation(present(result))
     for title, path in written.items():
         if path:
             say(f"{title}: {path}")
@@ -191,9 +192,10 @@ def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) 
 
 def _tell_failure(result: Comparison) -> None:
     """Print the verdict alone on standard error: a job that fails says why, however quiet it is."""
-    from urmpipe.printing.comparison import print_verdict
+    from urmpipe.printing.presentation import print_verdict
+    from urmpipe_pipeline.results import present
 
-    print_verdict(result, err=True)
+    print_verdict(present(result), err=True)
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:

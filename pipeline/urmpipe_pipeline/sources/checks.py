@@ -9,7 +9,7 @@ import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.gaps import GAP, apart
+from urmpipe_pipeline.gaps import GAP, gaps_behind
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.clock import Clock
@@ -281,7 +281,7 @@ def gaps(t_ns: IntArray) -> list[LogWarning]:
     if len(steps) < 2:
         return []
     period = float(np.median(steps))
-    places = np.flatnonzero(apart(t_ns)).tolist()
+    places = np.flatnonzero(gaps_behind(t_ns)).tolist()
     if not places:
         return []
     found = [f"{_passed(steps, k)} before row {k + 2}" for k in places[1:SHOWN_GAPS]]
