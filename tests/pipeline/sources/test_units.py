@@ -48,18 +48,6 @@ def test_units_in_names(read: Read, name: str, unit: str) -> None:
     assert not log.warnings
 
 
-def test_a_unit_that_is_not_known_is_refused(wrong: Wrong) -> None:
-    text = "t,q1,q2\n0,30,30\n0.1,31,30\n"
-    assert wrong(text, units={"": "gon"}) == ["--unit: found 'gon', allowed: rad, deg"]
-    assert wrong(text, units={"q1": "gon"}) == [
-        "--unit: found 'gon', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
-    ]
-    assert wrong("t,q1 [gon]\n0,30\n0.1,31\n") == [
-        "log.csv, column q1 [gon]: found the unit 'gon', allowed: rad, deg, m, mm, cm; say which with"
-        " --unit q1=deg"
-    ]
-
-
 def test_mixed_units_of_slides_and_turns(read: Read, arm: Arm) -> None:
     text = ",time,lift_mm,c_arm_lateral_m,c_arm_wigwag_deg\n0,0.0,100,0.1,90\n1,0.1,110,0.2,91\n"
     for robot in (None, arm(3, "prismatic", "prismatic", "revolute")):
