@@ -17,8 +17,8 @@ import urmpipe
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.text import pasted
 
 RunCommand = Callable[..., Any]
 
