@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+    from urmpipe_models.spelling import Voice
     from urmpipe_pipeline.joint_log import LogWarning
     from urmpipe_pipeline.runs.results import Run
 
@@ -63,26 +64,23 @@ def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     say(f"Recording: {recording}  (open it: {pasted(command)} view {pasted(recording)}{earlier})")
 
 
-def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
+def print_warnings(warnings: Sequence[LogWarning], log: str = "", voice: Voice = "command line") -> None:
     """Print warnings on standard error, one unwrapped line each, behind the name of their log if given."""
     named = f"{log}: " if log else ""
     for warning in warnings[:LISTED]:
-        place = f"row {warning.row}: " if warning.row is not None else ""
-        say(f"warning: {named}{place}{warning.message}", err=True)
+        say(f"warning: {named}{warning.words(voice)}", err=True)
     if len(warnings) > LISTED:
         say(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
 
 
 def print_run(run: Run, *, alternatives: bool = False) -> None:
     """Print what ingest inferred and what it changed; if asked for, how to have it otherwise."""
-    from urmpipe_pipeline.runs.explain import otherwise
-
     console = new_console()
     log = run.log
     columns = ("What", "Found", "Because", "Otherwise")[: 4 if alternatives else 3]
     table = new_table(*columns, title=f"{log.name}: {log.rows} rows, {run.duration:.6g} s")
     for inference in log.inferences:
-        cells = (inference.what, inference.value, inference.evidence, otherwise(inference))
+        cells = (inference.what, inference.value, inference.evidence, inference.otherwise("command line"))
         table.add_row(*cells[: len(columns)])
     grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
     resampled = any(warning.kind == "resampled" for warning in run.warnings)

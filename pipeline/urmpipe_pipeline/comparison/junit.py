@@ -27,6 +27,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.change import Absent, Change
 from urmpipe_pipeline.comparison.change_wording import noise_words, worse_words
@@ -45,44 +46,48 @@ UNHOLDABLE = re.compile("[^\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010fff
 """What XML may not hold, or a reader may turn into something else: line ends and tabs in attributes."""
 
 
-def write_junit(result: Comparison | Sequence[Finding], part: Path, path: Path) -> None:
+def write_junit(
+    result: Comparison | Sequence[Finding], part: Path, path: Path, voice: Voice = "python"
+) -> None:
     """Write the verdict of a comparison, or why there is none, as JUnit XML and read it back.
 
     Args:
         result: The comparison, or what was wrong: at least one finding.
         part: Where to write it, as `guarded_output` gives it.
         path: The name it is to have, for messages.
+        voice: In whose words it tells warnings and errors.
 
     Raises:
         OutputError: If it did not read back as it was written.
     """
-    root = junit_tree(result) if isinstance(result, Comparison) else error_tree(result)
+    root = junit_tree(result, voice) if isinstance(result, Comparison) else error_tree(result, voice)
     written = ET.tostring(root, encoding="unicode")
     part.write_text(f"{JUNIT_HEADER}\n{written}\n", encoding="utf-8", newline="\n")
     if ET.tostring(ET.parse(part).getroot(), encoding="unicode") != written:
         raise OutputError(Finding("reads back otherwise than written", str(path)))
 
 
-def junit_tree(result: Comparison) -> ET.Element:
-    """Return the element `testsuites` of a comparison."""
+def junit_tree(result: Comparison, voice: Voice = "python") -> ET.Element:
+    """Return the element `testsuites` of a comparison, its warnings in somebody's words."""
     root = ET.Element("testsuites", name=_plain(result.name))
-    root.extend(_suite(result, run) for run in result.runs)
+    root.extend(_suite(result, run, voice) for run in result.runs)
     if result.baseline:
         root.extend(_missing(one) for one in result.baseline.gone if one.quantity is None)
     return _summed(root)
 
 
-def error_tree(findings: Sequence[Finding]) -> ET.Element:
+def error_tree(findings: Sequence[Finding], voice: Voice = "python") -> ET.Element:
     """Return the element `testsuites` of a comparison that could not be made: an error a finding.
 
     Args:
         findings: What was wrong, at least one.
+        voice: In whose words it is told.
     """
     root = ET.Element("testsuites", name="urmpipe compare")
     suite = ET.SubElement(root, "testsuite", name="urmpipe compare")
     for number, finding in enumerate(findings, start=1):
         case = _case(finding.file or "urmpipe compare", f"can be compared ({number})")
-        _told(case, "error", BAD_INPUT, str(finding))
+        _told(case, "error", BAD_INPUT, finding.words(voice))
         suite.append(case)
     _counted(suite)
     return _summed(root)
@@ -97,7 +102,7 @@ def _summed(root: ET.Element) -> ET.Element:
     return root
 
 
-def _suite(result: Comparison, run: Deviation) -> ET.Element:
+def _suite(result: Comparison, run: Deviation, voice: Voice) -> ET.Element:
     """Return the test suite of one log."""
     suite = ET.Element("testsuite", name=_plain(run.name))
     properties = ET.SubElement(suite, "properties")
@@ -107,7 +112,7 @@ def _suite(result: Comparison, run: Deviation) -> ET.Element:
     if result.baseline:
         suite.extend(_changed(one) for one in result.baseline.changes if one.run == run.name)
         suite.extend(_lost(one) for one in result.baseline.gone if one.run == run.name)
-    if told := [f"{one.kind}: {one.message}" for one in _warnings(result, run)]:
+    if told := [f"{one.kind}: {one.words(voice)}" for one in _warnings(result, run)]:
         ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, told))
     return _counted(suite, result.provenance.created[:19])
 
@@ -115,8 +120,8 @@ def _suite(result: Comparison, run: Deviation) -> ET.Element:
 def _warnings(result: Comparison, run: Deviation) -> Iterator[LogWarning]:
     """Yield the warnings of a log, and those of its comparison that are about no other log."""
     yield from run.run.warnings
-    others = tuple(f"{one.name}: " for one in result.runs if one is not run)
-    yield from (one for one in result.warnings if not one.message.startswith(others))
+    others = [one.name for one in result.runs if one is not run]
+    yield from (one for one in result.warnings if one.about not in others)
 
 
 def _counted(suite: ET.Element, timestamp: str = "") -> ET.Element:

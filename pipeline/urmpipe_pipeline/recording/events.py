@@ -30,7 +30,8 @@ def draw_log_events(stream: RecordingStream, place: Place, run: Run) -> None:
     levels = ["INFO" if one.kind in ("wrap", "repaired") else "WARN" for one in run.audit]
     _draw(stream, f"{place.prefix}events/repolarization", t_ns, told, levels)
     said = [
-        f"{printable(one.kind)}{f' in row {one.row}' if one.row else ''}: {printable(one.message)}"
+        f"{printable(one.kind)}{f' in row {one.row}' if one.row else ''}:"
+        f" {printable(one.sentence('command line'))}"
         for one in run.warnings
     ]
     rows = np.clip([(one.row or 1) - 1 for one in run.warnings], 0, run.log.rows - 1).astype(np.int64)

@@ -8,11 +8,13 @@ from __future__ import annotations
 
 import json
 from collections.abc import Iterable, Mapping
+from dataclasses import asdict
 from itertools import groupby
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
@@ -59,7 +61,7 @@ def log_fields(data: Mapping[str, Any]) -> dict[str, Any]:
         "files": files_from(data["files"]),
         "joints": tuple(data["joints"]),
         "columns": tuple(LogColumn(**one) for one in data["columns"]),
-        "inferences": tuple(Inference(**one) for one in data["inferences"]),
+        "inferences": tuple(_message(Inference, one) for one in data["inferences"]),
         "warnings": warnings_from(data["warnings"]),
     }
 
@@ -127,7 +129,7 @@ def _run(run: Run, place: Place) -> dict[str, Any]:
         "tsp": run.tsp,
         "robot": robot_data(run.robot),
         "audit": [flat(one) for one in run.audit],
-        "warnings": [flat(one) for one in run.warnings],
+        "warnings": [asdict(one) for one in run.warnings],
         "provenance": provenance_data(run.provenance),
         "log": _log(run.log),
         **_solved(run, place),
@@ -164,8 +166,8 @@ def _log(log: JointLog) -> dict[str, Any]:
         "rotation_form": log.rotation_form,
         "columns": [flat(one) for one in log.columns],
         "digits": log.digits,
-        "inferences": [flat(one) for one in log.inferences],
-        "warnings": [flat(one) for one in log.warnings],
+        "inferences": [asdict(one) for one in log.inferences],
+        "warnings": [asdict(one) for one in log.warnings],
     }
 
 
@@ -175,7 +177,7 @@ def _comparison(result: Comparison, standing: list[Place]) -> dict[str, Any]:
         "reference": _reference(result.reference),
         "runs": [_deviation(one, place) for one, place in zip(result.runs, standing, strict=True)],
         "tolerance": dict(result.tolerance),
-        "warnings": [flat(one) for one in result.warnings],
+        "warnings": [asdict(one) for one in result.warnings],
         "provenance": provenance_data(result.provenance),
         "baseline": baseline_data(result.baseline),
     }
@@ -243,7 +245,16 @@ def files_from(data: list[dict[str, Any]]) -> tuple[SourceFile, ...]:
 
 def warnings_from(data: list[dict[str, Any]]) -> tuple[LogWarning, ...]:
     """Return the warnings that a JSON list tells of."""
-    return tuple(LogWarning(**one) for one in data)
+    return tuple(_message(LogWarning, one) for one in data)
+
+
+Told = TypeVar("Told", Inference, LogWarning)
+
+
+def _message(kind: type[Told], data: Mapping[str, Any]) -> Told:
+    """Return a warning or an inference that a JSON object tells of."""
+    lists = {"columns": tuple(data["columns"])} if "columns" in data else {}
+    return kind(**{**data, **lists, "hints": tuple(Hint(**one) for one in data["hints"])})
 
 
 def _plain(value: Any) -> Any:

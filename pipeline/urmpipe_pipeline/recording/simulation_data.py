@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import asdict
 from typing import Any
 
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
@@ -32,7 +33,7 @@ def simulation_json(simulation: Simulation, blocks: list[Block]) -> str:
         "blocks": [_block(one) for one in simulation.blocks],
         "connections": dict(simulation.connections),
         "failed": simulation.failed,
-        "warnings": [flat(one) for one in simulation.warnings],
+        "warnings": [asdict(one) for one in simulation.warnings],
         "provenance": provenance_data(simulation.provenance),
         "arms": [
             {"block": arm.block, "chain": robot_data(arm.chain), "entity": entity}

@@ -164,8 +164,7 @@ def warning_lines(warnings: Sequence[LogWarning]) -> Iterator[str]:
         yield f"Warnings: {len(warnings)}"
         yield ""
     for one in warnings[:LISTED]:
-        row = f" (row {one.row})" if one.row is not None else ""
-        yield f"- {shown(one.message)}{row}"
+        yield f"- {shown(one.words('command line'))}"
     if len(warnings) > LISTED:
         yield f"- and {len(warnings) - LISTED} more, all in the report"
 

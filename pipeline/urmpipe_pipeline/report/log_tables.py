@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.inverse.verdict import reached, verdict_of
-from urmpipe_pipeline.joint_log import SourceFile
+from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.json_values import plain
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditKind
@@ -114,10 +114,15 @@ def warnings_table(found: Result) -> Table:
     """Return the warnings of a result."""
     columns = (Column("Kind"), *numbers("Row"), Column("What"))
     rows = [
-        (warning.kind, text.NOTHING if warning.row is None else str(warning.row), warning.message)
+        (warning.kind, text.NOTHING if warning.row is None else str(warning.row), _said(warning))
         for warning in found.warnings
     ]
     return listing(f"Warnings ({len(rows)})", columns, rows)
+
+
+def _said(warning: LogWarning) -> str:
+    """Return a warning without its row, behind the name of what it is about."""
+    return replace(warning, row=None).words("command line")
 
 
 def inference_table(run: Run) -> Table:
