@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_quaternions, continuous_rotations
 from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.messages import Finding, Hint, Message, hint_words
+from urmpipe_models.messages import Finding, Hint, Message
 from urmpipe_models.orientation import NAMES, RotationForm, quaternions
 from urmpipe_models.spelling import Voice
 
@@ -69,7 +69,7 @@ class Inference:
 
     def otherwise(self, voice: Voice = "python") -> str:
         """Return how to have it otherwise; empty where it cannot be."""
-        return "; ".join(hint_words(self.hints, voice))
+        return ", or ".join(f"{hint.spelled(voice)} {hint.does}".strip() for hint in self.hints)
 
 
 @dataclass(frozen=True, slots=True)

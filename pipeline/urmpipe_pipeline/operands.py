@@ -8,6 +8,7 @@ from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_recording, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
@@ -18,10 +19,9 @@ from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.options_of_each import options_of_each
 
-COMPARISON = (
-    "found the recording of a comparison, allowed: one that ingest wrote; to hold it against another"
-    " comparison, give it alone, with --baseline OTHER.rrd"
-)
+COMPARISON = "found the recording of a comparison, allowed: one that ingest wrote"
+
+WITH_BASELINE = Hint("baseline", None, "compares it, alone, with an earlier one")
 
 SIMULATION = (
     "found the recording of a simulation, allowed: one that ingest wrote; a simulation is judged by the delta"
@@ -65,7 +65,7 @@ def load_runs(
 
 def _without_period_doubts(runs: Sequence[Run]) -> list[Run]:
     """Return the runs; a period that one of them needed is no doubt about the others."""
-    doubted = UNUSED_PERIOD.kind  # its message may be in keywords
+    doubted = UNUSED_PERIOD.kind
     if all(any(one.kind == doubted for one in run.warnings) for run in runs):
         return list(runs)
     return [replace(run, warnings=tuple(one for one in run.warnings if one.kind != doubted)) for run in runs]
@@ -99,7 +99,7 @@ def load_run(
         )
     result = read_recording(operand)
     if isinstance(result, Comparison):
-        raise RecordingError(Finding(COMPARISON, file=str(operand)))
+        raise RecordingError(Finding(COMPARISON, str(operand), hints=(WITH_BASELINE,)))
     if isinstance(result, Simulation):
         raise RecordingError(Finding(SIMULATION, file=str(operand)))
     return on_robot(result, robot)

@@ -16,7 +16,7 @@ from urmpipe_pipeline.comparison.wording import (
     out_words,
     stretch_words,
     sync_words,
-    tool_option,
+    tool_hint,
 )
 
 
@@ -32,7 +32,7 @@ def facts(run: Deviation, reference: Trajectory) -> Iterator[str]:
     if longest := run.longest_out:
         out = out_words(int(np.count_nonzero(run.outside)), len(run.sample))
         yield f"out of tolerance: {out}, the longest stretch: {stretch_words(longest)}"
-    yield sync_words(run.sync) or "clocks: both from their first samples"
+    yield sync_words(run.sync) or "clocks aligned at the first sample"
     turns = zip(run.joint_statistics, run.joint_turns, strict=True)
     turned = [f"{name} by {number:+d}" for name, number in turns if number]
     if turned:
@@ -40,8 +40,8 @@ def facts(run: Deviation, reference: Trajectory) -> Iterator[str]:
     yield from _place(run)
     yield from _sliding(run)
     if run.speed_correlation is not None:
-        yield f"the norm goes with the speed by r = {correlation(run.speed_correlation)}"
-    yield from (f"looks like: {cause}" for cause in causes(run, reference))
+        yield f"deviation correlates with speed (r = {correlation(run.speed_correlation)})"
+    yield from (f"looks like: {cause.sentence('command line')}" for cause in causes(run, reference))
 
 
 def _place(run: Deviation) -> Iterator[str]:
@@ -49,7 +49,8 @@ def _place(run: Deviation) -> Iterator[str]:
     if words := alignment_words(run.alignment):
         yield words
     if run.alignment.mode == "tool" and run.run.robot is not None:
-        yield f"to have it so from the start: {tool_option(run.run.robot, run.alignment)}"
+        tool = tool_hint(run.run.robot, run.alignment).spelled("command line")
+        yield f"to apply this permanently: {tool}"
 
 
 def _sliding(run: Deviation) -> Iterator[str]:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from urmpipe_models.messages import one_line
+from urmpipe_models.messages import Hint, one_line
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -84,14 +84,19 @@ def print_run(run: Run, *, alternatives: bool = False) -> None:
         table.add_row(*cells[: len(columns)])
     grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
     resampled = any(warning.kind == "resampled" for warning in run.warnings)
-    made = [("grid", grid, "resampled" if resampled else "the log's own rows", "--tsp SECONDS")]
+    made = [("grid", grid, "resampled" if resampled else "the log's own rows", _option("tsp"))]
     if not any(inference.what == "robot" for inference in log.inferences):
         name = run.robot.name if run.robot else "none"
-        made.append(("robot", name, _why_robot(run), "--robot NAME|FILE"))
+        made.append(("robot", name, _why_robot(run), _option("robot")))
     for row in made:
         table.add_row(*row[: len(columns)])
     console.print(table)
     _print_audit(console, run)
+
+
+def _option(parameter: str) -> str:
+    """Return an option with what the reader fills in."""
+    return Hint(parameter).spelled("command line")
 
 
 def _why_robot(run: Run) -> str:
@@ -100,7 +105,7 @@ def _why_robot(run: Run) -> str:
         return run.robot.description
     tried = run.log.joints and run.log.tcp_position is not None
     why = "not given, and none of the catalogue alone fits the recorded TCP" if tried else "not given"
-    return f"{why}: no kinematics (--robot NAME|FILE)"
+    return f"{why}: no kinematics ({_option('robot')})"
 
 
 def _print_audit(console: Console, run: Run) -> None:
@@ -120,7 +125,7 @@ def _print_audit(console: Console, run: Run) -> None:
         audit.add_row(one.kind, one.joint, str(one.row), instant, f"{one.step:+.5f}", turns)
     console.print(audit)
     if len(run.audit) > LISTED:
-        console.print(f"... and {len(run.audit) - LISTED} more; --audit FILE.csv lists all")
+        console.print(f"... and {len(run.audit) - LISTED} more; {_option('audit')} lists all")
 
 
 @contextmanager

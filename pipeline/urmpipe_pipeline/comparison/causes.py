@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.joint_log import LogWarning
 
 IN_SPACE = 0.1
 """Share of the largest norm that a log may be off the path by, and still be late rather than elsewhere."""
@@ -22,7 +24,7 @@ MOVED = 10.0
 off by more has another cause, whatever rounding left of the joint."""
 
 
-def causes(run: Deviation, reference: Trajectory) -> Iterator[str]:
+def causes(run: Deviation, reference: Trajectory) -> Iterator[LogWarning]:
     """Yield what a log that is out of tolerance looks like, a sentence each; nothing of one that passes.
 
     Late or early: out of a tolerance of position at the same time, but off the path by at most a tenth of
@@ -38,14 +40,17 @@ def causes(run: Deviation, reference: Trajectory) -> Iterator[str]:
         yield from _zeros(run)
 
 
-def _late(run: Deviation, reference: Trajectory) -> Iterator[str]:
+def _late(run: Deviation, reference: Trajectory) -> Iterator[LogWarning]:
     norm, path = run.statistics["norm"], run.statistics["path"]
     position = (run.statistics[axis] for axis in AXES)
     beyond = any(one.tolerance is not None and one.max > one.tolerance for one in position)
     if beyond and path.max <= IN_SPACE * norm.max and path.verdict != "fail":
-        remedy = "; --sync auto finds an offset of the clocks" if _has_own_clock(run, reference) else ""
+        hints = (
+            (Hint("sync", "auto", "finds an offset of the clocks"),) if _has_own_clock(run, reference) else ()
+        )
         most, least = text.quantity(norm.max, "m"), text.quantity(path.max, "m")
-        yield f"on the path but not in time (‖Δ‖ {most}, path {least}): late or early{remedy}"
+        said = f"on the path but not in time (‖Δ‖ {most}, path {least}): late or early"
+        yield LogWarning("late", said, hints=hints)
 
 
 def _has_own_clock(run: Deviation, reference: Trajectory) -> bool:
@@ -53,11 +58,12 @@ def _has_own_clock(run: Deviation, reference: Trajectory) -> bool:
     return run.sync.mode == "start" and run.run.log.files != reference.files and not run.run.single_poses
 
 
-def _zeros(run: Deviation) -> Iterator[str]:
+def _zeros(run: Deviation) -> Iterator[LogWarning]:
     for unit in ("rad", "m"):
         one = run.furthest_joint(unit)
         if one is None or MOVED * one.max < run.decisive.max:
             continue
         if one.max > 0.0 and one.std <= STEADY * abs(one.mean):
             mean = f"{text.quantity(one.mean, unit)}, std {text.quantity(one.std, unit)}"
-            yield f"{one.quantity} is off by the same throughout (reference - log = {mean}): another zero?"
+            said = f"{one.quantity} is off by the same throughout (reference - log = {mean}): another zero?"
+            yield LogWarning("another-zero", said)

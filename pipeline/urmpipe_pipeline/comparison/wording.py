@@ -6,6 +6,7 @@ import math
 from collections.abc import Sequence
 
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import tool_with
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -184,15 +185,14 @@ def alignment_words(alignment: Alignment) -> str:
     return f"aligned ({alignment.mode}): turned by {turned} about the origin, then moved by {by} mm"
 
 
-def tool_option(robot: Chain, alignment: Alignment) -> str:
-    """Return the option that gives an arm the tool that a comparison found, to a tenth of a micrometre.
+def tool_hint(robot: Chain, alignment: Alignment) -> Hint:
+    """Return what gives an arm the tool that a comparison found, to a tenth of a micrometre.
 
     Args:
         robot: The arm, perhaps with a tool already.
         alignment: That of the mode tool.
     """
-    rounded = (f"{round(value, 7) + 0.0:.7f}" for value in tool_with(robot, alignment))  # + 0.0: no -0
-    return "--tool " + ",".join(value.rstrip("0").rstrip(".") for value in rounded)
+    return Hint("tool", [round(value, 7) + 0.0 for value in tool_with(robot, alignment)])  # + 0.0: no -0
 
 
 def _vector(metres: tuple[float, ...]) -> str:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.export.metadata import MARK, as_json
@@ -41,8 +42,8 @@ def write_mat(name: str, fields: Mapping[str, Any], path: Path, target: Path) ->
 
     size = _size(fields)
     if size > LARGEST:
-        found = f"found {size} bytes, allowed: {LARGEST} in a MAT file of version 5; --to parquet takes all"
-        raise OutputError(Finding(found, str(target)))
+        found = f"found {size} bytes, allowed: {LARGEST} in a MAT file of version 5"
+        raise OutputError(Finding(found, str(target), hints=(Hint("to", "parquet", "takes all"),)))
     savemat(path, {name: dict(fields)}, appendmat=False, oned_as="column", long_field_names=True)
     with path.open("r+b") as file:
         file.write(f"MATLAB 5.0 MAT-file, {MARK}".encode().ljust(DESCRIPTION))

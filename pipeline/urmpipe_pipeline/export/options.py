@@ -6,7 +6,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal, get_args
 
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
@@ -33,18 +34,20 @@ class ExportOptions:
     tcp: Tcp | None = None
 
     def __post_init__(self) -> None:
-        for option, value, allowed in (
-            ("--to", self.to, FORMATS),
-            ("--rows", self.rows, get_args(Rows)),
-            ("--tcp", self.tcp, get_args(Tcp)),
+        for parameter, value, allowed in (
+            ("to", self.to, FORMATS),
+            ("rows", self.rows, get_args(Rows)),
+            ("tcp", self.tcp, get_args(Tcp)),
         ):
             if value is not None and value not in allowed:
-                raise OptionError(f"{option}: found {value}, allowed: {', '.join(allowed)}")
+                raise OptionError(Finding(parameter=parameter, found=value, allowed=", ".join(allowed)))
         if self.tcp is not None and self.to != "tum":
-            raise OptionError(f"--tcp: found with --to {self.to}, which has both, allowed: with --to tum")
+            found = f"{self.tcp} with the format {self.to}, which has both poses"
+            hint = Hint("to", "tum", "has one of them")
+            raise OptionError(Finding(parameter="tcp", found=found, hints=(hint,)))
         if self.tcp == "recorded" and self.rows == "grid":
-            message = "found with --tcp recorded, whose orientations stand at the file's rows only"
-            raise OptionError(f"--rows grid: {message}, allowed: --rows file")
+            found = "grid with recorded poses, whose orientations stand at the file's rows only"
+            raise OptionError(Finding(parameter="rows", found=found, allowed="file"))
 
     @property
     def chosen_rows(self) -> Rows:
@@ -58,9 +61,10 @@ class ExportOptions:
         has = "a comparison, which has the samples that it compared"
         if isinstance(result, Simulation):
             has = "a simulation, which has the samples that it recorded"
-        for option, value in (("--rows", self.rows), ("--tcp", self.tcp)):
+        for parameter, value in (("rows", self.rows), ("tcp", self.tcp)):
             if value is not None:
-                raise OptionError(f"{option}: found with {has}, allowed: with a run")
+                found = f"{value} with {has}"
+                raise OptionError(Finding(parameter=parameter, found=found, allowed="with a run"))
 
 
 def format_of(to: Format | None, output: Path | None) -> Format:
@@ -75,5 +79,5 @@ def format_of(to: Format | None, output: Path | None) -> Format:
     for known in FORMATS:
         if suffix == known:
             return known
-    allowed = f"allowed: --to {'|'.join(FORMATS)}, or an output that ends so"
-    raise OptionError(f"--to: found the output {output}, {allowed}")
+    allowed = f"{', '.join(FORMATS)}, or an output that ends so"
+    raise OptionError(Finding(parameter="to", found=f"the output {output}", allowed=allowed))

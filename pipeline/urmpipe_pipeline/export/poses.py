@@ -12,6 +12,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.export.options import ExportOptions, Rows
@@ -70,8 +71,8 @@ def _arm_poses(simulation: Simulation) -> list[Poses]:
     """Return the trajectory of the tip of each arm of a simulation."""
     where = _where(simulation)
     if not simulation.arms:
-        found = "found no block of kinematics, so no pose; allowed: --to csv, parquet or mat"
-        raise RecordingError(Finding(found, where))
+        hints = tuple(Hint("to", one, "needs none") for one in ("csv", "parquet", "mat"))
+        raise RecordingError(Finding("found no block of kinematics, so no pose", where, hints=hints))
     return [
         _by_kinematics(
             arm.block if len(simulation.arms) > 1 else "", arm.chain, simulation.t_ns, arm.q, where
@@ -97,8 +98,11 @@ def _run_poses(run: Run, tcp: Tcp, rows: Rows) -> Poses:
         return _recorded_poses(run)
     if run.robot is None or not run.log.joints:
         lacks = "robot" if run.log.joints else "joints"
-        allowed = "a log ingested with --robot NAME|FILE, or --tcp recorded of a log that recorded its pose"
-        raise _lacking(run, f"found no {lacks}, so no pose; allowed: {allowed}")
+        hints = (
+            Hint("robot", None, "makes a recording with poses", call="ingest"),
+            Hint("tcp", "recorded", "takes those of a log that recorded its pose"),
+        )
+        raise _lacking(run, f"found no {lacks}, so no pose", *hints)
     t_ns, q = (run.t_ns, run.q) if rows == "grid" else (run.log.t_ns, run.log.q)
     return _by_kinematics("", run.robot, run.log.clock_start_ns + t_ns, q, _where(run))
 
@@ -107,8 +111,9 @@ def _recorded_poses(run: Run) -> Poses:
     position, quat = run.log.tcp_position, run.log.tcp_quat_xyzw
     if position is None or quat is None:
         lacks = "position" if position is None else "orientation"
-        allowed = "a log that recorded position and orientation, or --tcp fk with a robot"
-        raise _lacking(run, f"found no recorded {lacks}, so no recorded pose; allowed: {allowed}")
+        hint = Hint("tcp", "fk", "takes those of a robot")
+        said = f"found no recorded {lacks}, so no recorded pose"
+        raise _lacking(run, f"{said}, allowed: a log that recorded position and orientation", hint)
     there = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(quat).all(axis=1))
     _refuse_none(run, there)
     clock = run.log.clock_start_ns + run.log.t_ns[there]
@@ -131,8 +136,8 @@ def _refuse_none(run: Run, there: IntArray) -> None:
         raise _lacking(run, "found no row with a pose, allowed: at least one")
 
 
-def _lacking(run: Run, message: str) -> RecordingError:
-    return RecordingError(Finding(message, _where(run)))
+def _lacking(run: Run, message: str, *hints: Hint) -> RecordingError:
+    return RecordingError(Finding(message, _where(run), hints=hints))
 
 
 def _where(result: Run | Simulation) -> str:

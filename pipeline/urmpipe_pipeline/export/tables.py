@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, RecordingError
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES
 from urmpipe_pipeline.export.originals import originals
@@ -20,6 +21,7 @@ from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.sources.clocks.text_times import ZONED
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 
 Values: TypeAlias = FloatArray | IntArray | NDArray[np.str_] | Times
@@ -84,8 +86,8 @@ def file_table(log: JointLog, *, units_told: bool = True) -> Table:
         RecordingError: If the log came from no file.
     """
     if not log.columns:
-        found = "found a log that was not read from a file, allowed: --rows grid"
-        raise RecordingError(Finding(found, log.name))
+        hint = Hint("rows", "grid", "writes the run on its grid")
+        raise RecordingError(Finding("found a log that was not read from a file", log.name, hints=(hint,)))
     kept = sorted((c for c in log.columns if _kept(log, c)), key=lambda column: column.number)
     names = _names(kept)
     clock_ns = log.clock_start_ns + log.t_ns
@@ -101,7 +103,7 @@ def file_table(log: JointLog, *, units_told: bool = True) -> Table:
 
 def _as_told(log: JointLog, clock_ns: IntArray, timed: Sequence[str]) -> IntArray:
     """Return the clock as its columns tell it: a time of day that passed midnight began anew there."""
-    began_anew = any(inference.what == "nights passed" for inference in log.inferences)
+    began_anew = any(inference.kind == "nights passed" for inference in log.inferences)
     return clock_ns % DAY if began_anew and timed == [TIME_OF_DAY] else clock_ns
 
 
@@ -209,7 +211,7 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
             "not-exported", f"{', '.join(empty)}: not ingested, since a column of them was empty"
         )
     for inference in log.inferences:
-        if inference.what == "columns not used":
+        if inference.kind == "columns not used":
             said = f"{inference.value}: not ingested ({inference.evidence}), so they cannot leave"
             yield LogWarning("not-exported", said)
     for warning in log.warnings:
@@ -218,8 +220,8 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
             yield LogWarning("not-exported", said, warning.row)
         elif warning.kind in ("skipped-row", "other-lines"):
             yield LogWarning("not-exported", warning.message, warning.row)
-    form = next((one for one in log.inferences if one.what == "form of the time"), None)
-    if form and "without a time zone" not in form.evidence and any(one.unit == DATE for one in kept):
+    form = next((one for one in log.inferences if one.kind == ZONED), None)
+    if form and any(one.unit == DATE for one in kept):
         yield LogWarning("clock-in-utc", f"{form.value} with a time zone: the dates leave in UTC")
 
 

@@ -18,7 +18,7 @@ from urmpipe_pipeline.comparison.wording import (
     out_words,
     stretch_words,
     tolerance_words,
-    tool_option,
+    tool_hint,
 )
 from urmpipe_pipeline.inverse.verdict import reached
 from urmpipe_pipeline.runs.results import Run
@@ -109,7 +109,7 @@ def deviation_facts(deviation: Deviation, reference: Trajectory) -> tuple[Fact, 
         Fact("Out of tolerance", outside),
         Fact("Longest stretch out", stretch(deviation.longest_out)),
         Fact("r(‖Δ‖, speed)", speed_correlation(deviation), "1: they grow together; 0: they are unrelated"),
-        *(Fact("Looks like", cause) for cause in causes(deviation, reference)),
+        *(Fact("Looks like", cause.sentence("command line")) for cause in causes(deviation, reference)),
     )
 
 
@@ -160,7 +160,7 @@ def _alignment_note(deviation: Deviation) -> str:
         return "both stand where they say they stood"
     if alignment.mode == "tool":
         robot = deviation.run.robot
-        option = f", as {tool_option(robot, alignment)} does" if robot else ""
+        option = f", as {tool_hint(robot, alignment).spelled('command line')} does" if robot else ""
         return f"the constant offset of the tool centre point that fits best{option}"
     return (
         "the first compared poses agree" if alignment.mode == "start" else "the rigid motion that fits best"

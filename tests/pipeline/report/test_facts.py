@@ -12,7 +12,7 @@ from urmpipe_models.robots.catalogue import load_robot, parse_offset
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Stretch
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
-from urmpipe_pipeline.comparison.wording import tool_option
+from urmpipe_pipeline.comparison.wording import tool_hint
 from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run
 from urmpipe_pipeline.report import facts
 
@@ -84,7 +84,7 @@ def test_a_rigid_motion_is_told_by_how_far_it_moves_and_turns(comparison: Compar
 def test_the_tool_option_repeats_a_tool_on_top_of_one_that_is_there() -> None:
     before = parse_offset("0.01,0,0.1,0,0,1.5707963267948966")
     arm = load_robot("urm6").placed(tool=before)
-    option = tool_option(arm, Alignment("tool", tool=(0.002, 0.0, 0.0)))
+    option = tool_hint(arm, Alignment("tool", tool=(0.002, 0.0, 0.0))).spelled("command line")
     after = parse_offset(option.removeprefix("--tool "))
     wanted = before.point((0.002, 0.0, 0.0))
     # seven digits behind the point are printed

@@ -10,6 +10,7 @@ from urmpipe_models.errors import Finding, LogError
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.units.unit_evidence import FULL_TURN_DEG, FULL_TURN_GON, steps_of
+from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
 
@@ -33,8 +34,8 @@ class GonDoubt:
             return []
         names = ", ".join(column.name for column in self._columns)
         said = f"{names}: {self._columns[0].unit_text} is taken as deg, as in German; elsewhere it is gon"
-        hint = "--unit deg says that it is right, values in gon are to be multiplied by 0.9"
-        return [LogWarning("gon-or-deg", f"{said}, 0.9 deg: {hint}")]
+        hints = unit_hints(self._columns, "deg", "confirms it; multiply values in gon by 0.9")
+        return [LogWarning("gon-or-deg", f"{said}, 0.9 deg", hints=hints)]
 
     def note(self, columns: Sequence[Column]) -> None:
         """Note those of some columns whose names alone tell a unit that is deg or gon."""
