@@ -69,6 +69,12 @@ class Comparison(Shown):
         return (*run.run.warnings, *(one for one in self.warnings if one.about == run.name))
 
     @property
+    def own_warnings(self) -> tuple[LogWarning, ...]:
+        """The warnings that are about no single log."""
+        names = {run.name for run in self.runs}
+        return tuple(one for one in self.warnings if one.about not in names)
+
+    @property
     def ranking(self) -> tuple[Deviation, ...]:
         """The logs from best to worst.
 
