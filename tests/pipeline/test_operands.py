@@ -152,7 +152,7 @@ def test_that_there_is_no_time_holds_for_the_log_without_one(load: Load) -> None
 def test_how_a_table_is_written_is_an_error_if_none_is(load: Load, tmp_path: Path) -> None:
     with pytest.raises(UrmpipeError) as caught:
         load(PATH, LOG, delimiter="semicolon")
-    given = "with --delimiter semicolon"
+    given = "with delimiter semicolon"
     allowed = f"and no row of numbers below it {given}, allowed: a table with a row a sample"
     assert str(caught.value).replace(f"{tmp_path}/", "").split("\n") == [
         f"log0.csv:1: found 't [s],x,y,z' {allowed}",
@@ -165,15 +165,15 @@ def test_what_no_log_has_is_an_error(load: Load, tmp_path: Path) -> None:
         load(PATH, LOG, joints=("A1", "A2"), units={"c": "deg"})
     allowed = "allowed: t [s], x, y, z of log0.csv; t [s], a [rad], b [rad] of log1.csv"
     assert str(caught.value).replace(f"{tmp_path}/", "").split("\n") == [
-        f"--joints: found no column 'A1', 'A2' in any log, {allowed}",
-        f"--unit: found no column 'c' in any log, {allowed}",
+        f"joints: found no column 'A1', 'A2' in any log, {allowed}",
+        f"unit: found no column 'c' in any log, {allowed}",
     ]
 
 
 def test_a_log_that_has_some_of_the_joints_only_is_an_error(load: Load) -> None:
     with pytest.raises(LogError) as caught:
         load(PATH, LOG, joints=("a", "c"))
-    assert str(caught.value) == "--joints: found no column 'c', allowed: a [rad], b [rad]"
+    assert str(caught.value) == "joints: found no column 'c', allowed: a [rad], b [rad]"
 
 
 def test_a_log_that_cannot_be_read_is_told_with_the_others(load: Load, tmp_path: Path) -> None:

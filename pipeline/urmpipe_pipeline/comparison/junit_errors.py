@@ -13,7 +13,7 @@ from urmpipe_pipeline.outputs import guarded_output
 
 
 @contextmanager
-def told_in_junit(path: Path | None, inputs: Sequence[Path], voice: Voice) -> Iterator[None]:
+def told_in_junit(path: Path | None, inputs: Sequence[Path], voice: Voice = "python") -> Iterator[None]:
     """Write an error of the body to a JUnit file, too, as `tell_junit` does, and raise it on.
 
     Args:

@@ -55,7 +55,7 @@ def write_junit(shown: Presentation, part: Path, path: Path, voice: Voice = "pyt
 
 
 @contextmanager
-def errors_in_junit(path: Path | None, inputs: Sequence[Path], voice: Voice) -> Iterator[None]:
+def errors_in_junit(path: Path | None, inputs: Sequence[Path], voice: Voice = "python") -> Iterator[None]:
     """Write an error of the body to a JUnit file, too, as `write_errors` does, and raise it on.
 
     Args:
