@@ -10,7 +10,8 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import is_recording, read_recording
+from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import UNUSED_PERIOD, ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot

@@ -23,7 +23,7 @@ from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.solve import Method
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import refuse_output
-from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.sources import ReadOptions
 
 SOLVING = 0.7

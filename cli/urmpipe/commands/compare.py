@@ -16,7 +16,7 @@ from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import LogOptions, log_options
 from urmpipe.options.types import TIMES, OneOf, ParsedType, parsed, quantity
 from urmpipe.process import tune_pyarrow
-from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE
+from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.comparison import Comparison
@@ -182,10 +182,11 @@ def compare(
 
 def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:
     """Print a comparison, and what was written."""
-    from urmpipe.printing.comparison import print_comparison
+    from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_pipeline.results import present
 
-    print_comparison(result)
+    print_presentation(present(result))
     for title, path in written.items():
         if path:
             say(f"{title}: {path}")
@@ -194,9 +195,10 @@ def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) 
 
 def _tell_failure(result: Comparison) -> None:
     """Print the verdict alone on standard error: a job that fails says why, however quiet it is."""
-    from urmpipe.printing.comparison import print_verdict
+    from urmpipe.printing.presentation import print_verdict
+    from urmpipe_pipeline.results import present
 
-    print_verdict(result, err=True)
+    print_verdict(present(result), err=True)
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:

@@ -93,10 +93,12 @@ def ingest(
 
 def _print(run: Run, explain: bool, replaces: bool, audit: Path | None, map_output: Path | None) -> None:
     """Print what was found in a log, and what was written."""
-    from urmpipe.printing.terminal import print_recording, print_run, say
+    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_pipeline.results import present
     from urmpipe_pipeline.text import counted
 
-    print_run(run, alternatives=explain)
+    print_presentation(present(run), every=explain)
     if run.recording:
         print_recording(run.recording, replaced=replaces)
     if audit:

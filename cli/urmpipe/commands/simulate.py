@@ -119,10 +119,12 @@ def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked
 
 def _print(result: Simulation, wall: float, replaces: bool, draw: Path | None) -> None:
     """Print what a simulation, which took `wall` seconds, came to."""
-    from urmpipe.printing.simulation import print_simulation
+    from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_pipeline.results import present
 
-    print_simulation(result, wall)
+    print_presentation(present(result))
+    say(f"Simulated in {wall:.2g} s, {result.duration / wall:.3g} times as fast as real time")
     if draw:
         say(f"Drawing: {draw}")
     print_recording(result.recording, replaced=replaces)
@@ -130,7 +132,7 @@ def _print(result: Simulation, wall: float, replaces: bool, draw: Path | None) -
 
 def _list(terminal: Terminal) -> int:
     """List the shipped systems."""
-    from urmpipe.printing.simulation import print_systems
+    from urmpipe.printing.systems import print_systems
     from urmpipe_fmus.cosim import load_system, system_names
 
     systems = [load_system(name, {}) for name in system_names()]

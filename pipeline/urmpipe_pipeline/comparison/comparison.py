@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import HEAD, Shown, line_of
+from urmpipe_models.display import Shown, line_of
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
@@ -46,7 +46,7 @@ class Comparison(Shown):
     tolerance: Mapping[str, float]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
-    recording: Path | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
     baseline: BaselineComparison | None = None
 
     @property
@@ -118,21 +118,6 @@ class Comparison(Shown):
         """Return what is to be known of it, and of its logs."""
         of_logs = [one.of(run.name) for run in self.runs for one in run.run.warnings]
         return [str(one) for one in (*self.warnings, *of_logs)]
-
-    def _table(self) -> str:
-        """Return for a notebook one row a log, the worst first; of one log the head of its table."""
-        if len(self.runs) == 1:
-            return Shown._table(self)
-        import pandas as pd
-
-        rows = [
-            {"run": one.name, "verdict": one.verdict}
-            | {f"max {name} [{found.unit}]": found.max for name, found in one.statistics.items()}
-            for one in reversed(self.ranking)
-        ]
-        shown = pd.DataFrame(rows[:HEAD]).to_html(index=False, float_format="{:.4g}".format)
-        shares = f"{min(HEAD, len(rows))} of {len(rows)} logs, the worst first"
-        return f"{shown}<p>{shares}; to_frame() has a row a log and quantity</p>"
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a log and quantity, as `rows`."""

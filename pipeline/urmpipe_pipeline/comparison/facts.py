@@ -7,15 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.alignment import tool_with
 from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.symbols import size_of, used_words
 from urmpipe_pipeline.comparison.trajectory import Sync
-from urmpipe_pipeline.comparison.wording import decided_words, out_words, stretch_words, tool_hint
+from urmpipe_pipeline.comparison.wording import decided_words, out_words, stretch_words
 from urmpipe_pipeline.presentation.parts import spot_at
-from urmpipe_pipeline.presentation.section import Fact, Place, Ref, Value
+from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
 
 
@@ -63,7 +65,7 @@ def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     yield Fact("Joint tolerance", _sliding(one))
     if (r := one.speed_correlation) is not None:
         yield Fact("r(‖Δ‖, speed)", Value(r, "1", signed=True), "1: they grow together; 0: no correlation")
-    yield from (Fact("Looks like", cause.sentence("command line")) for cause in causes(one, result.reference))
+    yield from (Fact("Looks like", cause) for cause in causes(one, result.reference))
     yield from (replace(fact, brief=fact.name == "Robot") for fact in log_facts(one.run))
 
 
@@ -137,9 +139,8 @@ def _alignment(one: Deviation) -> Iterator[Fact]:
     moved = one.alignment.mode != "none"
     yield Fact("Alignment", *alignment_words(one), brief=moved)
     if one.alignment.mode == "tool" and one.run.robot is not None:
-        yield Fact(
-            "To apply this permanently", tool_hint(one.run.robot, one.alignment).spelled("command line")
-        )
+        values = [round(value, 7) + 0.0 for value in tool_with(one.run.robot, one.alignment)]  # no -0.0
+        yield Fact("To apply this permanently", Advice(hints=(Hint("tool", values),)))
 
 
 def _sliding(one: Deviation) -> str:

@@ -12,9 +12,6 @@ from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.measure_units import units_of
 from urmpipe_models.messages import Hint
 
-DEFAULT_TOLERANCE = 0.0035
-"""Largest deviation allowed on an axis in [m]. Source: [UrmArm2021]_ section 2.4."""
-
 LENGTHS, ANGLES = ({"": Decimal(1), **units_of(si)} for si in ("m", "rad"))
 UNITS: dict[str, dict[str, Decimal]] = {
     **dict.fromkeys(("axis", "x", "y", "z", "norm", "path"), LENGTHS),

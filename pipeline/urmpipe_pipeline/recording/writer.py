@@ -6,28 +6,23 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.outputs import guarded_output
-from urmpipe_pipeline.recording.columns import block_columns
-from urmpipe_pipeline.recording.drawing import draw
-from urmpipe_pipeline.recording.entities import Block, blocks, printable
+from urmpipe_pipeline.presentation.section import Presentation
+from urmpipe_pipeline.recording.array_form import CodecError, Column
+from urmpipe_pipeline.recording.codec import Encoded, encode
+from urmpipe_pipeline.recording.columns import column_rows
 from urmpipe_pipeline.recording.identity import APPLICATION_ID
-from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
-from urmpipe_pipeline.recording.metadata import to_json
-from urmpipe_pipeline.recording.scene import scene_of
-from urmpipe_pipeline.recording.signal_entities import simulation_blocks
-from urmpipe_pipeline.recording.simulation_data import simulation_json
-from urmpipe_pipeline.recording.store import PROPERTY
+from urmpipe_pipeline.recording.store import PROPERTY, SLICE, document
 from urmpipe_pipeline.recording.verify import verify
-from urmpipe_pipeline.simulations.simulation import Result, Simulation
+from urmpipe_pipeline.recording.views.blueprint import send_views
+from urmpipe_pipeline.recording.views.plots import EntityOf
+from urmpipe_pipeline.text import encodable
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
-
-SLICE = 65_536
-"""Rows sent at a time: few enough to keep memory low, many enough to keep the overhead low."""
 
 AHEAD = 3
 """Slices under way at a time: there is always one to be written, and memory stays low."""
@@ -36,33 +31,42 @@ SPARE = 64 * 2**20
 """Bytes that must be free on the disk before a slice is sent: it, what is on its way, and the footer."""
 
 
-def write_recording(
-    result: Result,
+def write_result(
+    result: Any,
+    kind: str,
+    shown: Presentation,
     path: Path,
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
-) -> Path:
+) -> None:
     """Write the recording of a result, read it back, and put it in its place.
 
     Args:
-        result: What to record.
+        result: What to record, a dataclass.
+        kind: What the recording calls its kind.
+        shown: What the viewer shows of it.
         path: The file (.rrd); replaced if it is a recording of urmpipe's.
         inputs: The files the result was made from: none of them is replaced.
         progress: Told the share of the data that is written, 0..1.
-
-    Returns:
-        The path.
 
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
     with guarded_output(path, inputs, "recording") as part:
-        every, metadata = _content(result)
+        encoded = _encoded(result, path)
+        metadata = document(kind, encoded.tree)
         with _stream_into(part) as stream:
-            _describe(stream, result, every, metadata)
-            _send(stream, part.parent, every, progress)
-        verify(part, path, every, metadata)
-    return path
+            _describe(stream, shown, encoded, metadata)
+            _send(stream, part.parent, encoded.columns, progress)
+        verify(part, path, encoded.columns, metadata)
+
+
+def _encoded(result: Any, path: Path) -> Encoded:
+    """Return a result taken apart."""
+    try:
+        return encode(result)
+    except CodecError as error:
+        raise OutputError(Finding(f"cannot be recorded: {error}", str(path))) from error
 
 
 @contextmanager
@@ -88,9 +92,9 @@ def _stream_into(part: Path) -> Iterator[RecordingStream]:
 
 
 def _send(
-    stream: RecordingStream, folder: Path, every: Sequence[Block], progress: Callable[[float], None] | None
+    stream: RecordingStream, folder: Path, every: Sequence[Column], progress: Callable[[float], None] | None
 ) -> None:
-    """Send the arrays in slices, those with a row to verify first: reading back then need not read all.
+    """Send the arrays in slices, the first and the last row first: verifying then need not read all.
 
     Args:
         stream: Where to.
@@ -98,19 +102,24 @@ def _send(
         every: The arrays.
         progress: Told the share that is sent.
     """
-    total = sum(block.values.nbytes for block in every) or 1
+    total = sum(column.rows for column in every)
     done = 0
-    slices = [(block, rows) for block in every for rows in _slices(block)]
-    for number, (block, rows) in enumerate(slices):
-        values = block.values[rows]
-        times, column = block_columns(block, rows)
+    slices = [(column, start) for column in every for start in _starts(column.rows)]
+    for number, (column, start) in enumerate(slices):
+        rows = slice(start, min(start + SLICE, column.rows))
         if number % AHEAD == 0:
             stream.flush()  # waits until all that was sent is in the file
         _refuse_full_disk(folder)
-        stream.send_columns(block.entity, times, [column])
-        done += values.nbytes
+        stream.send_columns(column.at, *column_rows(column, rows))
+        done += rows.stop - start
         if progress:
             progress(done / total)
+
+
+def _starts(rows: int) -> list[int]:
+    """Return where the slices of an array begin: the first, the last, then all between."""
+    first, *others = range(0, rows, SLICE)
+    return [first, *others[-1:], *others[:-1]]
 
 
 def _refuse_full_disk(folder: Path) -> None:
@@ -119,32 +128,21 @@ def _refuse_full_disk(folder: Path) -> None:
         raise OutputError(Finding(f"found less than {SPARE >> 20} MB free on the disk", str(folder)))
 
 
-def _content(result: Result) -> tuple[list[Block], str]:
-    """Return the arrays and the metadata of a result."""
-    if isinstance(result, Simulation):
-        arrays = simulation_blocks(result)
-        return arrays, simulation_json(result, arrays)
-    arrays = blocks(result)
-    return arrays, to_json(result, arrays)
-
-
-def _describe(stream: RecordingStream, result: Result, every: list[Block], metadata: str) -> None:
-    """Send what is no array: the metadata, the viewer's layout, and what is there to be looked at."""
+def _describe(stream: RecordingStream, shown: Presentation, encoded: Encoded, metadata: str) -> None:
+    """Send what is no array: the metadata, and what is there to be looked at with its layout."""
     import rerun as rr
 
-    scene = scene_of(result)
-    stream.send_recording_name(printable(result.name))
-    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, opens_at_ns=opening_time(result)))
-    stream.send_blueprint(viewer_layout(result, scene))
-    draw(stream, result, every, scene)
+    stream.send_recording_name(encodable(shown.name))
+    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, opens_at_ns=shown.opens_at_ns))
+    stream.send_blueprint(send_views(stream, shown, _entities(encoded)))
 
 
-def _slices(block: Block) -> list[slice]:
-    starts = list(range(0, len(block.t_ns), SLICE))
-    return [
-        slice(start, start + SLICE) for start in sorted(starts, key=lambda start: not _verified(block, start))
-    ]
+def _entities(encoded: Encoded) -> EntityOf:
+    """Return what tells where an array stands, or the one that it is a view of, if it can be plotted."""
+    plotted = {column.at for column in encoded.columns if column.plotted}
 
+    def entity_of(values: Any, t_ns: Any) -> str | None:
+        at = encoded.entity_of(values, t_ns)
+        return at if at in plotted else None
 
-def _verified(block: Block, start: int) -> bool:
-    return any(start <= row < start + SLICE for row in block.verified)
+    return entity_of

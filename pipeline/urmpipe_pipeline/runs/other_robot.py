@@ -9,9 +9,9 @@ import numpy as np
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.meshes import VISUAL_MISSING
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, kinematics
-from urmpipe_pipeline.runs.meshes import VISUAL_MISSING
 from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, implausible
 from urmpipe_pipeline.runs.recorded_tcp import FAR_RECORDED, far_from_recorded
 from urmpipe_pipeline.runs.results import Run
