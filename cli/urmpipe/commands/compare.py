@@ -15,7 +15,6 @@ from urmpipe.options.grouped import Command
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import LogOptions, log_options
 from urmpipe.options.types import TIMES, OneOf, ParsedType, parsed, quantity
-from urmpipe.process import tune_pyarrow
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
@@ -149,7 +148,6 @@ def compare(
 
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
     """
-    tune_pyarrow()
     said = about_recordings(ctx, (reference, *logs))
     if said:
         terminal.note(said)

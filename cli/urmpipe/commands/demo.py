@@ -9,7 +9,6 @@ import click
 
 import urmpipe
 from urmpipe.options.output import Terminal, output_options
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
     from urmpipe.api.report import Report
@@ -48,7 +47,6 @@ def demo(output: Path, terminal: Terminal) -> int:
       urmpipe demo
       urmpipe demo -o somewhere --json
     """
-    tune_pyarrow()
     from urmpipe_datasets import LOGS
 
     output.mkdir(parents=True, exist_ok=True)

@@ -10,7 +10,6 @@ import click
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import LogOptions, log_options
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.runs.results import Run
@@ -67,7 +66,6 @@ def ingest(
         raise click.UsageError(
             f"-o: found {output} with --explain, which writes no recording, allowed: one of both"
         )
-    tune_pyarrow()
     target = None if explain else output or Path(default_name(logs))
     replaces = target is not None and target.exists()
     reading = log.reading()

@@ -11,7 +11,6 @@ import urmpipe
 from urmpipe.options.named import NamedType, argument_names, named_values
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.types import DURATION, SYSTEM, OneOf
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.simulations.simulation import Simulation
@@ -89,7 +88,6 @@ def simulate(
     if copy is not None:
         _refuse_run_options({"output": output, "draw": draw, **asked})
         return _write(system, copy, terminal)
-    tune_pyarrow()
     target = output or Path(default_name(system))
     return _run(system, target, draw, terminal, asked)
 

@@ -20,8 +20,8 @@ from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS, unit_of
 from urmpipe_pipeline.sources.clocks.stamps import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.numbers import ClockColumn
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import ClockColumn
 from urmpipe_pipeline.sources.units.unit_hints import called
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
 
