@@ -12,10 +12,10 @@ from urmpipe.guards import PathLike, one_or_many, paths, refuse_foreign, refuse_
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.inverse.verdict import verdict_of
 from urmpipe_pipeline.recording import read_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
+from urmpipe_pipeline.solved_targets.verdict import verdict_of
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -15,7 +15,7 @@ from urmpipe.options.types import DURATION, JointValuesType, OneOf, WholeType
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
-    from urmpipe.inverse.result import InverseResult
+    from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 
 def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
@@ -123,7 +123,7 @@ def ik(
     return 0 if result.verdict == "pass" else 1
 
 
-def _print(result: InverseResult, every: bool, robot: str | None, replaces: bool) -> None:
+def _print(result: SolvedTargets, every: bool, robot: str | None, replaces: bool) -> None:
     """Print what was found, and what was written: how to read it names the robot as the caller does."""
     from urmpipe.printing.inverse import print_inverse
     from urmpipe.printing.terminal import print_recording, say

@@ -7,18 +7,18 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe.inverse.result import InverseResult
-from urmpipe.inverse.wording import joint_number, reach_words, unreached
 from urmpipe.printing.columns import Column, print_columns
 from urmpipe.printing.terminal import LISTED, judged_line, new_console
 from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_pipeline import text
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.wording import headline, joint_number, unreached
 
 if TYPE_CHECKING:
     from rich.console import Console
 
 
-def print_inverse(result: InverseResult, *, every: bool = False) -> None:
+def print_inverse(result: SolvedTargets, *, every: bool = False) -> None:
     """Print how many targets were reached, the solutions or how the path went, and why targets were not.
 
     Args:
@@ -28,7 +28,7 @@ def print_inverse(result: InverseResult, *, every: bool = False) -> None:
     from urmpipe.printing.inverse_path import print_path
 
     console = new_console()
-    console.print(judged_line(result.verdict, reach_words(result)), soft_wrap=True)
+    console.print(judged_line(result.verdict, headline(result)), soft_wrap=True)
     if result.path is not None:
         print_path(console, result, result.path)
     else:
@@ -36,7 +36,7 @@ def print_inverse(result: InverseResult, *, every: bool = False) -> None:
     _print_unreached(console, result, every=every)
 
 
-def _print_solutions(console: Console, result: InverseResult, *, every: bool) -> None:
+def _print_solutions(console: Console, result: SolvedTargets, *, every: bool) -> None:
     """Print the solutions, as many as a person reads."""
     targets, columns = _listed(result, every=every)
     if not len(targets):
@@ -48,7 +48,7 @@ def _print_solutions(console: Console, result: InverseResult, *, every: bool) ->
         console.print(f"... and {more} more; --json lists all, and -o LOG.csv those nearest to the start")
 
 
-def _listed(result: InverseResult, *, every: bool) -> tuple[IndexArray, IndexArray]:
+def _listed(result: SolvedTargets, *, every: bool) -> tuple[IndexArray, IndexArray]:
     """Return target and column of the solutions to print."""
     if every:
         targets, columns = np.nonzero(result.solutions.reached)
@@ -57,7 +57,7 @@ def _listed(result: InverseResult, *, every: bool) -> tuple[IndexArray, IndexArr
     return targets, result.chosen[targets]
 
 
-def _columns(result: InverseResult, targets: IndexArray, columns: IndexArray) -> Iterator[Column]:
+def _columns(result: SolvedTargets, targets: IndexArray, columns: IndexArray) -> Iterator[Column]:
     """Yield the columns of the table: a row a solution."""
     yield Column("Row", [str(row) for row in result.row[targets]], key=True)
     yield Column("Branch", result.solutions.labels[targets, columns].tolist(), key=True)
@@ -77,7 +77,7 @@ def _numbers(values: FloatArray, unit: str) -> list[str]:
     return [f"{value * text.SHOWN[unit][1]:.1e}" for value in values]
 
 
-def _print_unreached(console: Console, result: InverseResult, *, every: bool) -> None:
+def _print_unreached(console: Console, result: SolvedTargets, *, every: bool) -> None:
     """Print why targets, or branches of them, have no solution."""
     lines = list(unreached(result, every=every))
     for line in lines[:LISTED]:

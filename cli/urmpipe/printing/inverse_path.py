@@ -7,12 +7,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from urmpipe.inverse.result import InverseResult
-from urmpipe.inverse.wording import joint_number
 from urmpipe.printing.columns import Column, print_columns
 from urmpipe_models.chains.chain import Joint
 from urmpipe_pipeline import text
-from urmpipe_pipeline.inverse.verdict import in_words
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.wording import in_words, joint_number
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -24,7 +23,7 @@ SHOWN = 10
 """Branches, jumps and stretches of joints too fast that are printed of each; the others are counted."""
 
 
-def print_path(console: Console, result: InverseResult, path: JointPath) -> None:
+def print_path(console: Console, result: SolvedTargets, path: JointPath) -> None:
     """Print how the joints follow a path: a summary, not its samples."""
     nearest = path.nearest_singularity
     if nearest is None:
@@ -34,7 +33,7 @@ def print_path(console: Console, result: InverseResult, path: JointPath) -> None
     print_columns(console, "Joints along the path", list(_columns(result)))
 
 
-def _lines(result: InverseResult, path: JointPath, nearest: int) -> Iterator[str]:
+def _lines(result: SolvedTargets, path: JointPath, nearest: int) -> Iterator[str]:
     """Yield what is to be said of the way."""
     yield f"branch: {'; '.join(_capped(list(_branches(result))))}"
     yield from _capped([_jump(result, one) for one in path.jumps])
@@ -53,7 +52,7 @@ def _capped(lines: list[str]) -> list[str]:
     return [*lines[:SHOWN], f"and {more} more; --json has all"] if more > 0 else lines
 
 
-def _branches(result: InverseResult) -> Iterator[str]:
+def _branches(result: SolvedTargets) -> Iterator[str]:
     """Yield the branches in the order of the path, with their rows if there are several."""
     reached = np.flatnonzero(result.reached)
     branch, row = result.branch[reached], result.row[reached]
@@ -68,7 +67,7 @@ def _rows(first: int, last: int) -> str:
     return f"row {first}" if first == last else f"rows {first}-{last}"
 
 
-def _jump(result: InverseResult, jump: Jump) -> str:
+def _jump(result: SolvedTargets, jump: Jump) -> str:
     """Return a jump with its time, its place and what moves."""
     steps = ", ".join(f"{one.joint} by {in_words(one.step, one.unit)}" for one in jump.joints)
     ways = "" if jump.from_branch == jump.to_branch else f"{jump.from_branch} → {jump.to_branch}: "
@@ -76,7 +75,7 @@ def _jump(result: InverseResult, jump: Jump) -> str:
     return f"jump {_at(result, jump.sample)}{since}, at ({text.point(jump.position)}) m: {ways}{steps}"
 
 
-def _nearest_singular(result: InverseResult, path: JointPath, nearest: int) -> str:
+def _nearest_singular(result: SolvedTargets, path: JointPath, nearest: int) -> str:
     """Return where the path comes nearest to a singular pose, and how near."""
     found = path.singularity
     return (
@@ -85,7 +84,7 @@ def _nearest_singular(result: InverseResult, path: JointPath, nearest: int) -> s
     )
 
 
-def _furthest(result: InverseResult) -> str:
+def _furthest(result: SolvedTargets) -> str:
     """Return how far the tool is from its targets at most, by forward kinematics."""
     miss = result.miss[:, 0]
     said = f"off by {text.quantity(float(np.nanmax(miss)), 'm')}"
@@ -94,7 +93,7 @@ def _furthest(result: InverseResult) -> str:
     return f"{said} at most, by forward kinematics; {_at(result, int(np.nanargmax(miss)))}"
 
 
-def _at(result: InverseResult, sample: int) -> str:
+def _at(result: SolvedTargets, sample: int) -> str:
     """Return when a sample is."""
     t = result.t
     return (
@@ -104,7 +103,7 @@ def _at(result: InverseResult, sample: int) -> str:
     )
 
 
-def _columns(result: InverseResult) -> Iterator[Column]:
+def _columns(result: SolvedTargets) -> Iterator[Column]:
     """Yield the columns of the table of joints: a row a joint."""
     joints, q = result.robot.moving, result.q
     reached = q[result.reached]
@@ -120,7 +119,7 @@ def _columns(result: InverseResult) -> Iterator[Column]:
     yield from _speeds(result, joints, units)
 
 
-def _speeds(result: InverseResult, joints: tuple[Joint, ...], units: list[str]) -> Iterator[Column]:
+def _speeds(result: SolvedTargets, joints: tuple[Joint, ...], units: list[str]) -> Iterator[Column]:
     """Yield how fast each joint is at most, and how fast it may be."""
     t = result.t
     if t is None or len(t) < 2:

@@ -22,11 +22,11 @@ from urmpipe_pipeline.comparison.wording import (
     tolerance_words,
     verdict_words,
 )
-from urmpipe_pipeline.inverse.verdict import reached, reached_words, solved
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import ghost_colour_word, run_colour_word
 from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.verdict import reached, reached_words, solved
 
 BRANCHES = 8
 """Branches that are listed; the others are counted."""

@@ -9,9 +9,9 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.wording import amount_words, tolerance_words, verdict_words
-from urmpipe_pipeline.inverse.verdict import faults, reached_words, solved
 from urmpipe_pipeline.report.facts import Fact
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.verdict import faults, reached_words, solved
 
 STATES = ("fail", "pass", "ingested")
 """What a banner may say, the most important first."""

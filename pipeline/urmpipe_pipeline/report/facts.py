@@ -20,8 +20,8 @@ from urmpipe_pipeline.comparison.wording import (
     tolerance_words,
     tool_option,
 )
-from urmpipe_pipeline.inverse.verdict import reached
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.verdict import reached
 
 
 @dataclass(frozen=True, slots=True)

@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.inverse.verdict import reached, verdict_of
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.json_values import plain
 from urmpipe_pipeline.provenance import Provenance
@@ -27,6 +26,7 @@ from urmpipe_pipeline.report.tables import (
 )
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result
+from urmpipe_pipeline.solved_targets.verdict import reached, verdict_of
 
 AUDIT_NOTES: dict[AuditKind, str] = {
     "in-between": "in-between: a sample that a linear resampling left on a wrap, Step deg off the line of its"

@@ -12,7 +12,6 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.wording import tolerance_words
-from urmpipe_pipeline.inverse.verdict import verdict_of
 from urmpipe_pipeline.report import (
     gallery,
     log_tables,
@@ -37,6 +36,7 @@ from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.answers import answers_of
 from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
+from urmpipe_pipeline.solved_targets.verdict import verdict_of
 
 Block: TypeAlias = Table | Figure | Drawing | Listing
 

@@ -185,9 +185,9 @@ def test_an_unknown_backend_is_refused() -> None:
 
 def test_a_result_without_a_page_is_refused(tmp_path: Path) -> None:
     solved = urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e")
-    with pytest.raises(urmpipe.OptionError, match=r"^results: found an InverseResult, allowed: a rec"):
+    with pytest.raises(urmpipe.OptionError, match=r"^results: found a SolvedTargets, allowed: a rec"):
         urmpipe.report([solved], tmp_path / "report.html")  # type: ignore[list-item]
-    with pytest.raises(urmpipe.OptionError, match=r"^result: found an InverseResult, allowed: a Run"):
+    with pytest.raises(urmpipe.OptionError, match=r"^result: found a SolvedTargets, allowed: a Run"):
         urmpipe.write_recording(solved, tmp_path / "solved.rrd")  # type: ignore[arg-type]
 
 

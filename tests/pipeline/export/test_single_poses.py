@@ -11,8 +11,8 @@ from urmpipe_models.inverse.targets import targets_of
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.export import ExportOptions, Format, export_result
 from urmpipe_pipeline.export.mat_file import run_fields
-from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.motion import goals_of, row_times, solved_run
 
 
 @pytest.fixture

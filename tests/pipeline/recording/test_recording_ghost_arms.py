@@ -22,7 +22,6 @@ from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
-from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.entities import places_of
 from urmpipe_pipeline.recording.ghost_arms import POSES, bones_of
@@ -31,6 +30,7 @@ from urmpipe_pipeline.recording.ghost_names import name_places
 from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.motion import Ghost, goals_of, row_times, solved_run
 
 MakeSolved = Callable[..., Run]
 

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from recorded import rows_of, static
-from urmpipe_pipeline.inverse.solved import Ghost
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
 from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.eye import FIELD_OF_VIEW, eye_distance, in_the_picture, seen
@@ -21,6 +20,7 @@ from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.motion import Ghost
 
 MakeSolved = Callable[..., Run]
 

@@ -12,7 +12,8 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.text import SHOWN, counted
+from urmpipe_pipeline.solved_targets.wording import in_words, reach_words
+from urmpipe_pipeline.text import counted
 
 if TYPE_CHECKING:
     from urmpipe_models.inverse.along_path.joint_path import JointPath
@@ -65,13 +66,6 @@ def reached_words(runs: Sequence[Run]) -> str:
     return f"{said}, with {text.enumerated(counts)}" if counts else said
 
 
-def reach_words(subject: str, arms: Sequence[str], found: int, wanted: int) -> str:
-    """Return that arms reach so many targets of some: "poses: ur5e reaches 3 targets"."""
-    part = "" if found == wanted else f"{found} of "
-    verb = "reaches" if len(arms) == 1 else "reach"
-    return f"{subject}: {text.enumerated(arms)} {verb} {part}{text.counted(wanted, 'target')}"
-
-
 def faults(run: Run) -> list[str]:
     """Return what keeps an arm from following the path, in the words of the warnings."""
     return [one.message for one in run.warnings if one.kind in (JUMP, TOO_FAST)]
@@ -80,10 +74,3 @@ def faults(run: Run) -> list[str]:
 def _first_of(count: int, noun: str, first: str, what: str = "") -> str:
     """Return how many there are, and the first: "2 joints too fast, here the first: ..."."""
     return f"{counted(count, noun)}{what}{', here the first' if count > 1 else ''}: {first}"
-
-
-def in_words(value: float, unit: str) -> str:
-    """Return an angle, a length or a rate of one in [rad] or [m] with the unit that people read."""
-    base, slash, per = unit.partition("/")
-    shown, factor = SHOWN[base]
-    return f"{value * factor:.4g} {shown}{slash}{per}"

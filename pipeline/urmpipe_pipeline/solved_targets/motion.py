@@ -22,6 +22,8 @@ from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.runs.ghosts import Ghost, Goals, ghosts_of, goals_of
 from urmpipe_pipeline.runs.ingest import kinematics, run_of
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.verdict import path_warnings
 from urmpipe_pipeline.sources import ReadOptions
 
 __all__ = ["TARGET_PERIOD_NS", "Ghost", "Goals", "ghosts_of", "goals_of", "row_times", "solved_run"]
@@ -206,3 +208,21 @@ def _others(chain: Chain, clock: _Clock, q: FloatArray, ghosts: Sequence[Ghost])
 def _from_start(goals: Goals, clock: _Clock) -> Goals:
     """Return the targets with times from the first row."""
     return replace(goals, t_ns=goals.t_ns - clock.start_ns)
+
+
+def recorded_run(result: SolvedTargets) -> Run:
+    """Return what is recorded of solved targets: the chosen solutions, the others as ghosts, the targets."""
+    since = row_times(len(result)) if result.t_ns is None else result.t_ns
+    t_ns = since + result.clock_start_ns
+    beside = (result.solutions if result.path is None else result.branches) if result.every else None
+    return solved_run(
+        result.name,
+        result.robot,
+        None if result.t_ns is None else t_ns,
+        result.q,
+        goals=goals_of(result.targets, t_ns, result.reasons, result.branch),
+        ghosts=() if beside is None else ghosts_of(beside, t_ns),
+        files=result.provenance.inputs,
+        warnings=(*result.warnings, *(path_warnings(result.path) if result.path else ())),
+        options=result.provenance.options,
+    )

@@ -18,9 +18,9 @@ from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
-from urmpipe_pipeline.inverse.solved import Ghost, ghosts_of, goals_of, row_times, solved_run
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.motion import Ghost, ghosts_of, goals_of, row_times, solved_run
 
 UR5E = load_robot("ur5e")
 STEP_NS = 5_000_000

@@ -10,25 +10,22 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import urmpipe
-from urmpipe.inverse.wording import (
-    NAMED,
-    far_warnings,
-    longest,
-    method_words,
-    near_singular_warnings,
-    reach_words,
-    rows_text,
-    shortfall_warnings,
-    singular_warnings,
-    start_warnings,
-    unreached,
-    within_pi_warnings,
-)
+from urmpipe_models.inverse.closed.closed_form import method_words
 from urmpipe_models.inverse.solutions import Singular, Solutions
 from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.solved_targets.solution_warnings import (
+    far_warnings,
+    longest,
+    near_singular_warnings,
+    shortfall_warnings,
+    singular_warnings,
+    start_warnings,
+    within_pi_warnings,
+)
+from urmpipe_pipeline.solved_targets.wording import NAMED, headline, rows_text, unreached
 
 
 @pytest.mark.parametrize(
@@ -204,4 +201,4 @@ def test_a_joint_that_is_too_fast_twice_is_one_joint() -> None:
     found = urmpipe.ik(targets_of(arm, q), arm, tsp=0.01, start=q[0].tolist())
     assert found.path is not None
     assert [one.joint for one in found.path.too_fast] == ["shoulder_pan_joint"] * 2
-    assert reach_words(found).endswith(" (closed form: three parallel axes), with 1 joint too fast")
+    assert headline(found).endswith(" (closed form: three parallel axes), with 1 joint too fast")
