@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from html import escape
 from typing import Any
 
-from urmpipe_models.errors import one_line
+from urmpipe_models.messages import one_line
 
 LONGEST = 120
 """Characters of the line: it fits into a terminal, and into a list of results."""

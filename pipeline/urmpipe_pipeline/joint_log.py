@@ -10,7 +10,9 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_quaternions, continuous_rotations
 from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.messages import Hint, Message, hint_words
 from urmpipe_models.orientation import NAMES, RotationForm, quaternions
+from urmpipe_models.spelling import Voice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,30 +46,62 @@ class Inference:
         what: The subject, such as "delimiter", "time column", "unit of q1".
         value: What was found.
         evidence: Why.
+        kind: A short word to find it by: "unit", "form"; by default its subject.
+        columns: Names of the columns or joints that it is about, where it is not about the whole file.
+        hints: What to give to have it otherwise.
     """
 
     what: str
     value: str
     evidence: str
+    kind: str = ""
+    columns: tuple[str, ...] = ()
+    hints: tuple[Hint, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Take the subject as the kind where none is given."""
+        if not self.kind:
+            object.__setattr__(self, "kind", self.what)
+
+    def otherwise(self, voice: Voice = "python") -> str:
+        """Return how to have it otherwise; empty where it cannot be."""
+        return "; ".join(hint_words(self.hints, voice))
 
 
 @dataclass(frozen=True, slots=True)
-class LogWarning:
+class LogWarning(Message):
     """Something about a log that a person should know, and that did not stop the work.
 
     Attributes:
         kind: A short word to filter by, such as "missing", "gap", "assumed-unit".
-        message: One line.
+        message: The sentence, in one line.
         row: Data row of the file from 1, where there is one.
+        about: The log or block that it is about, to stand among others.
+        column: Name of the column or joint that it is about.
+        parameter: Keyword of the public function that it is about.
+        found: What was found.
+        allowed: What is allowed.
+        hints: What to give to have it otherwise.
     """
 
     kind: str
     message: str
     row: int | None = None
+    about: str | None = None
+    column: str | None = None
+    parameter: str | None = None
+    found: str | None = None
+    allowed: str | None = None
+    hints: tuple[Hint, ...] = ()
 
     def of(self, name: str) -> LogWarning:
-        """Return it behind the name of what it is about, to stand among others."""
-        return replace(self, message=f"{name}: {self.message}")
+        """Return it as one about a log or a block of this name."""
+        return replace(self, about=name)
+
+    def place(self) -> str:
+        """Return log, row and column: "log: row 5: q1"."""
+        row = None if self.row is None else f"row {self.row}"
+        return ": ".join(filter(None, (self.about, row, self.column)))
 
 
 Role = Literal["time", "joint", "rate", "acceleration", "position", "rotation"]

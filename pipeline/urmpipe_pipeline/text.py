@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,9 +19,6 @@ FINEST = 1e-3
 
 SHOWN = {si: (unit, factor(si, unit)) for si, unit in (("m", "mm"), ("rad", "deg"))}
 """The units that people read, and how many of them one of the SI unit is."""
-
-_PARTING = frozenset(" \t'&()[]{},;=@#$`^!+%~|<>")
-"""What PowerShell or cmd reads as more than a letter of a word."""
 
 
 def number(value: float | None, unit: str, against: float | None = None) -> str:
@@ -109,19 +104,6 @@ def counted(count: int, noun: str) -> str:
 def enumerated(words: Sequence[str]) -> str:
     """Return some words as a list in a sentence: "a", "a and b", "a, b and c"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
-
-
-def pasted(word: object, platform: str = sys.platform) -> str:
-    """Return a word as it may be pasted into a shell: quoted if this would part it or read it otherwise.
-
-    Args:
-        word: Such as the path of a file.
-        platform: As `sys.platform` tells it: on Windows a backslash parts folders and is not quoted.
-    """
-    said = str(word)
-    if platform != "win32":
-        return shlex.quote(said)
-    return f'"{said}"' if not said or set(said) & _PARTING else said
 
 
 def unique(names: Sequence[str]) -> list[str]:

@@ -12,10 +12,10 @@ from urmpipe.main import run
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import misses, targets_of
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.recording import read_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.text import pasted
 
 Captured = pytest.CaptureFixture[str]
 

@@ -17,6 +17,7 @@ from urmpipe.guards import (
     one_or_many,
     paths,
     place_robot,
+    recorded,
     refuse_foreign,
     refuse_others,
     refuse_warnings,
@@ -37,7 +38,7 @@ from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE, kinds_with_
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.operands import load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
-from urmpipe_pipeline.recording import is_recording, read_recording, record
+from urmpipe_pipeline.recording import is_recording, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.runs.results import Run
@@ -126,7 +127,7 @@ def compare(
             write_junit(result, parts["junit"], told)
         if statistics is not None:
             write_statistics(result, parts["statistics"], Path(statistics))
-        return result if output is None else record(lambda early: result, Path(output), kept, progress)
+        return recorded(result, output, kept, progress)
 
 
 def _operands(reference: Operand | Comparison, logs: Sequence[Operand]) -> list[Any]:

@@ -127,7 +127,7 @@ def _print(result: SolvedTargets, every: bool, robot: str | None, replaces: bool
     """Print what was found, and what was written: how to read it names the robot as the caller does."""
     from urmpipe.printing.inverse import print_inverse
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_pipeline.text import pasted
+    from urmpipe_models.spelling import pasted
 
     print_inverse(result, every=every)
     written = result.output

@@ -5,6 +5,6 @@ The only part of urmpipe that knows Rerun. What stands where is told in `entitie
 
 from urmpipe_pipeline.recording.identity import is_ours, is_recording
 from urmpipe_pipeline.recording.reader import read_recording
-from urmpipe_pipeline.recording.writer import record, write_recording
+from urmpipe_pipeline.recording.writer import write_recording
 
-__all__ = ["is_ours", "is_recording", "read_recording", "record", "write_recording"]
+__all__ = ["is_ours", "is_recording", "read_recording", "write_recording"]

@@ -7,8 +7,6 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
-
 if TYPE_CHECKING:
     from rerun.chunk import RrdReader, StoreEntry
 
@@ -26,27 +24,6 @@ message, SetStoreInfo (1), and in it the store's kind, a recording (1), its iden
 
 WHOLE = b"RRF2FOOT\x01\0\0\0"
 """How a whole .rrd ends that has one footer."""
-
-
-def load_rerun() -> None:
-    """Import all of Rerun that is used.
-
-    No other thread may import meanwhile what Rerun imports too: of two threads that import the same
-    packages at once, one can see them half initialized.
-    """
-    import rerun.blueprint
-    import rerun.chunk  # noqa: F401
-
-
-def settle_pyarrow() -> None:
-    """Let pyarrow import here and now what it imports when it first converts a list and an array.
-
-    That is pandas (0.4 s, 32 MB), to see whether the list is a Series, and numpy.ma.
-    """
-    import pyarrow as pa
-
-    pa.array([0])
-    pa.array(np.zeros(1))
 
 
 def is_recording(path: Path) -> bool:

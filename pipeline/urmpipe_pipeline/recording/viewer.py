@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urmpipe_models.errors import ViewerError, for_each
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.recording.store import Store
-from urmpipe_pipeline.text import pasted
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -13,7 +13,6 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
-from urmpipe_models.row_blocks import THREADS
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
@@ -48,7 +47,6 @@ def ingest_log(
     tsp: float | None = None,
     derivative: Method | None = None,
     name: str | None = None,
-    early: Callable[[JointLog | Run], None] | None = None,
 ) -> Run:
     """Return the run of one log.
 
@@ -62,8 +60,6 @@ def ingest_log(
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
         name: What to call it; default: the file's stem.
-        early: Told the log when it is read and the run before its kinematics are computed, so that they
-            can be written meanwhile.
 
     Raises:
         LogError: With everything that is wrong with the files.
@@ -76,17 +72,13 @@ def ingest_log(
     if inferred:
         robot, because = inferred
         log = replace(log, inferences=(*log.inferences, because))
-    if early:
-        early(log)
     given = {
         "robot": robot.name if robot else None,
         "tsp": tsp,
         "derivative": derivative,
         "read": _given(options),
     }
-    return run_of(
-        log, robot, options, tsp=tsp, derivative=derivative, name=name, early=early, made=("ingest", given)
-    )
+    return run_of(log, robot, options, tsp=tsp, derivative=derivative, name=name, made=("ingest", given))
 
 
 def run_of(
@@ -98,7 +90,6 @@ def run_of(
     tsp: float | None = None,
     derivative: Method | None = None,
     name: str | None = None,
-    early: Callable[[JointLog | Run], None] | None = None,
 ) -> Run:
     """Return the run of a log that is there: what `ingest_log` does once it has read it.
 
@@ -110,7 +101,6 @@ def run_of(
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
         name: What to call it; default: the log's name.
-        early: Told the run before its kinematics are computed, so that it can be written meanwhile.
 
     Raises:
         LogError: If the log's joints are not the robot's, or its times need a grid without end.
@@ -127,7 +117,8 @@ def run_of(
     warnings += [*grid.warnings, *left_open, *([UNUSED_PERIOD] if clocked and options.period else [])]
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
-    run = Run(
+    tcp, noticed = kinematics(robot, q, qd, qdd)
+    return Run(
         name=name or log.name,
         log=log,
         robot=robot,
@@ -136,17 +127,12 @@ def run_of(
         q=q,
         qd=qd,
         qdd=qdd,
-        tcp=None,
+        tcp=tcp,
         tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
         audit=found.entries,
-        warnings=tuple(warnings),
+        warnings=(*warnings, *noticed),
         provenance=provenance(*made, log.files),
     )
-    if early:
-        early(run)
-    # The joints are being written meanwhile: that takes a core of its own.
-    tcp, noticed = kinematics(robot, q, qd, qdd, threads=1 if early else THREADS)
-    return replace(run, tcp=tcp, warnings=(*warnings, *noticed))
 
 
 def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
@@ -196,7 +182,7 @@ def _option_of(log: JointLog, unit: str) -> str:
 
 
 def kinematics(
-    robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray, *, threads: int = THREADS
+    robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> tuple[PointLog | None, list[LogWarning]]:
     """Return the motion of the tool centre point, if there is a robot, and what there is to say about it.
 
@@ -205,7 +191,6 @@ def kinematics(
         q: Joint values in [rad] or [m], shape (g, joints).
         qd: Their rates in [rad/s] or [m/s], shape (g, joints).
         qdd: Their second derivatives in [rad/s2] or [m/s2], shape (g, joints).
-        threads: Blocks of samples worked on side by side.
 
     Raises:
         LogError: If the log has another number of joints than the robot.
@@ -216,7 +201,7 @@ def kinematics(
         raise LogError(
             f"found {q.shape[1]} joints, allowed: {len(robot.coordinates)}, as robot {robot.name} has"
         )
-    tcp = point_over_log(robot, q, qd, qdd, threads=threads)
+    tcp = point_over_log(robot, q, qd, qdd)
     notices = missing_visuals(robot)
     if not tcp.singular.any():
         return tcp, notices

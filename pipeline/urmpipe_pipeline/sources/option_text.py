@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.joint_log import LogColumn
 from urmpipe_pipeline.sources.vocabulary import split_unit
-from urmpipe_pipeline.text import pasted
 
 
 def option(name: str, value: str) -> str:
