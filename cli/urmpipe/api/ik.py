@@ -20,8 +20,8 @@ from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import OutputKind, refuse_output
 from urmpipe_pipeline.recording import is_recording, write_recording
+from urmpipe_pipeline.solved_targets.drawn_run import recorded_run
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
-from urmpipe_pipeline.solved_targets.motion import recorded_run
 from urmpipe_pipeline.solved_targets.request import Request, refuse_unsolvable, start_of
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.solved_targets.solving import solve_targets

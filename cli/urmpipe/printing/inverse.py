@@ -11,8 +11,8 @@ from urmpipe.printing.columns import Column, print_columns
 from urmpipe.printing.terminal import LISTED, judged_line, new_console
 from urmpipe_models.arrays import FloatArray, IndexArray
 from urmpipe_pipeline import text
+from urmpipe_pipeline.solved_targets.presenter import headline, joint_number, unreached
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
-from urmpipe_pipeline.solved_targets.wording import headline, joint_number, unreached
 
 if TYPE_CHECKING:
     from rich.console import Console

@@ -10,8 +10,9 @@ import numpy as np
 from urmpipe.printing.columns import Column, print_columns
 from urmpipe_models.chains.chain import Joint
 from urmpipe_pipeline import text
+from urmpipe_pipeline.solved_targets.presenter import joint_number
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
-from urmpipe_pipeline.solved_targets.wording import in_words, joint_number
+from urmpipe_pipeline.solved_targets.wording import in_words
 
 if TYPE_CHECKING:
     from rich.console import Console

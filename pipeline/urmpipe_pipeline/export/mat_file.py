@@ -57,7 +57,7 @@ def run_fields(run: Run, about: Mapping[str, Any]) -> dict[str, Any]:
     units = run.joint_units
     tcp = run.tcp
     nothing = np.empty((0, 0))
-    moves = not run.single_poses
+    moves = run.timed
     return {
         "name": printable(run.name),
         "rows": "grid",

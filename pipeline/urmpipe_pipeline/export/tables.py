@@ -110,7 +110,7 @@ def grid_table(run: Run) -> Table:
 
     Of single poses the row stands for t, and there is nothing per second: no motion joins them.
     """
-    moves = not run.single_poses
+    moves = run.timed
     columns = [Column("t [s]", "s", Times(run.t_ns, "s"))]
     if not moves:
         columns = [Column("row", "", np.arange(1, len(run.t_ns) + 1))]

@@ -51,7 +51,7 @@ def _lone(result: Result) -> bool:
     if isinstance(result, Simulation):
         return False
     runs = [result] if isinstance(result, Run) else [one.run for one in result.runs]
-    return all(run.single_poses for run in runs)
+    return all(not run.timed for run in runs)
 
 
 def _draw_simulation(stream: RecordingStream, result: Simulation) -> None:

@@ -26,7 +26,7 @@ def enlarged(one: Deviation, radius: float) -> Way | None:
         radius: Of the scene in [m]; the enlarged deviation stays below it.
     """
     factor = _factor(one, radius)
-    if factor is None or one.run.single_poses:
+    if factor is None or not one.run.timed:
         return None
     position, row = one.reference + factor * (one.actual - one.reference), decided_row(one)
     return Way(

@@ -35,7 +35,7 @@ def draw_log_events(stream: RecordingStream, place: Place, run: Run) -> None:
     ]
     rows = np.clip([(one.row or 1) - 1 for one in run.warnings], 0, run.log.rows - 1).astype(np.int64)
     entity, levels = f"{place.prefix}events/warning", ["WARN"] * len(said)
-    _draw(stream, entity, run.log.t_ns[rows], said, levels, timed=not run.single_poses)
+    _draw(stream, entity, run.log.t_ns[rows], said, levels, timed=run.timed)
 
 
 def draw_comparison_events(stream: RecordingStream, place: Place, one: Deviation) -> None:

@@ -133,7 +133,7 @@ def _ghost_arm(run: Run, robot: Chain, ghost: Ghost, number: int, root: str, nam
         links=len(robot.joints),
         named=named[rows],
         thin=bool(number % 2),
-        gone=gone_after(run, ghost.t_ns[rows] if run.single_poses else ghost.t_ns),
+        gone=gone_after(run, ghost.t_ns[rows] if not run.timed else ghost.t_ns),
     )
 
 
@@ -191,7 +191,7 @@ def _drawn_rows(run: Run, t_ns: IntArray) -> IntArray:
     Of single poses the first; else those thinned out, and those at which it begins anew.
     """
     rows = np.searchsorted(run.log.t_ns, t_ns)
-    if run.single_poses:
+    if not run.timed:
         return np.flatnonzero(rows < POSES)
     begins = np.flatnonzero(np.diff(rows, prepend=-2) > 1)
     drawn = thinned(t_ns, np.zeros((len(t_ns), 1)), None)
@@ -206,7 +206,7 @@ def _names(run: Run, robot: Chain, view: float) -> tuple[IntArray, IntArray]:
     Returns:
         Times in integer [ns], shape (p,), and places, shape (1 + ghosts, p), those of the arm chosen first.
     """
-    t_ns = run.log.t_ns[:POSES] if run.single_poses else np.array([fullest_time(run)])
+    t_ns = run.log.t_ns[:POSES] if not run.timed else np.array([fullest_time(run)])
     chosen = run.log.q[_rows_at(run.log.t_ns, t_ns)]
     ghosts = [ghost.q[_rows_at(ghost.t_ns, t_ns)] for ghost in run.ghosts]
     places = np.array([name_places(*bones_of(robot, q)) for q in (chosen, *ghosts)])

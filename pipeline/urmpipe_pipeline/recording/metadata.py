@@ -166,6 +166,7 @@ def _log(log: JointLog) -> dict[str, Any]:
         "digits": log.digits,
         "inferences": [flat(one) for one in log.inferences],
         "warnings": [flat(one) for one in log.warnings],
+        "timed": log.timed,
     }
 
 

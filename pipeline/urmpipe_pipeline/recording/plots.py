@@ -139,7 +139,7 @@ class Plots:
 
     def speed(self, run: Run, place: Place) -> list[TimeSeriesView]:
         """Return the speed of an ingested log's tool centre point; nothing if it has none."""
-        if run.tcp is None or run.single_poses:
+        if run.tcp is None or not run.timed:
             return []
         return [self.series("Speed of the TCP [m/s]", overview_entity(speed_entity(place)), legend=False)]
 
@@ -180,12 +180,12 @@ class Plots:
     def motion(self, run: Run, place: Place) -> list[TimeSeriesView]:
         """Return the derivatives and the tool centre point, as far as the run has them."""
         found: list[tuple[str, str]] = []
-        if run.log.joints and not run.single_poses:
+        if run.log.joints and run.timed:
             found.append((f"Joint rates [{run.joint_unit('/s')}]", "joints/velocity"))
             found.append((f"Joint accelerations [{run.joint_unit('/s2')}]", "joints/acceleration"))
         if run.tcp is not None:
             found.append(("TCP [m]", "tcp/position"))
-            if not run.single_poses:
+            if run.timed:
                 found.append(("TCP velocity [m/s]", "tcp/velocity"))
                 found.append(("TCP acceleration [m/s2]", "tcp/acceleration"))
             found.append(("TCP rz, ry, rx [rad]", "tcp/euler_zyx"))

@@ -197,7 +197,7 @@ def _run_ways(run: Run, place: Place) -> Iterator[Way]:
         yield Way(*entities, colour, wanted, dashed(strips) if wanted else strips, track)
     if run.tcp is not None:
         entities = place.named("path"), place.named("point")
-        strips = () if run.single_poses else lines_of(run.tcp.position)
+        strips = () if not run.timed else lines_of(run.tcp.position)
         track = track_of(run.t_ns, run.tcp.position)
         yield Way(*entities, run_colour(0), False, strips, track)
 
@@ -205,7 +205,7 @@ def _run_ways(run: Run, place: Place) -> Iterator[Way]:
 def _asked(reference: Trajectory, shown: Deviation) -> Way:
     """Return the reference: its lines whole, its point where it is at the samples of a run."""
     entities = entity_path("path", "reference"), entity_path("point", "reference")
-    strips = () if shown.run.single_poses else dashed(lines_of(reference.position))
+    strips = () if not shown.run.timed else dashed(lines_of(reference.position))
     track = track_of(shown.t_ns, shown.reference, shown.sample, decided_row(shown))
     return Way(*entities, REFERENCE_COLOUR, True, strips, track)
 
@@ -219,7 +219,7 @@ def _done(one: Deviation, place: Place, colour: str) -> Way:
         place.named("point"),
         colour,
         False,
-        () if one.run.single_poses else lines_of(one.actual, one.sample, row),
+        () if not one.run.timed else lines_of(one.actual, one.sample, row),
         track,
     )
 

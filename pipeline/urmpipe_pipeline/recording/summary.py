@@ -51,10 +51,10 @@ def _of_run(run: Run) -> Iterator[str]:
     marked = ", marked by triangles in the joint's colour" if wraps else ""
     doubts = f"; other findings: {others}, marked by crosses" if others else ""
     yield f"### {_headline(run)}"
-    rows = text.counted(run.log.rows, "row") + ("" if run.single_poses else f", {run.duration:.6g} s")
+    rows = text.counted(run.log.rows, "row") + ("" if not run.timed else f", {run.duration:.6g} s")
     yield f"{files}, {done} {shown(run.log.source)}: {rows}. {robot}"
     yield ""
-    if run.single_poses:
+    if not run.timed:
         missing = " Rows that are not reached show no arm." if reached(run) < run.log.rows else ""
         yield f"Without times: the timeline counts rows, t = 0 s is row 1.{missing}"
     else:

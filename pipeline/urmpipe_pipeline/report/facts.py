@@ -54,7 +54,7 @@ def run_facts(run: Run) -> tuple[Fact, ...]:
 
 def _time_facts(run: Run) -> Iterator[Fact]:
     """Yield how many rows a log has and how far apart; single poses have no times."""
-    if run.single_poses:
+    if not run.timed:
         yield Fact("Rows", f"{run.log.rows}, without times")
         return
     yield Fact("Rows", f"{run.log.rows} every {text.seconds(run.log.period)} s")

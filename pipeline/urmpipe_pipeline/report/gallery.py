@@ -48,7 +48,7 @@ def run_figures(run: Run) -> list[Figure]:
 
     Of single poses the joints and the tool centre point, as points.
     """
-    if run.single_poses:
+    if not run.timed:
         return [unjoined(one) for one in _those_there([joints_figure(run), pose_by_row_figure(run)])]
     return _those_there([*_repolarization_figures(run), motion_figure(run), run_path_figure(run)])
 

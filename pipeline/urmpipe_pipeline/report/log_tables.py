@@ -54,7 +54,7 @@ def ingest_table(runs: Sequence[Run], links: Sequence[str]) -> Table:
             Cell(run.log.source),
             Cell(str(run.log.rows)),
             Cell(text.NOTHING if run.goals is None else str(reached(run))),
-            Cell(text.NOTHING if run.single_poses else text.seconds(run.duration)),
+            Cell(text.NOTHING if not run.timed else text.seconds(run.duration)),
             Cell(str(len(run.log.joints))),
             Cell(str(len(run.repolarizations))),
             Cell(str(len(run.warnings))),
@@ -99,7 +99,7 @@ def missed_table(run: Run) -> Table | None:
     rows = [
         (
             str(k + 1),
-            text.NOTHING if run.single_poses else text.seconds(goals.t_ns[k] / 1e9),
+            text.NOTHING if not run.timed else text.seconds(goals.t_ns[k] / 1e9),
             text.point(goals.position[k]),
             goals.reasons[k],
         )

@@ -61,7 +61,7 @@ def _unit(turns: np.bool_) -> str:
 
 def _beyond_limits(run: Run, robot: Chain) -> list[LogWarning]:
     """Return what the log's rows say against the arm's limits of place and speed."""
-    if not run.log.joints or run.single_poses:
+    if not run.log.joints or not run.timed:
         return []
     read = run.provenance.options.get("read") or {}
     repaired = bool(read.get("repair"))

@@ -33,7 +33,7 @@ class Run(Shown):
         name: The log's name.
         log: The file's own rows.
         robot: The arm, or None for a log without kinematics.
-        tsp: Sampling period of the grid in [s].
+        tsp: Sampling period of the grid in [s]; 0 without times.
         t_ns: Grid times in integer [ns], shape (g,).
         q: Repolarized joint values in [rad] or [m], shape (g, joints).
         qd: Rates in [rad/s] or [m/s], shape (g, joints).
@@ -81,9 +81,9 @@ class Run(Shown):
         return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9
 
     @property
-    def single_poses(self) -> bool:
-        """True of solved targets without times: no motion joins one pose and the next."""
-        return self.goals is not None and not any(column.role == "time" for column in self.log.columns)
+    def timed(self) -> bool:
+        """Whether its rows have times; else they are poses that no motion joins, and it has no rates."""
+        return self.log.timed
 
     @property
     def rotation_recorded(self) -> FloatArray | None:
@@ -126,7 +126,7 @@ class Run(Shown):
         """Return its name, its arm and how long it is."""
         arm = self.robot.name if self.robot else "no robot"
         rows = number_of(self.log.rows, "row")
-        if self.single_poses:
+        if not self.timed:
             return line_of(self.name, arm, rows)
         grid = f"grid of {number_of(len(self.t_ns), 'sample')}"
         return line_of(self.name, arm, f"{rows} in {self.duration:g} s", grid)

@@ -21,8 +21,10 @@ from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.results import SCHEMA
+from urmpipe_pipeline.runs.results import SCHEMA, Run
 from urmpipe_pipeline.solved_targets.joint_file import write_joint_log
+from urmpipe_pipeline.solved_targets.motion import run_of_solutions
+from urmpipe_pipeline.solved_targets.solution_warnings import path_warnings, unreached_warnings
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,6 +53,8 @@ class SolvedTargets(Shown):
         path: What is known of the way from target to target; None where each stands for itself.
         warnings: What a person should know.
         provenance: How to repeat it.
+        motion: The chosen solutions along a path as a run; None where it was not computed (`as_run`), and
+            without times.
         recording: Where it was written.
         joint_log: The joint log that was written.
     """
@@ -71,6 +75,7 @@ class SolvedTargets(Shown):
     path: JointPath | None
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
+    motion: Run | None = None
     recording: Path | None = None
     joint_log: Path | None = None
 
@@ -142,6 +147,29 @@ class SolvedTargets(Shown):
     def output(self) -> Path | None:
         """The recording or the joint log that was written."""
         return self.recording or self.joint_log
+
+    @property
+    def beside(self) -> Solutions | None:
+        """All solutions of each target, if they were requested; else None."""
+        if not self.every:
+            return None
+        return self.solutions if self.path is None else self.branches
+
+    def as_run(self) -> Run:
+        """Return the chosen solutions as a run: a motion where the targets have times, else poses.
+
+        Poses have no rates: no motion joins them (`Run.timed`).
+
+        Raises:
+            LogError: If the times need a grid without end.
+        """
+        if self.motion is not None:
+            return self.motion
+        why = (*(path_warnings(self.path) if self.path else ()), *unreached_warnings(self.reasons))
+        return run_of_solutions(
+            self.name, self.robot, self.q, self.t_ns, self.clock_start_ns, (*self.warnings, *why),
+            self.provenance,
+        )  # fmt: skip
 
     def _headline(self) -> str:
         """Return its verdict, the arm, and how many targets it reaches."""

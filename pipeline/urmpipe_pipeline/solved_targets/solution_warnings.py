@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.solved_targets.wording import rows_text
+from urmpipe_pipeline.solved_targets.wording import in_words, rows_text
+from urmpipe_pipeline.text import counted
 
 MILLI = 1e-3
 """A target in mm that is read as m is a thousand times too far."""
@@ -152,3 +154,36 @@ def longest(chain: Chain) -> float:
     frames = [*(joint.origin for joint in chain.joints), chain.tip, chain.tool]
     slides = [max(abs(joint.lower), abs(joint.upper)) for joint in chain.moving if joint.kind == "prismatic"]
     return float(sum(np.linalg.norm(frame.translation) for frame in frames)) + sum(slides)
+
+
+def path_warnings(path: JointPath) -> Iterator[LogWarning]:
+    """Yield why no arm can follow the joint values along a path: its jumps, and joints that are too fast."""
+    if path.jumps:
+        first = path.jumps[0]
+        steps = ", ".join(f"{one.joint} by {in_words(one.step, one.unit)}" for one in first.joints)
+        yield LogWarning("jump", _first_of(len(path.jumps), "jump", steps), first.sample + 1)
+    if path.too_fast:
+        one = path.too_fast[0]
+        said = f"{one.joint} at {in_words(one.speed, one.unit)} of {in_words(one.allowed, one.unit)} allowed"
+        count = len({one.joint for one in path.too_fast})
+        yield LogWarning("joint-too-fast", _first_of(count, "joint", said, " too fast"), one.first + 1)
+
+
+def unreached_warnings(reasons: Sequence[str | None]) -> Iterator[LogWarning]:
+    """Yield how many targets have no solution, and why the first has none.
+
+    Args:
+        reasons: Why a target has none, one line; None where it has one.
+    """
+    missed = [(row, reason) for row, reason in enumerate(reasons, start=1) if reason is not None]
+    if missed:
+        (row, reason), *others = missed
+        here = ", here the first" if others else ""
+        why = f": {reason.split('; ')[0]}" if reason else ""
+        said = f"no solution for {len(missed)} of {len(reasons)} targets{here}{why}"
+        yield LogWarning("unreachable", said, row)
+
+
+def _first_of(count: int, noun: str, first: str, more: str = "") -> str:
+    """Return how many there are, and the first: "2 joints too fast, here the first: ..."."""
+    return f"{counted(count, noun)}{more}{', here the first' if count > 1 else ''}: {first}"

@@ -12,7 +12,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.export import ExportOptions, Format, export_result
 from urmpipe_pipeline.export.mat_file import run_fields
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.motion import goals_of, row_times, solved_run
+from urmpipe_pipeline.solved_targets.drawn_run import goals_of, row_times, solved_run
 
 
 @pytest.fixture
@@ -25,7 +25,7 @@ def run() -> Run:
 
 
 def test_a_table_of_single_poses_counts_rows_and_has_nothing_per_second(run: Run, tmp_path: Path) -> None:
-    assert run.single_poses and run.robot is not None
+    assert not run.timed and run.robot is not None
     joints = [f"{joint.name} [rad]" for joint in run.robot.moving]
     wanted = ["row", *joints, "px [m]", "py [m]", "pz [m]", "rz [rad]", "ry [rad]", "rx [rad]"]
     formats: tuple[Format, ...] = ("csv", "parquet")

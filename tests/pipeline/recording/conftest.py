@@ -22,7 +22,7 @@ from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarnin
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.motion import Ghost, goals_of, row_times, solved_run
+from urmpipe_pipeline.solved_targets.drawn_run import Ghost, goals_of, row_times, solved_run
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)
 TILT = math.radians(52.0)

@@ -30,7 +30,7 @@ from urmpipe_pipeline.recording.ghost_names import name_places
 from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.motion import Ghost, goals_of, row_times, solved_run
+from urmpipe_pipeline.solved_targets.drawn_run import Ghost, goals_of, row_times, solved_run
 
 MakeSolved = Callable[..., Run]
 

@@ -20,7 +20,7 @@ from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.motion import Ghost
+from urmpipe_pipeline.solved_targets.drawn_run import Ghost
 
 MakeSolved = Callable[..., Run]
 

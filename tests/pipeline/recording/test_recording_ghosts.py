@@ -23,7 +23,7 @@ from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.verify import verify
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.motion import goals_of
+from urmpipe_pipeline.solved_targets.drawn_run import goals_of
 
 MakeSolved = Callable[..., Run]
 

@@ -22,7 +22,7 @@ from urmpipe_pipeline.recording.layout import opening_time
 from urmpipe_pipeline.recording.scene import NEAR, scene_of
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.motion import goals_of, row_times, solved_run
+from urmpipe_pipeline.solved_targets.drawn_run import goals_of, row_times, solved_run
 
 MakeSolved = Callable[..., Run]
 

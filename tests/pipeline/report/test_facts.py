@@ -14,7 +14,7 @@ from urmpipe_pipeline.comparison.deviation import Stretch
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.comparison.wording import tool_option
 from urmpipe_pipeline.report import facts
-from urmpipe_pipeline.solved_targets.motion import Ghost, goals_of, row_times, solved_run
+from urmpipe_pipeline.solved_targets.drawn_run import Ghost, goals_of, row_times, solved_run
 
 TURNED = ((0.0, -1.0, 0.0), (1.0, 0.0, 0.0), (0.0, 0.0, 1.0))
 

@@ -20,7 +20,7 @@ from urmpipe_pipeline.report.log_tables import missed_table
 from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.motion import goals_of, row_times, solved_run
+from urmpipe_pipeline.solved_targets.drawn_run import goals_of, row_times, solved_run
 
 FAR = "axis 4 is 1.174 m from axis 2, allowed: 0.0328 to 0.8172 m"
 

@@ -16,6 +16,7 @@ from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.solved_targets.presenter import headline, unreached
 from urmpipe_pipeline.solved_targets.solution_warnings import (
     far_warnings,
     longest,
@@ -25,7 +26,7 @@ from urmpipe_pipeline.solved_targets.solution_warnings import (
     start_warnings,
     within_pi_warnings,
 )
-from urmpipe_pipeline.solved_targets.wording import NAMED, headline, rows_text, unreached
+from urmpipe_pipeline.solved_targets.wording import NAMED, rows_text
 
 
 @pytest.mark.parametrize(
