@@ -49,13 +49,13 @@ if TYPE_CHECKING:
     from urmpipe_models.transform import Transform as Transform
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
-    from urmpipe_pipeline.export import Exported as Exported
     from urmpipe_pipeline.joint_log import JointLog as JointLog
     from urmpipe_pipeline.runs.results import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
     from urmpipe_pipeline.solved_targets.result import SolvedTargets as SolvedTargets
     from urmpipe_pipeline.sources import LogMap as LogMap
     from urmpipe_pipeline.sources import ReadOptions as ReadOptions
+    from urmpipe_pipeline.tables import Exported as Exported
 
 __version__ = "0.1.0"
 
@@ -65,7 +65,7 @@ _HOME = {
     "Comparison": "urmpipe_pipeline.comparison.comparison",
     "CosimulationError": "urmpipe_models.errors",
     "Deviation": "urmpipe_pipeline.comparison.deviation",
-    "Exported": "urmpipe_pipeline.export",
+    "Exported": "urmpipe_pipeline.tables",
     "FmuError": "urmpipe_models.errors",
     "SolvedTargets": "urmpipe_pipeline.solved_targets.result",
     "JointLog": "urmpipe_pipeline.joint_log",

@@ -234,7 +234,7 @@ def _is_ours(path: Path, kind: OutputKind) -> bool:
         with path.open("rb") as file:
             return _MARKS[kind].match(file.read(HEAD)) is not None
     if kind == "export":
-        from urmpipe_pipeline.export.identity import is_export
+        from urmpipe_pipeline.tables.identity import is_export
 
         return is_export(path)
     if kind == "recording":

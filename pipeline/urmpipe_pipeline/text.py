@@ -127,3 +127,8 @@ def exact(value: Any) -> str:
     if value is None:
         return ""
     return value if isinstance(value, str) else repr(value)
+
+
+def encodable(value: str) -> str:
+    """Return a text without the lone surrogates that stand for undecodable bytes of a file name."""
+    return value.encode("utf-8", "replace").decode("utf-8")

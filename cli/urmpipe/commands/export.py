@@ -13,7 +13,7 @@ from urmpipe.options.types import OneOf
 from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.export import Exported
+    from urmpipe_pipeline.tables import Exported
 
 
 @click.command(short_help="Write a recording as CSV, Parquet, MAT or TUM.")

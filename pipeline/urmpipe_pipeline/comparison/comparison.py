@@ -69,6 +69,12 @@ class Comparison(Shown):
         return (*run.run.warnings, *told)
 
     @property
+    def own_warnings(self) -> tuple[LogWarning, ...]:
+        """The warnings that are about no single log."""
+        names = tuple(f"{run.name}: " for run in self.runs)
+        return tuple(one for one in self.warnings if not one.message.startswith(names))
+
+    @property
     def ranking(self) -> tuple[Deviation, ...]:
         """The logs from best to worst.
 

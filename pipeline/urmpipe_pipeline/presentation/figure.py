@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.presentation.scene import Path, Spot
+from urmpipe_pipeline.presentation.scene import BoolArray, Path, Spot
 
 Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]
 
@@ -23,6 +23,7 @@ class Line:
         dashed: True for what was asked for, beside what was measured.
         steps: True for what changes only from one row to the next.
         points: True for rows that nothing joins.
+        t_ns: Time of each row in [ns], shape (n,), where it is not the panel's.
     """
 
     values: FloatArray
@@ -31,6 +32,7 @@ class Line:
     dashed: bool = False
     steps: bool = False
     points: bool = False
+    t_ns: IntArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -100,7 +102,7 @@ class Panel:
     over: Over | None = None
     logarithmic: bool = False
     small: bool = False
-    tinted: FloatArray | None = None
+    tinted: BoolArray | None = None
     share: float = 1.0
 
 

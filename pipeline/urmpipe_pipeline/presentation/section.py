@@ -11,6 +11,7 @@ from urmpipe_pipeline.presentation.figure import Drawing, Figure, SpaceFigure, T
 from urmpipe_pipeline.presentation.scene import Scene
 
 Verdict: TypeAlias = Literal["pass", "fail"] | None
+Level: TypeAlias = Literal["info", "warning", "error"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -146,7 +147,7 @@ class Event:
 
     t_ns: int | None
     words: str
-    level: Literal["info", "warning", "error"] = "info"
+    level: Level = "info"
 
 
 Block: TypeAlias = Table | Figure | SpaceFigure | Drawing | Text
@@ -174,7 +175,7 @@ class Section:
     Attributes:
         title: The heading.
         verdict: pass, fail or None.
-        facts: What it is about; of a judged section the first is what decided, a value with its limit.
+        facts: What it is about; of a judged section the first is what decided.
         tables: What is read first.
         figures: Returns its plots, for the viewer and a page, in order; called only where they are shown.
         blocks: Returns what only a page has room for, in order behind the figures: paths in space, what

@@ -44,8 +44,8 @@ def write_joint_log(
     Raises:
         OutputError: If there is no row to write, or it did not read back as it was written.
     """
-    from urmpipe_pipeline.export.lines import differences, quoted, texts, write_lines
-    from urmpipe_pipeline.export.times import Times
+    from urmpipe_pipeline.presentation.exports import Times
+    from urmpipe_pipeline.tables.lines import differences, quoted, texts, write_lines
 
     solved = np.isfinite(q).all(axis=1)
     if not solved.any():

@@ -7,12 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from urmpipe_models.inverse.targets import targets_of
+from exported import export_result
+from solved import solved
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.export import ExportOptions, Format, export_result
-from urmpipe_pipeline.export.mat_file import run_fields
+from urmpipe_pipeline import results
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.drawn_run import goals_of, row_times, solved_run
+from urmpipe_pipeline.tables import ExportOptions, Format
 
 
 @pytest.fixture
@@ -20,8 +20,7 @@ def run() -> Run:
     """Two targets without times, both reached."""
     robot = load_robot("ur5e")
     q = np.array([[1.7, -1.8, -1.5, -3.5, 1.6, -0.7], [-0.3, 0.1, 1.3, -0.6, 1.1, -2.4]])
-    goals = goals_of(targets_of(robot, q), row_times(2), ["", ""])
-    return solved_run("poses", robot, None, q, goals=goals)
+    return solved("poses", robot, q).as_run()
 
 
 def test_a_table_of_single_poses_counts_rows_and_has_nothing_per_second(run: Run, tmp_path: Path) -> None:
@@ -37,6 +36,7 @@ def test_a_table_of_single_poses_counts_rows_and_has_nothing_per_second(run: Run
 
 
 def test_a_mat_file_of_single_poses_has_no_times_and_nothing_per_second(run: Run) -> None:
-    fields = run_fields(run, {})
+    rows = results.exports(run).rows["grid"]
+    fields = rows.fields(rows.table(True))
     assert [name for name in ("t", "clock_ns", "qd", "qdd", "v", "a") if fields[name].size] == []
     np.testing.assert_array_equal(fields["q"], run.q)

@@ -6,9 +6,9 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from urmpipe_pipeline.export.metadata import as_json
-from urmpipe_pipeline.export.tables import Table
-from urmpipe_pipeline.export.times import Times
+from urmpipe_pipeline.presentation.exports import ExportTable, Times
+from urmpipe_pipeline.tables.metadata import as_json
+from urmpipe_pipeline.tables.times import typed
 
 KEY = b"urmpipe"
 """The key of our metadata in a file's schema."""
@@ -17,7 +17,7 @@ CLOCK = "clock [ns]"
 """The column of the exact clock; the file's own times are doubles where they count s, ms or us."""
 
 
-def write_parquet(table: Table, about: Mapping[str, Any], path: Path) -> list[str]:
+def write_parquet(table: ExportTable, about: Mapping[str, Any], path: Path) -> list[str]:
     """Write a table and return how the file differs from it, read back.
 
     A missing sample is a null. The metadata `urmpipe` of the schema are JSON, the metadata `unit` of each
@@ -28,7 +28,7 @@ def write_parquet(table: Table, about: Mapping[str, Any], path: Path) -> list[st
 
     columns = [*table.columns]
     arrays = [
-        column.values.typed()
+        typed(column.values)
         if isinstance(column.values, Times)
         else pa.array(column.values, from_pandas=column.values.dtype.kind == "f")
         for column in columns
@@ -40,7 +40,7 @@ def write_parquet(table: Table, about: Mapping[str, Any], path: Path) -> list[st
     if table.clock_ns is not None and CLOCK not in [column.name for column in columns]:
         arrays.append(pa.array(table.clock_ns))
         fields.append(pa.field(CLOCK, pa.int64(), metadata={b"unit": b"ns"}))
-    written = pa.Table.from_arrays(arrays, schema=pa.schema(fields, {KEY: as_json(dict(about)).encode()}))
+    written = pa.Table.from_arrays(arrays, schema=pa.schema(fields, {KEY: as_json(about).encode()}))
     pq.write_table(written, path)
     return differences(written, path)
 

@@ -2,82 +2,47 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from urmpipe_models.arrays import IntArray
+from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, Times
 
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
 """Powers of ten from a unit to [ns]."""
 
-DATE, TIME_OF_DAY = "date", "time of day"
-"""Units of clocks that are text."""
-
 HOUR = 3_600 * 10**9
 """An hour in [ns]."""
-
-DAY = 24 * HOUR
-"""A day in [ns]."""
 
 _FINENESS = ((10**9, "s"), (10**6, "ms"), (10**3, "us"), (1, "ns"))
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Times:
-    """A column of times.
+def text_of(times: Times) -> Any:
+    """Return the exact text of times as an Arrow array, with as many decimals as the column needs."""
+    common = int(np.gcd.reduce(times.ns)) if len(times.ns) else 0
+    if times.unit == DATE:
+        return _dates(times.ns, common)
+    if times.unit == TIME_OF_DAY:
+        return _times_of_day(times.ns, common)
+    return _decimals(times.ns, EXPONENTS[times.unit], common)
 
-    Attributes:
-        ns: In integer [ns], shape (n,).
-        unit: How the column counts them: s, ms, us, ns, date (ISO 8601) or time of day (hh:mm:ss).
+
+def typed(times: Times) -> Any:
+    """Return times as an Arrow array of a type for them; [s], [ms] and [us] are doubles, rounded once.
+
+    Times of day are durations where some lie outside of a day.
     """
+    import pyarrow as pa
 
-    ns: IntArray
-    unit: str
-
-    def text(self) -> Any:
-        """Return the exact text as an Arrow array, with as many decimals as the column needs."""
-        common = int(np.gcd.reduce(self.ns)) if len(self.ns) else 0
-        if self.unit == DATE:
-            return _dates(self.ns, common)
-        if self.unit == TIME_OF_DAY:
-            return _times_of_day(self.ns, common)
-        return _decimals(self.ns, EXPONENTS[self.unit], common)
-
-    def typed(self) -> Any:
-        """Return an Arrow array of a type for it; [s], [ms] and [us] are doubles, rounded once.
-
-        Times of day are durations where some lie outside of a day.
-        """
-        import pyarrow as pa
-
-        if self.unit == DATE:
-            return pa.array(self.ns).cast(pa.timestamp("ns"))
-        if self.unit == TIME_OF_DAY:
-            within = self.ns.min(initial=0) >= 0 and self.ns.max(initial=0) < DAY
-            return pa.array(self.ns).cast(pa.time64("ns") if within else pa.duration("ns"))
-        if self.unit == "ns":
-            return pa.array(self.ns)
-        return pa.array(np.true_divide(self.ns, 10.0 ** EXPONENTS[self.unit], dtype=np.float64))
-
-
-def shares(clock_ns: IntArray, units: Sequence[str]) -> list[Times]:
-    """Return what each column of a clock holds: all of it or, of two columns, its share.
-
-    Two columns are seconds and nanoseconds, or date and time of day.
-
-    Args:
-        clock_ns: The clock in integer [ns], shape (n,).
-        units: The unit of each of its columns.
-    """
-    steps = {"s": 10**9, DATE: DAY} if len(units) > 1 else {}
-    coarse = next((steps[unit] for unit in units if unit in steps), None)
-    if coarse is None:
-        return [Times(clock_ns, unit) for unit in units]
-    rest = clock_ns % coarse
-    return [Times(clock_ns - rest if unit in steps else rest, unit) for unit in units]
+    if times.unit == DATE:
+        return pa.array(times.ns).cast(pa.timestamp("ns"))
+    if times.unit == TIME_OF_DAY:
+        within = times.ns.min(initial=0) >= 0 and times.ns.max(initial=0) < DAY
+        return pa.array(times.ns).cast(pa.time64("ns") if within else pa.duration("ns"))
+    if times.unit == "ns":
+        return pa.array(times.ns)
+    return pa.array(np.true_divide(times.ns, 10.0 ** EXPONENTS[times.unit], dtype=np.float64))
 
 
 def _decimals(ns: IntArray, exponent: int, common: int) -> Any:

@@ -17,9 +17,9 @@ from hypothesis import strategies as st
 from scipy.io import loadmat
 
 import urmpipe
-from urmpipe_pipeline.export import FORMATS, Format
-from urmpipe_pipeline.export.times import EXPONENTS
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables import FORMATS, Format
+from urmpipe_pipeline.tables.times import EXPONENTS
 
 ENCODINGS = ("utf-8", "utf-8-sig", "utf-16", "latin-1")
 STYLES = ((",", "."), (";", ","), (";", "."), ("\t", "."), ("\t", ","), ("|", "."))

@@ -14,10 +14,12 @@ from pyarrow.csv import read_csv
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
+from exported import export_result
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.export import FORMATS, ExportOptions, Format, Rows, export_result
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.tables import FORMATS, ExportOptions, Format
+from urmpipe_pipeline.tables import RowNames as Rows
 
 START_NS = 1_700_000_000_123_456_789
 GRID = [

@@ -13,31 +13,31 @@ import pyarrow.parquet as pq
 import pytest
 from scipy.io import savemat
 
+from exported import export_result
 from urmpipe_models.errors import OptionError, OutputError, RecordingError, UrmpipeError
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.export import (
+from urmpipe_pipeline.presentation.exports import Times
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.tables import (
     FORMATS,
     ExportOptions,
     Format,
-    export_result,
     format_of,
     lines,
     mat_file,
     parquet_file,
 )
-from urmpipe_pipeline.export.identity import is_export
-from urmpipe_pipeline.export.lines import differences, texts, write_lines
-from urmpipe_pipeline.export.times import Times
-from urmpipe_pipeline.export.write import write_all
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.tables.identity import is_export
+from urmpipe_pipeline.tables.lines import differences, texts, write_lines
+from urmpipe_pipeline.tables.write import write_all
 
 
 def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:
-    """What an error of this kind says of its only finding."""
+    """What an error of this kind says of its only finding, on the command line."""
     with pytest.raises(kind) as caught:
         work()
     assert len(caught.value.findings) == 1
-    return caught.value.findings[0].message
+    return caught.value.findings[0].sentence("command line")
 
 
 def test_options_that_make_no_sense() -> None:
@@ -46,11 +46,14 @@ def test_options_that_make_no_sense() -> None:
     assert said(OptionError, lambda: options("csv", "own")) == "--rows: found own, allowed: grid, file"
     assert said(OptionError, lambda: options("tum", None, "ik")) == "--tcp: found ik, allowed: fk, recorded"
     assert said(OptionError, lambda: options("csv", tcp="fk")) == (
-        "--tcp: found with --to csv, which has both, allowed: with --to tum"
+        "--tcp: found fk with a table (csv), allowed: with trajectories; --to tum writes them"
     )
-    assert said(OptionError, lambda: options("tum", "grid", "recorded")) == (
-        "--rows grid: found with --tcp recorded, whose orientations stand at the file's rows only,"
-        " allowed: --rows file"
+
+
+def test_recorded_poses_stand_at_the_rows_of_the_file(run: Run, tmp_path: Path) -> None:
+    work = lambda: export_result(run, tmp_path / "a.tum", ExportOptions("tum", "grid", "recorded"))  # noqa: E731
+    assert said(OptionError, work) == (
+        "--rows: found grid with recorded poses, which stand at other rows, allowed: file"
     )
 
 
@@ -58,16 +61,14 @@ def test_the_suffix_tells_the_format_unless_it_is_given() -> None:
     assert [format_of(None, Path(f"a.{to.upper()}")) for to in FORMATS] == list(FORMATS)
     assert format_of("csv", Path("a.txt")) == "csv"
     assert said(OptionError, lambda: format_of(None, Path("a.txt"))) == (
-        "--to: found the output a.txt, allowed: --to csv|parquet|mat|tum, or an output that ends so"
+        "--to: found the output a.txt, allowed: csv, parquet, mat, tum, or an output that ends so"
     )
     assert format_of(None, None) == "csv"
 
 
 def test_a_comparison_has_the_samples_that_it_compared(comparison: Comparison, tmp_path: Path) -> None:
     work = lambda: export_result(comparison, tmp_path / "a.csv", ExportOptions("csv", "file"))  # noqa: E731
-    assert said(OptionError, work) == (
-        "--rows: found with a comparison, which has the samples that it compared, allowed: with a run"
-    )
+    assert said(OptionError, work) == "--rows: found file with a comparison, allowed: compared"
 
 
 def test_a_trajectory_needs_poses(run: Run, tmp_path: Path) -> None:
@@ -80,22 +81,22 @@ def test_a_trajectory_needs_poses(run: Run, tmp_path: Path) -> None:
         return message
 
     assert of(replace(run, robot=None)) == (
-        "found no robot, so no pose; allowed: a log ingested with --robot NAME|FILE, or --tcp recorded"
-        " of a log that recorded its pose"
+        "no robot, so no pose; urmpipe ingest --robot NAME|FILE gives it; --tcp recorded takes what the log"
+        " recorded"
     )
     assert of(run, tcp="recorded") == (
-        "found no recorded orientation, so no recorded pose; allowed: a log that recorded position and"
-        " orientation, or --tcp fk with a robot"
+        "no recorded orientation, so no recorded pose; --tcp fk takes the poses of a robot"
     )
-    assert (
-        of(replace(run, q=np.full_like(run.q, np.nan))) == "found no row with a pose, allowed: at least one"
-    )
+    assert of(replace(run, q=np.full_like(run.q, np.nan))) == "no row with a pose"
 
 
 def test_a_log_that_came_from_no_file_has_no_columns_of_one(run: Run, tmp_path: Path) -> None:
     made = replace(run, log=replace(run.log, columns=()))
     work = lambda: export_result(made, tmp_path / "a.csv", ExportOptions("csv", "file"))  # noqa: E731
-    assert said(RecordingError, work) == "found a log that was not read from a file, allowed: --rows grid"
+    assert (
+        said(RecordingError, work)
+        == "the log was not read from a file; --rows grid writes what was made of it"
+    )
 
 
 @pytest.mark.parametrize("to", ["parquet", "mat", "tum"])

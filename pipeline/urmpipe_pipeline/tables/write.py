@@ -12,25 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import Finding, OutputError
-from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.export.csv_file import write_csv
-from urmpipe_pipeline.export.mat_file import (
-    comparison_fields,
-    file_fields,
-    run_fields,
-    simulation_fields,
-    write_mat,
-)
-from urmpipe_pipeline.export.metadata import describe
-from urmpipe_pipeline.export.options import ExportOptions, Format
-from urmpipe_pipeline.export.parquet_file import write_parquet
-from urmpipe_pipeline.export.poses import Poses, poses_of
-from urmpipe_pipeline.export.tables import Table, delta_table, file_table, grid_table, simulation_table
-from urmpipe_pipeline.export.tum_file import write_tum
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output
-from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.simulations.simulation import Result, Simulation
+from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
+from urmpipe_pipeline.tables.csv_file import write_csv
+from urmpipe_pipeline.tables.mat_file import write_mat
+from urmpipe_pipeline.tables.metadata import as_json, described
+from urmpipe_pipeline.tables.options import ExportOptions, Format
+from urmpipe_pipeline.tables.parquet_file import write_parquet
+from urmpipe_pipeline.tables.tum_file import write_tum
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,12 +94,17 @@ class Exported(Shown):
 
 
 def export_result(
-    result: Result, output: Path | None, options: ExportOptions, inputs: Sequence[Path] = ()
+    exports: Exports,
+    recording: Path | None,
+    output: Path | None,
+    options: ExportOptions,
+    inputs: Sequence[Path] = (),
 ) -> Exported:
     """Write a result as tables or trajectories.
 
     Args:
-        result: A run, a comparison or a simulation.
+        exports: What can leave of it.
+        recording: Its recording, by which the output is named; None without one.
         output: The file; None names it after the recording or the result, in the working folder. Of
             several trajectories each has its own name behind that of the file.
         options: What leaves, and how.
@@ -120,60 +115,48 @@ def export_result(
         RecordingError: If the result does not hold what is asked for.
         OutputError: If a file may not be written there, or did not read back as it was written.
     """
-    options.check(result)
-    rows = _rows(result, options)
-    ending = f"-{rows}" if isinstance(result, Run) else ""
-    name = result.recording.stem if result.recording else _file_name(result.name)
+    rows, poses = options.chosen(exports)
+    ending = f"-{rows}" if len(exports.rows) > 1 else ""
+    name = recording.stem if recording else _file_name(exports.about["name"])
     target = output or Path(f"{name}{ending}.{options.to}")
     if options.to == "tum":
-        return _export_poses(result, target, options, rows, inputs)
-    table = _table(result, options)
-    write_all([target], [_writer(result, table, options.to, rows, target)], options.to, inputs)
+        return _export_poses(exports, exports.poses[poses](rows), target, rows, inputs)
+    table = exports.rows[rows].table(options.to != "csv")
+    write_all([target], [_writer(exports, table, options.to, rows, target)], options.to, inputs)
     names = tuple((column.name, column.unit) for column in table.columns)
     return Exported((ExportedFile(target, table.rows),), options.to, rows, names, 0, table.warnings)
 
 
-def _rows(result: Result, options: ExportOptions) -> str:
-    """Return what the rows of an export are called."""
-    if isinstance(result, Run):
-        return options.chosen_rows
-    return "compared" if isinstance(result, Comparison) else "simulated"
-
-
-def _table(result: Result, options: ExportOptions) -> Table:
-    if isinstance(result, Comparison):
-        return delta_table(result)
-    if isinstance(result, Simulation):
-        return simulation_table(result)
-    if options.chosen_rows == "file":
-        return file_table(result.log, units_told=options.to != "csv")
-    return grid_table(result)
-
-
-def _writer(result: Result, table: Table, to: Format, rows: str, target: Path) -> Callable[[Path], list[str]]:
+def _writer(
+    exports: Exports, table: ExportTable, to: Format, rows: str, target: Path
+) -> Callable[[Path], list[str]]:
     """Return what writes a table to a path."""
-    about = describe(result, rows)
+    about = described(exports.about, rows)
     if to == "csv":
         return partial(write_csv, table)
     if to == "parquet":
         return partial(write_parquet, table, about)
-    if isinstance(result, Comparison):
-        return partial(write_mat, "comparison", comparison_fields(result, about), target=target)
-    if isinstance(result, Simulation):
-        return partial(write_mat, "simulation", simulation_fields(result, table, about), target=target)
-    fields = file_fields(result, table, about) if rows == "file" else run_fields(result, about)
-    return partial(write_mat, "run", fields, target=target)
+    fields = {**exports.rows[rows].fields(table), "metadata": as_json(about)}
+    return partial(write_mat, exports.kind, fields, target=target)
 
 
 def _export_poses(
-    result: Result, target: Path, options: ExportOptions, rows: str, inputs: Sequence[Path]
+    exports: Exports, found: Sequence[Poses], target: Path, rows: str, inputs: Sequence[Path]
 ) -> Exported:
-    found, warnings = poses_of(result, options)
     targets = list(_targets(target, found))
     write_all(targets, [partial(write_tum, poses) for poses in found], "tum", inputs)
     files = tuple(ExportedFile(path, len(poses.clock_ns)) for path, poses in zip(targets, found, strict=True))
     left_out = sum(poses.left_out for poses in found)
-    return Exported(files, "tum", rows, POSE_COLUMNS, left_out, tuple(warnings))
+    return Exported(files, "tum", rows, POSE_COLUMNS, left_out, (*exports.warnings, *_left_out(found)))
+
+
+def _left_out(found: Sequence[Poses]) -> Iterator[LogWarning]:
+    """Yield a warning for each trajectory that lacks rows."""
+    for poses in found:
+        if poses.left_out:
+            said = f"{poses.left_out} of {poses.left_out + len(poses.clock_ns)} rows have no pose: left out"
+            one = LogWarning("left-out", said)
+            yield one.of(poses.name) if poses.name else one
 
 
 def _targets(target: Path, found: Sequence[Poses]) -> Iterator[Path]:

@@ -10,13 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_pipeline.export.times import DAY, EXPONENTS, Times, shares
+from urmpipe_pipeline.presentation.exports import DAY, Times
+from urmpipe_pipeline.runs.file_columns import shares
+from urmpipe_pipeline.tables.times import EXPONENTS, text_of, typed
 
 NS = st.integers(-(2**62) + 1, 2**62 - 1)
 
 
 def text(ns: list[int], unit: str) -> list[str]:
-    return list(Times(np.array(ns, dtype=np.int64), unit).text().to_pylist())
+    return list(text_of(Times(np.array(ns, dtype=np.int64), unit)).to_pylist())
 
 
 @given(st.lists(NS, min_size=1), st.sampled_from(sorted(EXPONENTS)))
@@ -55,7 +57,7 @@ def test_times_of_day_count_on_past_a_day_and_below_midnight() -> None:
 @given(st.lists(NS, min_size=1))
 def test_seconds_and_nanoseconds_share_a_time(ns: list[int]) -> None:
     seconds, nanoseconds = shares(np.array(ns, dtype=np.int64), ["s", "ns"])
-    for t, high, low in zip(ns, seconds.text().to_pylist(), nanoseconds.text().to_pylist(), strict=True):
+    for t, high, low in zip(ns, text_of(seconds).to_pylist(), text_of(nanoseconds).to_pylist(), strict=True):
         assert int(high) * 10**9 + int(low) == t
         assert 0 <= int(low) < 10**9
 
@@ -63,8 +65,8 @@ def test_seconds_and_nanoseconds_share_a_time(ns: list[int]) -> None:
 def test_date_and_time_of_day_share_a_time() -> None:
     ns = np.array([1_618_180_041_573_641_000])
     date, time = shares(ns, ["date", "time of day"])
-    assert date.text().to_pylist() == ["2021-04-11"]
-    assert time.text().to_pylist() == ["22:27:21.573641"]
+    assert text_of(date).to_pylist() == ["2021-04-11"]
+    assert text_of(time).to_pylist() == ["22:27:21.573641"]
 
 
 @pytest.mark.parametrize(
@@ -73,7 +75,7 @@ def test_date_and_time_of_day_share_a_time() -> None:
      ("time of day", "time64[ns]")],
 )  # fmt: skip
 def test_the_type_of_a_time_is_that_of_its_unit(unit: str, kind: str) -> None:
-    typed = Times(np.array([5_000_000]), unit).typed()
-    assert str(typed.type) == kind
+    array = typed(Times(np.array([5_000_000]), unit))
+    assert str(array.type) == kind
     if kind == "double":
-        assert typed[0].as_py() == 5e6 / 10 ** EXPONENTS[unit]
+        assert array[0].as_py() == 5e6 / 10 ** EXPONENTS[unit]

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urmpipe_pipeline.export.lines import differences, texts, write_lines
-from urmpipe_pipeline.export.metadata import MARK
-from urmpipe_pipeline.export.poses import Poses
-from urmpipe_pipeline.export.times import Times
+from urmpipe_pipeline.presentation.exports import Poses, Times
+from urmpipe_pipeline.tables.lines import differences, texts, write_lines
+from urmpipe_pipeline.tables.metadata import MARK
 
 HEAD = f"# {MARK}: t [s] x y z [m] qx qy qz qw\n"
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urmpipe_pipeline.export.metadata import MARK
+from urmpipe_pipeline.tables.metadata import MARK
 
 HEAD = 128
 """The mark of a MAT or TUM file stands within so many bytes of its start."""
@@ -18,7 +18,7 @@ def is_export(path: Path) -> bool:
     with path.open("rb") as file:
         head = file.read(HEAD)
     if head.startswith(PARQUET):
-        from urmpipe_pipeline.export.parquet_file import is_ours
+        from urmpipe_pipeline.tables.parquet_file import is_ours
 
         return is_ours(path)
     return MARK.encode() in head and head.startswith((b"# ", b"MATLAB 5.0"))

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urmpipe_pipeline.export.lines import differences, quoted, texts, write_lines
-from urmpipe_pipeline.export.tables import Table
+from urmpipe_pipeline.presentation.exports import ExportTable
+from urmpipe_pipeline.tables.lines import differences, quoted, texts, write_lines
 
 
-def write_csv(table: Table, path: Path) -> list[str]:
+def write_csv(table: ExportTable, path: Path) -> list[str]:
     """Write a table and return how the file differs from it, read back.
 
     Numbers have the shortest decimal text that gives the same double; times are exact.

@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_pipeline.export.times import Times
+from urmpipe_pipeline.presentation.exports import Times
+from urmpipe_pipeline.tables.times import text_of
 
 SLICE = 65_536
 """Rows written at a time: few enough to keep memory low."""
@@ -21,7 +22,7 @@ TAIL = 1 << 16
 
 def texts(columns: Sequence[Any]) -> list[Any]:
     """Return columns as they are written: times as Arrow arrays of their text, all others as they are."""
-    return [column.text() if isinstance(column, Times) else column for column in columns]
+    return [text_of(column) if isinstance(column, Times) else column for column in columns]
 
 
 def write_lines(path: Path, head: str, columns: Sequence[Any], delimiter: str) -> None:

@@ -15,11 +15,11 @@ from pyarrow.csv import read_csv
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
+from exported import export_result
 from urmpipe_models.errors import OptionError, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
-from urmpipe_pipeline.comparison.compare import Tcp
-from urmpipe_pipeline.export import ExportOptions, Format, Rows, export_result
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.tables import ExportOptions, Format
 
 MakeSimulation = Callable[..., Simulation]
 
@@ -125,23 +125,21 @@ def test_without_an_arm_there_is_no_trajectory(make_simulation: MakeSimulation, 
     with pytest.raises(RecordingError) as caught:
         export_result(simulation, tmp_path / "a.tum", ExportOptions("tum"))
     assert str(caught.value) == (
-        "log-to-delta: found no block of kinematics, so no pose; allowed: --to csv, parquet or mat"
+        'log-to-delta: no block of kinematics, so no pose; to="csv" writes its signals'
     )
     assert list(tmp_path.iterdir()) == []
 
 
 @pytest.mark.parametrize(
-    ("to", "rows", "tcp", "option"), [("csv", "file", None, "--rows"), ("tum", None, "recorded", "--tcp")]
+    ("options", "message"),
+    [
+        (ExportOptions("csv", "file"), "rows: found file with a simulation, allowed: simulated"),
+        (ExportOptions("tum", tcp="recorded"), "tcp: found recorded with a simulation, allowed: none"),
+    ],
 )
 def test_what_only_a_run_has_is_refused(
-    make_simulation: MakeSimulation,
-    tmp_path: Path,
-    to: Format,
-    rows: Rows | None,
-    tcp: Tcp | None,
-    option: str,
+    make_simulation: MakeSimulation, tmp_path: Path, options: ExportOptions, message: str
 ) -> None:
     with pytest.raises(OptionError) as caught:
-        export_result(make_simulation(5), tmp_path / "a", ExportOptions(to, rows, tcp))
-    found = "found with a simulation, which has the samples that it recorded"
-    assert str(caught.value) == f"{option}: {found}, allowed: with a run"
+        export_result(make_simulation(5), tmp_path / "a", options)
+    assert str(caught.value) == message

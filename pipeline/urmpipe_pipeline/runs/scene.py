@@ -1,0 +1,28 @@
+"""What stands in space of an ingested log: its arm, and the path of its tool centre point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from urmpipe_pipeline.palette import REFERENCE_COLOUR, run_colour
+from urmpipe_pipeline.presentation.scene import Arm, Path, Scene
+from urmpipe_pipeline.runs.results import Run
+
+
+def run_scene(run: Run) -> Scene | None:
+    """Return the arm of a log, where it was and where it recorded itself; None without a position."""
+    arms: tuple[Arm, ...] = ()
+    if run.robot is not None and run.tcp is not None:
+        arms = (Arm(run.robot, run.q, run.t_ns, run_colour(0)),)
+    paths = tuple(_paths(run))
+    return Scene("Arm and paths [m]", arms, paths) if arms or paths else None
+
+
+def _paths(run: Run) -> Iterator[Path]:
+    """Yield where the log recorded itself, and where it was by its joints."""
+    if run.tcp_recorded is not None:
+        by_joints = run.tcp is not None
+        colour = REFERENCE_COLOUR if by_joints else run_colour(0)
+        yield Path("recorded by the log", run.tcp_recorded, run.t_ns, colour, asked=by_joints)
+    if run.tcp is not None:
+        yield Path(run.name, run.tcp.position, run.t_ns, run_colour(0), line=run.timed)
