@@ -18,6 +18,8 @@ from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.runs import exports as run_exports
 from urmpipe_pipeline.runs import presenter as runs
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets import presenter as solved_targets
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 
 @dataclass(frozen=True, slots=True)
@@ -40,6 +42,7 @@ class Kind:
 KINDS: tuple[Kind, ...] = (
     Kind("run", Run, runs.present, run_exports.exports),
     Kind("comparison", Comparison, comparison.present, comparison_exports.exports),
+    Kind("solved targets", SolvedTargets, solved_targets.present, lambda one: run_exports.exports(one.as_run())),
 )
 """Every kind."""
 

@@ -40,9 +40,9 @@ def test_a_path_has_a_summary_and_one_solution_a_row_in_json(capsys: Captured, f
     assert run(["ik", "path.csv", "--robot", "arm6", "--start", start]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "PASS  path: arm6 reaches 40 targets (closed form: spherical wrist)"
-    assert lines[1].startswith("      branch: ")
-    assert lines[2].startswith("      nearest to a singularity at t = 0.")
-    assert lines[3].startswith("      off by ")
+    assert lines[1].startswith("      Branch: ")
+    assert lines[2].startswith("      Nearest to a singularity: at t = 0.")
+    assert lines[3].startswith("      Off by: ")
     found = answer(capsys, 0, "path.csv", "--robot", "arm6", "--start", start)
     assert (found["jumps"], found["too_fast"]) == ([], [])
     solved = np.array([one["solutions"][0]["q"] for one in found["targets"]])
@@ -83,7 +83,8 @@ def test_a_joint_that_is_too_fast_fails_the_path(capsys: Captured, folder: Path)
     )
     joint = fast["joint"]
     assert (
-        f"      {joint} too fast: 286.5 deg/s of 180 deg/s allowed, at t = 0.000 s (row 1) to row 30" in lines
+        f"      Too fast: {joint} at 286.5 deg/s of 180 deg/s allowed, at t = 0.000 s (row 1) to row 30"
+        in lines
     )
 
 
@@ -136,10 +137,10 @@ def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
     assert (verdict.word, verdict.headline, head) == ("FAIL", reached, f"### FAIL: {reached}")
     assert run(["ik", "path.csv", "--robot", "ur5e", "--start", start]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("      jump at t = 0.230 s (row 24), since row 16, at (") for line in lines)
-    (last,) = [line.split() for line in lines if line.startswith("wrist_3_joint [deg]")]
+    assert any(line.startswith("      Jump: at t = 0.230 s (row 24), since row 16, at (") for line in lines)
+    (last,) = [line.split() for line in lines if line.startswith("wrist_3_joint ")]
     fastest = np.degrees(abs(jump["steps"]["wrist_3_joint"]) / 0.08)
-    assert float(last[-2]) == pytest.approx(fastest, rel=1e-6)  # over the gap, as the joint that is too fast
+    assert float(last[-4]) == pytest.approx(fastest, rel=1e-6)  # over the gap, as the joint that is too fast
 
 
 def test_all_of_a_path_needs_a_recording_and_a_closed_form(capsys: Captured, folder: Path) -> None:

@@ -31,6 +31,8 @@ def playback_figures(run: Run) -> Iterator[Figure | SpaceFigure]:
 
 def path_figure(run: Run) -> Iterator[SpaceFigure]:
     """Yield the path of a tool centre point in space, by kinematics and as the log recorded it, if known."""
+    if not run.timed:
+        return
     paths = []
     if run.tcp_recorded is not None:
         paths.append(Path("recorded by the log", run.tcp_recorded, run.t_ns, REFERENCE_COLOUR, asked=True))

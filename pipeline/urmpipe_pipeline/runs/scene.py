@@ -6,6 +6,7 @@ from collections.abc import Iterator
 
 from urmpipe_pipeline.palette import REFERENCE_COLOUR, run_colour
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene
+from urmpipe_pipeline.runs.figures import times_of
 from urmpipe_pipeline.runs.results import Run
 
 
@@ -13,7 +14,7 @@ def run_scene(run: Run) -> Scene | None:
     """Return the arm of a log, where it was and where it recorded itself; None without a position."""
     arms: tuple[Arm, ...] = ()
     if run.robot is not None and run.tcp is not None:
-        arms = (Arm(run.robot, run.q, run.t_ns, run_colour(0)),)
+        arms = (Arm(run.robot, run.q, times_of(run), run_colour(0)),)
     paths = tuple(_paths(run))
     return Scene("Arm and paths [m]", arms, paths) if arms or paths else None
 
@@ -24,5 +25,5 @@ def _paths(run: Run) -> Iterator[Path]:
         by_joints = run.tcp is not None
         colour = REFERENCE_COLOUR if by_joints else run_colour(0)
         yield Path("recorded by the log", run.tcp_recorded, run.t_ns, colour, asked=by_joints)
-    if run.tcp is not None:
-        yield Path(run.name, run.tcp.position, run.t_ns, run_colour(0), line=run.timed)
+    if run.tcp is not None and run.timed:
+        yield Path(run.name, run.tcp.position, run.t_ns, run_colour(0))

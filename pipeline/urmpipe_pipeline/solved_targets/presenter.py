@@ -1,74 +1,131 @@
-"""How solved targets present themselves."""
+"""How solved targets show themselves: how many the arm reaches, how, and why not the others."""
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
+from dataclasses import replace
+from functools import partial
 
-from urmpipe_models.arrays import IntArray
 from urmpipe_models.inverse.closed.closed_form import method_words
+from urmpipe_pipeline.presentation.figure import Figure
+from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table
+from urmpipe_pipeline.presentation.section import (
+    Block,
+    Check,
+    Judged,
+    Presentation,
+    Ref,
+    Section,
+    Value,
+)
+from urmpipe_pipeline.runs.figures import run_figures
+from urmpipe_pipeline.runs.page import path_figure
+from urmpipe_pipeline.solved_targets.parts import (
+    events,
+    facts,
+    fast_words,
+    jump_words,
+    missed_table,
+    path_facts,
+    tables,
+    unreached,
+    unreached_facts,
+)
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
-from urmpipe_pipeline.solved_targets.wording import rows_text
-from urmpipe_pipeline.text import DIGITS, SHOWN, counted, enumerated
-
-NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
-"""What may differ in reasons that are one."""
+from urmpipe_pipeline.solved_targets.scene import opening_row, scene
+from urmpipe_pipeline.text import counted, enumerated
 
 
-def reach_words(subject: str, arms: Sequence[str], found: int, wanted: int) -> str:
-    """Return that arms reach so many targets of some: "poses: ur5e reaches 3 targets"."""
-    part = "" if found == wanted else f"{found} of "
-    verb = "reaches" if len(arms) == 1 else "reach"
-    return f"{subject}: {enumerated(arms)} {verb} {part}{counted(wanted, 'target')}"
+def present(one: SolvedTargets) -> Presentation:
+    """Return what solved targets show."""
+    row = opening_row(one)
+    body = Section(
+        f"Targets {one.name}",
+        one.verdict,
+        tuple(facts(one)),
+        tuple(tables(one)),
+        partial(_figures, one),
+        partial(_page, one),
+        tuple(_checks(one)),
+        {
+            "targets": len(one),
+            "reached": int(one.reached.sum()),
+            "robot": one.robot.name,
+            "method": one.method,
+        },
+        partial(events, one),
+        one.warnings,
+    )
+    return Presentation(
+        name=one.name,
+        headline=headline(one),
+        verdict=one.verdict,
+        facts=(*(path_facts(one, one.path) if one.path else ()), *unreached_facts(one)),
+        body=body,
+        opens_at_ns=row if one.t_ns is None else int(one.t_ns[row]),
+        scene=partial(scene, one),
+        lines=(
+            {
+                "Targets": Ref(body.title),
+                "Verdict": Judged(one.verdict),
+                "Robot": one.robot.name,
+                "Method": method_words(one.method),
+                "Rows": Value(len(one)),
+                "Reached": Value(int(one.reached.sum())),
+                "Duration": None if one.t_ns is None else Value(float(one.t_ns[-1]) / 1e9, "s"),
+                "Warnings": Value(len(one.warnings)),
+            },
+        ),
+        created=one.provenance.created,
+    )
 
 
-def joint_number(value: float, unit: str) -> str:
-    """Return a joint value in [rad] as [deg] or in [m] as [mm]; what is only rounding is 0."""
-    return f"{round(float(value) * SHOWN[unit][1], DIGITS) + 0.0:.{DIGITS}f}"
-
-
-def headline(result: SolvedTargets) -> str:
+def headline(one: SolvedTargets) -> str:
     """Return how many targets the arm reaches, how they were solved, and why it cannot follow a path."""
-    reached = reach_words(result.name, [result.robot.name], int(result.reached.sum()), len(result))
-    said = f"{reached} ({method_words(result.method)})"
-    if result.path is None:
+    found, wanted = int(one.reached.sum()), len(one)
+    part = "" if found == wanted else f"{found} of "
+    method = method_words(one.method)
+    said = f"{one.name}: {one.robot.name} reaches {part}{counted(wanted, 'target')} ({method})"
+    if one.path is None:
         return said
-    jumps, fast = len(result.path.jumps), len({one.joint for one in result.path.too_fast})
+    jumps, fast = len(one.path.jumps), len({stretch.joint for stretch in one.path.too_fast})
     others = [counted(jumps, "jump")] * bool(jumps) + [f"{counted(fast, 'joint')} too fast"] * bool(fast)
     return f"{said}, with {enumerated(others)}" if others else said
 
 
-def unreached(result: SolvedTargets, *, every: bool) -> Iterator[str]:
-    """Yield why targets have no solution, and, if all branches are asked for, why single branches have none.
-
-    Rows that follow each other for one reason, but for its numbers, are one line.
-    """
-    reasons = [reason or "" for reason in result.reasons]
-    kinds = [NUMBER.sub("#", reason) for reason in reasons]
-    start = 0
-    for end in range(1, len(kinds) + 1):
-        if end == len(kinds) or kinds[end] != kinds[start]:
-            if reasons[start]:
-                yield _not_reached(result.row[start:end], reasons[start:end])
-            elif every and result.method != "iterative":
-                yield from _branches_unreached(result, start, end)
-            start = end
+def _checks(one: SolvedTargets) -> Iterator[Check]:
+    """Yield what the verdict rests on: every target is reached, without a jump or a joint too fast."""
+    missed = len(one) - int(one.reached.sum())
+    why = (
+        "" if not missed else f"{missed} of {counted(len(one), 'target')}: {': '.join(next(unreached(one)))}"
+    )
+    yield Check("every target reached", "fail" if missed else "pass", why, kind="unreachable")
+    if one.path is None:
+        return
+    jumps = [jump_words(one, jump) for jump in one.path.jumps]
+    yield Check("no jump", "fail" if jumps else "pass", "; ".join(jumps[:1]), kind="jump")
+    fast = [fast_words(one, stretch) for stretch in one.path.too_fast]
+    yield Check("no joint too fast", "fail" if fast else "pass", "; ".join(fast[:1]), kind="joint-too-fast")
 
 
-def _not_reached(row: IntArray, reasons: Sequence[str]) -> str:
-    """Return why rows are not reached: by the one in the middle where the numbers of the reasons differ."""
-    if len(set(reasons)) == 1:
-        return f"{rows_text(row)} not reached: {reasons[0]}"
-    middle = len(reasons) // 2
-    return f"{rows_text(row)} not reached; row {row[middle]}: {reasons[middle]}"
+def _figures(one: SolvedTargets) -> Iterator[Figure]:
+    """Yield how the joints and the tool centre point move, or stand without times; a line at each jump."""
+    run = one.as_run()
+    first, *others = run_figures(run)
+    if one.t_ns is not None and one.path is not None:
+        jumps = {int(one.t_ns[jump.sample]): f"jump in row {one.row[jump.sample]}" for jump in one.path.jumps}
+        first = replace(first, instants=jumps)
+    if run.timed and not run.audit:
+        views = tuple(replace(view, name="Joints, solved") for view in first.views)
+        first = replace(first, caption="The chosen solutions.", views=views)
+    yield first
+    yield from others
 
 
-def _branches_unreached(result: SolvedTargets, start: int, end: int) -> Iterator[str]:
-    """Yield why branches of targets that others reach have no solution."""
-    for index in range(start, end):
-        found: dict[str, list[str]] = {}
-        for branch, reason in zip(result.solutions.branches, result.solutions.reasons[index], strict=True):
-            if reason:
-                found.setdefault(reason, []).append(branch)
-        for reason, branches in found.items():
-            yield f"{rows_text(result.row[index : index + 1])}: not {'; '.join(branches)}: {reason}"
+def _page(one: SolvedTargets) -> Iterator[Block]:
+    """Yield what only a page shows."""
+    if not one.reached.all():
+        yield missed_table(one)
+    yield from path_figure(one.as_run())
+    yield inputs_table("Input files", one.provenance.inputs)
+    yield provenance_table(one.provenance)

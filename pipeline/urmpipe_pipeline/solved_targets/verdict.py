@@ -11,7 +11,6 @@ import numpy as np
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.presenter import reach_words
 
 if TYPE_CHECKING:
     pass
@@ -54,3 +53,10 @@ def reached_words(runs: Sequence[Run]) -> str:
 def faults(run: Run) -> list[str]:
     """Return what keeps an arm from following the path, in the words of the warnings."""
     return [one.message for one in run.warnings if one.kind in (JUMP, TOO_FAST)]
+
+
+def reach_words(subject: str, arms: Sequence[str], found: int, wanted: int) -> str:
+    """Return that arms reach so many targets of some: "poses: ur5e reaches 3 targets"."""
+    part = "" if found == wanted else f"{found} of "
+    verb = "reaches" if len(arms) == 1 else "reach"
+    return f"{subject}: {text.enumerated(arms)} {verb} {part}{text.counted(wanted, 'target')}"
