@@ -42,7 +42,7 @@ class Kind:
 KINDS: tuple[Kind, ...] = (
     Kind("run", Run, runs.present, run_exports.exports),
     Kind("comparison", Comparison, comparison.present, comparison_exports.exports),
-    Kind("solved targets", SolvedTargets, solved_targets.present, lambda one: run_exports.exports(one.as_run())),
+    Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
 )
 """Every kind."""
 

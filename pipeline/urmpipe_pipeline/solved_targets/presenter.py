@@ -7,6 +7,7 @@ from dataclasses import replace
 from functools import partial
 
 from urmpipe_models.inverse.closed.closed_form import method_words
+from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table
 from urmpipe_pipeline.presentation.section import (
@@ -18,6 +19,7 @@ from urmpipe_pipeline.presentation.section import (
     Section,
     Value,
 )
+from urmpipe_pipeline.runs import exports as run_exports
 from urmpipe_pipeline.runs.figures import run_figures
 from urmpipe_pipeline.runs.page import path_figure
 from urmpipe_pipeline.solved_targets.parts import (
@@ -78,6 +80,11 @@ def present(one: SolvedTargets) -> Presentation:
         ),
         created=one.provenance.created,
     )
+
+
+def exports(one: SolvedTargets) -> Exports:
+    """Return what can leave of solved targets: that of the run of their chosen solutions."""
+    return run_exports.exports(one.as_run())
 
 
 def headline(one: SolvedTargets) -> str:
