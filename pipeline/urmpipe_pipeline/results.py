@@ -18,6 +18,9 @@ from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.runs import exports as run_exports
 from urmpipe_pipeline.runs import presenter as runs
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations import exports as simulation_exports
+from urmpipe_pipeline.simulations import presenter as simulations
+from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets import presenter as solved_targets
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
@@ -42,6 +45,7 @@ class Kind:
 KINDS: tuple[Kind, ...] = (
     Kind("run", Run, runs.present, run_exports.exports),
     Kind("comparison", Comparison, comparison.present, comparison_exports.exports),
+    Kind("simulation", Simulation, simulations.present, simulation_exports.exports),
     Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
 )
 """Every kind."""

@@ -33,7 +33,12 @@ from urmpipe_pipeline.joint_log import LogWarning
             'interval={"q1": (-1, 2.5)}',
             "joints.interval.q1 = [-1, 2.5]",
         ),
-        (Hint("joints", ["a b", "c"]), "--joints 'a b,c'", 'joints=["a b", "c"]', 'joints.column = ["a b", "c"]'),
+        (
+            Hint("joints", ["a b", "c"]),
+            "--joints 'a b,c'",
+            'joints=["a b", "c"]',
+            'joints.column = ["a b", "c"]',
+        ),
         (Hint("joints"), "--joints A,B,C", "joints=[A, B, C]", "joints.column = [A, B, C]"),
         (Hint("skip_bad", True), "--skip-bad", "skip_bad=True", "skip_bad = true"),
         (Hint("tool", [0.0, 0.1]), "--tool 0,0.1", "tool=[0, 0.1]", "tool = [0, 0.1]"),
@@ -62,18 +67,20 @@ HINTS = (
 def test_what_hints_do_is_told_once_and_no_file_tells_what_it_cannot_say() -> None:
     found = Finding("no clock", "log.csv", 3, hints=HINTS)
     assert found.words("command line") == (
-        "log.csv:3: no clock; --time none or --time 2 leaves it out; --skip-bad skips them; use --robot NAME|FILE"
+        "log.csv:3: no clock; --time none or --time 2 leaves it out; --skip-bad skips them;"
+        " use --robot NAME|FILE"
     )
     assert (
         str(found)
         == found.words("python")
         == (
-            'log.csv:3: no clock; time="none" or time="2" leaves it out; skip_bad=True skips them; use robot=NAME|FILE'
+            'log.csv:3: no clock; time="none" or time="2" leaves it out; skip_bad=True skips them;'
+            " use robot=NAME|FILE"
         )
     )
     assert found.words("system file") == (
-        'log.csv:3: no clock; clock.column = "none" or clock.column = "2" in the map of the log leaves it out;'
-        " use robot = NAME|FILE"
+        'log.csv:3: no clock; clock.column = "none" or clock.column = "2" in the map of the log leaves it'
+        " out; use robot = NAME|FILE"
     )
 
 

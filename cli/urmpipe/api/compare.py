@@ -25,17 +25,18 @@ from urmpipe.guards import (
 from urmpipe.words import by_command_line
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
+from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.doubts import EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.comparison.junit import write_junit
 from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
 from urmpipe_pipeline.comparison.statistics_table import write_statistics
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE, kinds_with_unit, parse_tolerance
+from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
+from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.operands import load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.recording import is_recording, read_recording

@@ -16,7 +16,7 @@ from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import LogOptions, log_options
 from urmpipe.options.types import TIMES, OneOf, ParsedType, parsed, quantity
 from urmpipe.process import tune_pyarrow
-from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE
+from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.comparison import Comparison

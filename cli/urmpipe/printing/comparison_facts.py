@@ -18,6 +18,7 @@ from urmpipe_pipeline.comparison.wording import (
     sync_words,
     tool_option,
 )
+from urmpipe_pipeline.presentation.digits import written
 
 
 def facts(run: Deviation, reference: Trajectory) -> Iterator[str]:
@@ -41,7 +42,7 @@ def facts(run: Deviation, reference: Trajectory) -> Iterator[str]:
     yield from _sliding(run)
     if run.speed_correlation is not None:
         yield f"the norm goes with the speed by r = {correlation(run.speed_correlation)}"
-    yield from (f"looks like: {cause}" for cause in causes(run, reference))
+    yield from (f"looks like: {written(cause)}" for cause in causes(run, reference))
 
 
 def _place(run: Deviation) -> Iterator[str]:

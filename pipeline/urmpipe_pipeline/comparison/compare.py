@@ -11,17 +11,18 @@ from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import LogError, OptionError, for_each
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.orientation import quaternions
+from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import align, check_align
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.doubts import exchanged, large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.comparison.left_out import left_out_warnings
 from urmpipe_pipeline.comparison.matching import Matched, as_recorded, by_kinematics, lacking, match
 from urmpipe_pipeline.comparison.measure import measure, unheld
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
-from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE, check_tolerance
+from urmpipe_pipeline.comparison.tolerance import check_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
+from urmpipe_pipeline.comparison.warnings import exchanged, large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit import audit_log

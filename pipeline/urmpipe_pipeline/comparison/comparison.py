@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -45,7 +45,7 @@ class Comparison(Shown):
     tolerance: Mapping[str, float]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
-    recording: Path | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
     baseline: BaselineComparison | None = None
 
     @property
@@ -71,8 +71,8 @@ class Comparison(Shown):
     @property
     def own_warnings(self) -> tuple[LogWarning, ...]:
         """The warnings that are about no single log."""
-        names = tuple(f"{run.name}: " for run in self.runs)
-        return tuple(one for one in self.warnings if not one.message.startswith(names))
+        of_logs = {one for run in self.runs for one in self.warnings_of(run)}
+        return tuple(one for one in self.warnings if one not in of_logs)
 
     @property
     def ranking(self) -> tuple[Deviation, ...]:

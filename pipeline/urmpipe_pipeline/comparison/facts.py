@@ -7,15 +7,17 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.alignment import tool_with
 from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.symbols import size_of, used_words
 from urmpipe_pipeline.comparison.trajectory import Sync
-from urmpipe_pipeline.comparison.wording import decided_words, out_words, stretch_words, tool_option
+from urmpipe_pipeline.comparison.wording import decided_words, out_words, stretch_words
 from urmpipe_pipeline.presentation.parts import spot_at
-from urmpipe_pipeline.presentation.section import Fact, Place, Ref, Value
+from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
 
 
@@ -137,7 +139,8 @@ def _alignment(one: Deviation) -> Iterator[Fact]:
     moved = one.alignment.mode != "none"
     yield Fact("Alignment", *alignment_words(one), brief=moved)
     if one.alignment.mode == "tool" and one.run.robot is not None:
-        yield Fact("To apply this permanently", tool_option(one.run.robot, one.alignment))
+        values = [round(value, 7) + 0.0 for value in tool_with(one.run.robot, one.alignment)]  # no -0.0
+        yield Fact("To apply this permanently", Advice(hints=(Hint("tool", values),)))
 
 
 def _sliding(one: Deviation) -> str:

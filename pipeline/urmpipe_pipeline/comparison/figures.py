@@ -123,7 +123,7 @@ def correlation_words(r: float | None) -> str:
 
 
 def column(values: FloatArray, index: int) -> FloatArray:
-    """Return a column of an array of shape (n, k), shape (n,)."""
+    """Return a column of an array in any unit of shape (n, k), shape (n,)."""
     return np.asarray(np.asarray(values)[:, index])
 
 

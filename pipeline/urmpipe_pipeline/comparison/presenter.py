@@ -34,8 +34,8 @@ from urmpipe_pipeline.comparison.wording import amount_words, tolerance_words, v
 from urmpipe_pipeline.palette import run_colour
 from urmpipe_pipeline.presentation.parts import inputs_table, minute, provenance_table, recording_fact
 from urmpipe_pipeline.presentation.section import Block, Event, Fact, Level, Presentation, Section, Value
-from urmpipe_pipeline.runs.page import playback_figures
 from urmpipe_pipeline.runs.parts import log_events, log_tables
+from urmpipe_pipeline.runs.playback_figures import playback_figures
 
 
 def present(result: Comparison) -> Presentation:

@@ -11,9 +11,6 @@ from numbers import Real
 from urmpipe_models.errors import OptionError, shown
 from urmpipe_models.measure_units import units_of
 
-DEFAULT_TOLERANCE = 0.0035
-"""Largest deviation allowed on an axis in [m]. Source: [UrmArm2021]_ section 2.4."""
-
 LENGTHS, ANGLES = ({"": Decimal(1), **units_of(si)} for si in ("m", "rad"))
 UNITS: dict[str, dict[str, Decimal]] = {
     **dict.fromkeys(("axis", "x", "y", "z", "norm", "path"), LENGTHS),

@@ -54,7 +54,7 @@ class ExportColumn:
 
 
 def columns_of(names: Sequence[str], units: Sequence[str], values: FloatArray) -> list[ExportColumn]:
-    """Return a column for each column of an array, its unit behind its name."""
+    """Return a column for each of some values in these units, shape (n, columns), the unit in its name."""
     return [
         ExportColumn(f"{name} [{unit}]", unit, values[:, k])
         for k, (name, unit) in enumerate(zip(names, units, strict=True))

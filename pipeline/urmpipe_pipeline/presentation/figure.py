@@ -89,6 +89,7 @@ class Panel:
         small: True for a deviation, shown in mm and deg; False for a place, shown in m and rad.
         tinted: Rows to tint besides those out of the limit, shape (n,); None for none.
         share: Height relative to other panels.
+        display_unit: A unit that people prefer to `unit`, such as deg; empty for none.
     """
 
     title: str
@@ -104,6 +105,7 @@ class Panel:
     small: bool = False
     tinted: BoolArray | None = None
     share: float = 1.0
+    display_unit: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -150,10 +152,16 @@ class SpaceFigure:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A drawing that is ready (SVG)."""
+    """A drawing that is ready (SVG).
+
+    Attributes:
+        title: Its heading.
+        alt: What it shows, for who does not see it.
+        svg: The drawing.
+    """
 
     title: str
-    caption: str
+    alt: str
     svg: str
 
 

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, SpaceFigure, Text
 from urmpipe_pipeline.presentation.scene import Scene
@@ -66,7 +67,20 @@ class Ref:
     colour: str = ""
 
 
-Cell: TypeAlias = Value | Place | Judged | Ref | str | None
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """Words and what the reader may give, spelled for who reads it: as options, as keywords.
+
+    Attributes:
+        words: What stands before; empty for nothing.
+        hints: The parameters with their values.
+    """
+
+    words: str = ""
+    hints: tuple[Hint, ...] = ()
+
+
+Cell: TypeAlias = Value | Place | Judged | Ref | Advice | str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,10 +157,16 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened at a time, or (`t_ns` None) that holds for all of it."""
+    """Something that happened at a time, or (`t_ns` None) that holds for all of it.
+
+    Attributes:
+        t_ns: Its time in [ns].
+        words: What happened; a warning is put into words for who reads it.
+        level: How serious it is.
+    """
 
     t_ns: int | None
-    words: str
+    words: str | LogWarning
     level: Level = "info"
 
 

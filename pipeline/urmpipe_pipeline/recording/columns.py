@@ -1,33 +1,38 @@
-"""Arrays as Rerun takes them: times in integer nanoseconds, rows of scalars as lists."""
+"""Arrays as Rerun takes them: times in integer nanoseconds, rows of scalars as lists, or many rows as one."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.recording.array_form import Column
 from urmpipe_pipeline.recording.entities import Block
+from urmpipe_pipeline.recording.store import PACKED, ROW
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from rerun import ComponentColumn, TimeColumn
 
 
 def time_columns(
-    t_ns: IntArray, name: str | None = None, numbers: IntArray | None = None
+    t_ns: IntArray | None, name: str | None = None, numbers: IntArray | None = None
 ) -> list[TimeColumn]:
     """Return the time columns: t in integer [ns], and a sequence if one is named.
 
     Rerun truncates seconds given as floats, which puts some times off by a nanosecond; integers are exact.
 
     Args:
-        t_ns: In integer [ns], shape (n,).
+        t_ns: In integer [ns], shape (n,); None for no times.
         name: Of the sequence.
         numbers: The sequence, shape (n,).
     """
     import rerun as rr
 
-    columns = [rr.TimeColumn("t", duration=t_ns.astype("timedelta64[ns]"))]
+    columns = [] if t_ns is None else [rr.TimeColumn("t", duration=t_ns.astype("timedelta64[ns]"))]
     if name is not None and numbers is not None:
         columns.append(rr.TimeColumn(name, sequence=numbers))
     return columns
@@ -45,6 +50,31 @@ def scalar_column(values: FloatArray) -> ComponentColumn:
     return rr.ComponentColumn(
         rr.Scalars.descriptor_scalars(), rr.components.ScalarBatch(values), offsets=offsets
     )
+
+
+@dataclass(frozen=True)
+class _Packed:
+    """Values of any type as Rerun takes those of a component."""
+
+    values: NDArray[Any]
+
+    def as_arrow_array(self) -> pa.Array:
+        import pyarrow as pa
+
+        return pa.array(self.values.reshape(-1))
+
+
+def column_rows(column: Column, rows: slice) -> tuple[list[TimeColumn], list[ComponentColumn]]:
+    """Return the times and the values of some rows of an array, one by one where it is plotted."""
+    import rerun as rr
+
+    values = np.asarray(column.values[rows] if column.values.ndim else column.values)
+    if not column.plotted:
+        packed = rr.ComponentColumn(PACKED, _Packed(values), lengths=[values.size])
+        return time_columns(None, ROW, np.array([rows.start + 1])), [packed]
+    t_ns = None if column.t_ns is None else np.asarray(column.t_ns[rows])
+    numbers = np.arange(rows.start + 1, rows.stop + 1)
+    return time_columns(t_ns, ROW, numbers), [scalar_column(values.reshape(len(values), -1))]
 
 
 def block_columns(block: Block, rows: slice) -> tuple[list[TimeColumn], ComponentColumn]:

@@ -7,15 +7,16 @@ from typing import TYPE_CHECKING
 
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import rgb
+from urmpipe_pipeline.recording.codec import Encoded
 from urmpipe_pipeline.recording.columns import block_columns
-from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, places_of, printable
+from urmpipe_pipeline.recording.entities import SUMMARY, Block, Place, blocks, places_of, printable
 from urmpipe_pipeline.recording.events import draw_comparison_events, draw_log_events
 from urmpipe_pipeline.recording.marks import MARK_SIZE, draw_meter_worst, draw_repolarizations, draw_worst
 from urmpipe_pipeline.recording.overview import overviews
 from urmpipe_pipeline.recording.scene import Scene
 from urmpipe_pipeline.recording.scene_drawing import draw_scene
 from urmpipe_pipeline.recording.series import series_lines
-from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE
+from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE, simulation_blocks
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.recording.tolerances import draw_meter_tolerances, draw_tolerances
@@ -26,13 +27,15 @@ if TYPE_CHECKING:
     from rerun import RecordingStream
 
 
-def draw(stream: RecordingStream, result: Result, every: Sequence[Block], scene: Scene) -> None:
+def draw(stream: RecordingStream, result: Result, encoded: Encoded, scene: Scene) -> None:
     """Send everything that is there to be looked at."""
     import rerun as rr
 
+    found = simulation_blocks(result, encoded) if isinstance(result, Simulation) else blocks(result, encoded)
+    every = list({block.entity: block for block in found}.values())
     words = simulation_summary(result) if isinstance(result, Simulation) else summary(result)
     stream.log(SUMMARY, rr.TextDocument(words, media_type="text/markdown"), static=True)
-    few = list(overviews(result, every))
+    few = list(overviews(result, every, encoded))
     _draw_styles(stream, [*every, *few], lone=_lone(result))
     for block in few:
         times, values = block_columns(block, slice(None))

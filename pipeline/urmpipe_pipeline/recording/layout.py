@@ -15,6 +15,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.recording.codec import Encoded
 from urmpipe_pipeline.recording.entities import SUMMARY, Place, places_of, printable
 from urmpipe_pipeline.recording.eye import EYE, eye_distance, seen
 from urmpipe_pipeline.recording.ghost_arms import fullest_time
@@ -48,16 +49,16 @@ LINE_LENGTH = 115
 """Characters that fit in a line of the summary where it has half of a usual window's width."""
 
 
-def viewer_layout(result: Result, scene: Scene) -> Blueprint:
+def viewer_layout(result: Result, scene: Scene, encoded: Encoded) -> Blueprint:
     """Return the views of a result, each with its unit, on the timeline t."""
     import rerun.blueprint as rrb
 
     if isinstance(result, Simulation):
-        plots = simulation_plots(result)
+        plots = simulation_plots(result, encoded)
         if scene.empty:  # there are tables in the words, which are no wider than they must be
             return _blueprint_of(rrb.Horizontal(simulation_words(), plots, column_shares=[1, 2]))
         return _blueprint(simulation_words(), simulation_summary(result), plots, scene)
-    right = _of_run(result) if isinstance(result, Run) else _of_comparison(result)
+    right = _of_run(result, encoded) if isinstance(result, Run) else _of_comparison(result, encoded)
     return _blueprint(rrb.TextDocumentView(origin=SUMMARY, name="Summary"), summary(result), right, scene)
 
 
@@ -136,24 +137,24 @@ def _scene_name(scene: Scene) -> str:
     return f"{arm} and paths [m], in crimson the deviation x{scene.enlarged.factor}"
 
 
-def _of_run(run: Run) -> Container:
+def _of_run(run: Run, encoded: Encoded) -> Container:
     """Return the plots of an ingested log from top to bottom."""
-    plots, place = Plots(run), places_of(run)[0]
+    plots, place = Plots(run, encoded), places_of(run)[0]
     rows = _joint_rows(plots, run, place)
     if speed := plots.speed(run, place):
         rows.append((_tabs(speed), HEIGHTS["speed"]))
-    motion, events = plots.motion(run, place), _events(place)
+    motion, events = plots.motion(run), _events(place)
     if not rows and motion:  # a path: there is room for where it was
         return _stacked([(_tabs(motion), HEIGHTS["delta"]), (events, HEIGHTS["events"])])
     rows.append((_tabs([events, *motion]), HEIGHTS["events"]))
     return _stacked(rows)
 
 
-def _of_comparison(result: Comparison) -> Container:
+def _of_comparison(result: Comparison, encoded: Encoded) -> Container:
     """Return the plots of each log; of several, each has a tab, and that of the worst is open."""
     import rerun.blueprint as rrb
 
-    plots, standing = Plots(result), places_of(result)
+    plots, standing = Plots(result, encoded), places_of(result)
     columns = [_of_log(plots, one, place, result) for one, place in zip(result.runs, standing, strict=True)]
     if len(columns) == 1:
         return columns[0]
@@ -178,7 +179,7 @@ def _of_log(plots: Plots, one: Deviation, place: Place, result: Comparison) -> C
     else:
         rows += _joint_rows(plots, one.run, place)
     rows.append((_tabs(plots.compared_speed(one, place)), HEIGHTS["speed"]))
-    rows.append((_tabs([_events(place), *plots.motion(one.run, place)]), HEIGHTS["events"]))
+    rows.append((_tabs([_events(place), *plots.motion(one.run)]), HEIGHTS["events"]))
     return _stacked(rows, f"{one.verdict.upper()} {printable(one.name)}")
 
 

@@ -11,10 +11,12 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.decimate import decimate
+from urmpipe_pipeline.recording.codec import Encoded
 from urmpipe_pipeline.recording.entities import Block, Place, places_of
-from urmpipe_pipeline.recording.shown_units import deviation_entity, plotted_deviations
+from urmpipe_pipeline.recording.shown_units import deviation_array, plotted_deviations
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result, Simulation
 
@@ -36,24 +38,24 @@ def overview_entity(entity: str) -> str:
     return f"/overview{entity}"
 
 
-def overviews(result: Result, every: Sequence[Block]) -> Iterator[Block]:
+def overviews(result: Result, every: Sequence[Block], encoded: Encoded) -> Iterator[Block]:
     """Yield the overview of each long array that has a plot, and the speed of a run.
 
     Args:
         result: What is recorded.
         every: Its arrays.
+        encoded: Where they stand.
     """
     if isinstance(result, Simulation):
         yield from (_overview(one, ROWS) for one in every if one.series == "signal" and _long(one))
         return
     runs = [result] if isinstance(result, Run) else [one.run for one in result.runs]
-    standing = zip(runs, places_of(result), strict=True)
-    plotted = {entity for run, place in standing for entity in _plotted(run, place)}
-    for block in every:
-        if block.entity in plotted and _long(block):
-            yield _overview(block, ROWS)
+    plotted = {encoded.entity_of(*array) for run in runs for array in _plotted(run)}
     if isinstance(result, Comparison):
-        yield from _deviations(result, every)
+        plotted |= {encoded.entity_of(one.speed, one.t_ns) for one in result.runs}
+    yield from (_overview(block, ROWS) for block in every if block.entity in plotted and _long(block))
+    if isinstance(result, Comparison):
+        yield from _deviations(result, every, encoded)
     if isinstance(result, Run) and result.tcp is not None:
         velocity = result.tcp.velocity
         speed = np.sqrt(np.einsum("ij,ij->i", velocity, velocity))[:, np.newaxis]
@@ -61,18 +63,18 @@ def overviews(result: Result, every: Sequence[Block]) -> Iterator[Block]:
         yield _overview(whole, ROWS if len(speed) > LONG else SPEED_ROWS)
 
 
-def _deviations(result: Comparison, every: Sequence[Block]) -> Iterator[Block]:
+def _deviations(result: Comparison, every: Sequence[Block], encoded: Encoded) -> Iterator[Block]:
     """Yield what is plotted of each deviation, in the units that people read."""
     arrays = {block.entity: block for block in every}
-    for one, place in zip(result.runs, places_of(result), strict=True):
+    for one in result.runs:
         for plot, values in plotted_deviations(one):
-            shown = replace(arrays[deviation_entity(place, plot)], values=values)
+            shown = replace(arrays[encoded.entity_of(deviation_array(one, plot), one.t_ns)], values=values)
             yield _overview(shown, ROWS) if _long(shown) else _beside(shown)
 
 
 def _beside(block: Block) -> Block:
     """Return an array with all its rows, as it stands among the overviews."""
-    return replace(block, entity=overview_entity(block.entity), worst=None)
+    return replace(block, entity=overview_entity(block.entity))
 
 
 def _long(block: Block) -> bool:
@@ -85,13 +87,12 @@ def speed_entity(place: Place) -> str:
     return f"{place.prefix}tcp/speed"
 
 
-def _plotted(run: Run, place: Place) -> Iterator[str]:
-    """Yield the entities that the layout shows first."""
+def _plotted(run: Run) -> Iterator[tuple[FloatArray | None, IntArray]]:
+    """Yield the arrays that the layout shows first, with their times."""
     if not run.log.joints:
-        yield f"{place.prefix}tcp/recorded"
-    yield f"{place.prefix}joints/raw"
-    yield f"{place.prefix}joints/repolarized"
-    yield place.named("matched", "speed")
+        yield run.tcp_recorded, run.t_ns
+    yield run.log.q, run.log.t_ns
+    yield run.q, run.t_ns
 
 
 def _overview(block: Block, most: int) -> Block:

@@ -10,12 +10,13 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.recording.codec import Encoded
 from urmpipe_pipeline.recording.entities import Place, printable
 from urmpipe_pipeline.recording.marks import mark_entity, worst_entity
 from urmpipe_pipeline.recording.overview import LONG, overview_entity, speed_entity
 from urmpipe_pipeline.recording.series import series_lines
 from urmpipe_pipeline.recording.shown_units import (
-    deviation_entity,
+    deviation_array,
     factors,
     plotted_deviations,
     shown_unit,
@@ -46,7 +47,9 @@ TALL, LOW = 8, 4
 class Plots:
     """Makes the plots of a recording; all of them show its whole time."""
 
-    def __init__(self, result: Result) -> None:
+    def __init__(self, result: Result, encoded: Encoded) -> None:
+        self._entity_of = encoded.entity_of
+        self._t_ns = result.t_ns if isinstance(result, Simulation) else None
         self._range = _whole_time(result)
         self._shares_axis = True
 
@@ -83,12 +86,10 @@ class Plots:
         """
         return self._arrays(name, unit, [entity], rows, *beside, legend=legend)
 
-    def signals(
-        self, group: Group, entities: Mapping[str, str], rows: int, *beside: str
-    ) -> list[TimeSeriesView]:
+    def signals(self, group: Group, rows: int, *beside: str) -> list[TimeSeriesView]:
         """Return the plot of some signals of a block, as `array` does it."""
         name = printable(f"{group.block}: {group.variables}")
-        own = [entities[one.name] for one in group.signals]
+        own = [self._entity_of(one.values, self._t_ns) for one in group.signals]
         views = self._arrays(name, printable(group.bracket), own, rows, *beside)
         if group.wanted and rows > 1:  # beside each other they have other names and colours
             standing = [list(map(overview_entity, own)), own] if rows > LONG else [own]
@@ -122,7 +123,11 @@ class Plots:
         """
         if not run.log.joints:
             return
-        unit, raw, after = run.joint_unit(), f"{place.prefix}joints/raw", f"{place.prefix}joints/repolarized"
+        unit, raw, after = (
+            run.joint_unit(),
+            self._entity_of(run.log.q, run.log.t_ns),
+            self._entity_of(run.q, run.t_ns),
+        )
         marks = mark_entity(place, "**"), worst_entity(place, "repolarized")
         if run.goals is not None and not run.audit:
             yield self.array("Joints, solved", unit, after, len(run.t_ns), *marks)
@@ -145,7 +150,7 @@ class Plots:
 
     def compared_speed(self, one: Deviation, place: Place) -> list[TimeSeriesView]:
         """Return the speed of a compared log's tool centre point."""
-        entity, worst = place.named("matched", "speed"), worst_entity(place, "speed")
+        entity, worst = self._entity_of(one.speed, one.t_ns), worst_entity(place, "speed")
         span = _span([one.speed], LOW)
         return self._arrays(
             "Speed of the TCP", "m/s", [entity], len(one.sample), worst, legend=False, span=span
@@ -168,7 +173,7 @@ class Plots:
         rows, views = len(one.sample), {}
         for plot, values in plotted_deviations(one):
             said = f"{names[plot]} [{shown_unit(one, plot)}]"
-            entity, long = deviation_entity(place, plot), rows > LONG
+            entity, long = self._entity_of(deviation_array(one, plot), one.t_ns), rows > LONG
             beside = tolerance_entities(plot), worst_entity(place, plot)
             span = _span([values, *_allowed(one, plot, tolerance)], TALL)
             said += f", every peak of {rows:,} rows" if long else ""
@@ -177,23 +182,23 @@ class Plots:
                 views[plot].append(self.series(f"all {rows:,} rows [{si[plot]}]", entity))
         return views
 
-    def motion(self, run: Run, place: Place) -> list[TimeSeriesView]:
+    def motion(self, run: Run) -> list[TimeSeriesView]:
         """Return the derivatives and the tool centre point, as far as the run has them."""
-        found: list[tuple[str, str]] = []
+        found: list[tuple[str, FloatArray]] = []
         if run.log.joints and run.timed:
-            found.append((f"Joint rates [{run.joint_unit('/s')}]", "joints/velocity"))
-            found.append((f"Joint accelerations [{run.joint_unit('/s2')}]", "joints/acceleration"))
+            found.append((f"Joint rates [{run.joint_unit('/s')}]", run.qd))
+            found.append((f"Joint accelerations [{run.joint_unit('/s2')}]", run.qdd))
         if run.tcp is not None:
-            found.append(("TCP [m]", "tcp/position"))
+            found.append(("TCP [m]", run.tcp.position))
             if run.timed:
-                found.append(("TCP velocity [m/s]", "tcp/velocity"))
-                found.append(("TCP acceleration [m/s2]", "tcp/acceleration"))
-            found.append(("TCP rz, ry, rx [rad]", "tcp/euler_zyx"))
+                found.append(("TCP velocity [m/s]", run.tcp.velocity))
+                found.append(("TCP acceleration [m/s2]", run.tcp.acceleration))
+            found.append(("TCP rz, ry, rx [rad]", run.tcp.euler_zyx))
         elif run.tcp_recorded is not None and run.log.joints:
-            found.append(("Recorded TCP [m]", "tcp/recorded"))
+            found.append(("Recorded TCP [m]", run.tcp_recorded))
         elif run.tcp_recorded is not None:
-            return self.array("Recorded TCP", "m", f"{place.prefix}tcp/recorded", len(run.t_ns))
-        return [self.series(name, place.prefix + entity) for name, entity in found]
+            return self.array("Recorded TCP", "m", self._entity_of(run.tcp_recorded, run.t_ns), len(run.t_ns))
+        return [self.series(name, self._entity_of(array, run.t_ns)) for name, array in found]
 
 
 def _looks(group: Group, number: int) -> SeriesLines:

@@ -9,7 +9,6 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.recording.entities import Place
 from urmpipe_pipeline.text import SHOWN
 
 DEVIATIONS = ("delta", "path", "angle", "joints")
@@ -20,15 +19,15 @@ MARGIN = 0.04
 """Free space above and below what is plotted, as a share of it."""
 
 
-def deviation_entity(place: Place, plot: str) -> str:
-    """Return where the array of a plot of `DEVIATIONS` stands, in SI."""
-    return place.named("delta") if plot == "delta" else place.named("matched", plot)
+def deviation_array(one: Deviation, plot: str) -> FloatArray | None:
+    """Return the array of a plot of `DEVIATIONS`, in SI; None if the log has none."""
+    return {"delta": one.delta, "path": one.path, "angle": one.angle, "joints": one.joint_delta}[plot]
 
 
 def plotted_deviations(one: Deviation) -> Iterator[tuple[str, FloatArray]]:
     """Yield each plot of `DEVIATIONS` that a log has, with its values in [mm] or [deg], shape (m, k)."""
-    for plot, values in zip(DEVIATIONS, (one.delta, one.path, one.angle, one.joint_delta), strict=True):
-        if values is not None:
+    for plot in DEVIATIONS:
+        if (values := deviation_array(one, plot)) is not None:
             yield plot, values.reshape(len(values), -1) * factors(one, plot)
 
 

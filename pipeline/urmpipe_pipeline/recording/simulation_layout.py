@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from itertools import groupby
 from typing import TYPE_CHECKING
 
+from urmpipe_pipeline.recording.codec import Encoded
 from urmpipe_pipeline.recording.entities import SUMMARY, printable
 from urmpipe_pipeline.recording.plots import Plots
-from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE, signal_entities, verdict_entities
+from urmpipe_pipeline.recording.signal_entities import SYSTEM_FILE, verdict_entities
 from urmpipe_pipeline.simulations.answers import answers_of
 from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
 from urmpipe_pipeline.simulations.simulation import Simulation
@@ -34,7 +34,7 @@ def simulation_words() -> Container:
     )
 
 
-def simulation_plots(result: Simulation) -> View | Container:
+def simulation_plots(result: Simulation, encoded: Encoded) -> View | Container:
     """Return the plots: all at once if they are few, else a tab a block.
 
     That of the worst meter is open; without one that of set points and answers, which comes first; else the
@@ -42,13 +42,12 @@ def simulation_plots(result: Simulation) -> View | Container:
     """
     import rerun.blueprint as rrb
 
-    plots = Plots(result)
+    plots = Plots(result, encoded)
     answers = answers_of(result)
     groups = [*answers, *groups_of(result)]
     if not groups:
         return rrb.TextDocumentView(origin=SYSTEM_FILE, name="No signal was recorded")
-    entities = signal_entities(result)
-    views = [_plot(plots, result, group, entities) for group in groups]
+    views = [_plot(plots, result, group) for group in groups]
     if len(views) <= SEEN_AT_ONCE:
         return _grid(views)
     paired = list(zip(groups, views, strict=True))
@@ -62,7 +61,7 @@ def simulation_plots(result: Simulation) -> View | Container:
     return rrb.Tabs(*tabs, active_tab=len(tabs) - 1 if opened is None else opened)
 
 
-def _plot(plots: Plots, result: Simulation, group: Group, entities: Mapping[str, str]) -> View | Container:
+def _plot(plots: Plots, result: Simulation, group: Group) -> View | Container:
     """Return the plot of a group, with what is allowed where it is judged; of a long one two as tabs."""
     import rerun.blueprint as rrb
 
@@ -73,7 +72,7 @@ def _plot(plots: Plots, result: Simulation, group: Group, entities: Mapping[str,
             f"{verdict_entities(result, 'tolerance')[number]}/**",
             verdict_entities(result, "marks/worst")[number],
         ]
-    views = plots.signals(group, entities, len(result.t_ns), *beside)
+    views = plots.signals(group, len(result.t_ns), *beside)
     return rrb.Tabs(*views, active_tab=0) if len(views) > 1 else views[0]
 
 

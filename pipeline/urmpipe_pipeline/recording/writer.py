@@ -6,28 +6,24 @@ import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.outputs import guarded_output
-from urmpipe_pipeline.recording.columns import block_columns
+from urmpipe_pipeline.recording.array_form import CodecError, Column
+from urmpipe_pipeline.recording.codec import Encoded, encode
+from urmpipe_pipeline.recording.columns import column_rows
 from urmpipe_pipeline.recording.drawing import draw
-from urmpipe_pipeline.recording.entities import Block, blocks, printable
+from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.recording.identity import APPLICATION_ID
 from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
-from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.scene import scene_of
-from urmpipe_pipeline.recording.signal_entities import simulation_blocks
-from urmpipe_pipeline.recording.simulation_data import simulation_json
-from urmpipe_pipeline.recording.store import PROPERTY
+from urmpipe_pipeline.recording.store import PROPERTY, SLICE, document
 from urmpipe_pipeline.recording.verify import verify
-from urmpipe_pipeline.simulations.simulation import Result, Simulation
+from urmpipe_pipeline.results import kind_of
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
-
-SLICE = 65_536
-"""Rows sent at a time: few enough to keep memory low, many enough to keep the overhead low."""
 
 AHEAD = 3
 """Slices under way at a time: there is always one to be written, and memory stays low."""
@@ -37,7 +33,7 @@ SPARE = 64 * 2**20
 
 
 def write_recording(
-    result: Result,
+    result: Any,
     path: Path,
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
@@ -57,12 +53,21 @@ def write_recording(
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
     with guarded_output(path, inputs, "recording") as part:
-        every, metadata = _content(result)
+        encoded = _encoded(result, path)
+        metadata = document(kind_of(result).name, encoded.tree)
         with _stream_into(part) as stream:
-            _describe(stream, result, every, metadata)
-            _send(stream, part.parent, every, progress)
-        verify(part, path, every, metadata)
+            _describe(stream, result, encoded, metadata)
+            _send(stream, part.parent, encoded.columns, progress)
+        verify(part, path, encoded.columns, metadata)
     return path
+
+
+def _encoded(result: Any, path: Path) -> Encoded:
+    """Return a result taken apart."""
+    try:
+        return encode(result)
+    except CodecError as error:
+        raise OutputError(Finding(f"cannot be recorded: {error}", str(path))) from error
 
 
 @contextmanager
@@ -88,9 +93,9 @@ def _stream_into(part: Path) -> Iterator[RecordingStream]:
 
 
 def _send(
-    stream: RecordingStream, folder: Path, every: Sequence[Block], progress: Callable[[float], None] | None
+    stream: RecordingStream, folder: Path, every: Sequence[Column], progress: Callable[[float], None] | None
 ) -> None:
-    """Send the arrays in slices, those with a row to verify first: reading back then need not read all.
+    """Send the arrays in slices, the first and the last row first: verifying then need not read all.
 
     Args:
         stream: Where to.
@@ -98,19 +103,24 @@ def _send(
         every: The arrays.
         progress: Told the share that is sent.
     """
-    total = sum(block.values.nbytes for block in every) or 1
+    total = sum(column.rows for column in every)
     done = 0
-    slices = [(block, rows) for block in every for rows in _slices(block)]
-    for number, (block, rows) in enumerate(slices):
-        values = block.values[rows]
-        times, column = block_columns(block, rows)
+    slices = [(column, start) for column in every for start in _starts(column.rows)]
+    for number, (column, start) in enumerate(slices):
+        rows = slice(start, min(start + SLICE, column.rows))
         if number % AHEAD == 0:
             stream.flush()  # waits until all that was sent is in the file
         _refuse_full_disk(folder)
-        stream.send_columns(block.entity, times, [column])
-        done += values.nbytes
+        stream.send_columns(column.at, *column_rows(column, rows))
+        done += rows.stop - start
         if progress:
             progress(done / total)
+
+
+def _starts(rows: int) -> list[int]:
+    """Return where the slices of an array begin: the first, the last, then all between."""
+    first, *others = range(0, rows, SLICE)
+    return [first, *others[-1:], *others[:-1]]
 
 
 def _refuse_full_disk(folder: Path) -> None:
@@ -119,32 +129,12 @@ def _refuse_full_disk(folder: Path) -> None:
         raise OutputError(Finding(f"found less than {SPARE >> 20} MB free on the disk", str(folder)))
 
 
-def _content(result: Result) -> tuple[list[Block], str]:
-    """Return the arrays and the metadata of a result."""
-    if isinstance(result, Simulation):
-        arrays = simulation_blocks(result)
-        return arrays, simulation_json(result, arrays)
-    arrays = blocks(result)
-    return arrays, to_json(result, arrays)
-
-
-def _describe(stream: RecordingStream, result: Result, every: list[Block], metadata: str) -> None:
+def _describe(stream: RecordingStream, result: Any, encoded: Encoded, metadata: str) -> None:
     """Send what is no array: the metadata, the viewer's layout, and what is there to be looked at."""
     import rerun as rr
 
     scene = scene_of(result)
     stream.send_recording_name(printable(result.name))
     stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, opens_at_ns=opening_time(result)))
-    stream.send_blueprint(viewer_layout(result, scene))
-    draw(stream, result, every, scene)
-
-
-def _slices(block: Block) -> list[slice]:
-    starts = list(range(0, len(block.t_ns), SLICE))
-    return [
-        slice(start, start + SLICE) for start in sorted(starts, key=lambda start: not _verified(block, start))
-    ]
-
-
-def _verified(block: Block, start: int) -> bool:
-    return any(start <= row < start + SLICE for row in block.verified)
+    stream.send_blueprint(viewer_layout(result, scene, encoded))
+    draw(stream, result, encoded, scene)

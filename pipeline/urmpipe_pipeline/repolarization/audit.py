@@ -14,6 +14,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.in_between import beside_wraps, off_line, repair
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
+from urmpipe_pipeline.gaps import MISSED_SAMPLE
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, seconds
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
 from urmpipe_pipeline.repolarization.interval import Interval, double_turns, given_periods, said_intervals
@@ -26,9 +27,6 @@ ALL = "; ingest --audit FILE.csv lists all"
 
 MOST = 10_000
 """Entries of a kind that are no wraps: a log with more of them is none of joints; a warning counts all."""
-
-GAP = 1.5
-"""Two values of a joint further apart than this many median periods have a gap between them."""
 
 NEAR = 3.0
 """A step misses 4 pi by no more than this times what the joint moves at its largest speed."""
@@ -219,13 +217,12 @@ def _ambiguous(
     steps = np.diff(log.t_ns)
     rows, joints = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     speeds = np.zeros(len(periods))
-    usual = (
-        float(np.median(steps)) if len(steps) and steps.max() > GAP * steps.min() else steps.max(initial=0)
-    )
-    wide = np.flatnonzero(steps > GAP * usual)
+    uneven = len(steps) and steps.max() > MISSED_SAMPLE * steps.min()
+    usual = float(np.median(steps)) if uneven else steps.max(initial=0)
+    wide = np.flatnonzero(steps > MISSED_SAMPLE * usual)
     sparse = _sparse(log)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
-        after, before = _wide_steps(log, j, GAP * usual) if sparse[j] else (wide + 1, wide)
+        after, before = _wide_steps(log, j, MISSED_SAMPLE * usual) if sparse[j] else (wide + 1, wide)
         if not len(after):
             continue
         odd = fixed.unexplained[fixed.unexplained[:, 1] == j, 0]

@@ -20,6 +20,7 @@ from urmpipe_pipeline.comparison.wording import (
     tolerance_words,
     tool_option,
 )
+from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.solved_targets.verdict import reached
 
@@ -109,7 +110,7 @@ def deviation_facts(deviation: Deviation, reference: Trajectory) -> tuple[Fact, 
         Fact("Out of tolerance", outside),
         Fact("Longest stretch out", stretch(deviation.longest_out)),
         Fact("r(‖Δ‖, speed)", speed_correlation(deviation), "1: they grow together; 0: they are unrelated"),
-        *(Fact("Looks like", cause) for cause in causes(deviation, reference)),
+        *(Fact("Looks like", written(cause)) for cause in causes(deviation, reference)),
     )
 
 

@@ -161,7 +161,7 @@ def coordinates(values: FloatArray, symbol: str, words: str = "") -> Line:
     """Return x, y and z of something in their colours.
 
     Args:
-        values: Shape (n, 3).
+        values: In any unit, shape (n, 3).
         symbol: Its letter.
         words: What stands behind the names.
     """

@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.parts import (
     columns_of,
@@ -15,9 +16,8 @@ from urmpipe_pipeline.presentation.parts import (
     recording_fact,
     table_of,
 )
-from urmpipe_pipeline.presentation.section import Cell, Event, Fact, Level, Table, Value
+from urmpipe_pipeline.presentation.section import Advice, Cell, Event, Fact, Level, Table, Value
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
-from urmpipe_pipeline.runs.explain import otherwise
 from urmpipe_pipeline.runs.results import Run
 
 AUDIT_NOTES: dict[AuditKind, str] = {
@@ -94,12 +94,12 @@ def audit_words(run: Run) -> str:
 def inference_table(run: Run, *, brief: bool = False) -> Table:
     """Return what was inferred about a log, and how else it can be read."""
     rows: list[tuple[Cell, ...]]
-    rows = [(one.what, one.value, one.evidence, otherwise(one)) for one in run.log.inferences]
+    rows = [(one.what, one.value, one.evidence, Advice(hints=one.hints)) for one in run.log.inferences]
     known = {one.what for one in run.log.inferences}
     units = ((f"unit of {column}", unit) for column, unit in run.log.units.items())
-    rows += [(what, unit, "as read", "") for what, unit in units if what not in known]
+    rows += [(what, unit, "as read", None) for what, unit in units if what not in known]
     if "robot" not in known and run.robot is not None:
-        rows.append(("robot", run.robot.name, run.robot.description, "--robot NAME|FILE"))
+        rows.append(("robot", run.robot.name, run.robot.description, Advice(hints=(Hint("robot"),))))
     heads = {"what": "Subject", "found": "Found", "evidence": "Why", "otherwise": "Otherwise"}
     table = table_of(f"What was inferred ({len(rows)})", heads, rows, brief=brief, folded=True)
     *others, last = table.columns
@@ -113,9 +113,7 @@ def log_events(run: Run) -> Iterator[Event]:
         yield Event(round(entry.t * 1e9), f"{entry.joint} {_entry_words(entry)}", level)
     for one in run.warnings:
         row = int(np.clip((one.row or 1) - 1, 0, run.log.rows - 1))
-        place = f" in row {one.row}" if one.row else ""
-        t_ns = int(run.log.t_ns[row]) if run.timed else None
-        yield Event(t_ns, f"{one.kind}{place}: {one.message}", "warning")
+        yield Event(int(run.log.t_ns[row]) if run.timed else None, one, "warning")
 
 
 def _entry_words(one: AuditEntry) -> str:

@@ -20,7 +20,6 @@ from urmpipe_pipeline.presentation.section import (
     Value,
 )
 from urmpipe_pipeline.runs.figures import run_figures
-from urmpipe_pipeline.runs.page import path_figure, playback_figures
 from urmpipe_pipeline.runs.parts import (
     audit_table,
     audit_words,
@@ -29,8 +28,9 @@ from urmpipe_pipeline.runs.parts import (
     log_facts,
     robot_words,
 )
+from urmpipe_pipeline.runs.playback_figures import playback_figures
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.runs.scene import run_scene
+from urmpipe_pipeline.runs.scene import path_figure, run_scene
 
 
 def present(run: Run) -> Presentation:

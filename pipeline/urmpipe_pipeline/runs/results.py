@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -61,7 +61,7 @@ class Run(Shown):
     audit: tuple[AuditEntry, ...]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
-    recording: Path | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
     ghosts: tuple[Ghost, ...] = ()
     goals: Goals | None = None
 

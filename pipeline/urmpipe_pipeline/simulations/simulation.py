@@ -176,7 +176,7 @@ class Simulation(Shown):
     connections: Mapping[str, str] = field(default_factory=dict)
     arms: tuple[Arm, ...] = ()
     verdicts: tuple[DeltaVerdict, ...] = ()
-    recording: Path | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t_ns", np.asarray(self.t_ns, dtype=np.int64))

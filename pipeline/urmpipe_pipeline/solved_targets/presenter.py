@@ -21,7 +21,7 @@ from urmpipe_pipeline.presentation.section import (
 )
 from urmpipe_pipeline.runs import exports as run_exports
 from urmpipe_pipeline.runs.figures import run_figures
-from urmpipe_pipeline.runs.page import path_figure
+from urmpipe_pipeline.runs.scene import path_figure
 from urmpipe_pipeline.solved_targets.parts import (
     events,
     facts,

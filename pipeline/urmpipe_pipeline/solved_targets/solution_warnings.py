@@ -11,7 +11,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets
-from urmpipe_models.kinematics.singularity import singularity_over_log
+from urmpipe_models.kinematics.singularity import NEAR_SINGULAR, singularity_over_log
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.solved_targets.wording import in_words, rows_text
 from urmpipe_pipeline.text import counted
@@ -22,10 +22,6 @@ MILLI = 1e-3
 FAR = 10.0
 """A target so many times farther than the arm reaches is no slip of the path, but may be one of the unit."""
 
-
-NEARLY = 1e-4
-"""Smallest singular value [-] below which a pose counts as nearly singular: a spherical wrist is aligned
-within some 0.05 deg, and joints turn ten thousand times as far as the tool."""
 
 ROUNDING = 1e-9
 """In [rad]: pi written and read is no angle beyond pi."""
@@ -72,7 +68,7 @@ def near_singular_warnings(
     if asked.any():
         smallest[asked] = singularity_over_log(chain, solutions.q[asked], orientation=orientation).smallest
     least = smallest.min(axis=1)
-    near = least < NEARLY
+    near = least < NEAR_SINGULAR
     if near.any():
         worst = int(np.argmin(least))
         where = f" in row {row[worst]}" if near.sum() > 1 else ""

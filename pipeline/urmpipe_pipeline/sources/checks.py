@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_pipeline.gaps import GAP, gaps_behind
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.clock import Clock
@@ -18,9 +19,6 @@ from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.tables.diagnose import SHOWN_FINDINGS, lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.table import NO_TIME, UNREADABLE, Numbers
-
-GAP = 3.0
-"""Times the median period: more than this between two rows is a gap."""
 
 FAR_BACK = 10.0
 """Median periods: a clock that falls back by more, to about its first time, begins again."""
@@ -274,7 +272,7 @@ def _unusual(values: FloatArray) -> list[int]:
 
 
 def gaps(t_ns: IntArray) -> list[LogWarning]:
-    """Return a warning with each place where more than `GAP` median periods pass between two rows.
+    """Return a warning with each gap between two rows.
 
     Args:
         t_ns: Times in [ns], shape (n,).
@@ -283,7 +281,7 @@ def gaps(t_ns: IntArray) -> list[LogWarning]:
     if len(steps) < 2:
         return []
     period = float(np.median(steps))
-    places = np.flatnonzero(steps > GAP * period).tolist()
+    places = np.flatnonzero(gaps_behind(t_ns)).tolist()
     if not places:
         return []
     found = [f"{_passed(steps, k)} before row {k + 2}" for k in places[1:SHOWN_GAPS]]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 from urmpipe_pipeline.csv_rows import write_rows
-from urmpipe_pipeline.presentation.section import Cell, Judged, Place, Ref, Table, Value
+from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Table, Value
 from urmpipe_pipeline.text import exact
 
 
@@ -37,5 +37,7 @@ def _cell(cell: Cell) -> str:
             return cell.title
         case Place():
             return " ".join(map(exact, cell.position))
+        case Advice():
+            return cell.words
         case _:
             return cell or ""

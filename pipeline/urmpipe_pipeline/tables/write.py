@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.outputs import guarded_output, know_own
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.csv_file import write_csv
+from urmpipe_pipeline.tables.identity import is_export
 from urmpipe_pipeline.tables.mat_file import write_mat
 from urmpipe_pipeline.tables.metadata import as_json, described
 from urmpipe_pipeline.tables.options import ExportOptions, Format
@@ -24,6 +25,8 @@ from urmpipe_pipeline.tables.tum_file import write_tum
 
 if TYPE_CHECKING:
     import pandas as pd
+
+know_own("export", is_export)
 
 POSE_COLUMNS = (
     ("t", "s"), ("x", "m"), ("y", "m"), ("z", "m"), ("qx", ""), ("qy", ""), ("qz", ""), ("qw", ""),

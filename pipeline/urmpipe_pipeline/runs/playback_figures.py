@@ -1,4 +1,4 @@
-"""What only a page shows of a log: its path in space, and its playback as the raw joints lead it."""
+"""The tool centre point before and after repolarization: the log played back as the raw joints lead it."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_pipeline import text
-from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, REFERENCE_COLOUR
+from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, SpaceFigure, View
 from urmpipe_pipeline.presentation.parts import ends, spot_at
 from urmpipe_pipeline.presentation.scene import Path, Spot
@@ -27,27 +27,6 @@ def playback_figures(run: Run) -> Iterator[Figure | SpaceFigure]:
     if played is not None and run.tcp is not None:
         yield _point_figure(run, run.tcp, played)
         yield _path_figure(run, run.tcp, played)
-
-
-def path_figure(run: Run) -> Iterator[SpaceFigure]:
-    """Yield the path of a tool centre point in space, by kinematics and as the log recorded it, if known."""
-    if not run.timed:
-        return
-    paths = []
-    if run.tcp_recorded is not None:
-        paths.append(Path("recorded by the log", run.tcp_recorded, run.t_ns, REFERENCE_COLOUR, asked=True))
-    if run.tcp is not None:
-        paths.append(Path("forward kinematics", run.tcp.position, run.t_ns, AXIS_COLOURS["norm"]))
-    if not paths or not np.isfinite(known := np.asarray(paths[-1].position)).any():
-        return
-    low, high = np.nanmin(known, axis=0), np.nanmax(known, axis=0)
-    yield SpaceFigure(
-        "Path in space",
-        "The tool centre point, equal scale on all axes.",
-        f"Path of {run.name} in three dimensions, within ({text.point(low)}) m and ({text.point(high)}) m.",
-        tuple(paths),
-        ends(known),
-    )
 
 
 def _point_figure(run: Run, after: PointLog, played: Playback) -> Figure:

@@ -14,9 +14,9 @@ from hypothesis.extra import numpy as hnp
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.baseline import complete_noise
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.doubts import large_noises, large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.comparison.statistics import Measured, describe
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
+from urmpipe_pipeline.comparison.warnings import large_noises, large_tolerances, recorded_apart, thin_evidence
 
 Compared = Callable[..., Comparison]
 
