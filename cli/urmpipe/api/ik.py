@@ -18,7 +18,7 @@ from urmpipe_models.inverse.search import USUAL_SEARCH, Search
 from urmpipe_models.inverse.solve import Method
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import OutputKind, refuse_output
+from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
 from urmpipe_pipeline.recording import is_recording, write_recording
 from urmpipe_pipeline.solved_targets.drawn_run import recorded_run
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
@@ -26,6 +26,7 @@ from urmpipe_pipeline.solved_targets.request import Request, refuse_unsolvable, 
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.solved_targets.solving import solve_targets
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables.joint_file import write_joint_log
 
 KINDS: dict[str, OutputKind] = {".csv": "joints", ".rrd": "recording"}
 """Kinds of outputs by their suffix."""
@@ -113,7 +114,7 @@ def ik(
         unwritten = LogWarning("not-written", f"{path} is not written: no target was reached")
         return replace(result, warnings=(*result.warnings, unwritten))
     if kind == "joints":
-        result.write_joint_log(path, kept)
+        _write_joints(result, path, kept)
         return replace(result, joint_log=path)
     write_recording(recorded_run(result), path, kept, writing)
     return replace(result, recording=path)
@@ -155,6 +156,19 @@ def _given(
     if isinstance(targets, (str, Path)) and Path(targets).is_file() and is_recording(Path(targets)):
         raise LogError(Finding("found a recording, allowed: a table (CSV) of targets", str(targets)))
     return given_targets(targets, t, tsp, read)
+
+
+def _write_joints(result: SolvedTargets, path: Path, kept: Sequence[Path]) -> None:
+    """Write the solutions nearest to the start as a joint log; rows that have none are left out.
+
+    Raises:
+        OutputError: If it may not be written there, or did not read back as it was written.
+    """
+    with guarded_output(path, kept, "joints") as part:
+        write_joint_log(
+            part, path, joints=result.robot.coordinates, units=result.joint_units, q=result.q, row=result.row,
+            t_ns=result.clock_ns,
+        )  # fmt: skip
 
 
 def _parts(

@@ -135,9 +135,8 @@ def solutions_table(one: SolvedTargets) -> Table:
         "row": ("Row", lambda at: Value(int(one.row[at[0]]))),
         "branch": ("Branch", lambda at: str(labels[at])),
     }
-    for j, joint in enumerate(one.robot.moving):
-        unit = "rad" if joint.kind == "revolute" else "m"
-        heads[joint.name] = joint.name, partial(_joint_value, q, j, unit)
+    for j, (name, unit) in enumerate(zip(one.robot.coordinates, one.joint_units, strict=True)):
+        heads[name] = name, partial(_joint_value, q, j, unit)
     heads["miss"] = "off by", lambda at: Value(float(miss[at]), "m")
     if angle is not None:
         heads["angle"] = "turned by", lambda at: Value(float(angle[at]), "rad")
@@ -160,7 +159,7 @@ def _shown(value: float, unit: str) -> Value:
 def joints_table(one: SolvedTargets) -> Table:
     """Return how each joint moves along a path: where it starts and ends, and how fast it is at most."""
     joints, q = one.robot.moving, one.q[one.reached]
-    units = ["rad" if joint.kind == "revolute" else "m" for joint in joints]
+    units = one.joint_units
     ends = {"start": q[0], "min": q.min(axis=0), "max": q.max(axis=0), "end": q[-1]}
     columns = [Column("joint", "Joint", [joint.name for joint in joints])]
     columns += [Column(key, key, list(map(_shown, values, units))) for key, values in ends.items()]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,10 +19,8 @@ from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets, misses
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
-from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.results import SCHEMA, Run
-from urmpipe_pipeline.solved_targets.joint_file import write_joint_log
 from urmpipe_pipeline.solved_targets.motion import run_of_solutions
 from urmpipe_pipeline.solved_targets.solution_warnings import path_warnings, unreached_warnings
 
@@ -112,9 +110,19 @@ class SolvedTargets(Shown):
         return len(self.row)
 
     @property
+    def clock_ns(self) -> IntArray | None:
+        """Times on the path's own clock in integer [ns], shape (n,); None without times."""
+        return None if self.t_ns is None else self.t_ns + self.clock_start_ns
+
+    @property
     def t(self) -> FloatArray | None:
         """Times on the path's own clock in [s], shape (n,); None where each target stands for itself."""
-        return None if self.t_ns is None else seconds(self.t_ns + self.clock_start_ns)
+        return None if self.clock_ns is None else seconds(self.clock_ns)
+
+    @property
+    def joint_units(self) -> list[str]:
+        """The SI unit of each joint, rad or m."""
+        return ["rad" if joint.kind == "revolute" else "m" for joint in self.robot.moving]
 
     @property
     def reached(self) -> BoolArray:
@@ -215,27 +223,6 @@ class SolvedTargets(Shown):
             found |= self._way(self.path)
         found["warnings"] = [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings]
         return found | {"output": str(self.output) if self.output else None}
-
-    def write_joint_log(self, path: Path, inputs: Sequence[Path] = ()) -> None:
-        """Write the solutions nearest to the start as a joint log; rows that have none are left out.
-
-        Args:
-            path: The file (.csv); replaced if it is a joint log of urmpipe's.
-            inputs: Files that are never replaced.
-
-        Raises:
-            OutputError: If it may not be written there, or did not read back as it was written.
-        """
-        with guarded_output(path, inputs, "joints") as part:
-            write_joint_log(
-                part,
-                path,
-                joints=self.robot.coordinates,
-                units=["rad" if joint.kind == "revolute" else "m" for joint in self.robot.moving],
-                q=self.q,
-                row=self.row,
-                t_ns=None if self.t_ns is None else self.t_ns + self.clock_start_ns,
-            )
 
     def _way(self, path: JointPath) -> dict[str, Any]:
         """Return what --json has of a path: its jumps, joints too fast, and its nearest singularity."""
