@@ -19,7 +19,8 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform, from_offset, rpy_of
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
-from urmpipe_pipeline.recording import is_recording, write_recording
+from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.simulations.simulation import Result
 
 Made = TypeVar("Made", bound=Result)

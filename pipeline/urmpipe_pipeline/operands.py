@@ -5,16 +5,19 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import is_recording, read_recording
+from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import UNUSED_PERIOD, ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.sources.options_of_each import options_of_each
 
@@ -29,8 +32,12 @@ SIMULATION = (
 )
 
 
+MadeRun: TypeAlias = Run | SolvedTargets
+"""Results that are a run, or have one."""
+
+
 def load_runs(
-    operands: Sequence[Path | Run],
+    operands: Sequence[Path | MadeRun],
     *,
     robot: Chain | None = None,
     read: ReadOptions | None = None,
@@ -40,7 +47,7 @@ def load_runs(
     """Return the runs of several operands; what is said of their logs holds for those that it fits.
 
     Args:
-        operands: Recordings, logs, paths, folders; runs as they are.
+        operands: Recordings, logs, paths, folders; runs, and solved targets as theirs.
         robot: The arm; of a recording or a run it replaces the one inside.
         read: How to read the CSV files; `options_of_each` tells which of it holds for which.
         tsp: Period of the grid in [s], of the CSV files.
@@ -50,13 +57,13 @@ def load_runs(
         UrmpipeError: With everything that is wrong with any of them.
     """
     given = read or ReadOptions()
-    logs = [one for one in operands if not isinstance(one, Run) and not _is_recording(one)]
+    logs = [one for one in operands if isinstance(one, Path) and not _is_recording(one)]
     each = iter(options_of_each(for_each(log_files, logs), given, robot))
 
-    def run_of(operand: Path | Run) -> Run:
+    def run_of(operand: Path | MadeRun) -> Run:
         """Return the run that an operand is, or is read as."""
-        if isinstance(operand, Run):
-            return on_robot(operand, robot)
+        if not isinstance(operand, Path):
+            return on_robot(operand.as_run(), robot)
         own = None if _is_recording(operand) else next(each)
         return load_run(operand, robot=robot, read=own, tsp=tsp, derivative=derivative)
 
@@ -102,7 +109,7 @@ def load_run(
         raise RecordingError(Finding(COMPARISON, file=str(operand)))
     if isinstance(result, Simulation):
         raise RecordingError(Finding(SIMULATION, file=str(operand)))
-    return on_robot(result, robot)
+    return on_robot(result.as_run(), robot)
 
 
 def load_comparison(operand: Path) -> Comparison | None:

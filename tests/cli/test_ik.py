@@ -13,7 +13,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import misses, targets_of
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.spelling import pasted
-from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 

@@ -15,7 +15,7 @@ from urmpipe import ik
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.recording.reader import read_recording
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.report.banner import Banner, solved_banner
 from urmpipe_pipeline.runs.results import Run

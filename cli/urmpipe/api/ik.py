@@ -19,8 +19,8 @@ from urmpipe_models.inverse.solve import Method
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
-from urmpipe_pipeline.recording import is_recording, write_recording
-from urmpipe_pipeline.solved_targets.drawn_run import recorded_run
+from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
 from urmpipe_pipeline.solved_targets.request import Request, refuse_unsolvable, start_of
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -116,7 +116,8 @@ def ik(
     if kind == "joints":
         _write_joints(result, path, kept)
         return replace(result, joint_log=path)
-    write_recording(recorded_run(result), path, kept, writing)
+    result = replace(result, motion=None if result.t_ns is None else result.as_run())
+    write_recording(result, path, kept, writing)
     return replace(result, recording=path)
 
 

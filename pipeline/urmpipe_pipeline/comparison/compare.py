@@ -24,9 +24,9 @@ from urmpipe_pipeline.comparison.tolerance import check_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.comparison.warnings import exchanged, large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit import audit_log
-from urmpipe_pipeline.runs.meshes import missing_visuals
 from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources.columns.tcp_like import TCP_NOT_READ

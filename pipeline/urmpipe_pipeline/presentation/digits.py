@@ -38,6 +38,17 @@ def written(cell: Cell, *, unit: bool = False, voice: Voice = "command line") ->
     return said or text.NOTHING
 
 
+def held(value: Value) -> str:
+    """Return a value with its unit and what is allowed of it: "2.5010 mm of 3.5 mm allowed"."""
+    allowed = allowed_words(value)
+    return f"{written(value, unit=True)} of {allowed} allowed" if allowed else written(value, unit=True)
+
+
+def allowed_words(value: Value) -> str:
+    """Return the limit of a value with its unit: "3.5 mm"; empty if there is none."""
+    return "" if value.limit is None else written(Value(value.limit, value.unit, given=True), unit=True)
+
+
 def unit_of(cells: Iterable[Cell]) -> str:
     """Return the unit that all values of a column are shown in; empty where they differ or have none."""
     units = {cell.unit for cell in cells if isinstance(cell, Value) and cell.number is not None}

@@ -97,15 +97,15 @@ class Targets:
         position: In [m], shape (n, 3).
         quat_xyzw: Orientations [-], shape (n, 4); None where none was asked for.
         reached: Which of them are reached, shape (n,).
-        t_ns: Times in [ns], shape (n,); None without times: no path joins them.
-        words: What is written at each that is not reached, n of them, empty where it is; () for nothing.
+        t_ns: Times in [ns], shape (n,); None without times.
+        reasons: Why they are not, one each; empty where nothing is known.
     """
 
     position: FloatArray
     quat_xyzw: FloatArray | None
     reached: BoolArray
     t_ns: IntArray | None
-    words: tuple[str, ...] = ()
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -14,11 +14,11 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import Provenance, provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree
 from urmpipe_pipeline.runs.grid import Grid, make_grid
-from urmpipe_pipeline.runs.meshes import missing_visuals
 from urmpipe_pipeline.runs.plausibility import implausible
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import Run

@@ -16,7 +16,6 @@ from urmpipe_models.orientation import NAMES, angles
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, seconds
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
-from urmpipe_pipeline.runs.ghosts import Ghost, Goals
 from urmpipe_pipeline.runs.grid import interpolate
 
 if TYPE_CHECKING:
@@ -44,8 +43,6 @@ class Run(Shown):
         warnings: What a person should know.
         provenance: How to repeat it.
         recording: Where it was written.
-        ghosts: The other branches of what inverse kinematics solved, times from the log's first row.
-        goals: What it was solved for, times from the log's first row; None for a run of anything else.
     """
 
     name: str
@@ -62,8 +59,6 @@ class Run(Shown):
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
     recording: Path | None = field(default=None, metadata={"stored": False})
-    ghosts: tuple[Ghost, ...] = ()
-    goals: Goals | None = None
 
     @property
     def t(self) -> FloatArray:
@@ -121,6 +116,10 @@ class Run(Shown):
             per: What divides it: "", "/s" or "/s2".
         """
         return " or ".join(f"{unit}{per}" for unit in sorted(set(self.joint_units) or {"rad"}, reverse=True))
+
+    def as_run(self) -> Run:
+        """Return this run: what results that have a run return of it."""
+        return self
 
     def _headline(self) -> str:
         """Return its name, its arm and how long it is."""

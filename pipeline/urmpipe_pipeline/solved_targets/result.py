@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -74,8 +74,8 @@ class SolvedTargets(Shown):
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
     motion: Run | None = None
-    recording: Path | None = None
-    joint_log: Path | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
+    joint_log: Path | None = field(default=None, metadata={"stored": False})
 
     def __post_init__(self) -> None:
         faults = [Finding(fault, self.name) for fault in self._faults()]

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.arrays import FloatArray
 from urmpipe_models.orientation import quaternions
 from urmpipe_pipeline.palette import ghost_colour, run_colour
 from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Targets
@@ -57,29 +57,13 @@ def opening_row(one: SolvedTargets) -> int:
 def scene(one: SolvedTargets) -> Scene:
     """Return the arm in its chosen solutions, the other branches, the path of its tool, and the targets."""
     beside = ghosts(one)
-    arms = [_chosen(one, named=bool(beside))]
+    branch = tuple(f"chosen: {name}" if name else "" for name in one.branch) if beside else ""
+    arms = [Arm(one.robot, one.q, one.t_ns, run_colour(0), branch, vanishes=True)]
     arms += [
         Arm(one.robot, ghost.q, one.t_ns, ghost_colour(i), ghost.name, ghost=True, vanishes=True)
         for i, ghost in enumerate(beside)
     ]
     return Scene("Arm and targets [m]", tuple(arms), _paths(one), targets=_targets(one))
-
-
-def _chosen(one: SolvedTargets, *, named: bool) -> Arm:
-    """Return the arm in the chosen solutions; its branch is named where there are others."""
-    if one.t_ns is None:
-        rows, q, t_ns = np.arange(len(one)), one.q, None
-    else:
-        run = one.as_run()
-        rows, q, t_ns = _rows_at(run.log.t_ns, run.t_ns), run.q, run.t_ns
-    branch = one.branch[rows]
-    label = tuple(f"chosen: {name}" if name else "" for name in branch) if named else ""
-    return Arm(one.robot, q, t_ns, run_colour(0), label, vanishes=True)
-
-
-def _rows_at(t_ns: IntArray, at: IntArray) -> IntArray:
-    """Return the last row at or before each time, else the first."""
-    return np.maximum(np.searchsorted(t_ns, at, side="right") - 1, 0)
 
 
 def _paths(one: SolvedTargets) -> tuple[Path, ...]:
@@ -94,8 +78,8 @@ def _targets(one: SolvedTargets) -> Targets:
     """Return the targets, those that are not reached with the first reason why."""
     rotation = one.targets.rotation
     quat = None if rotation is None else quaternions(np.asarray(rotation).reshape(-1, 9), "matrix")
-    words = tuple(
+    reasons = tuple(
         "" if reason is None else f"row {row}: {reason.split('; ')[0]}"
         for row, reason in zip(one.row, one.reasons, strict=True)
     )
-    return Targets(one.targets.position, quat, one.reached, one.t_ns, words)
+    return Targets(one.targets.position, quat, one.reached, one.t_ns, reasons)

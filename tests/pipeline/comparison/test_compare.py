@@ -20,7 +20,7 @@ from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, SourceFi
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit import audit_log
 from urmpipe_pipeline.runs.derivatives import derivatives
-from urmpipe_pipeline.runs.meshes import missing_visuals
+from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.runs.results import Run
 
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)

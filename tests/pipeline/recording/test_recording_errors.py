@@ -16,7 +16,8 @@ import rerun as rr
 
 from urmpipe_models.errors import OutputError, RecordingError
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import is_ours, is_recording, read_recording, write_recording
+from urmpipe_pipeline.recording import is_ours, is_recording
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, blocks
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.verify import verify
@@ -180,7 +181,7 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import conftest
 from urmpipe_models.errors import OutputError
-from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.results import write_recording
 try:
     write_recording(conftest.build_run(rows=5), Path(sys.argv[2]))
 except OutputError as error:

@@ -22,15 +22,15 @@ from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.orientation import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
-from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.recording.entities import places_of
 from urmpipe_pipeline.recording.ghost_arms import POSES, bones_of
 from urmpipe_pipeline.recording.ghost_drawing import capsules
-from urmpipe_pipeline.recording.ghost_names import name_places
+from urmpipe_pipeline.recording.views.label_places import name_places
 from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.drawn_run import Ghost, goals_of, row_times, solved_run
 
 MakeSolved = Callable[..., Run]
 

@@ -17,7 +17,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import AXIS_COLOURS, rgb
-from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.recording.layout import opening_time
 from urmpipe_pipeline.recording.scene import NEAR, scene_of
 from urmpipe_pipeline.recording.summary import summary

@@ -23,7 +23,7 @@ from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
 from urmpipe_pipeline.recording.overview import LONG
 from urmpipe_pipeline.recording.plots import Plots

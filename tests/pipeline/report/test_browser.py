@@ -13,9 +13,11 @@ from typing import TYPE_CHECKING
 import pytest
 
 from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.report import render_report
 from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.report.spec import Figure
+from urmpipe_pipeline.results import present
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
@@ -68,20 +70,20 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def shown(comparison: Comparison, bare_run: Run) -> list[Run | Comparison]:
+def shown(comparison: Comparison, bare_run: Run) -> list[Presentation]:
     """A comparison and a log of which only the joints are known."""
-    return [comparison, bare_run]
+    return [present(comparison), present(bare_run)]
 
 
 @pytest.fixture(scope="module")
-def report(shown: list[Run | Comparison], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(shown: list[Presentation], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
     path.write_text(render_report(shown), encoding="utf-8")
     return path
 
 
 @pytest.fixture(scope="module")
-def figures(shown: list[Run | Comparison]) -> list[Figure]:
+def figures(shown: list[Presentation]) -> list[Figure]:
     """Every figure of the page, from the top."""
     return [figure for _, figure in lay_out(shown).figures]
 
@@ -128,7 +130,7 @@ def test_a_simulation_is_drawn_and_its_drawing_runs_no_script(
     sound = make_simulation(3000)
     svg = sound.system_svg.replace("<svg ", "<svg onload='alert(3)' ").replace("</svg>", script)
     path = tmp_path / "simulation.html"
-    path.write_text(render_report([replace(sound, system_svg=svg)]), encoding="utf-8")
+    path.write_text(render_report([present(replace(sound, system_svg=svg))]), encoding="utf-8")
     with opened(browser, path) as page:
         scroll_through(page)
         image = page.locator(".drawing img")
@@ -210,7 +212,7 @@ def test_the_pointer_tells_the_number_that_the_table_has(
         plot.locator(".hoverlayer .legend, .hoverlayer .hovertext").first.wait_for()
         said = plot.locator(".hoverlayer").text_content() or ""
         assert "t = " in said
-        (row,) = page.locator("#c1-1 tr", has=page.locator("th[scope=row]", has_text="‖Δ‖")).all()
+        (row,) = page.locator("#r1-1 tr", has=page.locator("th[scope=row]", has_text="‖Δ‖")).all()
         (largest,) = [cell for cell in row.locator("td").all_inner_texts() if cell == f"{one.max * 1e3:.4f}"][
             :1
         ]
@@ -228,7 +230,7 @@ def test_nothing_offers_to_send_the_data_away(browser: Browser, report: Path) ->
 
 
 def test_time_axes_of_a_log_are_linked(browser: Browser, report: Path) -> None:
-    own = '.plot[data-link="c1-1"]:not(.space)'
+    own = '.plot[data-link="r1-1"]:not(.space)'
     ranges = """[...document.querySelectorAll(".plot:not(.space)")]
         .map(p => [p.dataset.link, p.layout.xaxis.range])"""
     with opened(browser, report) as page:
@@ -241,8 +243,8 @@ def test_time_axes_of_a_log_are_linked(browser: Browser, report: Path) -> None:
             f"[...document.querySelectorAll('{own}')].every(p => p.layout.xaxis.range[0] === 5)"
         )
         after = page.evaluate(ranges)
-        assert [one for one in after if one[0] == "c1-1"] == [["c1-1", [5, 9]]] * siblings
-        assert [one for one in after if one[0] != "c1-1"] == [one for one in before if one[0] != "c1-1"]
+        assert [one for one in after if one[0] == "r1-1"] == [["r1-1", [5, 9]]] * siblings
+        assert [one for one in after if one[0] != "r1-1"] == [one for one in before if one[0] != "r1-1"]
 
 
 def open_all(page: Page) -> None:
@@ -254,7 +256,7 @@ def test_a_phone_shows_it_without_sideways_scroll(
     browser: Browser, everything: Comparison, bare_run: Run, tmp_path: Path
 ) -> None:
     path = tmp_path / "report.html"
-    path.write_text(render_report([everything, bare_run]), encoding="utf-8")
+    path.write_text(render_report([present(everything), present(bare_run)]), encoding="utf-8")
     with opened(browser, path, width=390, phone=True) as page:
         open_all(page)
         scroll_through(page)
@@ -309,7 +311,7 @@ def test_a_card_leads_to_its_part(browser: Browser, report: Path, comparison: Co
         names = [name.strip() for name in page.locator(".card h3 a").all_inner_texts()]
         assert names == [run.name for run in comparison.ranking]
         page.locator(".card h3 a").last.click()
-        part = page.locator("#c1-2")
+        part = page.locator("#r1-2")
         assert part.locator("h3").inner_text().startswith(names[-1])
         box = part.bounding_box()
         assert box is not None
@@ -357,7 +359,7 @@ def test_without_scripts_the_numbers_are_there(browser: Browser, report: Path) -
 
 def test_hostile_texts_do_nothing(browser: Browser, hostile: Comparison, tmp_path: Path) -> None:
     path = tmp_path / "hostile.html"
-    path.write_text(render_report([hostile, hostile.runs[0].run]), encoding="utf-8")
+    path.write_text(render_report([present(hostile), present(hostile.runs[0].run)]), encoding="utf-8")
     with opened(browser, path) as page:
         scroll_through(page)
         assert page.locator("img, b").count() == 0
@@ -365,4 +367,4 @@ def test_hostile_texts_do_nothing(browser: Browser, hostile: Comparison, tmp_pat
         assert hostile.runs[0].run.log.joints[0] in legend
         names = {plot.get_attribute("data-name") or "" for plot in page.locator(".plot").all()}
         assert all(re.fullmatch(r"[a-z0-9-]+", name) for name in names)
-        assert hostile.name in page.locator("#c1 > h2").inner_text()
+        assert hostile.name in page.locator("#r1 > h2").inner_text()

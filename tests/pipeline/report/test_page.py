@@ -19,9 +19,10 @@ from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.compare import compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.report import render_report, write_report
 from urmpipe_pipeline.report.markup import asset, script_json
+from urmpipe_pipeline.results import present
 from urmpipe_pipeline.runs.results import Run
 
 VOID = {"meta", "br", "img", "link", "input", "hr", "path"}
@@ -83,7 +84,7 @@ class Page(HTMLParser):
 
 @pytest.fixture(scope="module")
 def html(comparison: Comparison, bare_run: Run) -> str:
-    return render_report([comparison, bare_run])
+    return render_report([present(comparison), present(bare_run)])
 
 
 @pytest.fixture(scope="module")
@@ -107,7 +108,7 @@ def test_numbers_are_those_of_the_json_and_the_recording(everything: Comparison,
     written = write_recording(everything, tmp_path / "all.rrd")
     read = read_recording(written)
     assert isinstance(read, Comparison)
-    page = Page(render_report([read]))
+    page = Page(render_report([present(read)]))
     as_json = json.loads(json.dumps(everything.to_dict()))["runs"]
     assert as_json == json.loads(json.dumps(read.to_dict()))["runs"]
     by_unit = zip(
@@ -226,7 +227,7 @@ def test_only_the_scripts_of_the_page_may_run(page: Page) -> None:
 
 
 def test_hostile_texts_stay_texts(hostile: Comparison) -> None:
-    html = render_report([hostile, hostile.runs[0].run])
+    html = render_report([present(hostile), present(hostile.runs[0].run)])
     page = Page(html)
     assert not page.all("img")
     assert not page.all("b")
@@ -252,22 +253,22 @@ def test_json_in_a_script_comes_back() -> None:
 def test_a_report_of_four_logs_is_small(comparison: Comparison) -> None:
     four = replace(comparison, runs=comparison.runs * 2)
     # every trace is decimated to the same number of points, however long the log is
-    assert len(render_report([four]).encode()) < 15e6
+    assert len(render_report([present(four)]).encode()) < 15e6
 
 
 def test_writing_replaces_a_report_of_ours_and_nothing_else(bare_run: Run, tmp_path: Path) -> None:
     path = tmp_path / "report.html"
-    assert write_report([bare_run], path).path == path
+    assert write_report([present(bare_run)], path).path == path
     first = path.read_bytes()
-    assert first.decode("utf-8") == render_report([bare_run])
-    write_report([replace(bare_run, name="other")], path)
+    assert first.decode("utf-8") == render_report([present(bare_run)])
+    write_report([present(replace(bare_run, name="other"))], path)
     assert path.read_bytes() != first
     with pytest.raises(OutputError, match="found an input of this command"):
-        write_report([bare_run], path, [path])
+        write_report([present(bare_run)], path, [path])
     foreign = tmp_path / "mine.html"
     foreign.write_text("<html></html>")
     with pytest.raises(OutputError, match="found a file that is no report of urmpipe's"):
-        write_report([bare_run], foreign)
+        write_report([present(bare_run)], foreign)
     assert foreign.read_text() == "<html></html>"
     assert {file.name for file in tmp_path.iterdir()} == {"report.html", "mine.html"}
 
@@ -289,7 +290,7 @@ def test_a_log_of_one_sample_and_a_path_have_pages_too(comparison: Comparison) -
         tcp_recorded=one.position,
     )
     result = compare_runs(path, [single])
-    page = Page(render_report([result, single, path]))
+    page = Page(render_report([present(result), present(single), present(path)]))
     plots = [attrs for _, attrs, _ in page.elements if (attrs.get("class") or "").startswith("plot")]
     assert len(plots) == 4 + 3 + 2
     assert [said for _, said in page.all("h1")] == ["PASS shifted within tolerance against shifted"]

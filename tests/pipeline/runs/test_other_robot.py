@@ -14,7 +14,7 @@ from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.errors import LogError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ghosts import Ghost
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot

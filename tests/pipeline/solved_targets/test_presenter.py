@@ -97,7 +97,7 @@ def test_every_ghost_brings_the_tool_to_the_targets_as_the_chosen_solution_does(
     assert np.abs(way_of_tool.position[reached] - path.targets.position[reached]).max() < 1e-10
     assert isinstance(chosen.label, tuple)
     assert set(chosen.label) == {f"chosen: {path.branch[0]}", ""}
-    assert [bool(one) for one in shown.targets.words] == (~reached).tolist()
+    assert [bool(one) for one in shown.targets.reasons] == (~reached).tolist()
 
 
 def test_a_ghost_is_where_another_solution_is() -> None:

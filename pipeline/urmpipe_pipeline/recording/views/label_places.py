@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.recording.eye import in_the_picture
+from urmpipe_pipeline.recording.views.camera import in_the_picture
 
 NAME_SIZE = (0.3, 0.035)
 """How wide and how high a name is in the view, as shares of the diagonal of all that is in view."""

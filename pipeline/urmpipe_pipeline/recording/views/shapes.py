@@ -1,26 +1,77 @@
-"""Send the links of the arm as they look: shapes that stand still below frames that move."""
+"""The links of an arm as they look: shapes that stand still below frames that move."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.visual import Box, Capsule, Colour, Cylinder, Mesh, Visual
+from urmpipe_models.kinematics.forward import frames_over_log
 from urmpipe_models.orientation import quaternions
+from urmpipe_pipeline.meshes import MEDIA_TYPES, drawable
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, rgb
-from urmpipe_pipeline.recording.bodies import Body
-from urmpipe_pipeline.recording.entities import entity_path, printable
-from urmpipe_pipeline.runs.meshes import MEDIA_TYPES
+from urmpipe_pipeline.recording.sending import keys, shown_path
 
 if TYPE_CHECKING:
     from rerun import AsComponents, RecordingStream, TimeColumn
 
-
 UNSEEN = 1e-9
 """Scale of a shape that is hidden; zero would be none that the viewer can invert."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """What moves as one: a frame of the arm and the shapes on it.
+
+    Attributes:
+        joint: Name of the joint whose frame it is; None for the base.
+        position: Of the frame in the world in [m], shape (m, 3).
+        quat_xyzw: Its rotation as unit quaternions [-], shape (m, 4).
+        visuals: The shapes that can be drawn, at least one.
+    """
+
+    joint: str | None
+    position: FloatArray
+    quat_xyzw: FloatArray
+    visuals: tuple[Visual, ...]
+
+
+def bodies_over_log(robot: Chain, q: FloatArray) -> tuple[Body, ...]:
+    """Return the links of an arm that have shapes which can be drawn.
+
+    Args:
+        robot: The arm.
+        q: Joint values in [rad] or [m], shape (m, joints).
+    """
+    shown = [visual for visual in robot.visuals if drawable(visual)]
+    if not shown:
+        return ()
+    position, rotation = frames_over_log(robot, q)
+    carriers = [None, *(joint.name for joint in robot.joints)]
+    return tuple(
+        Body(
+            carrier,
+            position[:, k],
+            quaternions(rotation[:, k].reshape(-1, 9), "matrix"),
+            tuple(visual for visual in shown if visual.joint == carrier),
+        )
+        for k, carrier in enumerate(carriers)
+        if any(visual.joint == carrier for visual in shown)
+    )
+
+
+def lacks_shapes(robot: Chain, bodies: Sequence[Body]) -> bool:
+    """Tell whether a moving link shows nothing; frames fixed to it count as the link."""
+    moving = np.cumsum([joint.kind != "fixed" for joint in robot.joints])
+    link = dict(zip((joint.name for joint in robot.joints), moving.tolist(), strict=True))
+    shown = {link[body.joint] for body in bodies if body.joint is not None}
+    return not set(range(1, int(moving[-1]) + 1)) <= shown
 
 
 def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> None:
@@ -30,17 +81,17 @@ def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> N
     """
     import rerun as rr
 
-    place = ("robot", "base") if body.joint is None else _carrier(body.joint)
+    place = _carrier(body.joint)
     position, rotation = body.position.astype(np.float32), body.quat_xyzw.astype(np.float32)
     if body.joint is None:  # the base does not move
         still = rr.Transform3D(translation=position[0], quaternion=rotation[0])
-        stream.log(entity_path(*place), still, static=True)
+        stream.log(shown_path(*place), still, static=True)
     else:
         columns = rr.Transform3D.columns(translation=position, quaternion=rotation)
-        stream.send_columns(entity_path(*place), times, columns)
+        stream.send_columns(shown_path(*place), times, columns)
     for number, visual in enumerate(body.visuals, start=1):
         if (shape := _shape(visual)) is not None:
-            entity = entity_path(*place, f"visual {number}")
+            entity = shown_path(*place, f"visual {number}")
             stream.log(entity, _placed(visual), static=True)
             stream.log(entity, shape, static=True)
 
@@ -60,12 +111,12 @@ def hide_body(stream: RecordingStream, body: Body, times: list[TimeColumn], coun
 
     if body.joint is not None:
         columns = rr.Transform3D.columns(translation=np.zeros((count, 3)), scale=np.full((count, 3), UNSEEN))
-        stream.send_columns(entity_path(*_carrier(body.joint)), times, columns)
+        stream.send_columns(shown_path(*_carrier(body.joint)), times, columns)
 
 
-def _carrier(joint: str) -> tuple[str, ...]:
-    """Return where the frame of a joint stands."""
-    return "robot", "joint", printable(joint) or "unnamed"
+def _carrier(joint: str | None) -> tuple[str, ...]:
+    """Return where the frame of a joint stands, or that of the base."""
+    return ("scene", "robot", "base") if joint is None else ("scene", "robot", "joint", *keys([joint]))
 
 
 def _placed(visual: Visual) -> AsComponents:
