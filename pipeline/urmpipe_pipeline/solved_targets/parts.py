@@ -77,7 +77,7 @@ def fast_words(one: SolvedTargets, stretch: TooFast) -> str:
 def _capped(lines: list[str]) -> list[str]:
     """Return the first lines, and how many more there are."""
     more = len(lines) - MANY
-    return [*lines[:MANY], f"and {more} more; --json has all"] if more > 0 else lines
+    return [*lines[:MANY], f"and {more} more"] if more > 0 else lines
 
 
 def _branches(one: SolvedTargets) -> Iterator[str]:
