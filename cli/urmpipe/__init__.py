@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from urmpipe_models.display import Shown
+
 if TYPE_CHECKING:
     from urmpipe.api.build_fmu import build_fmu as build_fmu
     from urmpipe.api.compare import compare as compare
@@ -102,6 +104,16 @@ _HOME = {
 }
 
 __all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604 - the names are those of _HOME
+
+
+def _page(result: Any) -> str | None:
+    """Return what a notebook shows of a result."""
+    from urmpipe.printing.notebook import notebook_page
+
+    return notebook_page(result)
+
+
+Shown.page = staticmethod(_page)
 
 
 def __getattr__(name: str) -> Any:

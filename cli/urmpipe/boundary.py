@@ -109,7 +109,7 @@ def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding]) -> None
         or arguments.count(named[0]) > 1
     ):
         return  # none, two, or one that is an operand, too
-    from urmpipe_pipeline.comparison.junit_errors import tell_junit
+    from urmpipe_pipeline.tables.junit import write_errors
 
     others = [Path(word) for word in arguments if word != named[0]]
-    tell_junit(Path(named[0]), others, findings)
+    write_errors(Path(named[0]), others, findings)

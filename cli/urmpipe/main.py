@@ -25,7 +25,6 @@ from urmpipe.boundary import (
     tell_junit_of,
 )
 from urmpipe.defaults import defaults_for, find_defaults
-from urmpipe.process import tune_python
 from urmpipe.usage import Defaults, Group
 
 COMMANDS = {
@@ -41,6 +40,10 @@ COMMANDS = {
     "simulate": "Run a system of blocks.",
 }
 """Each command and its short help: --help must not import them all (a test holds both together)."""
+
+COLLECT_AT = 100_000
+"""Objects made before Python looks for cycles among them. Python's own 700 cost a command, which first of
+all imports thousands of them, a tenth of a second."""
 
 
 class LazyGroup(Group):
@@ -107,7 +110,7 @@ def cli() -> None:
 def main(arguments: Sequence[str] | None = None) -> None:
     """Run the command line and exit: errors become lines on standard error and the exit code 2."""
     given = list(sys.argv[1:] if arguments is None else arguments)
-    tune_python()
+    gc.set_threshold(COLLECT_AT)
     open_streams()
     code = run(given)
     close_streams()

@@ -17,6 +17,10 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.orientation import RotationForm
 from urmpipe_models.repolarizer import FULL_TURN
 
+SMALL_STEP = np.pi / 4.0
+"""If no angle steps by more in [rad], no sample needs another name: two angles of the other one are at least
+three times as far off."""
+
 
 def continuous_quaternions(quat_xyzw: FloatArray) -> FloatArray:
     """Return quaternions with the sign that is nearest to the one before.
@@ -116,6 +120,8 @@ def _vectors(v: FloatArray) -> FloatArray:
 
 def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
     """Return Euler angles in [rad], shape (n, 3), of both families the one nearest to the sample before."""
+    if not (np.abs(np.diff(angles, axis=0)) > SMALL_STEP).any():
+        return angles + 0.0  # the other family is further off at every step
     other = angles * np.array([1.0, -1.0, 1.0]) + apart
     own, across = (_distance(one[1:], angles[:-1]) for one in (angles, other))
     switches = np.append(False, across < own)[: len(angles)]

@@ -29,23 +29,23 @@ from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.junit import write_junit
-from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
-from urmpipe_pipeline.comparison.statistics_table import write_statistics
 from urmpipe_pipeline.comparison.sync import SyncOption
+from urmpipe_pipeline.comparison.tables import statistics_rows
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.operands import MadeRun, load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.recording import is_recording
-from urmpipe_pipeline.results import kind_of, read_recording
+from urmpipe_pipeline.results import kind_of, present, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
+from urmpipe_pipeline.tables.table_csv import write_table
 
 Operand = PathLike | MadeRun
 
@@ -114,7 +114,7 @@ def compare(
         "recording": output, "junit": junit, "statistics": statistics,
     }  # fmt: skip
     told = None if junit is None else Path(junit)
-    with told_in_junit(told, kept), guarded_outputs(outputs, kept) as parts:
+    with errors_in_junit(told, kept), guarded_outputs(outputs, kept) as parts:
         options = CompareOptions(_allowed(tolerance), tcp, sync, align, _with_unit(tolerance))
         level = _noise_level(noise, baseline)
         given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
@@ -127,9 +127,9 @@ def compare(
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         if told is not None:
-            write_junit(result, parts["junit"], told)
+            write_junit(present(result), parts["junit"], told)
         if statistics is not None:
-            write_statistics(result, parts["statistics"], Path(statistics))
+            write_table(statistics_rows(result), parts["statistics"], Path(statistics))
         return recorded(result, output, kept, progress)
 
 

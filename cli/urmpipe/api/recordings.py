@@ -4,18 +4,17 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
 
 from urmpipe.edge import public
 from urmpipe.guards import PathLike, paths
 from urmpipe_models.display import Shown
-from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_pipeline import results
 
 
 @public
-def read_recording(path: PathLike) -> Any:
-    """Return the result that a recording holds: a run, a comparison, a simulation, solved targets.
+def read_recording(path: PathLike) -> Shown:
+    """Return the result that a recording holds: a Run, a Comparison, a Simulation, ...
 
     Args:
         path: A recording (.rrd) that urmpipe wrote.
@@ -23,7 +22,8 @@ def read_recording(path: PathLike) -> Any:
     Raises:
         RecordingError: If it is no recording, was cut off, is not of urmpipe, or of a newer layout.
     """
-    return results.read_recording(Path(path))
+    found: Shown = results.read_recording(Path(path))
+    return found
 
 
 @public
@@ -50,5 +50,6 @@ def write_recording(
         OutputError: If it may not be written there, or did not read back as it was written.
     """
     if not results.is_result(result):
-        raise OptionError(f"result: found {shown(result)}, allowed: a result, such as a Run or a Comparison")
+        allowed = "a result, such as a Run or a Comparison"
+        raise OptionError(Finding(parameter="result", found=shown(result), allowed=allowed))
     return results.write_recording(result, Path(output), paths(inputs), progress)

@@ -12,7 +12,6 @@ import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import TableOptions, table_options
 from urmpipe.options.types import DURATION, JointValuesType, OneOf, WholeType
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -104,7 +103,6 @@ def ik(
     Exit codes: 0 every target reached, 1 not so (rows that hold no target count, and along a path jumps and
     joints that are too fast), 2 bad input or usage.
     """
-    tune_pyarrow()
     reading = table.reading()
     replaces = output is not None and output.exists()
     with terminal.progress(f"Solving {targets}") as progress:

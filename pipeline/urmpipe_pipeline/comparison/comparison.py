@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import HEAD, Shown, line_of
+from urmpipe_models.display import Shown, line_of
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
@@ -118,21 +118,6 @@ class Comparison(Shown):
         """Return what is to be known of it, and of its logs."""
         of_logs = [w.of(one.name).message for one in self.runs for w in one.run.warnings]
         return [*(warning.message for warning in self.warnings), *of_logs]
-
-    def _table(self) -> str:
-        """Return for a notebook one row a log, the worst first; of one log the head of its table."""
-        if len(self.runs) == 1:
-            return Shown._table(self)
-        import pandas as pd
-
-        rows = [
-            {"run": one.name, "verdict": one.verdict}
-            | {f"max {name} [{found.unit}]": found.max for name, found in one.statistics.items()}
-            for one in reversed(self.ranking)
-        ]
-        shown = pd.DataFrame(rows[:HEAD]).to_html(index=False, float_format="{:.4g}".format)
-        shares = f"{min(HEAD, len(rows))} of {len(rows)} logs, the worst first"
-        return f"{shown}<p>{shares}; to_frame() has a row a log and quantity</p>"
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a log and quantity, as `rows`."""

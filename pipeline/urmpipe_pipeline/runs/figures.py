@@ -245,11 +245,18 @@ def _marks(run: Run) -> list[Mark]:
         own = [one for one in run.audit if one.joint == name]
         t_ns = np.array([round(one.t * 1e9) for one in own], dtype=np.int64)
         column = np.asarray(run.q)[:, run.log.joints.index(name)]
-        known = np.flatnonzero(np.isfinite(column))
-        if len(known):
-            values = np.interp(t_ns, run.t_ns[known], column[known])
+        rows = _beside(run.t_ns, column, t_ns)
+        if len(rows):
+            values = np.interp(t_ns, run.t_ns[rows], column[rows])
             found += [_mark(run, *pair) for pair in zip(own, values.tolist(), strict=True)]
     return found
+
+
+def _beside(times_ns: IntArray, column: FloatArray, t_ns: IntArray) -> IntArray:
+    """Return the samples before and after each time; where a value is missing, all that there are."""
+    after = np.searchsorted(times_ns, t_ns)
+    rows: IntArray = np.unique(np.clip(np.concatenate((after - 1, after)), 0, len(times_ns) - 1))
+    return rows if np.isfinite(column[rows]).all() else np.flatnonzero(np.isfinite(column))
 
 
 def _mark(run: Run, one: AuditEntry, value: float) -> Mark:

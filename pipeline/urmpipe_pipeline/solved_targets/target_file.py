@@ -19,7 +19,6 @@ from urmpipe_pipeline.sources.columns.columns import columns_of, listed
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
 from urmpipe_pipeline.sources.tables.opening import PATH, open_tables
-from urmpipe_pipeline.sources.tables.table import release_memory
 from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.targets.row_faults import Rows, read_rows
 from urmpipe_pipeline.sources.targets.sniff_targets import sniff_targets
@@ -100,7 +99,6 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
     rows = read_rows(plan)
     poses = _poses(plan, rows, form)
     t_ns, start, said, noticed = _times(rows, tsp, asked.period)
-    release_memory()
     return TargetFile(
         file=fingerprint(Path(file)),
         row=np.arange(1, len(rows.values) + 1),
@@ -151,8 +149,7 @@ def _poses(plan: Plan, rows: Rows, form: RotationForm | None) -> _Poses:
     shown = f"{form}{'' if units[0] == PURE else f' in {units[0].name}'}"
     found = Inference(f"form of {listed(columns)}", shown, "their names, or as given")
     ordered = {row: faults[row] for row in sorted(faults)}
-    doubts = (*warnings, *assumed, *finder.gon.warnings)
-    return _Poses(position, rotation, ordered, (*finder.inferences, found), doubts)
+    return _Poses(position, rotation, ordered, (*finder.inferences, found), (*warnings, *assumed))
 
 
 def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[list[Unit], list[LogWarning]]:

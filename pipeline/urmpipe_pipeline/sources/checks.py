@@ -16,9 +16,9 @@ from urmpipe_pipeline.sources.clocks.clock import Clock
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
 from urmpipe_pipeline.sources.clocks.quantised import behind_repeated
 from urmpipe_pipeline.sources.option_text import option
-from urmpipe_pipeline.sources.tables.diagnose import SHOWN_FINDINGS, lines_of_rows
+from urmpipe_pipeline.sources.tables.numbers import NO_TIME, UNREADABLE, Numbers
+from urmpipe_pipeline.sources.tables.row_reader import SHOWN_FINDINGS, lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import NO_TIME, UNREADABLE, Numbers
 
 FAR_BACK = 10.0
 """Median periods: a clock that falls back by more, to about its first time, begins again."""

@@ -22,10 +22,10 @@ from urmpipe_pipeline.sources.clocks.text_times import timed
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.plan import Plan
-from urmpipe_pipeline.sources.tables.blockwise import read_blockwise
-from urmpipe_pipeline.sources.tables.diagnose import lines_of_rows
+from urmpipe_pipeline.sources.tables.numbers import Numbers
+from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import Numbers, read_fast
+from urmpipe_pipeline.sources.tables.table import read_table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,7 +98,7 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     """Return the numbers of one table; raise what is wrong with them."""
     layout, clock = plan.tables.layouts[table], plan.clocks[table]
     places = [column.index for column in columns]
-    numbers = read_fast(layout, places, clock.parts) or read_blockwise(layout, places, clock.parts)
+    numbers = read_table(layout, places, clock.parts)
     unread = f"{len(numbers.unread)} of {len(numbers.values)} rows cannot be read"
     hint, warnings = "", _about_other_lines(layout, numbers)
     if skip_bad and may_skip(numbers):

@@ -17,10 +17,10 @@ from urmpipe_models.kinematics.forward import point_over_log, positions_over_log
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit import audit_log
 from urmpipe_pipeline.runs.derivatives import derivatives
-from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.runs.results import Run
 
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)

@@ -17,10 +17,10 @@ import rerun as rr
 from urmpipe_models.errors import OutputError, RecordingError
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_ours, is_recording
-from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, blocks
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.verify import verify
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]

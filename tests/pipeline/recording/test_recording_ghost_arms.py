@@ -23,13 +23,13 @@ from urmpipe_models.orientation import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run
-from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.recording.entities import places_of
 from urmpipe_pipeline.recording.ghost_arms import POSES, bones_of
 from urmpipe_pipeline.recording.ghost_drawing import capsules
-from urmpipe_pipeline.recording.views.label_places import name_places
 from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.scene import scene_of
+from urmpipe_pipeline.recording.views.label_places import name_places
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeSolved = Callable[..., Run]

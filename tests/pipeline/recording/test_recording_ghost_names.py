@@ -11,14 +11,14 @@ import pytest
 
 from recorded import rows_of, static
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
-from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, eye_distance, in_the_picture, seen
 from urmpipe_pipeline.recording.ghost_arms import POSES, bones_of, fullest_time
 from urmpipe_pipeline.recording.ghost_drawing import AXIS_RADIUS, LINK_RADIUS, OPACITY, THIN
-from urmpipe_pipeline.recording.views.label_places import NAME_SIZE, extent_of, name_places, placed_names
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
+from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, eye_distance, in_the_picture, seen
+from urmpipe_pipeline.recording.views.label_places import NAME_SIZE, extent_of, name_places, placed_names
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.solved_targets.drawn_run import Ghost
 

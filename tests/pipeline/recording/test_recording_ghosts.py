@@ -19,11 +19,11 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.inverse.solved import goals_of
 from urmpipe_pipeline.recording import writer
-from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.recording.entities import blocks
 from urmpipe_pipeline.recording.metadata import to_json
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.verify import verify
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeSolved = Callable[..., Run]

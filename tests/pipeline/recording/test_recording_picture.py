@@ -27,11 +27,11 @@ from urmpipe_pipeline.palette import (
     rgb,
     run_colour,
 )
-from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW
 from urmpipe_pipeline.recording.layout import eye_and_target
 from urmpipe_pipeline.recording.scene import Scene, scene_of
 from urmpipe_pipeline.recording.viewer import open_window, opening_times, run_viewer
+from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 

@@ -14,8 +14,8 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
-from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.repolarization.audit import LISTED, Audited, audit_log
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method, derivatives
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.sources import ReadOptions

@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import Phase, example, given, settings
+from hypothesis import Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources.tables import blocks, table
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -104,6 +105,28 @@ def test_a_sound_log_or_an_error_of_ours(content: bytes, options: ReadOptions, r
     assert set(log.joints) <= set(log.units)
     assert log.joints or log.tcp_position is not None
     assert robot is None or len(log.joints) in (0, len(robot.coordinates))
+
+
+def outcome(path: Path, options: ReadOptions) -> tuple[object, ...]:
+    """What is read of a file, or what is wrong with it."""
+    try:
+        log = read_log([path], options)
+    except UrmpipeError as error:
+        return (str(error),)
+    return log.t_ns.tobytes(), log.q.tobytes(), log.q.shape, log.inferences, log.warnings
+
+
+@settings(max_examples=200, deadline=None)
+@given(damaged(), st.sampled_from(OPTIONS), st.sampled_from([8, 30, 200]))
+def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: ReadOptions, size: int) -> None:
+    assume(b"\r" not in content)  # alone it ends a row for the parser, and no line of the file
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        path = Path(folder) / "log.csv"
+        path.write_bytes(content)
+        whole = outcome(path, options)
+        patch.setattr(blocks, "BLOCK_BYTES", size)
+        patch.setattr(table, "READ_BY_ROW", 8)
+        assert outcome(path, options) == whole
 
 
 INCREASE = "allowed: times that increase from row to row"

@@ -71,12 +71,6 @@ def test_a_header_that_says_degrees_over_radians(read: Read) -> None:
     )
 
 
-def test_kinematics_tell_degrees_from_gon(read: Read) -> None:
-    log = read(text([*joints(" [grad]"), "x [m]", "y [m]", "z [m]"], np.degrees(Q), FLANGE), UR5E)
-    np.testing.assert_allclose(log.q, Q, atol=PRINTED)
-    assert not log.warnings
-
-
 def test_the_user_has_the_last_word(read: Read) -> None:
     log = read(text([*joints(), "x [m]", "y [m]", "z [m]"], Q, FLANGE), UR5E, units={"": "deg"})
     np.testing.assert_allclose(log.q, np.radians(Q), atol=PRINTED)

@@ -16,9 +16,11 @@ from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log
 from urmpipe_pipeline.sources.clocks.stamps import known_forms
 from urmpipe_pipeline.sources.clocks.text_times import timed
-from urmpipe_pipeline.sources.tables.diagnose import CarefulReader
+from urmpipe_pipeline.sources.tables.block_parser import clock_scales, parse_block
+from urmpipe_pipeline.sources.tables.blocks import row_blocks
+from urmpipe_pipeline.sources.tables.numbers import ClockColumn
+from urmpipe_pipeline.sources.tables.row_reader import RowReader
 from urmpipe_pipeline.sources.tables.sniff import sniff
-from urmpipe_pipeline.sources.tables.table import ClockColumn, read_fast
 from urmpipe_pipeline.sources.tables.text import open_text
 
 Read = Callable[..., JointLog]
@@ -293,7 +295,7 @@ WRITERS: dict[str, Callable[[datetime], str]] = {
     st.lists(st.integers(1, 10**12), min_size=2, max_size=30),
     st.sampled_from(sorted(WRITERS)),
 )
-def test_dates_are_exact_and_both_readers_agree(start: datetime, steps: list[int], writer: str) -> None:
+def test_dates_are_exact_parsed_and_by_row(start: datetime, steps: list[int], writer: str) -> None:
     """Steps of 1 us to 11 days, written by Python's own clock."""
     exact = [start + timedelta(microseconds=int(us)) for us in np.cumsum([0, *steps])]
     if max(exact) > datetime(2110, 1, 1):
@@ -307,10 +309,10 @@ def test_dates_are_exact_and_both_readers_agree(start: datetime, steps: list[int
         key = {"us": "mdy", "german": "dmy", "counted": "us"}.get(writer, "")
         forms = known_forms(layout.cells(0))
         clock = (ClockColumn(0, forms=tuple(f for f in forms if key in f.keys) or forms),)
-        fast = read_fast(layout, [1], clock)
-        careful = CarefulReader(layout, [1], clock).read(text.splitlines()[1:])
-        assert fast is not None
-        read = [timed(layout, clock, numbers).clock for numbers in (fast, careful)]
+        parsed = parse_block(layout, [1], clock, b"".join(row_blocks(layout)), clock_scales(layout, clock))
+        by_row = RowReader(layout, [1], clock).read(text.splitlines()[1:])
+        assert parsed is not None
+        read = [timed(layout, clock, numbers).clock for numbers in (parsed, by_row)]
     wanted = [(time - datetime(1970, 1, 1)) // timedelta(microseconds=1) * 1000 for time in exact]
     assert [times.tolist() for times in read if times is not None] == [wanted, wanted]
 

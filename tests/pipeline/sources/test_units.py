@@ -38,7 +38,7 @@ def evidence(log: JointLog, what: str) -> str:
     [
         ("q1 [deg]", "deg"), ("q1 (rad)", "rad"), ("q1 (°)", "deg"), ("q1[Grad]", "deg"), ("q1_deg", "deg"),
         ("q1_rad", "rad"), ("q1 [degrees]", "deg"), ("q1 (Radians)", "rad"), ("q1 [deg sign]", "deg"),
-        ("q1 (grd)", "deg"),
+        ("q1 (grd)", "deg"), ("q1 [Grad]", "deg"), ("achse_1_grad", "deg"),
     ],
 )  # fmt: skip
 def test_units_in_names(read: Read, name: str, unit: str) -> None:
@@ -48,50 +48,15 @@ def test_units_in_names(read: Read, name: str, unit: str) -> None:
     assert not log.warnings
 
 
-GON = "1 gon is 0.9 deg: multiply values in gon by 0.9"
-
-
-def test_a_unit_that_is_deg_or_gon_is_refused_as_an_option(wrong: Wrong) -> None:
+def test_a_unit_that_is_not_known_is_refused(wrong: Wrong) -> None:
     text = "t,q1,q2\n0,30,30\n0.1,31,30\n"
-    either = "which is deg in German and gon elsewhere, allowed: rad, deg"
-    assert wrong(text, units={"": "grad"}) == [f"--unit: found 'grad', {either}; {GON}"]
-    assert wrong(text, units={"q1": "Grad"}) == [
-        f"--unit: found 'Grad', {either}, m, mm, cm, s, ms, us, ns, dmy, mdy; {GON}"
+    assert wrong(text, units={"": "gon"}) == ["--unit: found 'gon', allowed: rad, deg"]
+    assert wrong(text, units={"q1": "gon"}) == [
+        "--unit: found 'gon', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
     ]
-    assert wrong(text, units={"": "gon"}) == [f"--unit: found 'gon', allowed: rad, deg; {GON}"]
     assert wrong("t,q1 [gon]\n0,30\n0.1,31\n") == [
-        f"log.csv, column q1 [gon]: found the unit 'gon', allowed: rad, deg, m, mm, cm; {GON}"
-    ]
-
-
-@pytest.mark.parametrize("name", ["q1 [grad]", "q1_grad", "q1 (GRAD)", "Q1_GRAD"])
-def test_a_unit_that_is_deg_or_gon_is_taken_as_deg_and_said(read: Read, name: str) -> None:
-    text = f"t,{name}\n0,30\n0.1,31\n"
-    log = read(text)
-    assert log.q[0, 0] == 30 * DEG
-    (warning,) = log.warnings
-    column, unit = (name, name[-4:]) if "_" in name else ("q1", name[4:8])
-    assert (warning.kind, warning.message) == (
-        "gon-or-deg",
-        f"{column}: {unit} is taken as deg, as in German; elsewhere it is gon, 0.9 deg: --unit deg says that"
-        " it is right, values in gon are to be multiplied by 0.9",
-    )
-    assert not read(text, units={"": "deg"}).warnings
-
-
-@pytest.mark.parametrize("name", ["q1 [Grad]", "Winkel1 [grad]", "achse_1_grad", "Gelenk 1 (grad)"])
-def test_german_names_tell_degrees(read: Read, name: str) -> None:
-    log = read(f"t,{name}\n0,30\n0.1,31\n")
-    assert log.q[0, 0] == 30 * DEG
-    assert not log.warnings
-
-
-def test_wraps_tell_degrees_from_gon(read: Read, wrong: Wrong) -> None:
-    angle = np.arange(0.0, 800.0, 7.0)[:, np.newaxis]
-    assert not read(csv_of(angle % 360.0, 0.1, ("q1 [grad]",))).warnings
-    assert wrong(csv_of(angle % 400.0, 0.1, ("q1 [grad]",))) == [
-        "log.csv: found q1 in grad and 1 step of about 400 from one row to the next, a full turn in gon,"
-        " allowed: rad, deg; multiply the values by 0.9, which are deg then"
+        "log.csv, column q1 [gon]: found the unit 'gon', allowed: rad, deg, m, mm, cm; say which with"
+        " --unit q1=deg"
     ]
 
 

@@ -7,8 +7,9 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.presentation.digits import unit_of, written
-from urmpipe_pipeline.presentation.section import Fact, Judged, Presentation, Section, Table
+from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
+from urmpipe_pipeline.presentation.digits import written
+from urmpipe_pipeline.presentation.section import Fact, Presentation, Section, Table
 
 ROWS = 12
 """Rows of a table of verdicts that are shown; the others are counted. Of other tables only short ones are."""
@@ -45,40 +46,27 @@ def _section(section: Section, told: set[str]) -> Iterator[str]:
     yield from _facts([one for one in section.facts if one.name not in told])
     if section.notice:
         yield from ("", f"**{plain(section.notice)}**")
-    for table in section.tables:
-        if table.brief and table.columns and _fits(table):
+    for table in brief_tables(section):
+        if len(table.columns[0].cells) <= ROWS or rows_within(table, ROWS).start is not None:
             yield ""
             yield from _table(table)
 
 
-def _fits(table: Table) -> bool:
-    """Tell whether a table is short, or is one of verdicts, which is cut."""
-    verdicts = any(isinstance(cell, Judged) for one in table.columns for cell in one.cells)
-    return 0 < len(table.columns[0].cells) <= ROWS or verdicts
-
-
 def _facts(facts: Sequence[Fact], *, strong: bool = False) -> Iterator[str]:
     """Yield the brief facts in one paragraph."""
-    told = [one for one in facts if one.brief and one.value not in (None, "")]
     mark = "**" if strong else ""
+    told = [(plain(one.name), plain(written(one.value, unit=True))) for one in brief_facts(facts)]
     if told:
         yield ""
-        yield "; ".join(
-            f"{plain(one.name)}: {mark}{plain(written(one.value, unit=True))}{mark}" for one in told
-        )
+        yield "; ".join(f"{name}: {mark}{value}{mark}" for name, value in told)
 
 
 def _table(table: Table) -> Iterator[str]:
-    """Yield the brief columns that have a value."""
-    columns = [
-        one
-        for number, one in enumerate(table.columns)
-        if one.brief and (not number or any(written(cell) != text.NOTHING for cell in one.cells))
-    ]
-    heads = (f"{one.title} [{unit}]" if (unit := unit_of(one.cells)) else one.title for one in columns)
-    yield _row(heads)
+    """Yield the brief columns, and as many rows as fit."""
+    columns, rows = list(brief_columns(table)), rows_within(table, ROWS)
+    yield _row(map(head, columns))
     yield f"|{' --- |' * len(columns)}"
-    for cells in zip(*(one.cells[:ROWS] for one in columns), strict=True):
+    for cells in zip(*(one.cells[rows] for one in columns), strict=True):
         yield _row(map(written, cells))
     if (left := len(columns[0].cells) - ROWS) > 0:
         yield ""

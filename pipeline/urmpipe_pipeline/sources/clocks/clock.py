@@ -20,8 +20,8 @@ from urmpipe_pipeline.sources.clocks.stamps import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.numbers import ClockColumn
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import ClockColumn
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
 
 PAPER_PERIOD = 0.005

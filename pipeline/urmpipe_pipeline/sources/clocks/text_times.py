@@ -15,8 +15,8 @@ from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.cells.text_clock import DAY_NS, TIME_OF_DAY, Form
 from urmpipe_pipeline.sources.clocks.stamps import read_cells
 from urmpipe_pipeline.sources.option_text import option
+from urmpipe_pipeline.sources.tables.numbers import REPORTED, UNREADABLE, ClockColumn, Numbers
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import REPORTED, UNREADABLE, ClockColumn, Numbers
 
 MIDNIGHT_NS = DAY_NS - 3600 * 10**9
 """A time of day that falls back by this much or more has gone on over midnight."""

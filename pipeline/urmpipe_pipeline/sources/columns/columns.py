@@ -136,16 +136,16 @@ def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Un
     """Return the units that the user gave, by the column's number; by 0 that of all joints that turn.
 
     Raises:
-        OptionError: If a text is no unit or may be two, or that of all joints is none of angle.
+        OptionError: If a text is no unit, or that of all joints is none of angle.
         LogError: If there is no such column.
     """
     given = {}
     for text, unit_text in options.units.items():
-        unit, (either, remedy) = vocabulary().unit(unit_text), vocabulary().gon.about(unit_text)
+        unit = vocabulary().unit(unit_text)
         quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
-        if unit is None or unit.quantity not in quantities or remedy:
+        if unit is None or unit.quantity not in quantities:
             allowed = ", ".join(name for quantity in quantities for name in vocabulary().spelled(quantity))
-            raise OptionError(f"--unit: found {shown(unit_text)}{either}, allowed: {allowed}{remedy}")
+            raise OptionError(f"--unit: found {shown(unit_text)}, allowed: {allowed}")
         given[find_column(columns, text, "--unit").number if text else 0] = unit
     return given
 

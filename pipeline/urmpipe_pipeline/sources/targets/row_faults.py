@@ -21,10 +21,10 @@ from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD, Clock
 from urmpipe_pipeline.sources.clocks.text_times import timed
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.plan import Plan
-from urmpipe_pipeline.sources.tables.blockwise import read_blockwise
-from urmpipe_pipeline.sources.tables.diagnose import data_lines
+from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
+from urmpipe_pipeline.sources.tables.row_reader import data_lines
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import UNREADABLE, Numbers, read_fast
+from urmpipe_pipeline.sources.tables.table import read_table
 
 ALLOWED = "a finite number"
 """What the cells of such a table may hold."""
@@ -68,7 +68,7 @@ def read_rows(plan: Plan) -> Rows:
     columns = plan.roles.columns
     layout, clock = plan.tables.layouts[plan.main], plan.clocks[plan.main]
     places = [column.index for column in columns]
-    read = read_fast(layout, places, clock.parts) or read_blockwise(layout, places, clock.parts, ALLOWED)
+    read = read_table(layout, places, clock.parts, ALLOWED)
     if read.lasting:
         raise LogError(*read.lasting)
     numbers = _without_blank_end(layout, timed(layout, clock.parts, read))

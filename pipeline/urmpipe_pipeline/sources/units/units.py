@@ -16,7 +16,6 @@ from urmpipe_models.orientation import RotationForm, angles
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.option_text import option
-from urmpipe_pipeline.sources.units.gon import GonDoubt
 from urmpipe_pipeline.sources.units.kinematic_units import KinematicUnits
 from urmpipe_pipeline.sources.units.unit_evidence import Bounds, degrees_evidence, peak, radians_evidence
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Quantity, Unit, vocabulary
@@ -39,7 +38,6 @@ class UnitFinder:
         source: The source, if it is known.
         file: The file, for errors.
         kinematic: The units that the kinematics single out, if they do.
-        gon: The columns in degrees that may be in gon.
     """
 
     given: Mapping[int, Unit]
@@ -50,11 +48,6 @@ class UnitFinder:
     _doubted: dict[tuple[Unit, Unit, str], list[Column]] = field(default_factory=dict)
     _overruled: dict[Unit, list[Column]] = field(default_factory=dict)
     _noted: dict[tuple[str, str], list[str]] = field(default_factory=dict)
-    gon: GonDoubt = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Begin without a doubt."""
-        self.gon = GonDoubt(self.given, self.file)
 
     @property
     def inferences(self) -> list[Inference]:
@@ -67,7 +60,7 @@ class UnitFinder:
     @property
     def warnings(self) -> list[LogWarning]:
         """What was assumed, and what contradicts the kinematics or the names of the columns."""
-        return [*self._assumed, *self.gon.warnings, *self._contradictions(), *self._against_names()]
+        return [*self._assumed, *self._contradictions(), *self._against_names()]
 
     def joints(
         self, columns: Sequence[Column], values: FloatArray, t_ns: IntArray | None, robot: Chain | None
@@ -99,7 +92,6 @@ class UnitFinder:
             found = [unit if j in turns else other for j, other in enumerate(found)]
         if self.kinematic is None:
             self._refuse_contradictions(columns, told_units, values, t_ns, robot)
-            self.gon.note_unless_wrapped(columns, values)
         metre = vocabulary().units["m"]
         return [metre if unit is None else unit for unit in found]
 
@@ -150,7 +142,6 @@ class UnitFinder:
                 message = f"found the unit {own.name}, allowed: {names}"
                 raise LogError(Finding(message, self.file, column=column.header))
             units.append(own)
-        self.gon.note(columns)
         return units
 
     def _told(self, column: Column, kind: JointKind | None) -> Unit | None:
@@ -220,8 +211,7 @@ class UnitFinder:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
             message = f"found the unit {shown(column.unit_text)}, allowed: rad, deg, m, mm, cm"
-            _, gon = vocabulary().gon.about(column.unit_text)
-            hint = gon or f"; say which with {option('--unit', f'{column.name}={likely}')}"
+            hint = f"; say which with {option('--unit', f'{column.name}={likely}')}"
             raise LogError(Finding(f"{message}{hint}", self.file, column=column.header))
         return column.unit
 

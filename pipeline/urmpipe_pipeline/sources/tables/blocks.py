@@ -1,23 +1,20 @@
-"""The bytes of a table as the CSV parser wants them: UTF-8, decimal points, one space for a run of them."""
+"""Whole rows of a table: as they stand in the file, and as the CSV parser wants them."""
 
 from __future__ import annotations
 
 import codecs
-import os
-from collections.abc import Generator
-from types import TracebackType
+from collections.abc import Iterator
 
 import numpy as np
 from numpy.typing import NDArray
-from pyarrow import NativeFile, OSFile
 
 from urmpipe_pipeline.sources.cells.cell import SPACE
 from urmpipe_pipeline.sources.tables.sniff import Layout
 
 Bytes = NDArray[np.uint8]
 
-BLOCK_BYTES = 1 << 20
-"""What is read at once."""
+BLOCK_BYTES = 1 << 22
+"""What is read at once: enough rows for several threads to parse, few enough to keep memory low."""
 
 _NEWLINES = b"\n\r"
 _RUNS = (b"\t", b"  ", b" \n", b" \r", b"\n ", b"\r ")
@@ -28,74 +25,12 @@ _TO_POINTS = bytes.maketrans(b",.", b".~")
 _FROM_POINTS = np.frombuffer(bytes.maketrans(b".~", b",."), dtype=np.uint8)
 
 
-def open_table(layout: Layout) -> TableStream | NativeFile:
-    """Return the rows of a table as a file to read from, header excluded.
-
-    Where nothing is to be converted it is pyarrow's own, which needs no Python while it is read.
-    """
-    path = layout.segment.path
-    if _converts(layout) or layout.segment.end != path.stat().st_size:
-        return TableStream(layout)
-    file = OSFile(os.fsencode(path))
-    file.seek(layout.offset)
-    return file
-
-
 def as_written(layout: Layout, cells: Bytes) -> Bytes:
-    """Return cells that a stream has read, shape (bytes,), with the signs that the file has."""
+    """Return cells of `converted` rows, shape (bytes,), with the signs that the file has."""
     return _FROM_POINTS[cells] if layout.decimal == "," != layout.delimiter else cells
 
 
-class TableStream:
-    """The rows of a table as a file to read from, header excluded.
-
-    Args:
-        layout: How the table is written.
-        block: Some whole rows, as they stand in the file, instead of all.
-
-    Attributes:
-        closed: Whether it is closed.
-        left_out: Lines among labelled rows that are none, so far.
-    """
-
-    def __init__(self, layout: Layout, block: bytes | None = None) -> None:
-        self._layout = layout
-        self._blocks = row_blocks(layout) if block is None else (one for one in (block,))
-        self._ready = b""
-        self.closed = False
-        self.left_out = 0
-
-    def read(self, size: int = -1) -> bytes:
-        """Return up to so many bytes of the table, none at its end.
-
-        Raises:
-            UnfitError: If rows with arrays or labels are not written like the others.
-        """
-        while not self._ready:
-            block = next(self._blocks, None)
-            if block is None:
-                break
-            self._ready, left_out = converted(self._layout, block)
-            self.left_out += left_out
-        size = len(self._ready) if size < 0 else size
-        block, self._ready = self._ready[:size], self._ready[size:]
-        return block
-
-    def close(self) -> None:
-        """Close the file."""
-        self._blocks.close()
-        self.closed = True
-
-    def __enter__(self) -> TableStream:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
-
-
-def row_blocks(layout: Layout) -> Generator[bytes, None, None]:
+def row_blocks(layout: Layout) -> Iterator[bytes]:
     """Yield the rows of a table as they stand in the file, some thousand at a time, in `byte_encoding`.
 
     Args:
@@ -125,7 +60,9 @@ def byte_encoding(layout: Layout) -> str:
 
 
 def converted(layout: Layout, block: bytes) -> tuple[bytes, int]:
-    """Return whole rows as the parser wants them, and how many other lines were left out.
+    """Return whole rows as the parser wants them, in UTF-8 and with one space for a run of them.
+
+    Lines among labelled rows that are none are left out; how many they are is the second value.
 
     Decimal commas become points here, since pyarrow 26 parses decimals with another point wrongly in threads
     (they share a buffer); a point becomes a sign that no number has, so that 1.5 stays no number.
@@ -144,13 +81,6 @@ def converted(layout: Layout, block: bytes) -> tuple[bytes, int]:
         block = block.translate(_TO_POINTS)
     block = squeeze(block) if layout.delimiter == SPACE else block
     return (block.replace(layout.delimiter.encode(), b"\n") if layout.across else block), left_out
-
-
-def _converts(layout: Layout) -> bool:
-    """Return whether the parser wants other bytes than the file's own."""
-    wide = layout.segment.encoding.startswith("utf-16")
-    points = layout.decimal == "," != layout.delimiter
-    return wide or points or layout.delimiter == SPACE or layout.form is not None or layout.across
 
 
 def end_of_rows(block: bytes, layout: Layout) -> int:

@@ -1,4 +1,4 @@
-"""The careful pass: reads rows cell by cell and says where each wrong row and cell is."""
+"""Rows that the parser refuses, cell by cell: read, or told with the line and column of what is wrong."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from urmpipe_pipeline.sources.cells.cell import (
 )
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables.form import CONFLICT_MARK, RowError, Value
+from urmpipe_pipeline.sources.tables.numbers import NO_TIME, REPORTED, ClockColumn, Numbers
 from urmpipe_pipeline.sources.tables.sniff import COMMENTS, Layout
-from urmpipe_pipeline.sources.tables.table import NO_TIME, REPORTED, ClockColumn, Numbers
 
 SHOWN_FINDINGS = 20
 """Findings that are told one by one; the others are counted."""
@@ -75,7 +75,7 @@ class _Fault:
         return Finding(self.message + more, file, self.line, self.row, self.column)
 
 
-class CarefulReader:
+class RowReader:
     """Goes through rows one by one and keeps the first findings.
 
     Attributes:
