@@ -34,6 +34,12 @@ BlockKind = Literal["unit", "file", "fmu"]
 """A unit of urmpipe's own, a user's unit in a Python file, or any FMU."""
 
 
+def _floats(values: FloatArray) -> FloatArray:
+    """Return values as floats: those that are stay as they are, also where they are not read yet."""
+    known = getattr(values, "dtype", None) == np.float64
+    return values if known else np.asarray(values, dtype=np.float64)
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Signal:
     """One variable of a block over time; an array of them, such as chain.phi, if its values have columns.
@@ -57,7 +63,7 @@ class Signal:
     description: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", np.asarray(self.values, dtype=np.float64))
+        object.__setattr__(self, "values", _floats(self.values))
 
     @property
     def name(self) -> str:
@@ -137,7 +143,7 @@ class Arm:
     q: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "q", np.asarray(self.q, dtype=np.float64))
+        object.__setattr__(self, "q", _floats(self.q))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
