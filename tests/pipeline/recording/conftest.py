@@ -18,11 +18,11 @@ from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.inverse.solved import Ghost, goals_of, row_times, solved_run
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.drawn_run import Ghost, goals_of, row_times, solved_run
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)
 TILT = math.radians(52.0)

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from recorded import rows_of, static
-from urmpipe_pipeline.inverse.solved import Ghost
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
 from urmpipe_pipeline.recording.ghost_arms import POSES, bones_of, fullest_time
 from urmpipe_pipeline.recording.ghost_drawing import AXIS_RADIUS, LINK_RADIUS, OPACITY, THIN
@@ -21,6 +20,7 @@ from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, eye_distance,
 from urmpipe_pipeline.recording.views.label_places import NAME_SIZE, extent_of, name_places, placed_names
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.drawn_run import Ghost
 
 MakeSolved = Callable[..., Run]
 

@@ -15,7 +15,6 @@ from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.orientation import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import compare_runs
-from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import AXIS_COLOURS, rgb
 from urmpipe_pipeline.recording.layout import opening_time
@@ -23,6 +22,7 @@ from urmpipe_pipeline.recording.scene import NEAR, scene_of
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.drawn_run import goals_of, row_times, solved_run
 
 MakeSolved = Callable[..., Run]
 
