@@ -146,9 +146,9 @@ def test_targets_without_times_show_no_time(path: SolvedTargets) -> None:
     space = scene(poses)
     assert [arm.t_ns for arm in space.arms] == [None]
     assert (space.paths, space.targets and space.targets.t_ns) == ((), None)
-    assert shown.opens_at_ns == opening_row(poses) == 1  # the first row that is reached
+    assert shown.opens_at_row == opening_row(poses) == 1  # the first row that is reached
     assert set(panels(present(path))) == {(True, False)}
-    assert present(path).opens_at_ns == 0
+    assert (present(path).opens_at_ns, present(path).opens_at_row) == (0, None)
 
 
 def test_the_checks_are_the_verdict(path: SolvedTargets) -> None:

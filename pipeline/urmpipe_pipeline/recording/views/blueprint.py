@@ -122,7 +122,7 @@ def _rows(plots: Plots, part: _Part) -> list[Row]:
     rows: list[Row] = []
     last: list[View | Container] = []
     if part.events:
-        first = 0 if plots.whole is None else plots.whole[0]
+        first = None if plots.whole is None else plots.whole[0]
         last.append(events_view(plots.stream, part.events, shown_path("events", part.key), first))
     for number, figure in enumerate(part.figures):
         root = shown_path("plots", part.key, str(number))
