@@ -64,7 +64,8 @@ def present(one: SolvedTargets) -> Presentation:
         verdict=one.verdict,
         facts=(*(path_facts(one, one.path) if one.path else ()), *unreached_facts(one)),
         body=body,
-        opens_at_ns=row if one.t_ns is None else int(one.t_ns[row]),
+        opens_at_ns=0 if one.t_ns is None else int(one.t_ns[row]),
+        opens_at_row=row if one.t_ns is None else None,
         scene=partial(scene, one),
         lines=(
             {
