@@ -30,7 +30,7 @@ class Shown(ABC):
 
     def _notes(self) -> Sequence[str]:
         """Return what a person should know, a line each."""
-        return [warning.message for warning in getattr(self, "warnings", ())]
+        return [str(warning) for warning in getattr(self, "warnings", ())]
 
     def _table(self) -> str:
         """Return the head of its table in HTML."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_quaternions, continuous_rotations
 from urmpipe_models.display import Shown, line_of, number_of
-from urmpipe_models.messages import Hint, Message, hint_words
+from urmpipe_models.messages import Finding, Hint, Message
 from urmpipe_models.orientation import NAMES, RotationForm, quaternions
 from urmpipe_models.spelling import Voice
 
@@ -63,9 +63,13 @@ class Inference:
         if not self.kind:
             object.__setattr__(self, "kind", self.what)
 
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+        """Return its fields for JSON, and `otherwise`."""
+        return asdict(self) | {"otherwise": self.otherwise(voice)}
+
     def otherwise(self, voice: Voice = "python") -> str:
         """Return how to have it otherwise; empty where it cannot be."""
-        return "; ".join(hint_words(self.hints, voice))
+        return ", or ".join(f"{hint.spelled(voice)} {hint.does}".strip() for hint in self.hints)
 
 
 @dataclass(frozen=True, slots=True)
@@ -97,6 +101,10 @@ class LogWarning(Message):
     def of(self, name: str) -> LogWarning:
         """Return it as one about a log or a block of this name."""
         return replace(self, about=name)
+
+    def as_finding(self) -> Finding:
+        """Return it as what is wrong, where warnings are errors."""
+        return Finding(**{one.name: getattr(self, one.name) for one in fields(self)})
 
     def place(self) -> str:
         """Return log, row and column: "log: row 5: q1"."""
@@ -248,8 +256,8 @@ class JointLog(Shown):
                 columns |= {name: values[:, i] for i, name in enumerate(names)}
         return pd.DataFrame(columns)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what the log is and how it was read, without its rows."""
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+        """Return what the log is and how it was read, without its rows; messages in somebody's words."""
         return {
             "name": self.name,
             "source": self.source,
@@ -259,6 +267,6 @@ class JointLog(Shown):
             "clock_start": self.clock_start,
             "joints": list(self.joints),
             "units": self.units,
-            "inferences": [asdict(one) for one in self.inferences],
-            "warnings": [asdict(one) for one in self.warnings],
+            "inferences": [one.to_dict(voice) for one in self.inferences],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
         }

@@ -8,6 +8,7 @@ from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.results import read_recording
@@ -18,10 +19,9 @@ from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.sources import ReadOptions
 
-COMPARISON = (
-    "found the recording of a comparison, allowed: one that ingest wrote; to hold it against another"
-    " comparison, give it alone, with --baseline OTHER.rrd"
-)
+COMPARISON = "found the recording of a comparison, allowed: one that ingest wrote"
+
+WITH_BASELINE = Hint("baseline", None, "compares it, alone, with an earlier one")
 
 SIMULATION = (
     "found the recording of a simulation, allowed: one that ingest wrote; a simulation is judged by the delta"
@@ -91,7 +91,7 @@ def load_run(
         )
     result = read_recording(operand)
     if isinstance(result, Comparison):
-        raise RecordingError(Finding(COMPARISON, file=str(operand)))
+        raise RecordingError(Finding(COMPARISON, str(operand), hints=(WITH_BASELINE,)))
     if isinstance(result, Simulation):
         raise RecordingError(Finding(SIMULATION, file=str(operand)))
     return on_robot(result, robot)

@@ -25,6 +25,7 @@ from urmpipe.guards import (
 from urmpipe.words import by_command_line
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
+from urmpipe_models.spelling import Voice
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
@@ -73,6 +74,7 @@ def compare(
     junit: PathLike | None = None,
     statistics: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
+    voice: Voice = "python",
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
     """Hold logs against a reference, and write what is named: all or none. docs/python.md has the keywords.
@@ -100,6 +102,7 @@ def compare(
         junit: A JUnit file (XML) to write.
         statistics: A table (CSV) to write, one row a log and quantity.
         inputs: Files besides the operands that are never replaced.
+        voice: In whose words `junit` tells what to give: python or command line.
         progress: Told the share of the recording that is written, 0..1.
 
     Raises:
@@ -113,7 +116,7 @@ def compare(
         "recording": output, "junit": junit, "statistics": statistics,
     }  # fmt: skip
     told = None if junit is None else Path(junit)
-    with errors_in_junit(told, kept), guarded_outputs(outputs, kept) as parts:
+    with errors_in_junit(told, kept, voice), guarded_outputs(outputs, kept) as parts:
         options = CompareOptions(_allowed(tolerance), tcp, sync, align, _with_unit(tolerance))
         level = _noise_level(noise, baseline)
         given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
@@ -126,7 +129,7 @@ def compare(
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         if told is not None:
-            write_junit(present(result), parts["junit"], told)
+            write_junit(present(result), parts["junit"], told, voice)
         if statistics is not None:
             write_table(statistics_rows(result), parts["statistics"], Path(statistics))
         return recorded(result, output, kept, progress)

@@ -164,6 +164,7 @@ def compare(
             robot=reading.arm,
             read=reading.options,
             output=target,
+            voice="command line",
             progress=progress,
             **options,
         )
@@ -171,7 +172,7 @@ def compare(
         terminal.warn(one.run.warnings, one.name)
     terminal.warn(result.warnings)
     written = {"JUnit": options["junit"], "Statistics": options["statistics"]}
-    terminal.answer(result.to_dict, lambda: _print(result, replaces, written))
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, written))
     if terminal.quiet and result.verdict == "fail":
         _tell_failure(result)
     return 0 if result.verdict == "pass" else 1

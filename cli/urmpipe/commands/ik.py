@@ -117,7 +117,9 @@ def ik(
             **options,
         )
     terminal.warn(result.warnings)
-    terminal.answer(result.to_dict, lambda: _print(result, every, reading.robot, replaces))
+    terminal.answer(
+        lambda: result.to_dict("command line"), lambda: _print(result, every, reading.robot, replaces)
+    )
     return 0 if result.verdict == "pass" else 1
 
 

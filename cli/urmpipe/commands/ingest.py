@@ -83,7 +83,9 @@ def ingest(
             **options,
         )
     terminal.warn(run.warnings)
-    terminal.answer(run.to_dict, lambda: _print(run, explain, replaces, audit, map_output))
+    terminal.answer(
+        lambda: run.to_dict("command line"), lambda: _print(run, explain, replaces, audit, map_output)
+    )
     return 0
 
 

@@ -106,8 +106,10 @@ def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked
             system, output=target, draw=draw, told=terminal.note, progress=progress, **asked
         )
     wall = perf_counter() - started
-    terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
-    terminal.answer(result.to_dict, lambda: _print(result, wall, replaces, draw))
+    terminal.warn(
+        [one for one in result.warnings if one.kind != ON_PYTHON], voice="system file"
+    )  # that is told already
+    terminal.answer(lambda: result.to_dict("system file"), lambda: _print(result, wall, replaces, draw))
     if result.failed is not None:
         say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
     return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0

@@ -14,6 +14,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets, misses
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning, seconds
 from urmpipe_pipeline.runs.results import SCHEMA
 
@@ -121,7 +122,7 @@ class InverseResult(Shown):
         columns["reason"] = [reason or "" for reason in np.array(self.reasons, dtype=np.object_)[target]]
         return pd.DataFrame(columns)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the object that `urmpipe ik --json` prints."""
         found: dict[str, Any] = {
             "schema": SCHEMA,
@@ -135,7 +136,7 @@ class InverseResult(Shown):
         }
         if self.path is not None:
             found |= self._way(self.path)
-        found["warnings"] = [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings]
+        found["warnings"] = [one.to_dict(voice) for one in self.warnings]
         return found | {"output": str(self.output) if self.output else None}
 
     def _way(self, path: JointPath) -> dict[str, Any]:

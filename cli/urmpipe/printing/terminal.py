@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
+    from urmpipe_models.spelling import Voice
     from urmpipe_pipeline.joint_log import LogWarning
 
 LISTED = 30
@@ -62,12 +63,11 @@ def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     say(f"Recording: {recording}  (open it: {pasted(command)} view {pasted(recording)}{earlier})")
 
 
-def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
+def print_warnings(warnings: Sequence[LogWarning], log: str = "", voice: Voice = "command line") -> None:
     """Print warnings on standard error, one unwrapped line each, behind the name of their log if given."""
     named = f"{log}: " if log else ""
     for warning in warnings[:LISTED]:
-        place = f"row {warning.row}: " if warning.row is not None else ""
-        say(f"warning: {named}{place}{warning.message}", err=True)
+        say(f"warning: {named}{warning.words(voice)}", err=True)
     if len(warnings) > LISTED:
         say(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
 

@@ -12,9 +12,10 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import FORMS, RotationForm, width
 from urmpipe_pipeline.joint_log import Inference, LogWarning, SourceFile
-from urmpipe_pipeline.sources.clocks.clock import even_clock
+from urmpipe_pipeline.sources.clocks.clock import even_clock, unused_period
 from urmpipe_pipeline.sources.columns.columns import columns_of, listed
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan, make_plan
@@ -23,7 +24,7 @@ from urmpipe_pipeline.sources.tables.text import fingerprint
 from urmpipe_pipeline.sources.targets.row_faults import Rows, read_rows
 from urmpipe_pipeline.sources.targets.sniff_targets import sniff_targets
 from urmpipe_pipeline.sources.targets.target_rotation import rotation_units, target_form, target_rotations
-from urmpipe_pipeline.sources.units.rotation import PURE
+from urmpipe_pipeline.sources.units.rotation import form_inference
 from urmpipe_pipeline.sources.units.units import LONGEST_REACH, UnitFinder
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
@@ -113,7 +114,7 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
 
 
 def _plain_length(asked: ReadOptions) -> tuple[ReadOptions, Unit | None]:
-    """Return the options without a plain length (--unit mm), and that unit, which is of x, y, z here."""
+    """Return the options without a plain length (mm), and that unit, which is of x, y, z here."""
     unit = vocabulary().unit(asked.units.get("", ""))
     if unit is None or unit.quantity != "length" or unit.order:
         return asked, None
@@ -146,8 +147,7 @@ def _poses(plan: Plan, rows: Rows, form: RotationForm | None) -> _Poses:
     rotation, none = target_rotations(columns, form, turned * [unit.factor for unit in units])
     position[list(none)] = np.nan
     faults = {**rows.faults, **{index + 1: said for index, said in none.items()}}
-    shown = f"{form}{'' if units[0] == PURE else f' in {units[0].name}'}"
-    found = Inference(f"form of {listed(columns)}", shown, "their names, or as given")
+    found = form_inference([column.header for column in columns], form, units[0], "their names, or as given")
     ordered = {row: faults[row] for row in sorted(faults)}
     return _Poses(position, rotation, ordered, (*finder.inferences, found), (*warnings, *assumed))
 
@@ -166,7 +166,8 @@ def _length_units(plan: Plan, finder: UnitFinder, values: FloatArray) -> tuple[l
     if told or not LONGEST_REACH < nearest < np.inf:
         return units, []
     said = f"no unit is given for {listed(columns)}: they are taken as m, though every row is beyond any arm"
-    return units, [LogWarning("assumed-unit", f"{said}; --unit mm says otherwise")]
+    hints = (Hint("unit", {"": "mm"}, "reads them otherwise"),)
+    return units, [LogWarning("assumed-unit", said, hints=hints)]
 
 
 def _finite(values: FloatArray) -> FloatArray:
@@ -178,15 +179,15 @@ def _times(
     rows: Rows, tsp: float | None, period: float | None
 ) -> tuple[IntArray | None, int, tuple[Inference, ...], list[LogWarning]]:
     """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say."""
-    step, option = (period, "--period") if tsp is None else (tsp, "--tsp")
+    step, keyword = (period, "period") if tsp is None else (tsp, "tsp")
     if rows.clock is None and step is None:
         return None, 0, (), []
     if rows.clock is None:
-        times, said, noticed = even_clock(len(rows.values), step, option)
+        times, said, noticed = even_clock(len(rows.values), step, keyword)
         return times, 0, said, noticed
     start = int(rows.clock[0])
-    unused = f"{option} is not used, since the file has a clock; --time none leaves that out"
-    return rows.clock - start, start, (), [LogWarning("period-not-used", unused)] if step is not None else []
+    unused = [] if step is None else [unused_period(keyword)]
+    return rows.clock - start, start, (), unused
 
 
 def _refuse_unclear(plan: Plan, *, named: bool) -> None:
@@ -209,18 +210,15 @@ def _refuse_unclear(plan: Plan, *, named: bool) -> None:
         time = " beside the time" if plan.clock.columns else ""
         count = cells - len(plan.clock.columns)
         found = f"found {count} columns without names{time}, allowed: x, y, z alone or with an orientation"
-        raise LogError(Finding(f"{found}; {_remedy(count, timed=bool(time))}", file))
+        raise LogError(Finding(found, file, hints=tuple(_remedies(count, timed=bool(time)))))
 
 
-def _remedy(count: int, *, timed: bool) -> str:
-    """Return what tells so many columns without names: a header, the form of the orientation, the time."""
-    remedies = ["name the columns in a header"]
-    forms = [form for form in FORMS if 3 + width(form) == count]
-    if forms:
-        remedies.append(f"say which with --rotation {'|'.join(forms)}")
+def _remedies(count: int, *, timed: bool) -> Iterator[Hint]:
+    """Yield what tells so many columns without names: a header, the form of the orientation, the time."""
+    yield Hint("", does="name the columns in a header")
+    yield from (Hint("rotation", form, "says which") for form in FORMS if 3 + width(form) == count)
     if not timed and count - 1 in {3, *(3 + width(form) for form in FORMS)}:
-        remedies.append("say --time 1 if the first is the time")
-    return ", or ".join(remedies)
+        yield Hint("time", "1", "if the first is the time")
 
 
 def _about_file(plan: Plan) -> Iterator[Inference]:

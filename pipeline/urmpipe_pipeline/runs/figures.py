@@ -44,7 +44,7 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
     if not run.log.joints:
         return
     joints = f"Joint values of {run.name} over time: {', '.join(run.log.joints)}."
-    after = joint_panels(run, "joints", run.q, run.t_ns, _marks(run))
+    after = joint_panels(run, "after" if run.audit else "joints", run.q, run.t_ns, _marks(run))
     if not run.audit:
         said = "No joint had to be repolarized: the values are those of the file."
         yield Figure("Joints", said, f"{joints} {said}", (View("Joints, no repolarization needed", after),))
@@ -102,9 +102,8 @@ def speed_figure(name: str, t_ns: IntArray, speed: FloatArray) -> Figure:
     """
     title = "Speed of the tool centre point"
     panel = Panel("‖v‖", "m/s", (Line(speed, ("speed",), NORM),), t_ns, signed=False)
-    return Figure(
-        title, "The norm of its velocity.", f"{title} of {name}.", (View(title, (panel,)),), share=2.0
-    )
+    alt = f"{title} of {name} over time: the norm of its velocity."
+    return Figure(title, "The norm of its velocity.", alt, (View(title, (panel,)),), share=2.0)
 
 
 def motion_figure(run: Run) -> Iterator[Figure]:
@@ -117,7 +116,13 @@ def motion_figure(run: Run) -> Iterator[Figure]:
         return
     if run.tcp is None:
         caption = "As the log recorded it: without a robot there are no kinematics."
-        yield Figure("Motion", caption, f"Motion of {run.name} over time.", tuple(views), share=2.2)
+        yield Figure(
+            "Motion",
+            caption,
+            f"Motion over time, as the log {run.name} recorded it.",
+            tuple(views),
+            share=2.2,
+        )
         return
     point = point_name(run)
     yield Figure(
@@ -136,15 +141,13 @@ def point_name(run: Run) -> str:
     return f"p{len(run.robot.joints)}" if run.robot is not None else "p"
 
 
-def coordinates(values: FloatArray, symbol: str, words: str = "") -> Line:
-    """Return x, y and z of something in their colours.
+def coordinates(values: FloatArray) -> Line:
+    """Return x, y and z of something in their colours, by these names in all panels.
 
     Args:
-        values: In any unit, shape (n, 3).
-        symbol: Its letter.
-        words: What stands behind the names.
+        values: Shape (n, 3).
     """
-    return Line(values, tuple(f"{symbol}{axis}{words}" for axis in "xyz"), COORDINATES)
+    return Line(values, tuple("xyz"), COORDINATES)
 
 
 def _derivatives(run: Run) -> Iterator[View]:
@@ -155,10 +158,10 @@ def _derivatives(run: Run) -> Iterator[View]:
 
 def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     """Yield the views of the tool centre point by kinematics."""
-    yield View("TCP", (Panel(point_name(run), "m", (coordinates(tcp.position, "p"),), run.t_ns),))
-    yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity, "v"),), run.t_ns),))
+    yield View("TCP", (Panel(point_name(run), "m", (coordinates(tcp.position),), run.t_ns),))
+    yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), run.t_ns),))
     size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
-    lines = (coordinates(tcp.acceleration, "a"), size)
+    lines = (coordinates(tcp.acceleration), size)
     yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
     angles = continuous_euler(np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx))
     euler = Line(angles, tuple(EULER), tuple(EULER.values()))
@@ -170,7 +173,7 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
 def _recorded(run: Run) -> Iterator[View]:
     """Yield position and orientation as a log without kinematics recorded them itself."""
     if run.tcp_recorded is not None:
-        yield View("Recorded TCP", (Panel("p", "m", (coordinates(run.tcp_recorded, "p"),), run.t_ns),))
+        yield View("Recorded TCP", (Panel("p", "m", (coordinates(run.tcp_recorded),), run.t_ns),))
     if (values := run.rotation_recorded) is not None:
         names = run.rotation_names  # a quaternion has no unit
         line = Line(values, names, tuple(map(joint_colour, range(len(names)))))

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,6 +13,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.orientation import NAMES, angles
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, seconds
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
@@ -146,7 +147,7 @@ class Run(Shown):
             columns |= {name: self.tcp.euler_zyx[:, i] for i, name in enumerate(("rz", "ry", "rx"))}
         return pd.DataFrame(columns)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the object that `urmpipe ingest --json` prints."""
         return {
             "schema": SCHEMA,
@@ -161,9 +162,9 @@ class Run(Shown):
             "source": self.log.source,
             "robot": self.robot.name if self.robot else None,
             "units": dict(self.log.units),
-            "inferences": [asdict(inference) for inference in self.log.inferences],
+            "inferences": [one.to_dict(voice) for one in self.log.inferences],
             "repolarizations": [entry.to_dict() for entry in self.repolarizations],
             "audit": [entry.to_dict() for entry in self.audit],
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }

@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, for_each
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.checks import (
     MOST_SKIPPED,
@@ -100,22 +101,22 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     places = [column.index for column in columns]
     numbers = read_table(layout, places, clock.parts)
     unread = f"{len(numbers.unread)} of {len(numbers.values)} rows cannot be read"
-    hint, warnings = "", _about_other_lines(layout, numbers)
+    too_many, warnings = None, _about_other_lines(layout, numbers)
+    file = str(layout.segment.path)
     if skip_bad and may_skip(numbers):
         numbers, skipped = without_unread(numbers)
         warnings += skipped
     elif skip_bad and numbers.unread:
-        hint = f"{unread}, allowed with --skip-bad: {MOST_SKIPPED:.0%} of them"
+        too_many = Finding(unread, file, parameter="skip_bad", allowed=f"{MOST_SKIPPED:.0%} of them")
     elif may_skip(numbers):
-        hint = f"{unread}; --skip-bad leaves them out"
+        too_many = Finding(unread, file, hints=(Hint("skip_bad", True, "leaves them out"),))
     numbers = rebuilt(trimmed(timed(layout, clock.parts, numbers)))
-    file = str(layout.segment.path)
     if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
         raise LogError(Finding(message, file))
     findings = find_errors(layout, numbers, [column.header for column in columns], clock)
     if findings:
-        raise LogError(*findings, *([Finding(hint, file)] if hint else []))
+        raise LogError(*findings, *([too_many] if too_many else []))
     return replace(numbers, warnings=(*warnings, *numbers.warnings))
 
 

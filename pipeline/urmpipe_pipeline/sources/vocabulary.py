@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal
@@ -72,6 +72,7 @@ class Container:
     suffixes: tuple[str, ...]
     magic: tuple[bytes, ...]
     advice: str
+    parameters: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -209,4 +210,5 @@ def _container(entry: Mapping[str, Any]) -> Container:
         tuple(entry["suffixes"]),
         tuple(magic.encode("latin-1") for magic in entry["magic"]),
         entry["advice"],
+        entry.get("parameters", {}),
     )

@@ -172,17 +172,15 @@ def test_single_poses_are_no_motion_to_be_compared_with() -> None:
     poses = solved("poses", UR5E, None, way(50))
     motion = solved("motion", UR5E, np.arange(50) * STEP_NS, way(50))
     said = (
-        "found targets without times, which are no motion; allowed: a log or a path of its own times;"
-        " urmpipe ik --tsp S gives the targets some"
+        "found targets without times, which are no motion, allowed: a log or a path of its own times;"
+        " ik(tsp=SECONDS) gives the targets some"
     )
     for reference, runs in ((motion, [poses]), (poses, [motion]), (poses, [poses, motion])):
         with pytest.raises(LogError) as error:
             compare_runs(reference, runs)
-        assert {one.message for one in error.value.findings} == {said}
+        assert {one.sentence() for one in error.value.findings} == {said}
         assert {one.file for one in error.value.findings} == {"poses"}
-    with pytest.raises(
-        OptionError, match=r"^--sync: found 0.5 of targets without times, allowed: start, row"
-    ):
+    with pytest.raises(OptionError, match=r"^sync: found 0.5 of targets without times, allowed: start, row"):
         compare_runs(poses, [poses], CompareOptions(sync=0.5))
     for k in (0, 7):
         moved = way(50)

@@ -165,13 +165,11 @@ def test_options_say_what_a_header_does_not(read: Read) -> None:
     assert said(read(text)) == [
         (
             "assumed-unit",
-            "no unit is given for x, y, z: they are taken as m, though every row is beyond any arm;"
-            " --unit mm says otherwise",
+            "no unit is given for x, y, z: they are taken as m, though every row is beyond any arm",
         ),
         (
             "assumed-unit",
-            "no unit is given for rx, ry, rz: they are taken as rad, though most are beyond a turn;"
-            " --unit rx=deg says otherwise",
+            "no unit is given for rx, ry, rz: they are taken as rad, though most are beyond a turn",
         ),
     ]
 
@@ -189,8 +187,7 @@ def test_rx_ry_rz_may_be_a_rotation_vector_and_the_option_is_named(read: Read) -
     assert said(targets) == [
         (
             "assumed-rotation",
-            "rx, ry, rz are taken as angles about the moving axes Z, Y, X (rz, ry, rx);"
-            " --rotation vector if they are a rotation vector, as UR writes",
+            "rx, ry, rz are taken as angles about the moving axes Z, Y, X (rz, ry, rx)",
         )
     ]
     vector = read(text, rotation="vector")
@@ -199,7 +196,11 @@ def test_rx_ry_rz_may_be_a_rotation_vector_and_the_option_is_named(read: Read) -
     assert said(vector) == []
 
 
-MAP = 'a map (--map) says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+MAP = 'log_map=FILE.toml says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+
+
+def _forms(*forms: str) -> str:
+    return " or ".join(f'rotation="{form}"' for form in forms) + " says which"
 
 
 @pytest.mark.parametrize("names", ["W,P,R", "alpha,beta,gamma", "r11,r12,r13,r21", "j1,j2,j3,j4,j5,j6"])
@@ -207,7 +208,7 @@ def test_columns_that_may_be_an_orientation_are_not_left_out_in_silence(read: Re
     cells = ",".join("1" for _ in names.split(","))
     targets = read(f"nr,note,t,x,y,z,{names}\n1,home,0,0.3,0.1,0.5,{cells}\n")
     listed = names.replace(",", ", ")
-    told = f"x, y, z are targets without an orientation: {listed} are not used; {MAP}"
+    told = f"x, y, z are targets without an orientation: {listed} are not used"
     assert said(targets) == [("columns-not-used", told)]
     named = read(f"x,y,z,{names}\n0.3,0.1,0.5,{cells}\n", position=("x", "y", "z"))
     assert (named.rotation, said(named)) == (None, [])
@@ -215,7 +216,7 @@ def test_columns_that_may_be_an_orientation_are_not_left_out_in_silence(read: Re
 
 def test_a_form_without_an_orientation_is_refused(wrong: Wrong) -> None:
     assert wrong("x,y,z,W,P,R\n1,2,3,0,0,0\n", rotation="rpy") == [
-        "targets.csv: --rotation: found rpy given for x, y, z and no orientation, allowed: its columns beside"
+        "targets.csv: rotation: found rpy given for x, y, z and no orientation, allowed: its columns beside"
         f" them; {MAP}"
     ]
     assert wrong("x,y,z,u,v,w\n1,2,3,0,0,0\n", orientation=("u", "v", "w")) == [
@@ -255,16 +256,14 @@ def test_more_columns_without_names_need_an_even_time_or_the_form_of_the_orienta
     without = (
         "columns without names, allowed: x, y, z alone or with an orientation; name the columns in a header"
     )
+    first = 'time="1" if the first is the time'
     assert wrong(six) == [
-        f"targets.csv: found 6 {without}, or say which with --rotation vector|rpy|zyx|xyz|zyz|zxz"
+        f"targets.csv: found 6 {without}; {_forms('vector', 'rpy', 'zyx', 'xyz', 'zyz', 'zxz')}"
     ]
     assert wrong("0.3 0.1 0.5 2 0 0 0\n") == [
-        f"targets.csv: found 7 {without}, or say which with --rotation quat_xyzw|quat_wxyz, or say --time 1"
-        " if the first is the time"
+        f"targets.csv: found 7 {without}; {_forms('quat_xyzw', 'quat_wxyz')}; {first}"
     ]
-    assert wrong("0.3 0.1 0.5 2\n") == [
-        f"targets.csv: found 4 {without}, or say --time 1 if the first is the time"
-    ]
+    assert wrong("0.3 0.1 0.5 2\n") == [f"targets.csv: found 4 {without}; {first}"]
     assert wrong("0.3 0.1 0.5 0 1\n") == [f"targets.csv: found 5 {without}"]
     assert_turned(read(six, rotation="zyx"), [R, R])
     seven = "".join(
@@ -272,7 +271,7 @@ def test_more_columns_without_names_need_an_even_time_or_the_form_of_the_orienta
     )
     assert wrong(seven) == [
         "targets.csv: found 4, 5, 6, 7, which may be quat_xyzw or quat_wxyz, allowed: one form;"
-        " --rotation quat_xyzw or --rotation quat_wxyz says which"
+        f" {_forms('quat_xyzw', 'quat_wxyz')}"
     ]
     assert_turned(read(seven, rotation="quat_wxyz"), [R] * 3)
     assert wrong(seven.split("\n")[0]) == wrong(seven)
@@ -286,5 +285,5 @@ def test_of_columns_without_names_the_form_tells_the_time_by_their_number(read: 
     assert_turned(targets, [np.eye(3)] * 3)
     assert wrong("".join(row[:15] + "\n" for row in rows)) == [
         "targets.csv:1: found a first column that increases from row to row, which may be the time or"
-        " a counter: say --time 1 or --time none"
+        ' a counter; time="1" or time="none" says which'
     ]

@@ -45,7 +45,7 @@ def test_targets_without_times_are_frames_and_no_way(make_solved: MakeSolved, tm
     ]
     assert static(path, "/targets/frames", "LineStrips3D:colors") == packed[:3] * 40  # x, y, z
     drawn = {chunk.entity_path for chunk in RrdReader(path).store().stream().filter(content="/targets/**")}
-    assert drawn == {f"/targets/{leaf}" for leaf in ("frames", "missed", "position", "quat_xyzw")}
+    assert drawn == {f"/targets/{leaf}" for leaf in ("frames", "missed")}
     assert scene_of(run).ways[0].strips == ()
 
 

@@ -93,4 +93,4 @@ def test_there_is_no_scene_without_positions(make_run: MakeRun, tmp_path: Path) 
     assert scene_of(run).empty
     path = write_recording(run, tmp_path / "run.rrd")
     entities = {chunk.entity_path.split("/")[1] for chunk in RrdReader(path).store().stream()}
-    assert entities == {"__properties", "events", "joints", "marks", "summary"}
+    assert entities == {"__properties", "events", "log", "marks", "q", "qd", "qdd", "summary"}

@@ -98,7 +98,7 @@ def test_meshes_are_in_the_recording_and_not_in_its_metadata(
     blob = column(path, "/robot/joint/turn3/visual\\ 1", "Asset3D:blob")
     assert bytes(blob.reshape(-1).astype(np.uint8)) == mesh.read_bytes()
     told = json.loads(Store(path).metadata)["result"]["robot"]["visuals"][3]
-    assert (told["mesh"], told["scale"]) == (str(mesh), [1.0, 1.0, 1.0])
+    assert told["shape"] == {"$is": "Mesh", "file": str(mesh), "scale": [1.0, 1.0, 1.0]}
 
 
 def test_an_arm_read_back_looks_as_it_did_and_without_its_meshes_has_lines(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import pytest
 
@@ -33,11 +34,17 @@ def judged(title: str, verdict: Verdict, used: float | None, *facts: Fact) -> Se
     return Section(title, verdict, (off(used, verdict), *facts))
 
 
-def toy(name: str, verdict: Verdict, *sections: Section, word: str = "", **more: object) -> Presentation:
-    body = Section(f"Toy {name}", verdict, tables=more.pop("tables", ()), sections=sections)  # type: ignore[arg-type]
-    return Presentation(
-        name, f"{name} came out", verdict, (Fact("Which", Ref(f"{name}-1")),), body, word, **more
-    )  # type: ignore[arg-type]
+def toy(
+    name: str,
+    verdict: Verdict,
+    *sections: Section,
+    word: str = "",
+    tables: tuple[Table, ...] = (),
+    **more: Any,
+) -> Presentation:
+    body = Section(f"Toy {name}", verdict, tables=tables, sections=sections)
+    facts = (Fact("Which", Ref(f"{name}-1")),)
+    return Presentation(name, f"{name} came out", verdict, facts, body, word, **more)
 
 
 def names(page: Page) -> list[str]:

@@ -151,7 +151,7 @@ def test_a_merge_conflict_is_named_once(wrong: Wrong) -> None:
         " or an empty, Null or NaN cell where a sample is missing",
     ]
     text = joined(*rows(100), *both, *rows(30, 1.3), "1.7,x,0.5", *rows(9, 1.8))
-    assert wrong(text) == [*said, "log.csv: 1 of 203 rows cannot be read; --skip-bad leaves them out"]
+    assert wrong(text) == [*said, "log.csv: 1 of 203 rows cannot be read; skip_bad=True leaves them out"]
     assert wrong(text, skip_bad=True) == said[:1]
 
 
@@ -211,7 +211,7 @@ def test_rows_that_cannot_be_read_are_left_out_if_asked_for(read: Read, wrong: W
         "log.csv:503: found 1 cell ('(paused)'), allowed: 3",
     ]
     assert wrong(joined(*lines)) == [
-        *said, "log.csv: 3 of 1000 rows cannot be read; --skip-bad leaves them out"
+        *said, "log.csv: 3 of 1000 rows cannot be read; skip_bad=True leaves them out"
     ]  # fmt: skip
     log = read(joined(*lines), skip_bad=True)
     kept = np.delete(np.arange(1000), [100, 500, 501])
@@ -240,7 +240,7 @@ def test_no_more_than_one_row_in_a_hundred_is_left_out(read: Read, wrong: Wrong)
     assert read(joined(*lines), skip_bad=True).rows == 297
     lines[221] = "torn"
     assert wrong(joined(*lines), skip_bad=True)[-1] == (
-        "log.csv: 4 of 300 rows cannot be read, allowed with --skip-bad: 1% of them"
+        "log.csv: skip_bad: 4 of 300 rows cannot be read: allowed: 1% of them"
     )
 
 

@@ -168,15 +168,16 @@ def test_an_order_that_makes_no_difference_is_taken_and_told(read: Read) -> None
 def test_an_order_that_nothing_tells_is_asked_for(read: Read, wrong: Wrong) -> None:
     text = clocked("01/02/2021 23:59:59", "02/02/2021 00:00:01", "03/02/2021 00:00:02")
     assert wrong(text) == [
-        "log.csv:2, column timestamp: found '01/02/2021 23:59:59', which may be date and time, day first or"
-        " date and time, month first: say which with --unit timestamp=dmy or --unit timestamp=mdy"
+        "log.csv:2, column timestamp: found '01/02/2021 23:59:59', which may be date and time, day"
+        ' first or date and time, month first; unit={"timestamp": "dmy"} or unit={"timestamp": "mdy"}'
+        " says which"
     ]
     assert read(text, units={"timestamp": "dmy"}).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
     assert read(text, units={"timestamp": "mdy"}).clock_start_ns == unix(2021, 1, 2, 23, 59, 59)
     header = text.replace("timestamp", "Date (dd/mm/yyyy)")
     assert read(header).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
     assert wrong(text, units={"timestamp": "ms"}) == [
-        "--unit: found ms for the time 'timestamp', allowed: dmy, mdy"
+        "unit: found ms for the time 'timestamp', allowed: dmy, mdy"
     ]
 
 
@@ -206,9 +207,9 @@ def test_zero_padded_digits_behind_a_colon_are_decimals(read: Read) -> None:
 def test_digits_behind_a_colon_that_nothing_tells_are_asked_for(read: Read, wrong: Wrong) -> None:
     text = clocked("10:11:32:100", "10:11:32:105", "10:11:32:110", name="Time")
     assert wrong(text) == [
-        "log.csv:2, column Time: found '10:11:32:100', which may be time of day, decimals behind the last"
-        " colon or time of day, microseconds behind the last colon: say which with --unit Time=s or"
-        " --unit Time=us"
+        "log.csv:2, column Time: found '10:11:32:100', which may be time of day, decimals behind the"
+        ' last colon or time of day, microseconds behind the last colon; unit={"Time": "s"} or'
+        ' unit={"Time": "us"} says which'
     ]
     assert read(text, units={"Time": "us"}).t_ns.tolist() == [0, 5 * US, 10 * US]
     assert read(text, units={"Time": "ms"}).t_ns.tolist() == [0, 5 * MS, 10 * MS]
