@@ -163,9 +163,10 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
     lines = (coordinates(tcp.acceleration), size)
     yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
-    angles = continuous_euler(np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx))
-    euler = Line(angles, tuple(EULER), tuple(EULER.values()))
-    tinted = tcp.singular if np.any(tcp.singular) else None
+    tinted = np.asarray(tcp.singular) if np.any(tcp.singular) else None
+    angles = np.asarray(tcp.euler_zyx)
+    defined = angles if tinted is None else np.where(tinted[:, np.newaxis], np.nan, angles)
+    euler = Line(continuous_euler(defined), tuple(EULER), tuple(EULER.values()))
     panel = Panel("rz, ry, rx", "rad", (euler,), run.t_ns, tinted=tinted)
     yield View("TCP rz, ry, rx", (panel,))
 
