@@ -34,7 +34,6 @@ if TYPE_CHECKING:
     from urmpipe.api.view import view as view
     from urmpipe.api.write_map import write_map as write_map
     from urmpipe.edge import UrmpipeWarning as UrmpipeWarning
-    from urmpipe.inverse.result import InverseResult as InverseResult
     from urmpipe_fmus.build import BuiltFmu as BuiltFmu
     from urmpipe_models.chains.chain import Chain as Chain
     from urmpipe_models.errors import CosimulationError as CosimulationError
@@ -55,6 +54,7 @@ if TYPE_CHECKING:
     from urmpipe_pipeline.joint_log import JointLog as JointLog
     from urmpipe_pipeline.runs.results import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
+    from urmpipe_pipeline.solved_targets.result import SolvedTargets as SolvedTargets
     from urmpipe_pipeline.sources import LogMap as LogMap
     from urmpipe_pipeline.sources import ReadOptions as ReadOptions
     from urmpipe_pipeline.tables import Exported as Exported
@@ -69,7 +69,7 @@ _HOME = {
     "Deviation": "urmpipe_pipeline.comparison.deviation",
     "Exported": "urmpipe_pipeline.tables",
     "FmuError": "urmpipe_models.errors",
-    "InverseResult": "urmpipe.inverse.result",
+    "SolvedTargets": "urmpipe_pipeline.solved_targets.result",
     "JointLog": "urmpipe_pipeline.joint_log",
     "LogError": "urmpipe_models.errors",
     "LogMap": "urmpipe_pipeline.sources",

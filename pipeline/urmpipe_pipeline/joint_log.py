@@ -18,6 +18,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
+ROW_NS = 1_000_000_000
+"""How much of `t_ns` a row without a time counts: `t` is then the number of the row from 0, and no time."""
+
+
 def seconds(nanoseconds: IntArray) -> FloatArray:
     """Return integer `nanoseconds` as [s], each rounded once, of the same shape."""
     return np.true_divide(nanoseconds, 1e9, dtype=np.float64)
@@ -155,7 +159,8 @@ class JointLog(Shown):
         name: The file's stem.
         source: Which reader read it, such as "coppeliasim" or "table".
         files: The files it came from.
-        t_ns: Time of each row in integer [ns] from the first row, shape (n,), strictly increasing.
+        t_ns: Time of each row in integer [ns] from the first row, shape (n,), strictly increasing; of rows
+            without times their number from 0, `ROW_NS` a row.
         clock_start_ns: The file's own clock at the first row in integer [ns].
         joints: Names of the joint columns, in the robot's order.
         q: Joint values in [rad] or [m], shape (n, joints); NaN where a sample is missing.
@@ -169,6 +174,7 @@ class JointLog(Shown):
         digits: Significant digits of the joint values where the file was seen to be quantised.
         inferences: What the reader found out.
         warnings: What a person should know.
+        timed: Whether the rows have times; else they are poses that no motion joins.
     """
 
     name: str
@@ -188,6 +194,7 @@ class JointLog(Shown):
     digits: int | None = None
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
+    timed: bool = True
 
     @property
     def t(self) -> FloatArray:
@@ -239,7 +246,7 @@ class JointLog(Shown):
     def _headline(self) -> str:
         """Return its name, its source and how long it is."""
         joints = number_of(len(self.joints), "joint") if self.joints else "a path"
-        rows = f"{number_of(self.rows, 'row')} {self.period:g} s apart"
+        rows = number_of(self.rows, "row") + (f" {self.period:g} s apart" if self.timed else "")
         return line_of(self.name, self.source, joints, rows)
 
     def to_frame(self) -> pd.DataFrame:

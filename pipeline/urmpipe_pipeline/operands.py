@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
@@ -17,6 +18,7 @@ from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.sources import ReadOptions
 
 COMPARISON = "found the recording of a comparison, allowed: one that ingest wrote"
@@ -29,8 +31,12 @@ SIMULATION = (
 )
 
 
+MadeRun: TypeAlias = Run | SolvedTargets
+"""Results that are a run, or have one."""
+
+
 def load_runs(
-    operands: Sequence[Path | Run],
+    operands: Sequence[Path | MadeRun],
     *,
     robot: Chain | None = None,
     read: ReadOptions | None = None,
@@ -40,7 +46,7 @@ def load_runs(
     """Return the runs of several operands; the reading options hold for every log among them.
 
     Args:
-        operands: Recordings, logs, paths, folders; runs as they are.
+        operands: Recordings, logs, paths, folders; runs, and solved targets as theirs.
         robot: The arm; of a recording or a run it replaces the one inside.
         read: How to read the CSV files, all of them.
         tsp: Period of the grid in [s], of the CSV files.
@@ -50,10 +56,10 @@ def load_runs(
         UrmpipeError: With everything that is wrong with any of them.
     """
 
-    def run_of(operand: Path | Run) -> Run:
+    def run_of(operand: Path | MadeRun) -> Run:
         """Return the run that an operand is, or is read as."""
-        if isinstance(operand, Run):
-            return on_robot(operand, robot)
+        if not isinstance(operand, Path):
+            return on_robot(operand.as_run(), robot)
         try:
             return load_run(operand, robot=robot, read=read, tsp=tsp, derivative=derivative)
         except LogError as error:  # of several logs, each is named
@@ -94,7 +100,7 @@ def load_run(
         raise RecordingError(Finding(COMPARISON, str(operand), hints=(WITH_BASELINE,)))
     if isinstance(result, Simulation):
         raise RecordingError(Finding(SIMULATION, file=str(operand)))
-    return on_robot(result, robot)
+    return on_robot(result.as_run(), robot)
 
 
 def load_comparison(operand: Path) -> Comparison | None:

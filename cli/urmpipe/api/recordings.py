@@ -37,7 +37,7 @@ def write_recording(
     """Write the recording of a result, read it back, and put it in its place.
 
     Args:
-        result: What `ingest`, `compare` or `simulate` returned.
+        result: What `ingest`, `compare`, `simulate` or `ik` returned.
         output: The recording (.rrd) to write; replaced if it is one of urmpipe's.
         inputs: Files that are never replaced.
         progress: Told the share of the recording that is written, 0..1.

@@ -138,7 +138,7 @@ def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOptio
 
     Single poses are held against single poses row by row; any other offset would interpolate between them.
     """
-    single = [run for run in (reference, *runs) if run.single_poses]
+    single = [run for run in (reference, *runs) if not run.timed]
     if single and len(single) <= len(runs):
         said = "found targets without times, which are no motion, allowed: a log or a path of its own times"
         hint = Hint("tsp", None, "gives the targets some", call="ik")

@@ -46,7 +46,7 @@ def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
             said = f"{found.quantity}: judged at {found.samples} of {len(one.sample)} compared samples"
             told = f"{said}; a sample without a value is out of tolerance"
             yield LogWarning("partly-judged", told, about=one.name)
-    if not one.run.single_poses and _rests(one):
+    if one.run.timed and _rests(one):
         said = f"{text.counted(len(one.sample), 'sample')} compared, all in one pose"
         yield LogWarning("one-pose", f"{said}: the verdict is on that pose alone", about=one.name)
 

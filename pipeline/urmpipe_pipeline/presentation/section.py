@@ -240,6 +240,7 @@ class Presentation:
         facts: The few facts that explain the headline.
         body: Everything else.
         opens_at_ns: Where the viewer opens in [ns].
+        opens_at_row: The row, from 0, at which it opens instead where the result has no times; else None.
         scene: Returns the 3D view; called only where it is drawn.
         lines: Its rows among those of several results, by their heads; the first cell names a row, and rows
             of one name stand below each other.
@@ -254,6 +255,7 @@ class Presentation:
     body: Section
     word: str = ""
     opens_at_ns: int = 0
+    opens_at_row: int | None = None
     scene: Callable[[], Scene | None] | None = None
     lines: tuple[Mapping[str, Cell], ...] = ()
     rows: Callable[[], Table] | None = None

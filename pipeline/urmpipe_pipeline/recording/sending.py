@@ -45,7 +45,7 @@ def times_column(t_ns: IntArray) -> TimeColumn:
 
 
 def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
-    """Return the times of some rows on the timeline t; on the timeline row where there are none.
+    """Return the times of some rows on the timeline t; on the timeline row, from 1, where there are none.
 
     Args:
         t_ns: Times of all rows in integer [ns], shape (n,); None without times.
@@ -54,7 +54,7 @@ def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
     import rerun as rr
 
     if t_ns is None:
-        return [rr.TimeColumn("row", sequence=rows)]
+        return [rr.TimeColumn("row", sequence=np.asarray(rows) + 1)]
     return [times_column(np.asarray(t_ns)[rows])]
 
 

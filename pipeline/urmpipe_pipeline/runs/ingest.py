@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -16,7 +16,7 @@ from urmpipe_models.kinematics.forward import PointLog, point_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.meshes import missing_visuals
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.provenance import Provenance, provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree
 from urmpipe_pipeline.runs.grid import Grid, make_grid
@@ -77,7 +77,15 @@ def ingest_log(
         "derivative": derivative,
         "read": _given(options),
     }
-    return run_of(log, robot, options, tsp=tsp, derivative=derivative, name=name, made=("ingest", given))
+    return run_of(
+        log,
+        robot,
+        options,
+        tsp=tsp,
+        derivative=derivative,
+        name=name,
+        made=provenance("ingest", given, log.files),
+    )
 
 
 def run_of(
@@ -85,7 +93,7 @@ def run_of(
     robot: Chain | None,
     options: ReadOptions,
     *,
-    made: tuple[str, Mapping[str, Any]],
+    made: Provenance,
     tsp: float | None = None,
     derivative: Method | None = None,
     name: str | None = None,
@@ -96,7 +104,7 @@ def run_of(
         log: The log, its times strictly increasing.
         robot: The arm, with base and tool; None for no kinematics.
         options: How it was read: `interval`, `repair` and `period` matter here.
-        made: Which command makes the run, and the options it was given.
+        made: How to repeat it.
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
         name: What to call it; default: the log's name.
@@ -130,7 +138,7 @@ def run_of(
         tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
         audit=found.entries,
         warnings=(*warnings, *noticed),
-        provenance=provenance(*made, log.files),
+        provenance=made,
     )
 
 

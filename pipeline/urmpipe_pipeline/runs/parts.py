@@ -37,11 +37,23 @@ def log_facts(run: Run) -> tuple[Fact, ...]:
     return (
         Fact("Robot", robot_words(run)),
         Fact("Source", run.log.source, brief=False),
-        Fact("Rows", f"{run.log.rows} every {text.seconds(run.log.period)} s"),
-        Fact("Grid", f"{len(run.t_ns)} samples every {text.seconds(run.tsp)} s"),
-        Fact("Duration", Value(run.duration, "s")),
+        *_time_facts(run),
         recording_fact(run.recording),
     )
+
+
+def _time_facts(run: Run) -> Iterator[Fact]:
+    """Yield how many rows a log has, how far apart, and how long it is."""
+    if not run.timed:
+        yield Fact("Rows", f"{run.log.rows}, without times")
+        return
+    for name, count, noun, period in (
+        ("Rows", run.log.rows, "row", run.log.period),
+        ("Grid", len(run.t_ns), "sample", run.tsp),
+    ):
+        every = f" every {text.seconds(period)} s" if count > 1 else ""
+        yield Fact(name, f"{text.counted(count, noun)}{every}")
+    yield Fact("Duration", Value(run.duration, "s"))
 
 
 def robot_words(run: Run) -> str:
@@ -116,7 +128,7 @@ def log_events(run: Run) -> Iterator[Event]:
         yield Event(round(entry.t * 1e9), f"{entry.joint} {_entry_words(entry)}", level)
     for one in run.warnings:
         row = int(np.clip((one.row or 1) - 1, 0, run.log.rows - 1))
-        yield Event(int(run.log.t_ns[row]), one, "warning")
+        yield Event(int(run.log.t_ns[row]) if run.timed else None, one, "warning")
 
 
 def _entry_words(one: AuditEntry) -> str:

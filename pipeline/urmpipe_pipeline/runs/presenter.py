@@ -34,6 +34,7 @@ from urmpipe_pipeline.runs.scene import path_figure, run_scene
 
 def present(run: Run) -> Presentation:
     """Return what an ingested log shows: nothing of it is judged."""
+    duration = Value(run.duration, "s") if run.timed else None
     body = Section(
         f"Log {run.name}",
         None,
@@ -60,7 +61,7 @@ def present(run: Run) -> Presentation:
                 "Robot": run.robot.name if run.robot else "none",
                 "Source": run.log.source,
                 "Rows": Value(run.log.rows),
-                "Duration": Value(run.duration, "s"),
+                "Duration": duration,
                 "Joints": Value(len(run.log.joints)),
                 "Repolarizations": Value(len(run.repolarizations)),
                 "Warnings": Value(len(run.warnings)),

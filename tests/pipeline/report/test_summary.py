@@ -123,6 +123,13 @@ def test_a_result_that_fails_for_a_reason_of_its_own_has_a_card_beside_its_parts
     assert names(lay_out([toy("sound", "pass", meter)])) == ["meter"]
 
 
+def test_a_judged_part_that_says_nothing_of_itself_has_no_card_of_its_own() -> None:
+    gone = judged("baseline", "fail", None), Section("gone", "fail")
+    outer = Section("baseline", "fail", (Fact("Since then", "1 gone"),), sections=gone[1:])
+    assert names(lay_out([toy("now", "fail", judged("log", "pass", 0.5), outer)])) == ["baseline", "log"]
+    assert names(lay_out([toy("bare", "pass")])) == ["Toy bare"]
+
+
 def test_tables_about_the_parts_stand_with_the_cards_and_others_in_the_part() -> None:
     ranking = Table("Ranking", (Column("log", "Log", [Ref("a")]), Column("n", "n", [Value(1)])))
     other = Table("Signals", (Column("signal", "Signal", ["x"]), Column("n", "n", [Value(1)])))

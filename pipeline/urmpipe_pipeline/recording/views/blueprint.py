@@ -16,7 +16,7 @@ from urmpipe_pipeline.presentation.figure import Figure, Text
 from urmpipe_pipeline.presentation.section import Event, Presentation, Section
 from urmpipe_pipeline.recording.sending import keys, shown_path
 from urmpipe_pipeline.recording.views.events import events_view
-from urmpipe_pipeline.recording.views.plots import EntityOf, Plots, whole_time
+from urmpipe_pipeline.recording.views.plots import EntityOf, Plots, most_rows, whole_time
 from urmpipe_pipeline.recording.views.scene_drawing import scene_view
 from urmpipe_pipeline.recording.views.summary import summary
 from urmpipe_pipeline.text import encodable
@@ -54,8 +54,9 @@ def send_views(stream: RecordingStream, shown: Presentation, entity_of: EntityOf
     words = summary(shown)
     stream.log(shown_path("summary"), rr.TextDocument(words, media_type="text/markdown"), static=True)
     parts = _parts(shown.body)
-    whole = whole_time(figure for part in parts for figure in part.figures)
-    plots = Plots(stream, entity_of, whole)
+    figures = [figure for part in parts for figure in part.figures]
+    whole = whole_time(figures)
+    plots = Plots(stream, entity_of, whole, most_rows(figures))
     scene = shown.scene() if shown.scene is not None else None
     space = None if scene is None else scene_view(stream, scene, shown.opens_at_ns)
     texts = [text for part in parts for text in part.texts]
@@ -122,7 +123,7 @@ def _rows(plots: Plots, part: _Part) -> list[Row]:
     rows: list[Row] = []
     last: list[View | Container] = []
     if part.events:
-        first = 0 if plots.whole is None else plots.whole[0]
+        first = None if plots.whole is None else plots.whole[0]
         last.append(events_view(plots.stream, part.events, shown_path("events", part.key), first))
     for number, figure in enumerate(part.figures):
         root = shown_path("plots", part.key, str(number))

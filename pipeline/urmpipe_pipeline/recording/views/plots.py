@@ -62,11 +62,13 @@ class Plots:
         stream: Where to.
         entity_of: Where arrays of the result stand.
         whole: From the first to the last time in [ns]; None without times.
+        rows: How many rows are plotted at most: the axis without times.
     """
 
     stream: RecordingStream
     entity_of: EntityOf
     whole: tuple[int, int] | None
+    rows: int = 0
     _looks: dict[str, _Look] = field(default_factory=dict)
     _shares_axis: bool = True
 
@@ -127,10 +129,13 @@ class Plots:
         return view
 
     def _range(self) -> TimeRange | None:
-        """Return the whole time with a margin; None if there is none or but one instant."""
+        """Return the whole time, or all rows, with a margin; None if there is none or but one instant."""
         import rerun as rr
         import rerun.blueprint as rrb
 
+        if self.whole is None and self.rows > 1:
+            last = self.rows + math.ceil(AFTER * self.rows)
+            return rrb.TimeRange(*(rr.TimeRangeBoundary.absolute(seq=row) for row in (0, last)))
         if self.whole is None or self.whole[0] == self.whole[1]:
             return None
         first, last = self.whole
@@ -294,6 +299,12 @@ def whole_time(figures: Iterable[Figure]) -> tuple[int, int] | None:
             if t_ns is not None and len(t_ns):
                 ends += [int(t_ns[0]), int(t_ns[-1])]
     return (min(ends), max(ends)) if ends else None
+
+
+def most_rows(figures: Iterable[Figure]) -> int:
+    """Return how many rows any line of some figures has at most."""
+    panels = (panel for figure in figures for view in figure.views for panel in view.panels)
+    return max((len(line.values) for panel in panels for line in panel.lines), default=0)
 
 
 def overview(values: FloatArray, most: int) -> IntArray:

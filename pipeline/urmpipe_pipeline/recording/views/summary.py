@@ -34,11 +34,10 @@ def summary(shown: Presentation) -> str:
 
 
 def _where_to_go(shown: Presentation) -> str:
-    at = (
-        f"`urmpipe view` opens this at {text.seconds(shown.opens_at_ns / 1e9)} s. "
-        if shown.opens_at_ns
-        else ""
-    )
+    where = f"{text.seconds(shown.opens_at_ns / 1e9)} s" if shown.opens_at_ns else ""
+    if shown.opens_at_row:
+        where = f"row {shown.opens_at_row + 1}"
+    at = f"`urmpipe view` opens this at {where}. " if where else ""
     return f"{at}Everything else: `urmpipe report` with this file."
 
 

@@ -12,8 +12,8 @@ from scipy.spatial.transform import Rotation
 
 from make_specimens import paths
 from specimen import SPECIMENS, Truth
-from urmpipe_pipeline.inverse.target_file import TargetFile, read_targets
 from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
 from urmpipe_pipeline.sources import ReadOptions, read_log, read_map
 
 DATASETS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from urmpipe_models.errors import LogError
-from urmpipe_pipeline.inverse.target_file import TargetFile
+from urmpipe_pipeline.solved_targets.target_file import TargetFile
 from urmpipe_pipeline.sources import ReadOptions, read_log
 
 Read = Callable[..., TargetFile]

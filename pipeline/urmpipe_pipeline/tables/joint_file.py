@@ -10,7 +10,9 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.outputs import TARGET_ROW
+from urmpipe_pipeline.presentation.exports import Times
 from urmpipe_pipeline.sources.cells.cell import printable
+from urmpipe_pipeline.tables.lines import differences, quoted, texts, write_lines
 
 
 def write_joint_log(
@@ -44,9 +46,6 @@ def write_joint_log(
     Raises:
         OutputError: If there is no row to write, or it did not read back as it was written.
     """
-    from urmpipe_pipeline.presentation.exports import Times
-    from urmpipe_pipeline.tables.lines import differences, quoted, texts, write_lines
-
     solved = np.isfinite(q).all(axis=1)
     if not solved.any():
         said = f"found no joint values for any of {len(q)} targets, allowed: at least one for a log"

@@ -9,26 +9,22 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-import urmpipe
-from urmpipe.inverse.wording import (
-    NAMED,
-    far_warnings,
-    longest,
-    method_words,
-    near_singular_warnings,
-    reach_words,
-    rows_text,
-    shortfall_warnings,
-    singular_warnings,
-    start_warnings,
-    unreached,
-    within_pi_warnings,
-)
+from urmpipe_models.inverse.closed.closed_form import method_words
 from urmpipe_models.inverse.solutions import Singular, Solutions
 from urmpipe_models.inverse.targets import Targets, targets_of
 from urmpipe_models.kinematics.singularity import singularity_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.solved_targets.solution_warnings import (
+    far_warnings,
+    longest,
+    near_singular_warnings,
+    shortfall_warnings,
+    singular_warnings,
+    start_warnings,
+    within_pi_warnings,
+)
+from urmpipe_pipeline.solved_targets.wording import NAMED, rows_text
 
 
 @pytest.mark.parametrize(
@@ -175,33 +171,3 @@ def test_a_joint_with_limits_that_within_pi_leaves_beyond_pi_is_told_of() -> Non
         )
     ]
     assert not list(within_pi_warnings(limited, np.clip(q, -np.pi, np.pi)))
-
-
-def test_rows_out_of_reach_for_one_reason_are_one_line_whatever_its_numbers() -> None:
-    arm = load_robot("ur5e")
-    poses = np.tile(np.eye(4), (7, 1, 1))
-    poses[:, 0, 3] = [0.3, 1.1, 1.2, 1.3, 0.3, 1.5, 1.5]
-    poses[6, :3, 3] = np.nan
-    found = urmpipe.ik(poses, arm)
-    lines = list(unreached(found, every=False))
-    assert [line.partition(": ")[0] for line in lines] == [
-        "rows 2-4 not reached; row 3",
-        "row 6 not reached",
-        "row 7 not reached",
-    ]
-    assert lines[0] == f"rows 2-4 not reached; row 3: {found.reasons[2]}"
-    assert lines[1] == f"row 6 not reached: {found.reasons[5]}"
-    same = np.repeat(poses[1:2], 3, axis=0)
-    assert list(unreached(urmpipe.ik(same, arm), every=False)) == [
-        f"rows 1-3 not reached: {found.reasons[1]}"
-    ]
-
-
-def test_a_joint_that_is_too_fast_twice_is_one_joint() -> None:
-    arm = load_robot("ur5e")
-    q = np.tile([0.1, -0.9, 1.2, -0.5, 0.7, 0.2], (40, 1))
-    q[:, 0] += np.cumsum(np.where((np.arange(40) // 10) % 2, 0.05, 0.001))
-    found = urmpipe.ik(targets_of(arm, q), arm, tsp=0.01, start=q[0].tolist())
-    assert found.path is not None
-    assert [one.joint for one in found.path.too_fast] == ["shoulder_pan_joint"] * 2
-    assert reach_words(found).endswith(" (closed form: three parallel axes), with 1 joint too fast")

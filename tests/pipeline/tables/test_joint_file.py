@@ -15,11 +15,11 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import LogError, OutputError
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.inverse.joint_file import write_joint_log
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.tables.joint_file import write_joint_log
 
 STEP = 5_000_000
 

@@ -1,27 +1,20 @@
-"""What inverse kinematics says in words: rows, what was reached, why not, and what was chosen."""
+"""The warnings of inverse kinematics: singular poses, nearest points, units that are hardly meant."""
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from urmpipe.inverse.result import InverseResult
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.kinematics.singularity import NEAR_SINGULAR, singularity_over_log
-from urmpipe_pipeline.inverse import verdict
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.text import DIGITS, SHOWN, counted, enumerated
-
-NAMED = 6
-"""Rows or stretches of rows that are named; the others are counted."""
-
-NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
-"""What may differ in reasons that are one."""
+from urmpipe_pipeline.solved_targets.wording import in_words, rows_text
+from urmpipe_pipeline.text import counted
 
 MILLI = 1e-3
 """A target in mm that is read as m is a thousand times too far."""
@@ -35,77 +28,6 @@ ROUNDING = 1e-9
 
 MANY_TURNS = 4.0 * np.pi
 """Joint values beyond two turns in [rad] are hardly meant: they may be in deg."""
-
-
-def rows_text(rows: Sequence[int] | IntArray) -> str:
-    """Return rows, shape (n,), for a sentence: "row 3", "rows 3, 7-9 and 40 more"."""
-    rows = np.asarray(rows)
-    first = np.flatnonzero(np.diff(rows, prepend=rows[0] - 2) != 1)
-    last = np.append(first[1:], len(rows)) - 1
-    parts = [
-        str(rows[a]) if a == b else f"{rows[a]}-{rows[b]}"
-        for a, b in zip(first[:NAMED], last[:NAMED], strict=True)
-    ]
-    more = len(rows) - 1 - last[:NAMED][-1]
-    said = ", ".join(parts) + (f" and {more} more" if more else "")
-    return f"row{'' if len(rows) == 1 else 's'} {said}"
-
-
-def joint_number(value: float, unit: str) -> str:
-    """Return a joint value in [rad] as [deg] or in [m] as [mm]; what is only rounding is 0."""
-    return f"{round(float(value) * SHOWN[unit][1], DIGITS) + 0.0:.{DIGITS}f}"
-
-
-def method_words(method: str) -> str:
-    """Return what solved the targets: "closed form: spherical wrist", or "iterative"."""
-    return method if method == "iterative" else f"closed form: {method}"
-
-
-def reach_words(result: InverseResult) -> str:
-    """Say how many targets the arm reaches, and how they were solved."""
-    reached = verdict.reach_words(result.name, [result.robot.name], int(result.reached.sum()), len(result))
-    said = f"{reached} ({method_words(result.method)})"
-    if result.path is None:
-        return said
-    jumps, fast = len(result.path.jumps), len({one.joint for one in result.path.too_fast})
-    others = [counted(jumps, "jump")] * bool(jumps) + [f"{counted(fast, 'joint')} too fast"] * bool(fast)
-    return f"{said}, with {enumerated(others)}" if others else said
-
-
-def unreached(result: InverseResult, *, every: bool) -> Iterator[str]:
-    """Yield why targets have no solution, and, if all branches are asked for, why single branches have none.
-
-    Rows that follow each other for one reason, but for its numbers, are one line.
-    """
-    reasons = [reason or "" for reason in result.reasons]
-    kinds = [NUMBER.sub("#", reason) for reason in reasons]
-    start = 0
-    for end in range(1, len(kinds) + 1):
-        if end == len(kinds) or kinds[end] != kinds[start]:
-            if reasons[start]:
-                yield _not_reached(result.row[start:end], reasons[start:end])
-            elif every and result.method != "iterative":
-                yield from _branches_unreached(result, start, end)
-            start = end
-
-
-def _not_reached(row: IntArray, reasons: Sequence[str]) -> str:
-    """Return why rows are not reached: by the one in the middle where the numbers of the reasons differ."""
-    if len(set(reasons)) == 1:
-        return f"{rows_text(row)} not reached: {reasons[0]}"
-    middle = len(reasons) // 2
-    return f"{rows_text(row)} not reached; row {row[middle]}: {reasons[middle]}"
-
-
-def _branches_unreached(result: InverseResult, start: int, end: int) -> Iterator[str]:
-    """Yield why branches of targets that others reach have no solution."""
-    for index in range(start, end):
-        found: dict[str, list[str]] = {}
-        for branch, reason in zip(result.solutions.branches, result.solutions.reasons[index], strict=True):
-            if reason:
-                found.setdefault(reason, []).append(branch)
-        for reason, branches in found.items():
-            yield f"{rows_text(result.row[index : index + 1])}: not {'; '.join(branches)}: {reason}"
 
 
 def singular_warnings(solutions: Solutions, row: IntArray, listed: BoolArray) -> Iterator[LogWarning]:
@@ -228,3 +150,36 @@ def longest(chain: Chain) -> float:
     frames = [*(joint.origin for joint in chain.joints), chain.tip, chain.tool]
     slides = [max(abs(joint.lower), abs(joint.upper)) for joint in chain.moving if joint.kind == "prismatic"]
     return float(sum(np.linalg.norm(frame.translation) for frame in frames)) + sum(slides)
+
+
+def path_warnings(path: JointPath) -> Iterator[LogWarning]:
+    """Yield why no arm can follow the joint values along a path: its jumps, and joints that are too fast."""
+    if path.jumps:
+        first = path.jumps[0]
+        steps = ", ".join(f"{one.joint} by {in_words(one.step, one.unit)}" for one in first.joints)
+        yield LogWarning("jump", _first_of(len(path.jumps), "jump", steps), first.sample + 1)
+    if path.too_fast:
+        one = path.too_fast[0]
+        said = f"{one.joint} at {in_words(one.speed, one.unit)} of {in_words(one.allowed, one.unit)} allowed"
+        count = len({one.joint for one in path.too_fast})
+        yield LogWarning("joint-too-fast", _first_of(count, "joint", said, " too fast"), one.first + 1)
+
+
+def unreached_warnings(reasons: Sequence[str | None]) -> Iterator[LogWarning]:
+    """Yield how many targets have no solution, and why the first has none.
+
+    Args:
+        reasons: Why a target has none, one line; None where it has one.
+    """
+    missed = [(row, reason) for row, reason in enumerate(reasons, start=1) if reason is not None]
+    if missed:
+        (row, reason), *others = missed
+        here = ", here the first" if others else ""
+        why = f": {reason.split('; ')[0]}" if reason else ""
+        said = f"no solution for {len(missed)} of {len(reasons)} targets{here}{why}"
+        yield LogWarning("unreachable", said, row)
+
+
+def _first_of(count: int, noun: str, first: str, more: str = "") -> str:
+    """Return how many there are, and the first: "2 joints too fast, here the first: ..."."""
+    return f"{counted(count, noun)}{more}{', here the first' if count > 1 else ''}: {first}"

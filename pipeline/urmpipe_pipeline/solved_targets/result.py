@@ -1,10 +1,11 @@
-"""What `urmpipe.ik` returns: joint values by target, how far the tool misses it, and why there are none."""
+"""Solved targets: joint values by target, how far the tool misses it, and why there are none."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,20 +13,24 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray, IntArray, TextArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.targets import Targets, misses
 from urmpipe_models.spelling import Voice
+from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
-from urmpipe_pipeline.runs.results import SCHEMA
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.runs.results import SCHEMA, Run
+from urmpipe_pipeline.solved_targets.motion import run_of_solutions
+from urmpipe_pipeline.solved_targets.solution_warnings import path_warnings, unreached_warnings
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from urmpipe_models.inverse.along_path.joint_path import JointPath
-
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class InverseResult(Shown):
+class SolvedTargets(Shown):
     """The joint values that bring the tool centre point of an arm to n targets.
 
     Attributes:
@@ -33,16 +38,24 @@ class InverseResult(Shown):
         robot: The arm, with base and tool.
         method: What solved it: "spherical wrist", "three parallel axes" or "iterative".
         row: Data row of each target in its file, from 1, shape (n,).
-        t_ns: Times in integer [ns], shape (n,), of a path; None where each stands for itself.
+        t_ns: Times of a path from its first row in integer [ns], shape (n,); None where each target stands
+            for itself.
+        clock_start_ns: The path's own clock at the first row in integer [ns].
         targets: Where the tool shall be.
         solutions: All solutions that were found, k a target at most; along a path one.
         chosen: Column of the solution nearest to the start, shape (n,); it means nothing where there is none.
         miss: How far the tool is from its target by forward kinematics, in [m], shape (n, k).
         angle: By which angle it is turned away from it, in [rad], shape (n, k); None where any orientation
             will do.
-        path: What is to be known of the way from target to target; None where each stands for itself.
+        every: Whether all solutions were requested: they are shown beside the chosen ones.
+        branches: Along a path all solutions of each target, if they were requested; else None.
+        path: What is known of the way from target to target; None where each stands for itself.
         warnings: What a person should know.
-        output: The joint log or the recording that was written.
+        provenance: How to repeat it.
+        motion: The chosen solutions along a path as a run; None where it was not computed (`as_run`), and
+            without times.
+        recording: Where it was written.
+        joint_log: The joint log that was written.
     """
 
     name: str
@@ -50,22 +63,67 @@ class InverseResult(Shown):
     method: str
     row: IntArray
     t_ns: IntArray | None
+    clock_start_ns: int
     targets: Targets
     solutions: Solutions
     chosen: IndexArray
     miss: FloatArray
     angle: FloatArray | None
-    path: JointPath | None = None
-    warnings: tuple[LogWarning, ...] = ()
-    output: Path | None = None
+    every: bool
+    branches: Solutions | None
+    path: JointPath | None
+    warnings: tuple[LogWarning, ...]
+    provenance: Provenance
+    motion: Run | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
+    joint_log: Path | None = field(default=None, metadata={"stored": False})
+
+    def __post_init__(self) -> None:
+        faults = [Finding(fault, self.name) for fault in self._faults()]
+        if faults:
+            raise LogError(*faults)
+
+    def _faults(self) -> Iterator[str]:
+        """Yield what does not fit together."""
+        n, k, joints = self.solutions.q.shape
+        shapes: dict[str, tuple[NDArray[Any] | None, tuple[int, ...]]] = {
+            "rows": (self.row, (n,)),
+            "times": (self.t_ns, (n,)),
+            "positions": (self.targets.position, (n, 3)),
+            "rotations": (self.targets.rotation, (n, 3, 3)),
+            "chosen solutions": (self.chosen, (n,)),
+            "distances": (self.miss, (n, k)),
+            "angles": (self.angle, (n, k)),
+            "branches": (None if self.branches is None else self.branches.reached[:, 0], (n,)),
+            "samples of the path": (None if self.path is None else self.path.q, (n, joints)),
+        }
+        if not n:
+            yield "found no target, allowed: one or more"
+        if joints != len(self.robot.coordinates):
+            yield f"found {joints} joints, allowed: {len(self.robot.coordinates)}"
+        for what, (values, allowed) in shapes.items():
+            if values is not None and values.shape != allowed:
+                yield f"found {what} of shape {values.shape}, allowed: {allowed}"
+        if self.t_ns is not None and (np.diff(self.t_ns) <= 0).any():
+            yield "found times that do not rise, allowed: rising times"
 
     def __len__(self) -> int:
         return len(self.row)
 
     @property
+    def clock_ns(self) -> IntArray | None:
+        """Times on the path's own clock in integer [ns], shape (n,); None without times."""
+        return None if self.t_ns is None else self.t_ns + self.clock_start_ns
+
+    @property
     def t(self) -> FloatArray | None:
-        """Times in [s], shape (n,); None where each target stands for itself."""
-        return None if self.t_ns is None else seconds(self.t_ns)
+        """Times on the path's own clock in [s], shape (n,); None where each target stands for itself."""
+        return None if self.clock_ns is None else seconds(self.clock_ns)
+
+    @property
+    def joint_units(self) -> list[str]:
+        """The SI unit of each joint, rad or m."""
+        return ["rad" if joint.kind == "revolute" else "m" for joint in self.robot.moving]
 
     @property
     def reached(self) -> BoolArray:
@@ -89,10 +147,38 @@ class InverseResult(Shown):
         return [self.solutions.reason(target) for target in range(len(self))]
 
     @property
-    def verdict(self) -> Literal["pass", "fail"]:
+    def verdict(self) -> Verdict:
         """Pass if the arm reaches every target, along a path without a jump or a joint that is too fast."""
         smooth = self.path is None or not (self.path.jumps or self.path.too_fast)
         return "pass" if smooth and bool(self.reached.all()) else "fail"
+
+    @property
+    def output(self) -> Path | None:
+        """The recording or the joint log that was written."""
+        return self.recording or self.joint_log
+
+    @property
+    def beside(self) -> Solutions | None:
+        """All solutions of each target, if they were requested; else None."""
+        if not self.every:
+            return None
+        return self.solutions if self.path is None else self.branches
+
+    def as_run(self) -> Run:
+        """Return the chosen solutions as a run: a motion where the targets have times, else poses.
+
+        Poses have no rates: no motion joins them (`Run.timed`).
+
+        Raises:
+            LogError: If the times need a grid without end.
+        """
+        if self.motion is not None:
+            return self.motion
+        why = (*(path_warnings(self.path) if self.path else ()), *unreached_warnings(self.reasons))
+        return run_of_solutions(
+            self.name, self.robot, self.q, self.t_ns, self.clock_start_ns, (*self.warnings, *why),
+            self.provenance,
+        )  # fmt: skip
 
     def _headline(self) -> str:
         """Return its verdict, the arm, and how many targets it reaches."""
@@ -178,7 +264,7 @@ class InverseResult(Shown):
 
     def _time(self, index: int) -> float | None:
         """Return the time of a target in [s]; None where each stands for itself."""
-        return None if self.t_ns is None else float(self.t_ns[index]) / 1e9
+        return None if self.t_ns is None else float(self.t_ns[index] + self.clock_start_ns) / 1e9
 
     def _target(self, index: int, there: BoolArray) -> dict[str, Any]:
         """Return a target as --json has it: every solution, and which of them is nearest to the start.

@@ -1,4 +1,4 @@
-"""The targets that `urmpipe.ik` is given: a file, or arrays."""
+"""The targets that inverse kinematics is given: a file, or arrays."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
+from urmpipe_models.errors import OptionError, shown
 from urmpipe_models.inverse.checks import ROTATION_TOLERANCE
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
-from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.solved_targets.target_file import read_targets
 from urmpipe_pipeline.sources import ReadOptions
 
 TargetsLike: TypeAlias = str | Path | Targets | ArrayLike
@@ -39,9 +39,11 @@ class GivenTargets:
     Attributes:
         name: What to call them.
         row: Data row of each, from 1, shape (n,).
-        t_ns: Times in integer [ns], shape (n,), of a path; None where each stands for itself.
+        t_ns: Times of a path from its first row in integer [ns], shape (n,); None where each target stands
+            for itself.
         targets: Where the tool shall be; NaN where a row holds no target.
         faults: Why a row holds no target, one line; empty where it does, n of them.
+        clock_start_ns: The path's own clock at the first row in integer [ns].
         warnings: What a person should know of the file.
         file: Where they came from; None of arrays.
     """
@@ -51,6 +53,7 @@ class GivenTargets:
     t_ns: IntArray | None
     targets: Targets
     faults: tuple[str, ...]
+    clock_start_ns: int = 0
     warnings: tuple[LogWarning, ...] = ()
     file: SourceFile | None = None
 
@@ -79,19 +82,19 @@ def given_targets(
     targets, faults = (given, ()) if isinstance(given, Targets) else _of_array(_numbers("targets", given))
     count = len(targets)
     t_ns = _times(count, t, tsp)
-    return GivenTargets("targets", np.arange(1, count + 1), t_ns, targets, faults or ("",) * count)
+    start = 0 if t_ns is None else int(t_ns[0])
+    since = None if t_ns is None else t_ns - start
+    return GivenTargets("targets", np.arange(1, count + 1), since, targets, faults or ("",) * count, start)
 
 
 def _of_file(path: Path, tsp: float | None, read: ReadOptions | None) -> GivenTargets:
     """Return the targets of a file."""
-    from urmpipe_pipeline.inverse.target_file import read_targets
-
-    if path.is_file() and is_recording(path):
-        raise LogError(Finding("found a recording, allowed: a table (CSV) of targets", str(path)))
     found = read_targets(path, read, tsp)
-    t_ns = None if found.t_ns is None else found.t_ns + found.clock_start_ns
     faults = tuple(found.faults.get(int(row), "") for row in found.row)
-    return GivenTargets(path.stem, found.row, t_ns, found.targets, faults, found.warnings, found.file)
+    return GivenTargets(
+        path.stem, found.row, found.t_ns, found.targets, faults, found.clock_start_ns, found.warnings,
+        found.file,
+    )  # fmt: skip
 
 
 def _numbers(name: str, given: ArrayLike) -> FloatArray:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from urmpipe_pipeline.inverse.target_file import TargetFile, read_targets
+from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
 from urmpipe_pipeline.sources import ReadOptions
 
 Read = Callable[..., TargetFile]

@@ -1,31 +1,28 @@
-"""What is asked of inverse kinematics: the arm, the targets, the options, and which of them are refused."""
+"""A request to inverse kinematics: the arm, the targets and the options, and which of them are refused."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
 
-from urmpipe.guards import Frame, Robot, place_robot
-from urmpipe.inverse.output import Written
-from urmpipe.inverse.targets import GivenTargets
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError, shown
 from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import METHODS, Method
-from urmpipe_models.robots.catalogue import robot_names
+from urmpipe_pipeline.solved_targets.given_targets import GivenTargets
 
 TYPED = 1e-3
 """A start beyond a limit by this, in [rad] or [m], is on it: people type limits with few digits."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class Asked:
+class Request:
     """What is to be solved, and how.
 
     Attributes:
@@ -33,11 +30,10 @@ class Asked:
         given: Where its tool shall be.
         start: Joint values in [rad] or [m], shape (joints,), that solutions are to be near to; None for the
             robot's own.
-        every: Whether all solutions are asked for.
+        every: Whether all solutions are requested.
         within_pi: Whether joints that turn without end are written within -pi to pi.
         method: Which methods are allowed.
         search: How far to search for what does not follow from the start.
-        progress: Told the share of solving that is done, 0..1.
     """
 
     arm: Chain
@@ -47,7 +43,6 @@ class Asked:
     within_pi: bool
     method: Method
     search: Search
-    progress: Callable[[float], None] | None
 
     @property
     def form(self) -> ClosedForm | None:
@@ -69,43 +64,43 @@ class Asked:
         return options | ({} if self.start is None else {"start": self.start.tolist()})
 
 
-def refuse_unsolvable(asked: Asked, kind: Written | None) -> None:
+def refuse_unsolvable(request: Request, *, recorded: bool) -> None:
     """Raise an `OptionError` with every option that makes no sense, alone or with a path.
 
     Args:
-        asked: What is asked.
-        kind: What is to be written.
+        request: What is to be solved.
+        recorded: Whether a recording is to be written.
     """
-    faults = [*_bad_values(asked)]
-    if not faults and asked.given.t_ns is not None:
-        faults += [*_what_no_path_has(asked, kind)]
+    faults = [*_bad_values(request)]
+    if not faults and request.given.t_ns is not None:
+        faults += [*_not_for_paths(request, recorded)]
     if faults:
         raise OptionError(*faults)
 
 
-def _bad_values(asked: Asked) -> Iterator[str]:
+def _bad_values(request: Request) -> Iterator[str]:
     """Yield which values make no sense."""
-    if asked.method not in METHODS:
-        yield f"--method: found {shown(asked.method)}, allowed: {', '.join(METHODS)}"
-    yield from (f"--{fault}" for fault in asked.search.faults())
+    if request.method not in METHODS:
+        yield f"--method: found {shown(request.method)}, allowed: {', '.join(METHODS)}"
+    yield from (f"--{fault}" for fault in request.search.faults())
 
 
-def _what_no_path_has(asked: Asked, kind: Written | None) -> Iterator[str]:
-    """Yield what is asked of a path and is not there."""
-    lacks = "positions only" if asked.given.targets.rotation is None else "no closed form"
-    if asked.method == "iterative":
+def _not_for_paths(request: Request, recorded: bool) -> Iterator[str]:
+    """Yield the options that a path does not have."""
+    lacks = "positions only" if request.given.targets.rotation is None else "no closed form"
+    if request.method == "iterative":
         yield (
             "--method: found iterative with a path, allowed: auto; a path takes the closed form of the arm"
             " if it has one"
         )
-    if asked.method == "closed" and asked.form is None:
-        yield f"--method: found closed with a path of {asked.arm.name} that has {lacks}, allowed: auto"
-    if asked.every and asked.form is None:
+    if request.method == "closed" and request.form is None:
+        yield f"--method: found closed with a path of {request.arm.name} that has {lacks}, allowed: auto"
+    if request.every and request.form is None:
         yield (
-            f"--all: found with a path of {asked.arm.name} that has {lacks}, allowed: with poses and an arm"
+            f"--all: found with a path of {request.arm.name} that has {lacks}, allowed: with poses and an arm"
             " that has a closed form, whose branches run along the path; or with targets without times"
         )
-    elif asked.every and kind != "recording":
+    elif request.every and not recorded:
         yield (
             "--all: found with a path and no recording, allowed: with -o RUN.rrd, where every branch is a"
             " ghost arm; or with targets without times"
@@ -143,17 +138,3 @@ def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[str]:
             degrees = "; in deg?" if unit == "rad" and abs(value) > 2.0 * math.pi else ""
             limits = f"{joint.lower:.6g} to {joint.upper:.6g} {unit}"
             yield f"--start: found {joint.name} = {value:g}, allowed: {limits}{degrees}"
-
-
-def arm_of(robot: Robot | None, base: Frame | None, tool: Frame | None) -> Chain:
-    """Return the arm on its base and with its tool, frames in [m] and [rad] as 6 numbers or of shape (4, 4).
-
-    Raises:
-        OptionError: If there is none.
-        RobotError: If it is unknown, or with everything that is wrong with its file.
-    """
-    arm = place_robot(robot, base, tool)
-    if arm is None:
-        names = ", ".join(robot_names())
-        raise OptionError(f"found no robot; allowed: --robot NAME|FILE, a TOML, a URDF or one of {names}")
-    return arm
