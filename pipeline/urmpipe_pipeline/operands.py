@@ -113,6 +113,11 @@ def load_comparison(operand: Path) -> Comparison | None:
     return result if isinstance(result, Comparison) else None
 
 
+def is_log(operand: Path) -> bool:
+    """Return whether an operand is a log that is yet to be read."""
+    return not _is_recording(operand)
+
+
 def _is_recording(operand: Path) -> bool:
     return operand.suffix == ".rrd" or (operand.is_file() and is_recording(operand))
 

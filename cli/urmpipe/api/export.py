@@ -6,8 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike, paths, refuse_foreign, refuse_others
+from urmpipe.keyword_checks import PathLike, paths, public, refuse_foreign, refuse_others
 from urmpipe_models.display import Shown
 from urmpipe_pipeline import results
 from urmpipe_pipeline.results import read_recording

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike, paths
+from urmpipe.keyword_checks import PathLike, paths, public
 from urmpipe_models.display import Shown
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_pipeline import results
