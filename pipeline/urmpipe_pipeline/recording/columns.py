@@ -38,23 +38,9 @@ def time_columns(
     return columns
 
 
-def scalar_column(values: FloatArray) -> ComponentColumn:
-    """Return an array as a column of lists; `Scalars.columns` takes six times as long over it.
-
-    Args:
-        values: In the unit of their plot, shape (n, k).
-    """
-    import rerun as rr
-
-    offsets = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.shape[1])
-    return rr.ComponentColumn(
-        rr.Scalars.descriptor_scalars(), rr.components.ScalarBatch(values), offsets=offsets
-    )
-
-
 @dataclass(frozen=True)
-class _Packed:
-    """Values of any type as Rerun takes those of a component."""
+class _Values:
+    """Values of any type as Rerun takes those of a component; its own batches copy them first."""
 
     values: NDArray[Any]
 
@@ -64,13 +50,25 @@ class _Packed:
         return pa.array(self.values.reshape(-1))
 
 
+def scalar_column(values: FloatArray) -> ComponentColumn:
+    """Return an array as a column of lists; `Scalars.columns` takes six times as long over it.
+
+    Args:
+        values: In the unit of their plot, shape (n, k).
+    """
+    import rerun as rr
+
+    offsets = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.shape[1])
+    return rr.ComponentColumn(rr.Scalars.descriptor_scalars(), _Values(values), offsets=offsets)
+
+
 def column_rows(column: Column, rows: slice) -> tuple[list[TimeColumn], list[ComponentColumn]]:
     """Return the times and the values of some rows of an array, one by one where it is plotted."""
     import rerun as rr
 
     values = np.asarray(column.values[rows] if column.values.ndim else column.values)
     if not column.plotted:
-        packed = rr.ComponentColumn(PACKED, _Packed(values), lengths=[values.size])
+        packed = rr.ComponentColumn(PACKED, _Values(values), lengths=[values.size])
         return time_columns(None, ROW, np.array([rows.start + 1])), [packed]
     t_ns = None if column.t_ns is None else np.asarray(column.t_ns[rows])
     numbers = np.arange(rows.start + 1, rows.stop + 1)

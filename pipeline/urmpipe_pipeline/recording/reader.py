@@ -15,9 +15,10 @@ from urmpipe_pipeline.recording.array_form import CodecError
 from urmpipe_pipeline.recording.codec import decode
 from urmpipe_pipeline.recording.rows import Rows
 from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store
+from urmpipe_pipeline.simulations.simulation import Result
 
 
-def read_recording(path: Path, *, lazy: bool = False) -> Any:
+def read_recording(path: Path, *, lazy: bool = False) -> Result:
     """Return the result that a recording holds.
 
     What stands inside a result comes back without the file that it once stood in.
@@ -36,7 +37,7 @@ def read_recording(path: Path, *, lazy: bool = False) -> Any:
         known = ", ".join(one.name for one in results.KINDS)
         raise store.error(f"found a result of kind {document.get('kind')!r}, allowed: {known}")
     try:
-        result = decode(kind.cls, document.get("result"), _reads(store, lazy))
+        result: Result = decode(kind.cls, document.get("result"), _reads(store, lazy))
     except CodecError as error:
         raise store.error(f"found damaged metadata, {error}") from error
     located = any(one.name == "recording" for one in fields(result))

@@ -276,7 +276,7 @@ def test_what_cannot_be_read_back_is_named(make_run: MakeRun, tmp_path: Path) ->
 
 
 def test_what_could_not_be_read_back_is_not_written(make_run: MakeRun, tmp_path: Path) -> None:
-    run = replace(make_run(rows=5), tsp="5 ms")
+    run = replace(make_run(rows=5), tsp="5 ms")  # type: ignore[arg-type]
     with pytest.raises(OutputError) as caught:
         write_recording(run, tmp_path / "one.rrd")
     assert (

@@ -79,7 +79,7 @@ def everything(rows: Any) -> list[Any]:
 @pytest.mark.usefixtures("known")
 def test_arrays_are_read_when_they_are_used(tmp_path: Path) -> None:
     wanted = accuracy()
-    back = read_recording(write_recording(wanted, tmp_path / "toy.rrd"), lazy=True)
+    back: Any = read_recording(write_recording(wanted, tmp_path / "toy.rrd"), lazy=True)
     for name in ("t_ns", "error", "inside", "count", "poses"):
         rows, array = getattr(back, name), getattr(wanted, name)
         assert (rows.shape, rows.dtype, rows.ndim, len(rows)) == (array.shape, array.dtype, array.ndim, ROWS)
@@ -105,7 +105,7 @@ def test_any_slice_is_that_of_the_array(
     path, run = tmp_path / "run.rrd", make_run(rows=50)
     if not path.exists():
         write_recording(run, path)
-    back = read_recording(path, lazy=True)
+    back: Any = read_recording(path, lazy=True)
     assert everything(back.q[first:end:step]) == everything(run.q[first:end:step])
 
 
@@ -113,6 +113,6 @@ def test_a_simulation_is_opened_without_its_signals(
     make_simulation: Callable[..., Simulation], tmp_path: Path
 ) -> None:
     wanted = make_simulation(50)
-    back = read_recording(write_recording(wanted, tmp_path / "a.rrd"), lazy=True)
+    back: Any = read_recording(write_recording(wanted, tmp_path / "a.rrd"), lazy=True)
     assert all(one.values._whole is None for one in back.signals)
     assert_same(back.to_dict() | {"recording": None}, wanted.to_dict())
