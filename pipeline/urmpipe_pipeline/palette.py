@@ -50,6 +50,9 @@ NEUTRAL_COLOUR = "#c8d0d4"
 DEVIATION_COLOUR = "#fe046c"
 """The deviation made visible in the 3D view: the enlarged path and the worst place; crimson."""
 
+INK_COLOUR = "#1b2329"
+"""Marks that are no data, such as where a path begins."""
+
 
 def joint_colour(index: int) -> str:
     """Return the colour of a joint as #rrggbb, counted from 0 at the base."""

@@ -96,6 +96,21 @@ def percent(share: float) -> str:
     return f"{scaled:.2g} %" if scaled < 1.0 else f"{scaled:.1f} %"
 
 
+def portion(share: float) -> str:
+    """Return how much of something is used up, to stand before it: "71.0 % of", "1.2 times".
+
+    Above 1 it has three digits, or as many as tell it from 1, without an exponent.
+    """
+    if share <= 1.0:
+        return f"{percent(share)} of"
+    if share >= 1000.0:
+        return f"{share:.0f} times"
+    digits = 3
+    while digits < 15 and f"{share:.{digits}g}" == "1":
+        digits += 1
+    return f"{share:.{digits}g} times"
+
+
 def counted(count: int, noun: str) -> str:
     """Return a count with its noun in the right number: "1 log", "2 logs"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
@@ -127,3 +142,8 @@ def exact(value: Any) -> str:
     if value is None:
         return ""
     return value if isinstance(value, str) else repr(value)
+
+
+def encodable(value: str) -> str:
+    """Return a text without the lone surrogates that stand for undecodable bytes of a file name."""
+    return value.encode("utf-8", "replace").decode("utf-8")

@@ -5,33 +5,48 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable
 
+from urmpipe_models.messages import hint_words
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline import text
-from urmpipe_pipeline.presentation.section import Cell, Judged, Place, Ref, Value
+from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Value
 
 FINEST = 15
 """Digits of a share at most: more are not in it."""
 
 
-def written(cell: Cell, *, unit: bool = False) -> str:
+def written(cell: Cell, *, unit: bool = False, voice: Voice = "command line") -> str:
     """Return a cell as people read it.
 
     Args:
         cell: What is shown.
         unit: Whether its unit stands behind it; in a table it stands in the head.
+        voice: Who reads it: how parameters are spelled.
     """
     match cell:
-        case None | "":
-            return text.NOTHING
-        case str():
-            return cell
-        case Ref():
-            return cell.title
-        case Judged():
-            return text.NOTHING if cell.verdict is None else cell.verdict.upper()
-        case Place():
-            return f"({text.point(cell.position)})" + (" m" if unit else "")
         case Value():
             return _number(cell, unit=unit)
+        case Place():
+            return f"({text.point(cell.position)})" + (" m" if unit else "")
+        case Advice():
+            said = "; ".join(filter(None, (cell.words, *hint_words(cell.hints, voice))))
+        case Judged():
+            said = (cell.verdict or "").upper()
+        case Ref():
+            said = cell.title
+        case _:
+            said = cell or ""
+    return said or text.NOTHING
+
+
+def held(value: Value) -> str:
+    """Return a value with its unit and what is allowed of it: "2.5010 mm of 3.5 mm allowed"."""
+    allowed = allowed_words(value)
+    return f"{written(value, unit=True)} of {allowed} allowed" if allowed else written(value, unit=True)
+
+
+def allowed_words(value: Value) -> str:
+    """Return the limit of a value with its unit: "3.5 mm"; empty if there is none."""
+    return "" if value.limit is None else written(Value(value.limit, value.unit, given=True), unit=True)
 
 
 def unit_of(cells: Iterable[Cell]) -> str:

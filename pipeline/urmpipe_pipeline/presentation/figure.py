@@ -7,7 +7,7 @@ from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.presentation.scene import Path, Spot
+from urmpipe_pipeline.presentation.scene import BoolArray, Path, Spot
 
 Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]
 
@@ -23,6 +23,7 @@ class Line:
         dashed: True for what was asked for, beside what was measured.
         steps: True for what changes only from one row to the next.
         points: True for rows that nothing joins.
+        t_ns: Time of each row in [ns], shape (n,), where it is not the panel's.
     """
 
     values: FloatArray
@@ -31,6 +32,7 @@ class Line:
     dashed: bool = False
     steps: bool = False
     points: bool = False
+    t_ns: IntArray | None = None
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -87,6 +89,7 @@ class Panel:
         small: True for a deviation, shown in mm and deg; False for a place, shown in m and rad.
         tinted: Rows to tint besides those out of the limit, shape (n,); None for none.
         share: Height relative to other panels.
+        display_unit: A unit that people prefer to `unit`, such as deg; empty for none.
     """
 
     title: str
@@ -100,8 +103,9 @@ class Panel:
     over: Over | None = None
     logarithmic: bool = False
     small: bool = False
-    tinted: FloatArray | None = None
+    tinted: BoolArray | None = None
     share: float = 1.0
+    display_unit: str = ""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -148,10 +152,16 @@ class SpaceFigure:
 
 @dataclass(frozen=True, slots=True)
 class Drawing:
-    """A drawing that is ready (SVG)."""
+    """A drawing that is ready (SVG).
+
+    Attributes:
+        title: Its heading.
+        alt: What it shows, for who does not see it.
+        svg: The drawing.
+    """
 
     title: str
-    caption: str
+    alt: str
     svg: str
 
 

@@ -50,7 +50,7 @@ class Path:
         colour: As #rrggbb.
         asked: True for what was asked for: drawn broad and dashed, so that what was done shows in the gaps.
         label: What is written at the moving point.
-        values: What it is coloured by (small to large), shape (n,); None for its colour.
+        values: What it is coloured by (small to large), in `unit`, shape (n,); None for its colour.
         unit: SI unit of `values`.
         sample: Row numbers, shape (n,): broken where one is missing; None: none is missing.
         kept: Rows that are drawn in any case.
@@ -95,15 +95,17 @@ class Targets:
 
     Attributes:
         position: In [m], shape (n, 3).
-        quat_xyzw: Orientations, shape (n, 4); None where none was asked for.
+        quat_xyzw: Orientations [-], shape (n, 4); None where none was asked for.
         reached: Which of them are reached, shape (n,).
         t_ns: Times in [ns], shape (n,); None without times.
+        reasons: Why they are not, one each; empty where nothing is known.
     """
 
     position: FloatArray
     quat_xyzw: FloatArray | None
     reached: BoolArray
     t_ns: IntArray | None
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -6,11 +6,13 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, SpaceFigure, Text
 from urmpipe_pipeline.presentation.scene import Scene
 
 Verdict: TypeAlias = Literal["pass", "fail"] | None
+Level: TypeAlias = Literal["info", "warning", "error"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -65,7 +67,20 @@ class Ref:
     colour: str = ""
 
 
-Cell: TypeAlias = Value | Place | Judged | Ref | str | None
+@dataclass(frozen=True, slots=True)
+class Advice:
+    """Words and what the reader may give, spelled for who reads it: as options, as keywords.
+
+    Attributes:
+        words: What stands before; empty for nothing.
+        hints: The parameters with their values.
+    """
+
+    words: str = ""
+    hints: tuple[Hint, ...] = ()
+
+
+Cell: TypeAlias = Value | Place | Judged | Ref | Advice | str | None
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,11 +157,17 @@ class Check:
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Something that happened at a time, or (`t_ns` None) that holds for all of it."""
+    """Something that happened at a time, or (`t_ns` None) that holds for all of it.
+
+    Attributes:
+        t_ns: Its time in [ns].
+        words: What happened; a warning is put into words for who reads it.
+        level: How serious it is.
+    """
 
     t_ns: int | None
-    words: str
-    level: Literal["info", "warning", "error"] = "info"
+    words: str | LogWarning
+    level: Level = "info"
 
 
 Block: TypeAlias = Table | Figure | SpaceFigure | Drawing | Text
@@ -174,9 +195,10 @@ class Section:
     Attributes:
         title: The heading.
         verdict: pass, fail or None.
-        facts: What it is about; of a judged section the first is what decided, a value with its limit.
+        facts: What it is about; of a judged section the first is what decided.
         tables: What is read first.
-        figures: Returns its plots, for the viewer and a page, in order; called only where they are shown.
+        figures: Returns its plots, and texts that the viewer has room for, too, in order; called only where
+            they are shown.
         blocks: Returns what only a page has room for, in order behind the figures: paths in space, what
             takes long to compute, long tables, texts; called only there.
         checks: What was judged. With checks or properties a section is a test suite of JUnit.
@@ -194,7 +216,7 @@ class Section:
     verdict: Verdict = None
     facts: tuple[Fact, ...] = ()
     tables: tuple[Table, ...] = ()
-    figures: Callable[[], Iterable[Figure]] = no_figures
+    figures: Callable[[], Iterable[Figure | Text]] = no_figures
     blocks: Callable[[], Iterable[Block]] = no_blocks
     checks: tuple[Check, ...] = ()
     properties: Mapping[str, Any] = field(default_factory=dict)
@@ -218,6 +240,7 @@ class Presentation:
         facts: The few facts that explain the headline.
         body: Everything else.
         opens_at_ns: Where the viewer opens in [ns].
+        opens_at_row: The row, from 0, at which it opens instead where the result has no times; else None.
         scene: Returns the 3D view; called only where it is drawn.
         lines: Its rows among those of several results, by their heads; the first cell names a row, and rows
             of one name stand below each other.
@@ -232,6 +255,7 @@ class Presentation:
     body: Section
     word: str = ""
     opens_at_ns: int = 0
+    opens_at_row: int | None = None
     scene: Callable[[], Scene | None] | None = None
     lines: tuple[Mapping[str, Cell], ...] = ()
     rows: Callable[[], Table] | None = None

@@ -7,6 +7,8 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from urmpipe_pipeline.outputs import know_own
+
 if TYPE_CHECKING:
     from rerun.chunk import RrdReader, StoreEntry
 
@@ -42,6 +44,9 @@ def is_ours(path: Path) -> bool:
         return bool(our_entries(open_reader(path)))
     except (RuntimeError, ValueError):
         return False
+
+
+know_own("recording", is_ours)
 
 
 def _begins_as_ours(path: Path) -> bool:

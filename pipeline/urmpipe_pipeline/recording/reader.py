@@ -3,28 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from urmpipe_pipeline import results
 from urmpipe_pipeline.recording.array_form import CodecError
 from urmpipe_pipeline.recording.codec import decode
 from urmpipe_pipeline.recording.rows import Rows
 from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store
-from urmpipe_pipeline.simulations.simulation import Result
 
 
-def read_recording(path: Path, *, lazy: bool = False) -> Result:
+def read_result(path: Path, kinds: Mapping[str, type], *, lazy: bool = False) -> Any:
     """Return the result that a recording holds.
 
     What stands inside a result comes back without the file that it once stood in.
 
     Args:
         path: A recording (.rrd) that urmpipe wrote.
+        kinds: The classes of results by the names of their kinds.
         lazy: Whether arrays are read when they are used (`Rows`); the file must stand as long.
 
     Raises:
@@ -32,12 +31,11 @@ def read_recording(path: Path, *, lazy: bool = False) -> Result:
     """
     store = Store(path)
     document = _document(store)
-    kind = next((one for one in results.KINDS if one.name == document.get("kind")), None)
-    if kind is None:
-        known = ", ".join(one.name for one in results.KINDS)
-        raise store.error(f"found a result of kind {document.get('kind')!r}, allowed: {known}")
+    cls = kinds.get(document.get("kind", ""))
+    if cls is None:
+        raise store.error(f"found a result of kind {document.get('kind')!r}, allowed: {', '.join(kinds)}")
     try:
-        result: Result = decode(kind.cls, document.get("result"), _reads(store, lazy))
+        result = decode(cls, document.get("result"), _reads(store, lazy))
     except CodecError as error:
         raise store.error(f"found damaged metadata, {error}") from error
     located = any(one.name == "recording" for one in fields(result))

@@ -15,6 +15,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import CosimulationError
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
@@ -259,7 +260,7 @@ class Simulation(Shown):
             columns |= dict(zip(one.names, one.columns.T, strict=True))
         return pd.DataFrame(columns)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the object that `urmpipe simulate --json` prints."""
         t = self.t
         return {
@@ -276,7 +277,7 @@ class Simulation(Shown):
             "failed": self.failed,
             "verdict": self.verdict,
             "verdicts": [one.to_dict() for one in self.verdicts],
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
 

@@ -16,10 +16,11 @@ import rerun as rr
 
 from urmpipe_models.errors import OutputError, RecordingError
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import is_ours, is_recording, read_recording, write_recording
+from urmpipe_pipeline.recording import is_ours, is_recording
 from urmpipe_pipeline.recording.codec import encode
 from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store, document
 from urmpipe_pipeline.recording.verify import verify
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
@@ -202,7 +203,7 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import conftest
 from urmpipe_models.errors import OutputError
-from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.results import write_recording
 try:
     write_recording(conftest.build_run(rows=5), Path(sys.argv[2]))
 except OutputError as error:

@@ -13,16 +13,15 @@ from rerun.chunk import RrdReader
 
 from recording_contents import views
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import write_recording
-from urmpipe_pipeline.recording.codec import encode
 from urmpipe_pipeline.recording.entities import places_of
-from urmpipe_pipeline.recording.eye import FIELD_OF_VIEW, FILLED, WIDE
 from urmpipe_pipeline.recording.layout import eye_and_target, viewer_layout
 from urmpipe_pipeline.recording.plots import SHARED_AXIS, Plots
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.shown_units import MARGIN, span_with_numbers
 from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, FILLED, WIDE
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
@@ -34,7 +33,7 @@ def test_what_is_doubtful_is_counted_in_the_title(make_run: MakeRun) -> None:
     run = make_run(rows=50)
     titles = []
     for audit in ((), run.audit, (*run.audit, doubt), (doubt,)):
-        *_, (view, *_) = Plots(run, encode(run)).joints(replace(run, audit=audit), places_of(run)[0])
+        *_, (view, *_) = Plots(run).joints(replace(run, audit=audit), places_of(run)[0])
         titles.append(view.name)
     assert titles == [
         "Joints, no repolarization needed [rad]",
@@ -46,7 +45,7 @@ def test_what_is_doubtful_is_counted_in_the_title(make_run: MakeRun) -> None:
 
 def test_joints_that_needed_no_repolarization_are_one_plot_with_the_file_behind_it(make_run: MakeRun) -> None:
     run = replace(make_run(rows=50), audit=())
-    (row,) = Plots(run, encode(run)).joints(run, places_of(run)[0])
+    (row,) = Plots(run).joints(run, places_of(run)[0])
     assert [view.name for view in row] == [
         "Joints, no repolarization needed [rad]",
         "Joints in the file [rad]",
@@ -92,7 +91,7 @@ def test_the_layout_is_in_the_file(make_comparison: MakeComparison, tmp_path: Pa
     } <= set(names)
     assert all("[" in name for name in names if name != "Summary")
     assert {"PASS a b", "PASS reference"} <= set(found["ContainerBlueprint:display_name"])
-    assert {"/overview/runs/a_b/delta", "/overview/runs/reference/delta", "/tolerance/delta/**"} <= set(
+    assert {"/overview/delta/a\\ b", "/overview/delta/reference\\ \\(2\\)", "/tolerance/delta/**"} <= set(
         found["ViewContents:query"]
     )
 
@@ -100,15 +99,13 @@ def test_the_layout_is_in_the_file(make_comparison: MakeComparison, tmp_path: Pa
 def test_the_worst_log_and_what_decides_are_open(make_comparison: MakeComparison) -> None:
     comparison = make_comparison(("far", "near", "farther"))
     far, near, farther = comparison.runs
-    turned = replace(comparison, runs=(far, farther, near))
-    layout = viewer_layout(turned, scene_of(comparison), encode(turned))
+    layout = viewer_layout(replace(comparison, runs=(far, farther, near)), scene_of(comparison))
     tabs: Any = list(layout.root_container.contents)[1]
     assert (tabs.contents[tabs.active_tab].name, len(tabs.contents)) == ("FAIL farther", 3)
     assert tabs.contents[0].contents[0].active_tab == 0
     path = replace(far.statistics["path"], tolerance=1e-9)
     decided = replace(far, statistics={**far.statistics, "path": path})
-    one = replace(comparison, runs=(decided,))
-    alone = viewer_layout(one, scene_of(comparison), encode(one))
+    alone = viewer_layout(replace(comparison, runs=(decided,)), scene_of(comparison))
     column: Any = list(alone.root_container.contents)[1]
     first, joints, *_ = column.contents
     assert first.contents[first.active_tab].name == "Distance from the path [mm]"

@@ -11,8 +11,8 @@ from rerun.chunk import RrdReader
 
 from recording_contents import columns, times_of, views
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.overview import LONG, ROWS, SPEED_ROWS
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]

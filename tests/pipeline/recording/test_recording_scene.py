@@ -24,13 +24,13 @@ from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.wording import amount_words
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.meshes import drawable, missing_visuals
 from urmpipe_pipeline.recording.bodies import bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import LEAST_SEEN
 from urmpipe_pipeline.recording.scene import Mark, scene_of
 from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import kinematics
-from urmpipe_pipeline.runs.meshes import drawable, missing_visuals
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import subprocess
 import sys
 from collections.abc import Callable
@@ -15,7 +16,6 @@ from hypothesis import strategies as st
 from hypothesis.extra.numpy import arrays
 from rerun import blueprint as rrb
 
-from recording_contents import columns
 from same_results import assert_same
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import RecordingError
@@ -23,16 +23,16 @@ from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.recording import read_recording, write_recording
-from urmpipe_pipeline.recording.codec import encode
 from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
 from urmpipe_pipeline.recording.overview import LONG
 from urmpipe_pipeline.recording.plots import Plots
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.simulation_layout import simulation_plots
 from urmpipe_pipeline.recording.simulation_summary import simulation_summary
-from urmpipe_pipeline.recording.store import SLICE, Store
+from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.viewer import opening_times
+from urmpipe_pipeline.recording.writer import SLICE
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.signal_groups import Group
 from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation
@@ -49,8 +49,8 @@ def assert_comes_back(simulation: Simulation, folder: Path) -> None:
     assert [one.name for one in folder.iterdir()] == ["simulation.rrd"]
 
 
-def values_at(path: Path, entity: str) -> FloatArray:
-    return np.array(columns(path, entity, "Scalars:scalars"))
+def values_at(store: Store, entity: str) -> FloatArray:
+    return np.concatenate([chunk.values for chunk in store.chunks(entity)])
 
 
 def test_a_simulation_comes_back_as_it_was(make_simulation: MakeSimulation, tmp_path: Path) -> None:
@@ -80,9 +80,9 @@ def test_a_long_one_comes_back_in_the_order_of_time(make_simulation: MakeSimulat
     simulation = make_simulation(2 * SLICE + 5)
     assert_comes_back(simulation, tmp_path)
     rows = Store(tmp_path / "simulation.rrd").rows
-    assert rows["/signals/log.q/values"] == 2 * SLICE + 5
-    assert 0 < rows["/overview/signals/log.q/values"] < SLICE
-    assert "/overview/t_ns" not in rows
+    assert rows["/signals/log/q"] == 2 * SLICE + 5
+    assert 0 < rows["/overview/signals/log/q"] < SLICE
+    assert "/overview/signals" not in rows
 
 
 def test_columns_of_a_wider_array_come_back_as_they_were(
@@ -102,17 +102,25 @@ def test_a_variable_is_an_entity_with_a_column_a_scalar(
     make_simulation: MakeSimulation, tmp_path: Path
 ) -> None:
     simulation = make_simulation(50)
-    path = write_recording(simulation, tmp_path / "a.rrd")
+    store = Store(write_recording(simulation, tmp_path / "a.rrd"))
     for one in simulation.signals:
-        np.testing.assert_array_equal(values_at(path, f"/signals/{one.name}/values"), one.columns)
-    np.testing.assert_array_equal(
-        values_at(path, encode(simulation).entity_of(simulation.arms[0].q, simulation.t_ns)),
-        simulation.arms[0].q,
-    )
-    np.testing.assert_array_equal(values_at(path, "/tolerance/meter/axis"), [[0.0035, -0.0035]] * 2)
-    worst = values_at(path, "/marks/worst/meter")
+        np.testing.assert_array_equal(values_at(store, f"/signals/{one.block}/{one.variable}"), one.columns)
+    np.testing.assert_array_equal(values_at(store, "/arms/chain/joints"), simulation.arms[0].q)
+    np.testing.assert_array_equal(values_at(store, "/tolerance/meter/axis"), [[0.0035, -0.0035]] * 2)
+    worst = values_at(store, "/marks/worst/meter")
     judged = np.column_stack([simulation.signals[2].values, simulation.signals[3].values])
     np.testing.assert_array_equal(worst, [[judged.min()], [judged.max()]])
+
+
+def test_each_kind_says_its_own_layout(
+    make_simulation: MakeSimulation, make_run: MakeRun, tmp_path: Path
+) -> None:
+    """An older urmpipe, which knows layouts up to 4, refuses a simulation by number and still reads a run."""
+    paths = (
+        write_recording(make_run(rows=5), tmp_path / "run.rrd"),
+        write_recording(make_simulation(5), tmp_path / "simulation.rrd"),
+    )
+    assert [json.loads(Store(path).metadata)["layout_version"] for path in paths] == [4, 5]
 
 
 def test_rerun_finds_nothing_wrong(make_simulation: MakeSimulation, tmp_path: Path) -> None:
@@ -137,9 +145,8 @@ def test_the_viewer_opens_at_the_worst_sample(make_simulation: MakeSimulation, t
 def test_what_decides_is_open_else_what_stands_last(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation(5)
     others = tuple(Signal(f"b{i}", f"v{i}", np.arange(5.0)) for i in range(8))
-    simulation = replace(simulation, signals=(*simulation.signals, *others))
-    both = simulation, replace(simulation, verdicts=())
-    judged, plain = (simulation_plots(one, encode(one)) for one in both)
+    judged = simulation_plots(replace(simulation, signals=(*simulation.signals, *others)))
+    plain = simulation_plots(replace(simulation, signals=(*simulation.signals, *others), verdicts=()))
     assert isinstance(judged, rrb.Tabs) and isinstance(plain, rrb.Tabs)
     assert [list(tabs.contents)[int(str(tabs.active_tab))].name for tabs in (judged, plain)] == [
         "meter",
@@ -158,8 +165,7 @@ def test_set_points_and_answers_come_first_and_are_open_where_nothing_is_judged(
         signals=(*simulation.signals, *pair, *others),
         connections={"c.set_theta": "set_point.theta", "c.real_theta": "load.theta"},
     )
-    both = simulation, replace(simulation, verdicts=())
-    judged, plain = (simulation_plots(one, encode(one)) for one in both)
+    judged, plain = simulation_plots(simulation), simulation_plots(replace(simulation, verdicts=()))
     assert isinstance(judged, rrb.Tabs) and isinstance(plain, rrb.Tabs)
     assert [list(tabs.contents)[int(str(tabs.active_tab))].name for tabs in (judged, plain)] == [
         "meter",
@@ -170,10 +176,7 @@ def test_set_points_and_answers_come_first_and_are_open_where_nothing_is_judged(
     (view,) = first.contents
     assert isinstance(view, rrb.TimeSeriesView)
     assert view.name == "Set point and answer: theta [rad]"
-    assert list(view.visualizer_overrides) == [
-        "/signals/set_point.theta/values",
-        "/signals/load.theta/values",
-    ]
+    assert list(view.visualizer_overrides) == ["/signals/set_point/theta", "/signals/load/theta"]
 
 
 def test_set_points_of_a_long_simulation_look_alike_in_overview_and_in_full(
@@ -181,19 +184,17 @@ def test_set_points_of_a_long_simulation_look_alike_in_overview_and_in_full(
 ) -> None:
     pair = tuple(Signal(block, "theta", np.zeros(LONG + 1), "rad") for block in ("set_point", "load"))
     group = Group("Set point and answer", "rad", pair, family=True, wanted=1)
-    simulation = replace(make_simulation(LONG + 1), signals=pair, verdicts=())
-    views = Plots(simulation, encode(simulation)).signals(group, LONG + 1)
-    whole = [f"/signals/{one.name}/values" for one in pair]
+    views = Plots(make_simulation(5)).signals(group, {one.name: f"/{one.block}" for one in pair}, LONG + 1)
     assert [list(view.visualizer_overrides) for view in views] == [
-        [f"/overview{one}" for one in whole],
-        whole,
+        ["/overview/set_point", "/overview/load"],
+        ["/set_point", "/load"],
     ]
 
 
 def test_words_stand_above_the_arm_and_else_beside_the_plots(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation(5)
     for one, left in ((simulation, rrb.Vertical), (replace(simulation, arms=()), rrb.Tabs)):
-        root = viewer_layout(one, scene_of(one), encode(one)).root_container
+        root = viewer_layout(one, scene_of(one)).root_container
         assert isinstance(root, rrb.Horizontal)
         assert isinstance(next(iter(root.contents)), left)
 

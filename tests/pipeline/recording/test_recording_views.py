@@ -14,10 +14,10 @@ from rerun.chunk import RrdReader
 from recording_contents import columns, packed, times_of
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR
-from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
