@@ -17,9 +17,9 @@ from recording_contents import times_of
 from same_results import assert_same
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
 from urmpipe_pipeline import results
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.presentation.section import Presentation, Section
 from urmpipe_pipeline.recording.store import SLICE
-from urmpipe_pipeline.results import Kind
+from urmpipe_pipeline.results import Kind, read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
@@ -55,10 +55,14 @@ def accuracy() -> Accuracy:
     )  # fmt: skip
 
 
+def shown(result: Accuracy) -> Presentation:
+    return Presentation(result.name, "measured", None, (), Section(result.name))
+
+
 @pytest.fixture
 def known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Add the kind to those of results, which is all that recording asks for."""
-    monkeypatch.setattr(results, "KINDS", (*results.KINDS, Kind("accuracy", Accuracy)))
+    monkeypatch.setattr(results, "KINDS", (*results.KINDS, Kind("accuracy", Accuracy, shown)))
 
 
 @pytest.mark.usefixtures("known")
