@@ -126,7 +126,7 @@ def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -
 def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
     assert run(["ingest", "good.csv", "--robot", "ur5e", "-q"]) == 0
     for baseline, found in (
-        ("good.rrd", "found the recording of one log, allowed: that of a comparison (--baseline)"),
+        ("good.rrd", "found a recording (run), allowed: that of a comparison (--baseline)"),
         ("good.csv", "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"),
         (
             "missing.rrd",

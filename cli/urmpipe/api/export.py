@@ -10,7 +10,7 @@ from urmpipe.edge import public
 from urmpipe.guards import PathLike, paths, refuse_foreign, refuse_others
 from urmpipe_models.display import Shown
 from urmpipe_pipeline import results
-from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.results import read_recording
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.tables import Exported, Format, PoseNames, RowNames

@@ -12,8 +12,7 @@ from urmpipe.guards import PathLike, one_or_many, paths, refuse_foreign, refuse_
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
 from urmpipe_pipeline.presentation.section import Cell, Value
-from urmpipe_pipeline.recording import read_recording
-from urmpipe_pipeline.results import KINDS, present
+from urmpipe_pipeline.results import KINDS, present, read_recording
 from urmpipe_pipeline.simulations.simulation import Result
 
 if TYPE_CHECKING:

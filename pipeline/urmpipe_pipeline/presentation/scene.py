@@ -98,12 +98,14 @@ class Targets:
         quat_xyzw: Orientations [-], shape (n, 4); None where none was asked for.
         reached: Which of them are reached, shape (n,).
         t_ns: Times in [ns], shape (n,); None without times.
+        reasons: Why they are not, one each; empty where nothing is known.
     """
 
     position: FloatArray
     quat_xyzw: FloatArray | None
     reached: BoolArray
     t_ns: IntArray | None
+    reasons: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -3,27 +3,27 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from urmpipe_pipeline import results
 from urmpipe_pipeline.recording.array_form import CodecError
 from urmpipe_pipeline.recording.codec import decode
 from urmpipe_pipeline.recording.rows import Rows
 from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store
 
 
-def read_recording(path: Path, *, lazy: bool = False) -> Any:
+def read_result(path: Path, kinds: Mapping[str, type], *, lazy: bool = False) -> Any:
     """Return the result that a recording holds.
 
     What stands inside a result comes back without the file that it once stood in.
 
     Args:
         path: A recording (.rrd) that urmpipe wrote.
+        kinds: The classes of results by the names of their kinds.
         lazy: Whether arrays are read when they are used (`Rows`); the file must stand as long.
 
     Raises:
@@ -31,12 +31,11 @@ def read_recording(path: Path, *, lazy: bool = False) -> Any:
     """
     store = Store(path)
     document = _document(store)
-    kind = next((one for one in results.KINDS if one.name == document.get("kind")), None)
-    if kind is None:
-        known = ", ".join(one.name for one in results.KINDS)
-        raise store.error(f"found a result of kind {document.get('kind')!r}, allowed: {known}")
+    cls = kinds.get(document.get("kind", ""))
+    if cls is None:
+        raise store.error(f"found a result of kind {document.get('kind')!r}, allowed: {', '.join(kinds)}")
     try:
-        result = decode(kind.cls, document.get("result"), _reads(store, lazy))
+        result = decode(cls, document.get("result"), _reads(store, lazy))
     except CodecError as error:
         raise store.error(f"found damaged metadata, {error}") from error
     located = any(one.name == "recording" for one in fields(result))
@@ -69,15 +68,15 @@ def _document(store: Store) -> dict[str, Any]:
     if version != LAYOUT_VERSION:
         who = "a newer" if newer else "an older"
         said = f"found layout version {version}, allowed: {LAYOUT_VERSION}; {who} urmpipe wrote it"
-        raise store.error(f"{said}: make it again, {_again(document)}")
+        raise store.error(f"{said}: make it again{_again(document)}")
     return document
 
 
 def _again(document: dict[str, Any]) -> str:
-    """Return the command that makes a recording again, as far as its metadata tell."""
+    """Return how to make a recording again: by which command, as far as its metadata tell."""
     try:
         made = document["result"]["provenance"]
         inputs = " ".join(one["name"] for one in made["inputs"])
-        return f"urmpipe {made['command']} {inputs} and its options"
+        return f": urmpipe {made['command']} {inputs} and its options"
     except (KeyError, TypeError):
-        return "from what it was made of"
+        return " from what it was made of"

@@ -46,6 +46,7 @@ class Store:
         rows: How many rows each entity has.
         metadata: The JSON text in its property.
         opens_at_ns: Where the viewer should stand in [ns]; 0 if nothing is said.
+        opens_at_row: The row, from 1, at which it should stand where there are no times; else None.
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,6 +60,8 @@ class Store:
         self.rows = _row_counts(self._store.summary())
         self.metadata = self._metadata()
         self.opens_at_ns = int(self._property("opens_at_ns") or 0)
+        row = self._property("opens_at_row")
+        self.opens_at_row = None if row is None else int(row)
 
     def error(self, message: str) -> RecordingError:
         """Return an error that names this file."""

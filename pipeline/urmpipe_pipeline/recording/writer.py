@@ -10,17 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.recording.array_form import CodecError, Column
 from urmpipe_pipeline.recording.codec import Encoded, encode
 from urmpipe_pipeline.recording.columns import column_rows
-from urmpipe_pipeline.recording.drawing import draw
-from urmpipe_pipeline.recording.entities import printable
 from urmpipe_pipeline.recording.identity import APPLICATION_ID
-from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
-from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.store import PROPERTY, SLICE, document
-from urmpipe_pipeline.recording.verify import verify
-from urmpipe_pipeline.results import kind_of
+from urmpipe_pipeline.recording.verify import verified, verify
+from urmpipe_pipeline.recording.views.blueprint import send_views
+from urmpipe_pipeline.recording.views.plots import EntityOf
+from urmpipe_pipeline.text import encodable
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -32,34 +31,34 @@ SPARE = 64 * 2**20
 """Bytes that must be free on the disk before a slice is sent: it, what is on its way, and the footer."""
 
 
-def write_recording(
+def write_result(
     result: Any,
+    kind: str,
+    shown: Presentation,
     path: Path,
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
-) -> Path:
+) -> None:
     """Write the recording of a result, read it back, and put it in its place.
 
     Args:
-        result: What to record.
+        result: What to record, a dataclass.
+        kind: What the recording calls its kind.
+        shown: What the viewer shows of it.
         path: The file (.rrd); replaced if it is a recording of urmpipe's.
         inputs: The files the result was made from: none of them is replaced.
         progress: Told the share of the data that is written, 0..1.
-
-    Returns:
-        The path.
 
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
     with guarded_output(path, inputs, "recording") as part:
         encoded = _encoded(result, path)
-        metadata = document(kind_of(result).name, encoded.tree)
+        metadata = document(kind, encoded.tree)
         with _stream_into(part) as stream:
-            _describe(stream, result, encoded, metadata)
+            _describe(stream, shown, encoded, metadata)
             _send(stream, part.parent, encoded.columns, progress)
         verify(part, path, encoded.columns, metadata)
-    return path
 
 
 def _encoded(result: Any, path: Path) -> Encoded:
@@ -95,7 +94,7 @@ def _stream_into(part: Path) -> Iterator[RecordingStream]:
 def _send(
     stream: RecordingStream, folder: Path, every: Sequence[Column], progress: Callable[[float], None] | None
 ) -> None:
-    """Send the arrays in slices, the first and the last row first: verifying then need not read all.
+    """Send the arrays in slices, those with a row to verify first: reading back then need not read all.
 
     Args:
         stream: Where to.
@@ -118,9 +117,9 @@ def _send(
 
 
 def _starts(rows: int) -> list[int]:
-    """Return where the slices of an array begin: the first, the last, then all between."""
-    first, *others = range(0, rows, SLICE)
-    return [first, *others[-1:], *others[:-1]]
+    """Return where the slices of an array begin: first those with a row to verify."""
+    early = dict.fromkeys(row - row % SLICE for row in verified(rows))
+    return [*early, *(start for start in range(0, rows, SLICE) if start not in early)]
 
 
 def _refuse_full_disk(folder: Path) -> None:
@@ -129,12 +128,24 @@ def _refuse_full_disk(folder: Path) -> None:
         raise OutputError(Finding(f"found less than {SPARE >> 20} MB free on the disk", str(folder)))
 
 
-def _describe(stream: RecordingStream, result: Any, encoded: Encoded, metadata: str) -> None:
-    """Send what is no array: the metadata, the viewer's layout, and what is there to be looked at."""
+def _describe(stream: RecordingStream, shown: Presentation, encoded: Encoded, metadata: str) -> None:
+    """Send what is no array: the metadata, and what is there to be looked at with its layout."""
     import rerun as rr
 
-    scene = scene_of(result)
-    stream.send_recording_name(printable(result.name))
-    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, opens_at_ns=opening_time(result)))
-    stream.send_blueprint(viewer_layout(result, scene, encoded))
-    draw(stream, result, encoded, scene)
+    stream.send_recording_name(encodable(shown.name))
+    opens: dict[str, Any] = {"opens_at_ns": shown.opens_at_ns}
+    if shown.opens_at_row is not None:
+        opens = {"opens_at_row": shown.opens_at_row + 1}
+    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, **opens))
+    stream.send_blueprint(send_views(stream, shown, _entities(encoded)))
+
+
+def _entities(encoded: Encoded) -> EntityOf:
+    """Return what tells where an array stands, or the one that it is a view of, if it can be plotted."""
+    plotted = {column.at for column in encoded.columns if column.plotted}
+
+    def entity_of(values: Any, t_ns: Any) -> str | None:
+        at = encoded.entity_of(values, t_ns)
+        return at if at in plotted else None
+
+    return entity_of

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,10 +29,15 @@ NORM = (AXIS_COLOURS["norm"],)
 def run_figures(run: Run) -> Iterator[Figure]:
     """Yield the plots of a log that stands alone: joints, speed, motion."""
     yield from joints_figure(run)
-    if run.tcp is not None:
+    if run.timed and run.tcp is not None:
         velocity = np.asarray(run.tcp.velocity)
         yield speed_figure(run.name, run.t_ns, np.sqrt(np.einsum("ij,ij->i", velocity, velocity)))
     yield from motion_figure(run)
+
+
+def times_of(run: Run) -> IntArray | None:
+    """Return the times of a run's samples in [ns], shape (g,); None if the number of a row is its axis."""
+    return run.t_ns if run.timed else None
 
 
 def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
@@ -43,8 +49,12 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
     """
     if not run.log.joints:
         return
-    joints = f"Joint values of {run.name} over time: {', '.join(run.log.joints)}."
-    after = joint_panels(run, "after" if run.audit else "joints", run.q, run.t_ns, _marks(run))
+    axis = "time" if run.timed else "the rows"
+    joints = f"Joint values of {run.name} over {axis}: {', '.join(run.log.joints)}."
+    after = joint_panels(run, "after" if run.audit else "joints", run.q, times_of(run), _marks(run))
+    if not run.timed:
+        yield Figure("Joints", "A pose a row: no motion joins them.", joints, (View("Joints", after),))
+        return
     if not run.audit:
         said = "No joint had to be repolarized: the values are those of the file."
         yield Figure("Joints", said, f"{joints} {said}", (View("Joints, no repolarization needed", after),))
@@ -66,7 +76,7 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
 
 
 def joint_panels(
-    run: Run, title: str, values: FloatArray, t_ns: IntArray, marks: Sequence[Mark] = (), per: str = ""
+    run: Run, title: str, values: FloatArray, t_ns: IntArray | None, marks: Sequence[Mark] = (), per: str = ""
 ) -> tuple[Panel, ...]:
     """Return joints over time, a panel for those that turn and one for those that slide.
 
@@ -74,7 +84,7 @@ def joint_panels(
         run: Whose joints they are.
         title: What is plotted of them.
         values: In rad and m, divided by `per`, shape (n, joints).
-        t_ns: Times in [ns], shape (n,).
+        t_ns: Times in [ns], shape (n,); None: the rows are points.
         marks: Marks on them, by the names of the joints.
         per: "", "/s" or "/s2".
     """
@@ -86,6 +96,7 @@ def joint_panels(
             values if len(own) == len(names) else np.asarray(values)[:, own],
             tuple(names[j] for j in own),
             tuple(map(joint_colour, own)),
+            points=t_ns is None,
         )
         marked = tuple(mark for mark in marks if mark.name in line.names)
         panels.append(Panel(title, unit + per, (line,), t_ns, marks=marked, share=1.5))
@@ -125,6 +136,16 @@ def motion_figure(run: Run) -> Iterator[Figure]:
         )
         return
     point = point_name(run)
+    if not run.timed:
+        yield Figure(
+            "Poses of the tool centre point",
+            f"{point} and its Euler angles (moving Z-Y-X, in the colours of their axes), by forward"
+            " kinematics.",
+            f"Poses of {point} of {run.name} by forward kinematics.",
+            tuple(views),
+            share=2.2,
+        )
+        return
     yield Figure(
         "Motion",
         f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a, and its Euler"
@@ -151,23 +172,31 @@ def coordinates(values: FloatArray) -> Line:
 
 
 def _derivatives(run: Run) -> Iterator[View]:
-    if run.log.joints and len(run.t_ns) > 1:
+    if run.timed and run.log.joints and len(run.t_ns) > 1:
         yield View("Joint rates", joint_panels(run, "rates", run.qd, run.t_ns, per="/s"))
         yield View("Joint accelerations", joint_panels(run, "accelerations", run.qdd, run.t_ns, per="/s2"))
 
 
 def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     """Yield the views of the tool centre point by kinematics."""
-    yield View("TCP", (Panel(point_name(run), "m", (coordinates(tcp.position),), run.t_ns),))
+    t_ns, points = times_of(run), not run.timed
+    position = replace(coordinates(tcp.position), points=points)
+    yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
+    if run.timed:
+        yield from _point_derivatives(run, tcp)
+    known = np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx)
+    angles = continuous_euler(known) if run.timed else known
+    euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
+    tinted = tcp.singular if np.any(tcp.singular) else None
+    yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
+
+
+def _point_derivatives(run: Run, tcp: PointLog) -> Iterator[View]:
+    """Yield the views of velocity and acceleration."""
     yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), run.t_ns),))
     size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
     lines = (coordinates(tcp.acceleration), size)
     yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
-    angles = continuous_euler(np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx))
-    euler = Line(angles, tuple(EULER), tuple(EULER.values()))
-    tinted = tcp.singular if np.any(tcp.singular) else None
-    panel = Panel("rz, ry, rx", "rad", (euler,), run.t_ns, tinted=tinted)
-    yield View("TCP rz, ry, rx", (panel,))
 
 
 def _recorded(run: Run) -> Iterator[View]:

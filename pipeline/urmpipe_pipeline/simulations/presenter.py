@@ -99,6 +99,7 @@ def _body(simulation: Simulation) -> Section:
         simulation.verdict,
         (*_outcome(simulation), *_facts(simulation)),
         (*meters_table(simulation), *first_signals_table(simulation)),
+        partial(_system_file, simulation),
         blocks=partial(_page, simulation),
         checks=(end,),
         events=partial(_events, simulation),
@@ -167,6 +168,11 @@ def _section(
     )
 
 
+def _system_file(simulation: Simulation) -> Iterator[Text]:
+    if simulation.system_text:
+        yield Text("System file", simulation.system_text)
+
+
 def _page(simulation: Simulation) -> Iterator[Block]:
     """Yield what only a page shows of a simulation: its system, its paths, its values."""
     if simulation.system_svg:
@@ -176,8 +182,6 @@ def _page(simulation: Simulation) -> Iterator[Block]:
     yield from path_figure(simulation)
     yield signals_table(simulation)
     yield settings_table(simulation)
-    if simulation.system_text:
-        yield Text("System file", simulation.system_text)
     yield inputs_table("Input files", simulation.provenance.inputs)
     yield provenance_table(simulation.provenance)
 

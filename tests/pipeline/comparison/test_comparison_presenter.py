@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from presented import Untouched, cells, every_section, facts
+from presented import Untouched, cells, every_section, facts, figures
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.baseline import against_baseline
@@ -167,7 +167,7 @@ def test_what_changed_since_the_baseline_is_a_section(paths: Compared) -> None:
 def test_the_plots_are_the_deviation_with_what_is_allowed(arms: Compared) -> None:
     result = arms({"a": noisy(1)}, tolerance={"axis": 0.001, "angle": 0.002, "joint": 0.002})
     one = result.runs[0]
-    deviation, joints, *_ = log_section(result, "a").figures()
+    deviation, joints, *_ = figures(log_section(result, "a"))
     delta, path, angle = deviation.views
     for i, (axis, panel) in enumerate(zip(AXES, delta.panels, strict=True)):
         held = one.statistics[axis]
@@ -183,14 +183,14 @@ def test_the_plots_are_the_deviation_with_what_is_allowed(arms: Compared) -> Non
 @pytest.mark.parametrize(("kind", "view"), [("axis", 0), ("path", 1), ("angle", 2)])
 def test_the_viewer_opens_what_decided(arms: Compared, kind: str, view: int) -> None:
     result = arms({"a": noisy(1)}, tolerance={kind: 1e-6})
-    deviation, *_ = log_section(result, "a").figures()
+    deviation, *_ = figures(log_section(result, "a"))
     assert deviation.opened == view
 
 
 def test_paths_have_no_joints_and_no_arm(paths: Compared) -> None:
     result = paths({"a": off(0.001)})
     shown = present(result)
-    units = {p.unit for f in shown.body.sections[0].figures() for view in f.views for p in view.panels}
+    units = {p.unit for f in figures(shown.body.sections[0]) for view in f.views for p in view.panels}
     assert units == {"m", "m/s"}
     assert shown.scene is not None
     scene = shown.scene()
@@ -284,6 +284,6 @@ def test_a_log_of_one_row_is_shown(paths: Compared) -> None:
     assert shown.scene is not None
     assert shown.scene() is not None
     for section in every_section(shown.body):
-        assert all(figure.views for figure in section.figures())
+        assert all(figure.views for figure in figures(section))
         list(section.blocks())
         list(section.events())

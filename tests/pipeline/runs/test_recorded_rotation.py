@@ -11,7 +11,7 @@ from scipy.spatial.transform import Rotation
 from exported import export_result
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.orientation import NAMES, RotationForm, width
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
