@@ -22,6 +22,7 @@ from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
 from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.simulations.simulation import Result
+from urmpipe_pipeline.text import counted
 
 Made = TypeVar("Made", bound=Result)
 
@@ -212,13 +213,8 @@ def refuse_foreign(files: Sequence[Path]) -> None:
 def refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:
     """Raise a `LogError` with all warnings if they are to be errors."""
     if strict and warnings:
-        raise LogError(*(Finding(f"{_told(one)} (--strict)", row=one.row) for one in warnings))
-
-
-def _told(warning: LogWarning) -> str:
-    """Return a warning with its kind and its row, as the terminal prints it."""
-    row = f"row {warning.row}: " if warning.row else ""
-    return f"{warning.kind}: {row}{warning.message}"
+        found = Finding(parameter="strict", found=counted(len(warnings), "warning"), allowed="none")
+        raise LogError(found, *(one.as_finding() for one in warnings))
 
 
 def offset_of(frame: Transform) -> tuple[float, ...]:

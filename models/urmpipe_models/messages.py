@@ -12,11 +12,11 @@ would change it, are fields. Who prints chooses the voice, so that a stored mess
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass
 from itertools import groupby
 from typing import Any
 
-from urmpipe_models.spelling import IN_MAP, IN_NO_FILE, Voice, option_of, spelled
+from urmpipe_models.spelling import IN_MAP, IN_NO_FILE, Voice, spelled, subject
 
 Value = str | bool | float | list[str] | list[float] | Mapping[str, str | tuple[float, float] | None] | None
 """What to give a parameter: by column or joint, "" for all; True for a flag; None for the reader's own."""
@@ -85,8 +85,7 @@ class Message:
         )
         said = ": ".join(filter(None, (self.message, ", ".join(told))))
         if self.parameter:
-            subject = option_of(self.parameter) if voice == "command line" else self.parameter
-            said = f"{subject}: {said}"
+            said = f"{subject(self.parameter, voice)}: {said}"
         return one_line("; ".join([said, *hint_words(self.hints, voice)]))
 
     def words(self, voice: Voice) -> str:
@@ -96,9 +95,7 @@ class Message:
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return its fields for JSON, with the sentence as `message`."""
-        told = {one.name: getattr(self, one.name) for one in fields(self)}  # type: ignore[arg-type]
-        hints = [{one.name: getattr(hint, one.name) for one in fields(hint)} for hint in self.hints]
-        return told | {"message": self.sentence(voice), "hints": hints}
+        return asdict(self) | {"message": self.sentence(voice)}  # type: ignore[call-overload, no-any-return]
 
 
 @dataclass(frozen=True, slots=True)
@@ -132,13 +129,11 @@ class Finding(Message):
     hints: tuple[Hint, ...] = ()
 
     def place(self) -> str:
-        """Return file, line and column: "log.csv:12, column q1"."""
-        place = self.file or ""
-        if self.line is not None:
-            place += f":{self.line}"
-        if self.column is not None:
-            place += f"{', ' if place else ''}column {self.column}"
-        return ": ".join(filter(None, (self.about, place)))
+        """Return file, line (or row) and column: "log.csv:12, column q1"."""
+        file = (self.file or "") + ("" if self.line is None else f":{self.line}")
+        row = None if self.row is None or self.line is not None else f"row {self.row}"
+        column = None if self.column is None else f"column {self.column}"
+        return ": ".join(filter(None, (self.about, ", ".join(filter(None, (file, row, column))))))
 
 
 def hint_words(hints: Sequence[Hint], voice: Voice) -> Iterator[str]:

@@ -59,12 +59,22 @@ IN_MAP = {
 }
 """Where the map of a log, which a system file names, says how to read it."""
 
+IN_FILE = {**IN_MAP, "log_map": "map", "robot": "robot"}
+"""Where a system file, or the map of a log in it, says what is a parameter elsewhere; others are options."""
+
 _PARTING = frozenset(" \t'&()[]{},;=@#$`^!+%~|<>")
 """What PowerShell or cmd reads as more than a letter of a word."""
 
 
 IN_NO_FILE = ("repair", "skip_bad", "derivative", "tsp")
 """Parameters of a log that no file says."""
+
+
+def subject(parameter: str, voice: Voice) -> str:
+    """Return a parameter as somebody calls it: an option, a keyword, or a key of a file."""
+    if voice == "python":
+        return parameter
+    return IN_FILE.get(parameter, option_of(parameter)) if voice == "system file" else option_of(parameter)
 
 
 def option_of(parameter: str) -> str:
@@ -78,7 +88,7 @@ def spelled(parameter: str, value: Any, voice: Voice) -> str:
     if isinstance(value, Mapping):
         value = {key: own if one is None else one for key, one in value.items()}
     value = own if value is None else value
-    if voice == "command line":
+    if voice == "command line" or (voice == "system file" and parameter not in IN_FILE):
         return " ".join(_options(option_of(parameter), value))
     return f"{parameter}={_in_python(value)}" if voice == "python" else _in_file(parameter, value)
 
@@ -127,7 +137,7 @@ def _in_python(value: Any) -> str:
 
 def _in_file(parameter: str, value: Any) -> str:
     """Return what a system file, or the map of a log in it, says: as TOML."""
-    key = IN_MAP.get(parameter, parameter)
+    key = IN_FILE[parameter]
     if not isinstance(value, Mapping):
         return f"{key} = {_in_toml(value)}"
     paths = (key + (f".{name if name.isidentifier() else _quoted(name)}" if name else "") for name in value)

@@ -24,6 +24,8 @@ from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations import exports as simulation_exports
 from urmpipe_pipeline.simulations import presenter as simulations
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.solved_targets import presenter as solved_targets
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,6 +49,7 @@ KINDS: tuple[Kind, ...] = (
     Kind("run", Run, runs.present, run_exports.exports),
     Kind("comparison", Comparison, comparison.present, comparison_exports.exports),
     Kind("simulation", Simulation, simulations.present, simulation_exports.exports),
+    Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
 )
 """Every kind."""
 

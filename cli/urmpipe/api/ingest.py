@@ -25,11 +25,12 @@ from urmpipe_models.errors import Finding, LogError, for_each
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.recording import is_recording
-from urmpipe_pipeline.runs.audit_file import write_audit
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.runs.presenter import audit_rows
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables.table_csv import write_table
 
 LOG_ALLOWED = f"a file, several of one log, or a folder of them; {WRITTEN_FIRST}"
 
@@ -84,7 +85,7 @@ def ingest(
         run = ingest_log(files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name)
         refuse_warnings(strict, run.warnings)
         if audit is not None:
-            write_audit(run, written["audit"], Path(audit))
+            write_table(audit_rows(run), written["audit"], Path(audit))
         if write_map is not None:
             write_map_part(run, written["map"], Path(write_map), map_robot)
         return recorded(run, output, kept, progress)

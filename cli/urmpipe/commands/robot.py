@@ -72,11 +72,11 @@ def show(
     """
     import numpy as np
 
-    from urmpipe.inverse.wording import start_warnings
     from urmpipe.printing.chain_drawing import chain_svg
     from urmpipe.printing.robot import chain_at, print_chain
     from urmpipe_models.errors import OptionError
     from urmpipe_models.robots.written import write_export
+    from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
     chain = _placed(name, placing)
     q = chain.start if q is None else q

@@ -4,56 +4,53 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
+from typing import Any
 
 from urmpipe_models.display import HEAD
-from urmpipe_models.errors import one_line
-from urmpipe_pipeline import text
-from urmpipe_pipeline.presentation.digits import unit_of, written
-from urmpipe_pipeline.presentation.section import Fact, Presentation, Section, Table
+from urmpipe_models.messages import one_line
+from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
+from urmpipe_pipeline.presentation.digits import written
+from urmpipe_pipeline.presentation.section import Fact, Section, Table
 
 
-def notebook_html(one: Presentation) -> str:
-    """Return what a notebook shows of a result."""
-    word = (one.verdict or one.word).upper()
-    headline = f"<p><b>{_shown(word)}</b> {_shown(one.headline)}</p>"
-    return headline + _facts(one.facts) + "".join(_section(one.body))
+def notebook_page(result: Any) -> str | None:
+    """Return what a notebook shows of a result; None of what does not present itself."""
+    from urmpipe_pipeline.results import is_result, present
+
+    if not is_result(result):
+        return None
+    shown = present(result)
+    word = (shown.verdict or shown.word).upper()
+    headline = f"<p><b>{type(result).__name__}</b> {_plain(word)} {_plain(shown.headline)}</p>"
+    return headline + _facts(shown.facts) + "".join(_section(shown.body))
 
 
 def _section(section: Section) -> Iterator[str]:
-    yield from (_table(table) for table in section.tables if table.brief and table.columns)
+    yield from map(_table, brief_tables(section))
     yield _facts(section.facts)
     if section.warnings:
-        yield f"<ul>{''.join(f'<li>{_shown(one.message)}</li>' for one in section.warnings)}</ul>"
+        yield f"<ul>{''.join(f'<li>{_plain(str(one))}</li>' for one in section.warnings)}</ul>"
     for below in section.sections:
         if below.facts or below.tables or below.warnings:
-            yield f"<p><b>{_shown(below.title)}</b></p>"
+            yield f"<p><b>{_plain(below.title)}</b></p>"
             yield from _section(below)
 
 
 def _facts(facts: tuple[Fact, ...]) -> str:
-    brief = [one for one in facts if one.brief and one.value not in (None, "")]
-    rows = (
-        f"<tr><th>{_shown(one.name)}</th><td>{_shown(written(one.value, unit=True))}</td></tr>"
-        for one in brief
-    )
-    return f"<table>{''.join(rows)}</table>" if brief else ""
+    told = [(one.name, written(one.value, unit=True, voice="python")) for one in brief_facts(facts)]
+    rows = (f"<tr><th>{_plain(name)}</th><td>{_plain(value)}</td></tr>" for name, value in told)
+    return f"<table>{''.join(rows)}</table>" if told else ""
 
 
 def _table(table: Table) -> str:
-    """Return the first rows of the brief columns that have a value."""
-    columns = [
-        one
-        for number, one in enumerate(table.columns)
-        if one.brief and (not number or any(written(cell) != text.NOTHING for cell in one.cells))
-    ]
-    heads = (f"{one.title} [{unit}]" if (unit := unit_of(one.cells)) else one.title for one in columns)
-    rows = len(table.columns[0].cells)
-    lines = zip(*(map(written, one.cells[:HEAD]) for one in columns), strict=True)
-    body = "".join(f"<tr>{''.join(f'<td>{_shown(cell)}</td>' for cell in line)}</tr>" for line in lines)
-    more = f"<p>{HEAD} of {rows} rows</p>" if rows > HEAD else ""
-    head = "".join(f"<th>{_shown(one)}</th>" for one in heads)
-    return f"<p>{_shown(table.title)}</p><table><tr>{head}</tr>{body}</table>{more}"
+    columns, shown = list(brief_columns(table)), rows_within(table, HEAD)
+    count = len(columns[0].cells)
+    heads = "".join(f"<th>{_plain(head(one))}</th>" for one in columns)
+    rows = zip(*(one.cells[shown] for one in columns), strict=True)
+    lines = (f"<tr>{''.join(f'<td>{_plain(written(cell))}</td>' for cell in row)}</tr>" for row in rows)
+    more = f"<p>{HEAD} of {count} rows</p>" if count > HEAD else ""
+    return f"<p>{_plain(table.title)}</p><table><tr>{heads}</tr>{''.join(lines)}</table>{more}"
 
 
-def _shown(value: str) -> str:
+def _plain(value: str) -> str:
     return escape(one_line(value))

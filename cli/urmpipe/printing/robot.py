@@ -10,10 +10,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe.inverse.wording import method_words
 from urmpipe.printing.terminal import new_console, new_table
 from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.closed.closed_form import closed_form
+from urmpipe_models.inverse.closed.closed_form import closed_form, method_words
 from urmpipe_models.kinematics.forward import forward, points_over_log
 from urmpipe_models.robots.robot_file import chain_to_dict
 from urmpipe_models.transform import Transform, euler_zyx, rpy_of

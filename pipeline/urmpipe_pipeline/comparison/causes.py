@@ -53,7 +53,7 @@ def _late(run: Deviation, reference: Trajectory) -> Iterator[Advice]:
 
 def _has_own_clock(run: Deviation, reference: Trajectory) -> bool:
     """Tell whether an offset may be looked for: not in one file, nor between targets without times."""
-    return run.sync.mode == "start" and run.run.log.files != reference.files and not run.run.single_poses
+    return run.sync.mode == "start" and run.run.log.files != reference.files and run.run.timed
 
 
 def _zeros(run: Deviation) -> Iterator[Advice]:

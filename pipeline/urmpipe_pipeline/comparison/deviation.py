@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.runs.results import Run
@@ -234,7 +235,7 @@ class Deviation(Shown):
 
     def _notes(self) -> list[str]:
         """Return what is to be known of the log."""
-        return [warning.message for warning in self.run.warnings]
+        return [str(warning) for warning in self.run.warnings]
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a compared sample: t [s], then every quantity, in [m] or [rad].
@@ -246,7 +247,7 @@ class Deviation(Shown):
         names = [one.quantity for one in self.all_statistics]
         return pd.DataFrame({"t": self.t, **dict(zip(names, self.values, strict=True))})
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the JSON object of one run."""
         worst, longest = self.worst, self.longest_out
         angle = self.statistics.get("angle")
@@ -275,5 +276,5 @@ class Deviation(Shown):
             "longest_out": None if longest is None else asdict(longest),
             "speed_correlation": self.speed_correlation,
             "verdict": self.verdict,
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.run.warnings],
+            "warnings": [one.to_dict(voice) for one in self.run.warnings],
         }

@@ -86,7 +86,7 @@ def path_figure(one: Deviation) -> SpaceFigure:
         (
             Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
             Path(
-                "actual", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
+                "actual: ‖Δ‖", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
                 sample=one.sample, kept=(decided_row(one),),
             ),
         ),

@@ -12,7 +12,7 @@ from urmpipe_models.errors import LogError
 from urmpipe_models.orientation import angle_between
 from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Kind
-from urmpipe_pipeline.comparison.matching import Matched, joints_apart, lacking
+from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, joints_apart, lacking
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.statistics import Measured, correlation, describe, overall
 from urmpipe_pipeline.comparison.trajectory import Trajectory
@@ -150,11 +150,11 @@ def _refuse_unheld(
     """Raise a `LogError` if there is a tolerance for what a side does not have: nothing would be judged."""
     faults = []
     if "angle" in tolerance and angle is None:
-        found = "--tolerance angle: found a side without an orientation"
-        faults.append(lacking(run, f"{found}, allowed: joints with a --robot, or a recorded orientation"))
+        said = f"angle: found a side without an orientation, allowed: {ORIENTED}"
+        faults.append(lacking(run, said, parameter="tolerance"))
     if "joint" in tolerance and joint_delta is None:
-        found = f"--tolerance joint: found that {unheld(reference, run)}"
-        faults.append(lacking(run, f"{found}, allowed: the same joints on both sides"))
+        said = f"joint: found that {unheld(reference, run)}, allowed: the same joints on both sides"
+        faults.append(lacking(run, said, parameter="tolerance"))
     if faults:
         raise LogError(*faults)
 

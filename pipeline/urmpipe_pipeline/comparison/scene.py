@@ -81,7 +81,7 @@ def _placed(robot: Chain, one: Deviation) -> Chain:
 
 def _reference(reference: Trajectory, shown: Deviation) -> Iterator[Path]:
     """Yield the whole reference as a line, and the point where it is at the samples of a log."""
-    if not shown.run.single_poses:
+    if shown.run.timed:
         yield Path(reference.name, reference.position, None, REFERENCE_COLOUR, asked=True)
     yield Path(
         reference.name, shown.reference, shown.t_ns, REFERENCE_COLOUR, asked=True, sample=shown.sample,
@@ -93,7 +93,7 @@ def _log(one: Deviation, colour: str) -> Path:
     """Return where a compared log was."""
     return Path(
         one.name, one.actual, one.t_ns, colour, sample=one.sample, kept=(decided_row(one),),
-        line=not one.run.single_poses,
+        line=one.run.timed,
     )  # fmt: skip
 
 
@@ -110,7 +110,7 @@ def _enlarged(one: Deviation, radius: float) -> tuple[Path, int] | None:
     Only that of the log whose arm is drawn: a line a log would hide all of them.
     """
     factor = _factor(one.statistics["norm"].max, radius)
-    if factor is None or one.run.single_poses:
+    if factor is None or not one.run.timed:
         return None
     position = one.reference + factor * (np.asarray(one.actual) - one.reference)
     row = decided_row(one)

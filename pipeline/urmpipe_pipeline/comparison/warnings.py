@@ -7,6 +7,7 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
@@ -42,12 +43,12 @@ def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
     """
     for found in one.all_statistics:
         if found.tolerance is not None and found.missing:
-            said = f"judged at {found.samples} of {len(one.sample)} compared samples"
-            told = f"{one.name}: {found.quantity}: {said}; one without a value is out of tolerance"
-            yield LogWarning("partly-judged", told)
-    if not one.run.single_poses and _rests(one):
+            said = f"{found.quantity}: judged at {found.samples} of {len(one.sample)} compared samples"
+            told = f"{said}; a sample without a value is out of tolerance"
+            yield LogWarning("partly-judged", told, about=one.name)
+    if one.run.timed and _rests(one):
         said = f"{text.counted(len(one.sample), 'sample')} compared, all in one pose"
-        yield LogWarning("one-pose", f"{one.name}: {said}: the verdict is on that pose alone")
+        yield LogWarning("one-pose", f"{said}: the verdict is on that pose alone", about=one.name)
 
 
 def _rests(one: Deviation) -> bool:
@@ -74,8 +75,11 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
         if value > most:
             shown, bare = text.limit(value, unit), f"{value:g}"
             said = f"a tolerance of {shown} {other} ({kind}) lets anything pass: {bare} is in {unit}"
-            hint = f"{bare}{other} meant? If not: --tolerance {kind}={bare}{unit}"
-            yield LogWarning("large-tolerance", f"{said}; {hint}")
+            hints = (
+                Hint("tolerance", f"{kind}={bare}{other}", f"if {other} was meant"),
+                Hint("tolerance", f"{kind}={bare}{unit}", "if not"),
+            )
+            yield LogWarning("large-tolerance", said, hints=hints)
 
 
 def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
@@ -98,8 +102,8 @@ def exchanged(reference: Run, runs: Iterable[Run]) -> Iterator[LogWarning]:
     """Yield a warning for each path that is held as a log against one with joints: perhaps the wrong way."""
     for run in runs:
         if reference.log.joints and not run.log.joints:
-            said = f"a path without joints, held against {reference.name}, which has joints"
-            yield LogWarning(EXCHANGED, f"{run.name}: {said}: the reference stands first, then the logs")
+            said = f"a path without joints, compared with {reference.name}, which has joints"
+            yield LogWarning(EXCHANGED, f"{said}: the reference comes first, then the logs", about=run.name)
 
 
 def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
@@ -114,8 +118,8 @@ def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
     apart = np.linalg.norm(run.tcp.position - run.tcp_recorded, axis=1)
     if (known := apart[np.isfinite(apart)]).size and (most := float(known.max())) > allowed:
         said = f"by its joints it is up to {text.quantity(most, 'm')} from the tool centre point it recorded"
-        remedy = f"this verdict does not judge it, urmpipe compare with {run.name} alone does"
-        yield LogWarning("recorded-tcp-apart", f"{run.name}: {said}, {_cause(most)}; {remedy}")
+        remedy = f"this verdict does not judge it, a comparison of {run.name} alone does"
+        yield LogWarning("recorded-tcp-apart", f"{said}, {_cause(most)}; {remedy}", about=run.name)
 
 
 def _cause(apart: float) -> str:

@@ -5,9 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 
-from urmpipe_models.chains.chain import Chain
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.alignment import tool_with
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics, Stretch
@@ -182,17 +180,6 @@ def alignment_words(alignment: Alignment) -> str:
         return f"aligned (tool): tool centre point moved by {_vector(alignment.tool)} mm in the tool's frame"
     turned, by = text.quantity(alignment.angle, "rad"), _vector(alignment.translation)
     return f"aligned ({alignment.mode}): turned by {turned} about the origin, then moved by {by} mm"
-
-
-def tool_option(robot: Chain, alignment: Alignment) -> str:
-    """Return the option that gives an arm the tool that a comparison found, to a tenth of a micrometre.
-
-    Args:
-        robot: The arm, perhaps with a tool already.
-        alignment: That of the mode tool.
-    """
-    rounded = (f"{round(value, 7) + 0.0:.7f}" for value in tool_with(robot, alignment))  # + 0.0: no -0
-    return "--tool " + ",".join(value.rstrip("0").rstrip(".") for value in rounded)
 
 
 def _vector(metres: tuple[float, ...]) -> str:

@@ -68,15 +68,15 @@ def _document(store: Store) -> dict[str, Any]:
     if version != LAYOUT_VERSION:
         who = "a newer" if newer else "an older"
         said = f"found layout version {version}, allowed: {LAYOUT_VERSION}; {who} urmpipe wrote it"
-        raise store.error(f"{said}: make it again, {_again(document)}")
+        raise store.error(f"{said}: make it again{_again(document)}")
     return document
 
 
 def _again(document: dict[str, Any]) -> str:
-    """Return the command that makes a recording again, as far as its metadata tell."""
+    """Return how to make a recording again: by which command, as far as its metadata tell."""
     try:
         made = document["result"]["provenance"]
         inputs = " ".join(one["name"] for one in made["inputs"])
-        return f"urmpipe {made['command']} {inputs} and its options"
+        return f": urmpipe {made['command']} {inputs} and its options"
     except (KeyError, TypeError):
-        return "from what it was made of"
+        return " from what it was made of"

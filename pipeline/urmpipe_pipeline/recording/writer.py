@@ -16,7 +16,7 @@ from urmpipe_pipeline.recording.codec import Encoded, encode
 from urmpipe_pipeline.recording.columns import column_rows
 from urmpipe_pipeline.recording.identity import APPLICATION_ID
 from urmpipe_pipeline.recording.store import PROPERTY, SLICE, document
-from urmpipe_pipeline.recording.verify import verify
+from urmpipe_pipeline.recording.verify import verified, verify
 from urmpipe_pipeline.recording.views.blueprint import send_views
 from urmpipe_pipeline.recording.views.plots import EntityOf
 from urmpipe_pipeline.text import encodable
@@ -94,7 +94,7 @@ def _stream_into(part: Path) -> Iterator[RecordingStream]:
 def _send(
     stream: RecordingStream, folder: Path, every: Sequence[Column], progress: Callable[[float], None] | None
 ) -> None:
-    """Send the arrays in slices, the first and the last row first: verifying then need not read all.
+    """Send the arrays in slices, those with a row to verify first: reading back then need not read all.
 
     Args:
         stream: Where to.
@@ -117,9 +117,9 @@ def _send(
 
 
 def _starts(rows: int) -> list[int]:
-    """Return where the slices of an array begin: the first, the last, then all between."""
-    first, *others = range(0, rows, SLICE)
-    return [first, *others[-1:], *others[:-1]]
+    """Return where the slices of an array begin: first those with a row to verify."""
+    early = dict.fromkeys(row - row % SLICE for row in verified(rows))
+    return [*early, *(start for start in range(0, rows, SLICE) if start not in early)]
 
 
 def _refuse_full_disk(folder: Path) -> None:

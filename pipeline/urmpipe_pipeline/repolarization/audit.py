@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.in_between import beside_wraps, off_line, repair
+from urmpipe_models.messages import Hint
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
 from urmpipe_pipeline.gaps import MISSED_SAMPLE
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, seconds
@@ -22,7 +23,7 @@ from urmpipe_pipeline.repolarization.interval import Interval, double_turns, giv
 LISTED = 8
 """Warnings of a kind that are told one by one; the others are counted, and listed by the audit."""
 
-ALL = "; ingest --audit FILE.csv lists all"
+ALL = (Hint("audit", None, "lists all", call="ingest"),)
 """Where the others are."""
 
 MOST = 10_000
@@ -307,7 +308,7 @@ def _warn_unexplained(log: JointLog, odd: _Places, periods: FloatArray) -> Itera
         )
         yield LogWarning("large-step", said, row + 1)
     if len(odd.rows) > LISTED:
-        yield LogWarning("large-step", f"{len(odd.rows) - LISTED} more steps that are no wraps{ALL}")
+        yield LogWarning("large-step", f"{len(odd.rows) - LISTED} more steps that are no wraps", hints=ALL)
 
 
 def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
@@ -315,11 +316,11 @@ def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
     for row, j, _, off in zip(*(part[:LISTED].tolist() for part in between), strict=True):
         said = (
             f"{log.joints[j]} lies between the ends of a wrap, {abs(off):.4g} rad off the line of its"
-            " neighbours, where a linear resampling left it: --repair puts it there"
+            " neighbours, where a linear resampling left it"
         )
-        yield LogWarning("in-between", said, row + 1)
+        yield LogWarning("in-between", said, row + 1, hints=(Hint("repair", True, "puts it there"),))
     if len(between.rows) > LISTED:
-        yield LogWarning("in-between", f"{len(between.rows) - LISTED} more samples on wraps{ALL}")
+        yield LogWarning("in-between", f"{len(between.rows) - LISTED} more samples on wraps", hints=ALL)
 
 
 def _warn_ambiguous(log: JointLog, unsure: _Places, speeds: FloatArray) -> Iterator[LogWarning]:
@@ -338,4 +339,4 @@ def _warn_ambiguous(log: JointLog, unsure: _Places, speeds: FloatArray) -> Itera
         yield LogWarning("ambiguous-turn", said, row + 1)
     if len(gaps) > LISTED:
         left = len(gaps) - LISTED
-        yield LogWarning("ambiguous-turn", f"{left} more gaps in which joints can have turned{ALL}")
+        yield LogWarning("ambiguous-turn", f"{left} more gaps in which joints can have turned", hints=ALL)

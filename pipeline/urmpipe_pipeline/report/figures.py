@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
+from urmpipe_pipeline.display_unit import display_unit
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Over, Panel, Shape
 from urmpipe_pipeline.report import spec
@@ -38,8 +39,8 @@ ALONE_PX, OVER_PX = 236, 300
 AROUND_PX = 64
 """Height of what stands above and below them: legend and axis."""
 
-SMALL_PX = ALONE_PX + AROUND_PX
-"""Height of a figure of one panel over time: two stand side by side."""
+SMALL_PX = 400
+"""Height of a figure at most that stands beside another one."""
 
 PANEL_PX = ((1, 112), (4, 150), (8, 220))
 """Height of one panel among some, by the number of lines that it has at most."""
@@ -87,7 +88,7 @@ def span_of(figures: Iterable[Figure]) -> Span:
 
 
 class Links:
-    """Which figures of a result share their time axis: those of a section, and those with the same times."""
+    """Which figures of a result share their time axis: those of a section, and panels with the same times."""
 
     def __init__(self) -> None:
         """Know no times yet."""
@@ -100,8 +101,7 @@ class Links:
             figures: Those of the section.
             ident: Its anchor.
         """
-        lines = ((panel, one) for figure in figures for panel in _panels(figure) for one in panel.lines)
-        times = [t_ns for pair in lines if (t_ns := _times(*pair)) is not None]
+        times = [panel.t_ns for one in figures for panel in _panels(one) if panel.t_ns is not None]
         found = next((link for known, link in self._known if any(known is t_ns for t_ns in times)), ident)
         self._known += [(t_ns, found) for t_ns in times]
         return found
@@ -129,8 +129,10 @@ def drawn_figures(figure: Figure, times: Span) -> Iterator[spec.Figure]:
 
 def shown_unit(panel: Panel) -> tuple[str, float]:
     """Return the unit that a panel is drawn in, and how many of it one of its own is."""
-    own = (panel.unit.replace("/s2", "/s²"), 1.0)
-    return text.SHOWN.get(panel.unit, own) if panel.small else own
+    if panel.small and panel.unit in text.SHOWN:
+        return text.SHOWN[panel.unit]
+    unit, factor = display_unit(panel.unit, panel.display_unit)
+    return unit.replace("/s2", "/s²"), factor
 
 
 def columns_of(line_: Line) -> FloatArray:

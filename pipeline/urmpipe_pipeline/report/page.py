@@ -92,7 +92,7 @@ class Part:
 
     @property
     def pairs(self) -> bool:
-        """Whether its blocks stand side by side: figures of one panel each, and nothing else."""
+        """Whether its blocks stand side by side: small figures and nothing else."""
         small = (isinstance(block, Figure) and block.height <= SMALL_PX for block in self.blocks)
         return bool(self.blocks) and all(small) and not self.parts
 

@@ -127,7 +127,7 @@ def cards_of(shown: Sequence[tuple[Presentation, Anchors]], *, plain: bool) -> t
     """
     found = []
     for one, anchors in shown:
-        sections = list(judged_sections(one.body)) or ([one.body] if plain else [])
+        sections = list(judged_sections(one.body)) or ([one.body] if plain or one.verdict else [])
         for section in sections:
             beside = len(shown) > 1 and section is not one.body
             name = f"{section.title} ({one.name})" if beside else section.title
@@ -137,10 +137,10 @@ def cards_of(shown: Sequence[tuple[Presentation, Anchors]], *, plain: bool) -> t
 
 
 def judged_sections(section: Section) -> Iterator[Section]:
-    """Yield the innermost sections with a verdict, and one that fails for a reason of its own."""
+    """Yield the innermost sections with a verdict and facts, and one that fails for a reason of its own."""
     below = [found for child in section.sections for found in judged_sections(child)]
     alone = section.verdict == "fail" and all(one.verdict != "fail" for one in below)
-    if section.verdict and (alone or not below):
+    if section.verdict and (alone if below else section.facts):
         yield section
     yield from below
 

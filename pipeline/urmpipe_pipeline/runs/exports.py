@@ -67,7 +67,7 @@ def grid_table(run: Run) -> ExportTable:
 
     Of single poses the row stands for t, and there is nothing per second: no motion joins them.
     """
-    moves = not run.single_poses
+    moves = run.timed
     columns = [ExportColumn("t [s]", "s", Times(run.t_ns, "s"))]
     if not moves:
         columns = [ExportColumn("row", "", np.arange(1, len(run.t_ns) + 1))]
@@ -101,7 +101,7 @@ def _grid_fields(run: Run) -> dict[str, Any]:
     units = run.joint_units
     tcp = run.tcp
     nothing = np.empty((0, 0))
-    moves = not run.single_poses
+    moves = run.timed
     return {
         "name": encodable(run.name),
         "rows": "grid",

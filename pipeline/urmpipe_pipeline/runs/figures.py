@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -28,10 +29,15 @@ NORM = (AXIS_COLOURS["norm"],)
 def run_figures(run: Run) -> Iterator[Figure]:
     """Yield the plots of a log that stands alone: joints, speed, motion."""
     yield from joints_figure(run)
-    if run.tcp is not None:
+    if run.timed and run.tcp is not None:
         velocity = np.asarray(run.tcp.velocity)
         yield speed_figure(run.name, run.t_ns, np.sqrt(np.einsum("ij,ij->i", velocity, velocity)))
     yield from motion_figure(run)
+
+
+def times_of(run: Run) -> IntArray | None:
+    """Return the times of a run's samples in [ns], shape (g,); None if the number of a row is its axis."""
+    return run.t_ns if run.timed else None
 
 
 def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
@@ -43,8 +49,12 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
     """
     if not run.log.joints:
         return
-    joints = f"Joint values of {run.name} over time: {', '.join(run.log.joints)}."
-    after = joint_panels(run, "joints", run.q, run.t_ns, _marks(run))
+    axis = "time" if run.timed else "the rows"
+    joints = f"Joint values of {run.name} over {axis}: {', '.join(run.log.joints)}."
+    after = joint_panels(run, "after" if run.audit else "joints", run.q, times_of(run), _marks(run))
+    if not run.timed:
+        yield Figure("Joints", "A pose a row: no motion joins them.", joints, (View("Joints", after),))
+        return
     if not run.audit:
         said = "No joint had to be repolarized: the values are those of the file."
         yield Figure("Joints", said, f"{joints} {said}", (View("Joints, no repolarization needed", after),))
@@ -66,7 +76,7 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
 
 
 def joint_panels(
-    run: Run, title: str, values: FloatArray, t_ns: IntArray, marks: Sequence[Mark] = (), per: str = ""
+    run: Run, title: str, values: FloatArray, t_ns: IntArray | None, marks: Sequence[Mark] = (), per: str = ""
 ) -> tuple[Panel, ...]:
     """Return joints over time, a panel for those that turn and one for those that slide.
 
@@ -74,7 +84,7 @@ def joint_panels(
         run: Whose joints they are.
         title: What is plotted of them.
         values: In rad and m, divided by `per`, shape (n, joints).
-        t_ns: Times in [ns], shape (n,).
+        t_ns: Times in [ns], shape (n,); None: the rows are points.
         marks: Marks on them, by the names of the joints.
         per: "", "/s" or "/s2".
     """
@@ -86,6 +96,7 @@ def joint_panels(
             values if len(own) == len(names) else np.asarray(values)[:, own],
             tuple(names[j] for j in own),
             tuple(map(joint_colour, own)),
+            points=t_ns is None,
         )
         marked = tuple(mark for mark in marks if mark.name in line.names)
         panels.append(Panel(title, unit + per, (line,), t_ns, marks=marked, share=1.5))
@@ -102,9 +113,8 @@ def speed_figure(name: str, t_ns: IntArray, speed: FloatArray) -> Figure:
     """
     title = "Speed of the tool centre point"
     panel = Panel("‖v‖", "m/s", (Line(speed, ("speed",), NORM),), t_ns, signed=False)
-    return Figure(
-        title, "The norm of its velocity.", f"{title} of {name}.", (View(title, (panel,)),), share=2.0
-    )
+    alt = f"{title} of {name} over time: the norm of its velocity."
+    return Figure(title, "The norm of its velocity.", alt, (View(title, (panel,)),), share=2.0)
 
 
 def motion_figure(run: Run) -> Iterator[Figure]:
@@ -117,9 +127,25 @@ def motion_figure(run: Run) -> Iterator[Figure]:
         return
     if run.tcp is None:
         caption = "As the log recorded it: without a robot there are no kinematics."
-        yield Figure("Motion", caption, f"Motion of {run.name} over time.", tuple(views), share=2.2)
+        yield Figure(
+            "Motion",
+            caption,
+            f"Motion over time, as the log {run.name} recorded it.",
+            tuple(views),
+            share=2.2,
+        )
         return
     point = point_name(run)
+    if not run.timed:
+        yield Figure(
+            "Poses of the tool centre point",
+            f"{point} and its Euler angles (moving Z-Y-X, in the colours of their axes), by forward"
+            " kinematics.",
+            f"Poses of {point} of {run.name} by forward kinematics.",
+            tuple(views),
+            share=2.2,
+        )
+        return
     yield Figure(
         "Motion",
         f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a, and its Euler"
@@ -136,41 +162,47 @@ def point_name(run: Run) -> str:
     return f"p{len(run.robot.joints)}" if run.robot is not None else "p"
 
 
-def coordinates(values: FloatArray, symbol: str, words: str = "") -> Line:
-    """Return x, y and z of something in their colours.
+def coordinates(values: FloatArray) -> Line:
+    """Return x, y and z of something in their colours, by these names in all panels.
 
     Args:
-        values: In any unit, shape (n, 3).
-        symbol: Its letter.
-        words: What stands behind the names.
+        values: Shape (n, 3).
     """
-    return Line(values, tuple(f"{symbol}{axis}{words}" for axis in "xyz"), COORDINATES)
+    return Line(values, tuple("xyz"), COORDINATES)
 
 
 def _derivatives(run: Run) -> Iterator[View]:
-    if run.log.joints and len(run.t_ns) > 1:
+    if run.timed and run.log.joints and len(run.t_ns) > 1:
         yield View("Joint rates", joint_panels(run, "rates", run.qd, run.t_ns, per="/s"))
         yield View("Joint accelerations", joint_panels(run, "accelerations", run.qdd, run.t_ns, per="/s2"))
 
 
 def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     """Yield the views of the tool centre point by kinematics."""
-    yield View("TCP", (Panel(point_name(run), "m", (coordinates(tcp.position, "p"),), run.t_ns),))
-    yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity, "v"),), run.t_ns),))
-    size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
-    lines = (coordinates(tcp.acceleration, "a"), size)
-    yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
-    angles = continuous_euler(np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx))
-    euler = Line(angles, tuple(EULER), tuple(EULER.values()))
+    t_ns, points = times_of(run), not run.timed
+    position = replace(coordinates(tcp.position), points=points)
+    yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
+    if run.timed:
+        yield from _point_derivatives(run, tcp)
+    known = np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx)
+    angles = continuous_euler(known) if run.timed else known
+    euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
     tinted = tcp.singular if np.any(tcp.singular) else None
-    panel = Panel("rz, ry, rx", "rad", (euler,), run.t_ns, tinted=tinted)
-    yield View("TCP rz, ry, rx", (panel,))
+    yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
+
+
+def _point_derivatives(run: Run, tcp: PointLog) -> Iterator[View]:
+    """Yield the views of velocity and acceleration."""
+    yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), run.t_ns),))
+    size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
+    lines = (coordinates(tcp.acceleration), size)
+    yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
 
 
 def _recorded(run: Run) -> Iterator[View]:
     """Yield position and orientation as a log without kinematics recorded them itself."""
     if run.tcp_recorded is not None:
-        yield View("Recorded TCP", (Panel("p", "m", (coordinates(run.tcp_recorded, "p"),), run.t_ns),))
+        yield View("Recorded TCP", (Panel("p", "m", (coordinates(run.tcp_recorded),), run.t_ns),))
     if (values := run.rotation_recorded) is not None:
         names = run.rotation_names  # a quaternion has no unit
         line = Line(values, names, tuple(map(joint_colour, range(len(names)))))
@@ -216,11 +248,18 @@ def _marks(run: Run) -> list[Mark]:
         own = [one for one in run.audit if one.joint == name]
         t_ns = np.array([round(one.t * 1e9) for one in own], dtype=np.int64)
         column = np.asarray(run.q)[:, run.log.joints.index(name)]
-        known = np.flatnonzero(np.isfinite(column))
-        if len(known):
-            values = np.interp(t_ns, run.t_ns[known], column[known])
+        rows = _beside(run.t_ns, column, t_ns)
+        if len(rows):
+            values = np.interp(t_ns, run.t_ns[rows], column[rows])
             found += [_mark(run, *pair) for pair in zip(own, values.tolist(), strict=True)]
     return found
+
+
+def _beside(times_ns: IntArray, column: FloatArray, t_ns: IntArray) -> IntArray:
+    """Return the samples before and after each time; where a value is missing, all that there are."""
+    after = np.searchsorted(times_ns, t_ns)
+    rows: IntArray = np.unique(np.clip(np.concatenate((after - 1, after)), 0, len(times_ns) - 1))
+    return rows if np.isfinite(column[rows]).all() else np.flatnonzero(np.isfinite(column))
 
 
 def _mark(run: Run, one: AuditEntry, value: float) -> Mark:

@@ -13,6 +13,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
 from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportColumn, ExportTable, Times
 from urmpipe_pipeline.runs.originals import originals
+from urmpipe_pipeline.sources.clocks.text_times import ZONED
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
 from urmpipe_pipeline.text import encodable
 
@@ -58,7 +59,7 @@ def file_table(log: JointLog, *, units_told: bool = True) -> ExportTable:
 
 def _as_told(log: JointLog, clock_ns: IntArray, timed: Sequence[str]) -> IntArray:
     """Return the clock as its columns tell it: a time of day that passed midnight began anew there."""
-    began_anew = any(inference.what == "nights passed" for inference in log.inferences)
+    began_anew = any(inference.kind == "nights passed" for inference in log.inferences)
     return clock_ns % DAY if began_anew and timed == [TIME_OF_DAY] else clock_ns
 
 
@@ -95,7 +96,7 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
             "not-exported", f"{', '.join(empty)}: not ingested, since a column of them was empty"
         )
     for inference in log.inferences:
-        if inference.what == "columns not used":
+        if inference.kind == "columns not used":
             said = f"{inference.value}: not ingested ({inference.evidence}), so they cannot leave"
             yield LogWarning("not-exported", said)
     for warning in log.warnings:
@@ -104,8 +105,8 @@ def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
             yield LogWarning("not-exported", said, warning.row)
         elif warning.kind in ("skipped-row", "other-lines"):
             yield LogWarning("not-exported", warning.message, warning.row)
-    form = next((one for one in log.inferences if one.what == "form of the time"), None)
-    if form and "without a time zone" not in form.evidence and any(one.unit == DATE for one in kept):
+    form = next((one for one in log.inferences if one.kind == ZONED), None)
+    if form and any(one.unit == DATE for one in kept):
         yield LogWarning("clock-in-utc", f"{form.value} with a time zone: the dates leave in UTC")
 
 

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.gaps import inside_gaps
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.sources.clocks.quantised import Regular, behind_rounded
@@ -178,8 +179,9 @@ def _refuse_endless(log: JointLog, wanted: float, count: int) -> None:
         row = int(np.argmax(steps)) + 2
         found = f"found {count} samples every {wanted / 1e6:.6g} ms for {log.rows} rows"
         gap = f"{float(steps.max()) / 1e9:.6g} s pass before row {row}"
-        message = f"{found}, {gap}, allowed: {MOST} samples; a clock without such a gap, or --tsp SECONDS"
-        raise LogError(Finding(message, log.files[0].name if log.files else log.name, row=row))
+        message = f"{found}, {gap}, allowed: {MOST} samples; a clock without such a gap"
+        hints = (Hint("tsp", None, "sets a longer period"),)
+        raise LogError(Finding(message, log.files[0].name if log.files else log.name, row=row, hints=hints))
 
 
 def _rounded(clock: Regular) -> LogWarning:

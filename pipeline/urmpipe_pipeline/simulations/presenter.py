@@ -100,7 +100,7 @@ def _body(simulation: Simulation) -> Section:
         simulation.verdict,
         (*_outcome(simulation), *_facts(simulation)),
         (*meters_table(simulation), *first_signals_table(simulation)),
-        figures=partial(_system, simulation),
+        partial(_system, simulation),
         blocks=partial(_page, simulation),
         checks=(end,),
         events=partial(_events, simulation),

@@ -25,6 +25,7 @@ from pathlib import Path
 from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError, UrmpipeError
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import JUNIT_HEADER, guarded_output
@@ -36,39 +37,41 @@ UNHOLDABLE = re.compile("[^\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010fff
 """What XML may not hold, or a reader may turn into something else: line ends and tabs in attributes."""
 
 
-def write_junit(shown: Presentation, part: Path, path: Path) -> None:
+def write_junit(shown: Presentation, part: Path, path: Path, voice: Voice = "python") -> None:
     """Write the checks of a presentation as JUnit XML and read it back.
 
     Args:
         shown: The presentation.
         part: Where to write it, as `guarded_output` gives it.
         path: The name it is to have, for messages.
+        voice: In whose words it tells warnings.
 
     Raises:
         OutputError: If it did not read back as it was written.
     """
     root = ET.Element("testsuites", name=_plain(shown.name))
-    root.extend(_suites(shown.body, shown.created[:19], ()))
+    root.extend(_suites(shown.body, shown.created[:19], (), voice))
     _write(root, part, path)
 
 
 @contextmanager
-def errors_in_junit(path: Path | None, inputs: Sequence[Path]) -> Iterator[None]:
+def errors_in_junit(path: Path | None, inputs: Sequence[Path], voice: Voice = "python") -> Iterator[None]:
     """Write an error of the body to a JUnit file, too, as `write_errors` does, and raise it on.
 
     Args:
         path: The JUnit file; None for none.
         inputs: The files that it may not replace.
+        voice: In whose words it is told.
     """
     try:
         yield
     except UrmpipeError as error:
         if path is not None:
-            write_errors(path, inputs, error.findings)
+            write_errors(path, inputs, error.findings, voice)
         raise
 
 
-def write_errors(path: Path, inputs: Sequence[Path], findings: Sequence[Finding]) -> None:
+def write_errors(path: Path, inputs: Sequence[Path], findings: Sequence[Finding], voice: Voice) -> None:
     """Write why there is no verdict to a JUnit file, one test case a finding: no earlier verdict stays.
 
     A file that is no JUnit file of urmpipe's, or an input, is left as it is.
@@ -77,12 +80,13 @@ def write_errors(path: Path, inputs: Sequence[Path], findings: Sequence[Finding]
         path: The JUnit file.
         inputs: The files that it may not replace.
         findings: What was wrong, at least one.
+        voice: In whose words it is told.
     """
     root = ET.Element("testsuites", name="urmpipe compare")
     suite = ET.SubElement(root, "testsuite", name="urmpipe compare")
     for number, finding in enumerate(findings, start=1):
         case = _case(suite, finding.file or "urmpipe compare", f"can be compared ({number})")
-        _reason(case, "error", BAD_INPUT, str(finding))
+        _reason(case, "error", BAD_INPUT, finding.words(voice))
     _count(suite)
     with suppress(OutputError), guarded_output(path, inputs, "junit") as part:
         _write(root, part, path)
@@ -100,16 +104,18 @@ def _write(root: ET.Element, part: Path, path: Path) -> None:
         raise OutputError(Finding("reads back otherwise than written", str(path)))
 
 
-def _suites(section: Section, timestamp: str, above: tuple[LogWarning, ...]) -> Iterator[ET.Element]:
+def _suites(
+    section: Section, timestamp: str, above: tuple[LogWarning, ...], voice: Voice
+) -> Iterator[ET.Element]:
     """Yield the test suite of a section that judges something, and those of the sections below it."""
     warnings = (*section.warnings, *above)
     if section.checks or section.properties:
-        yield _suite(section, timestamp, warnings)
+        yield _suite(section, timestamp, [f"{one.kind}: {one.words(voice)}" for one in warnings])
     for one in section.sections:
-        yield from _suites(one, timestamp, warnings)
+        yield from _suites(one, timestamp, warnings, voice)
 
 
-def _suite(section: Section, timestamp: str, warnings: Sequence[LogWarning]) -> ET.Element:
+def _suite(section: Section, timestamp: str, warnings: Sequence[str]) -> ET.Element:
     suite = ET.Element("testsuite", name=_plain(section.title))
     if section.properties:
         properties = ET.SubElement(suite, "properties")
@@ -120,8 +126,7 @@ def _suite(section: Section, timestamp: str, warnings: Sequence[LogWarning]) -> 
         if check.verdict == "fail":
             _reason(case, "failure", check.kind, check.words)
     if warnings:
-        lines = (f"{one.kind}: {one.message}" for one in warnings)
-        ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, lines))
+        ET.SubElement(suite, "system-out").text = "\n".join(map(_plain, warnings))
     _count(suite)
     if timestamp:
         suite.set("timestamp", timestamp)

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output, know_own
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
@@ -83,7 +84,7 @@ class Exported(Shown):
 
         return pd.DataFrame([(str(one.path), one.rows) for one in self.files], columns=["file", "rows"])
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the object that `urmpipe export --json` prints."""
         return {
             "schema": 1,
@@ -92,7 +93,7 @@ class Exported(Shown):
             "rows": self.rows,
             "columns": [{"name": name, "unit": unit} for name, unit in self.columns],
             "left_out": self.left_out,
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
         }
 
 

@@ -13,12 +13,10 @@ from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
-from urmpipe_pipeline.runs.ghosts import Goals
 
 Compared = Callable[..., Comparison]
 
 WANTED = Trajectory("wanted", np.zeros(1, dtype=np.int64), np.zeros((1, 3)))
-NO_TIMES = Goals(np.zeros(1, dtype=np.int64), np.zeros((1, 3)), None, ("",))
 
 T = 0.005 * np.arange(1000)
 
@@ -78,7 +76,7 @@ def test_no_offset_is_looked_for_where_there_is_none(paths: Compared) -> None:
     late = with_maxima(paths({"log": np.full((100, 3), 0.004)}).runs[0], norm=0.0812, path=5.3e-5)
     for run, reference in (
         (late, replace(WANTED, files=late.run.log.files)),
-        (replace(late, run=replace(late.run, goals=NO_TIMES)), WANTED),
+        (replace(late, run=replace(late.run, log=replace(late.run.log, timed=False))), WANTED),
     ):
         (found,) = causes(run, reference)
         assert not found.hints

@@ -24,13 +24,13 @@ from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.wording import amount_words
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.results import read_recording, write_recording
+from urmpipe_pipeline.meshes import drawable, missing_visuals
 from urmpipe_pipeline.recording.bodies import bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import LEAST_SEEN
 from urmpipe_pipeline.recording.scene import Mark, scene_of
 from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import kinematics
-from urmpipe_pipeline.meshes import drawable, missing_visuals
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
@@ -98,7 +98,7 @@ def test_meshes_are_in_the_recording_and_not_in_its_metadata(
     blob = column(path, "/robot/joint/turn3/visual\\ 1", "Asset3D:blob")
     assert bytes(blob.reshape(-1).astype(np.uint8)) == mesh.read_bytes()
     told = json.loads(Store(path).metadata)["result"]["robot"]["visuals"][3]
-    assert (told["mesh"], told["scale"]) == (str(mesh), [1.0, 1.0, 1.0])
+    assert told["shape"] == {"$is": "Mesh", "file": str(mesh), "scale": [1.0, 1.0, 1.0]}
 
 
 def test_an_arm_read_back_looks_as_it_did_and_without_its_meshes_has_lines(

@@ -67,9 +67,9 @@ def test_a_name_is_one_that_every_system_takes(title: str, part: str, stem: str)
 
 
 def test_formats_are_svg_and_png(tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match=r"^--format: found pdf, allowed: svg, png, both$"):
+    with pytest.raises(OptionError, match=r"^format: found pdf, allowed: svg, png, both$"):
         FigureOptions(tmp_path, ("pdf",))  # type: ignore[arg-type]
-    with pytest.raises(OptionError, match=r"^--format: found nothing, allowed: svg, png, both$"):
+    with pytest.raises(OptionError, match=r"^format: found nothing, allowed: svg, png, both$"):
         FigureOptions(tmp_path, ())
 
 
@@ -91,7 +91,7 @@ def test_a_file_is_no_folder(figure: Figure, tmp_path: Path) -> None:
     path.write_text("mine")
     with pytest.raises(OutputError) as caught:
         write_figures([("log", figure)], FigureOptions(path))
-    assert str(caught.value) == f"{path}: --figures: found a file, allowed: a folder"
+    assert str(caught.value) == f"{path}: figures: found a file, allowed: a folder"
 
 
 def test_without_kaleido_one_line_says_how_to_install_it(

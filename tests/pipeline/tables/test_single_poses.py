@@ -8,10 +8,9 @@ import numpy as np
 import pytest
 
 from exported import export_result
-from urmpipe_models.inverse.targets import targets_of
+from solved import solved
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline import results
-from urmpipe_pipeline.inverse.solved import goals_of, row_times, solved_run
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.tables import ExportOptions, Format
 
@@ -21,12 +20,11 @@ def run() -> Run:
     """Two targets without times, both reached."""
     robot = load_robot("ur5e")
     q = np.array([[1.7, -1.8, -1.5, -3.5, 1.6, -0.7], [-0.3, 0.1, 1.3, -0.6, 1.1, -2.4]])
-    goals = goals_of(targets_of(robot, q), row_times(2), ["", ""])
-    return solved_run("poses", robot, None, q, goals=goals)
+    return solved("poses", robot, q).as_run()
 
 
 def test_a_table_of_single_poses_counts_rows_and_has_nothing_per_second(run: Run, tmp_path: Path) -> None:
-    assert run.single_poses and run.robot is not None
+    assert not run.timed and run.robot is not None
     joints = [f"{joint.name} [rad]" for joint in run.robot.moving]
     wanted = ["row", *joints, "px [m]", "py [m]", "pz [m]", "rz [rad]", "ry [rad]", "rx [rad]"]
     formats: tuple[Format, ...] = ("csv", "parquet")

@@ -10,7 +10,7 @@ import numpy as np
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.section import Event
 from urmpipe_pipeline.recording.sending import times_at
-from urmpipe_pipeline.recording.store import TIME
+from urmpipe_pipeline.recording.store import ROW, TIME
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -43,7 +43,7 @@ def events_view(
     times = times_at(None, np.zeros_like(at)) if first_ns is None else times_at(at, np.arange(len(at)))
     stream.send_columns(entity, times, columns)
     shown = rrb.TextLogColumns(
-        timeline_columns=[rrb.encodings.TimelineColumn(TIME, visible=False)],
+        timeline_columns=[rrb.encodings.TimelineColumn(one, visible=False) for one in (TIME, ROW)],
         text_log_columns=["LogLevel", "Body"],
     )
     name = "Events" if first_ns is None else "Events, at t [s]"

@@ -145,9 +145,9 @@ class Plots:
         if self.whole is None or self.whole[0] == self.whole[1]:
             return None
         first, last = self.whole
-        edges = first - BEFORE * (last - first), last + AFTER * (last - first)
-        key = "nanos" if self.timed else "seq"
-        start, end = (rr.TimeRangeBoundary.absolute(**{key: round(at)}) for at in edges)
+        key, span = "nanos" if self.timed else "seq", last - first
+        edges = math.floor(first - BEFORE * span), math.ceil(last + AFTER * span)
+        start, end = (rr.TimeRangeBoundary.absolute(**{key: at}) for at in edges)
         return rrb.TimeRange(start=start, end=end)
 
     def _line(self, drawn: _Drawn, panel: Panel, line: Line, root: str) -> None:

@@ -8,7 +8,8 @@ from collections.abc import Iterable, Iterator, Sequence
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import colour_word
-from urmpipe_pipeline.presentation.digits import unit_of, written
+from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
+from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.presentation.scene import Path, Scene
 from urmpipe_pipeline.presentation.section import Fact, Judged, Presentation, Section, Table
 
@@ -30,10 +31,10 @@ def summary(shown: Presentation, scene: Scene | None = None) -> str:
         scene: Its scene, if there is one: which path has which colour.
     """
     word = (shown.verdict or shown.word).upper()
-    head = f"{word}: {plain(shown.headline)}" if word else plain(shown.headline)
+    title = f"{word}: {plain(shown.headline)}" if word else plain(shown.headline)
     sections = [shown.body, *(shown.body.sections if len(shown.body.sections) == 1 else ())]
     told = {one.name for one in shown.facts}
-    lines = [f"### {head}", *_facts(shown.facts, strong=True)]
+    lines = [f"### {title}", *_facts(shown.facts, strong=True)]
     for section in sections:
         lines += _facts([one for one in section.facts if one.name not in told])
         lines += ["", f"**{plain(section.notice)}**"] if section.notice else []
@@ -46,15 +47,9 @@ def summary(shown: Presentation, scene: Scene | None = None) -> str:
     return "\n".join(lines)
 
 
-def opening_words(shown: Presentation) -> str:
-    """Return where the viewer opens: a time, or a row; empty for the beginning."""
-    if shown.opens_at_row:
-        return f"row {shown.opens_at_row + 1}"
-    return f"{text.seconds(shown.opens_at_ns / 1e9)} s" if shown.opens_at_ns else ""
-
-
 def _where_to_go(shown: Presentation) -> str:
-    at = opening_words(shown)
+    at = f"{text.seconds(shown.opens_at_ns / 1e9)} s" if shown.opens_at_ns else ""
+    at = f"row {shown.opens_at_row + 1}" if shown.opens_at_row else at
     opens = f"`urmpipe view` opens this at {at}, other programs at the beginning. " if at else ""
     return f"{opens}Everything else: `urmpipe report` with this file."
 
@@ -62,9 +57,9 @@ def _where_to_go(shown: Presentation) -> str:
 def _tables(sections: Sequence[Section]) -> Iterator[Table]:
     """Yield the tables there is room for; of several about the same things the first."""
     about: set[tuple[str, ...]] = set()
-    for table in (table for section in sections for table in section.tables):
-        names = tuple(map(written, table.columns[0].cells)) if table.brief and table.columns else ()
-        if names and names not in about and (len(names) <= ROWS or _has_verdicts(table)):
+    for table in (table for section in sections for table in brief_tables(section)):
+        names = tuple(map(written, table.columns[0].cells))
+        if names not in about and (len(names) <= ROWS or _has_verdicts(table)):
             yield table
         about.add(names)
 
@@ -75,25 +70,18 @@ def _has_verdicts(table: Table) -> bool:
 
 def _facts(facts: Sequence[Fact], *, strong: bool = False) -> Iterator[str]:
     """Yield the brief facts in one paragraph."""
-    told = [one for one in facts if one.brief and one.value not in (None, "")]
     mark = "**" if strong else ""
+    told = [(plain(one.name), plain(written(one.value, unit=True))) for one in brief_facts(facts)]
     if told:
         yield ""
-        yield "; ".join(
-            f"{plain(one.name)}: {mark}{plain(written(one.value, unit=True))}{mark}" for one in told
-        )
+        yield "; ".join(f"{name}: {mark}{value}{mark}" for name, value in told)
 
 
 def _table(table: Table) -> Iterator[str]:
-    """Yield the brief columns that have a value."""
-    columns = [
-        one
-        for number, one in enumerate(table.columns)
-        if one.brief and (not number or any(written(cell) != text.NOTHING for cell in one.cells))
-    ]
-    heads = (f"{one.title} [{unit}]" if (unit := unit_of(one.cells)) else one.title for one in columns)
-    yield from ("", _row(heads), f"|{' --- |' * len(columns)}")
-    for cells in zip(*(one.cells[:ROWS] for one in columns), strict=True):
+    """Yield the brief columns, and as many rows as fit."""
+    columns, rows = list(brief_columns(table)), rows_within(table, ROWS)
+    yield from ("", _row(map(head, columns)), f"|{' --- |' * len(columns)}")
+    for cells in zip(*(one.cells[rows] for one in columns), strict=True):
         yield _row(map(written, cells))
     if (left := len(columns[0].cells) - ROWS) > 0:
         yield from ("", f"and {left} more, all in the report")

@@ -1,0 +1,267 @@
+"""What stands in a file that a command wrote: named columns of values. Nothing of urmpipe reads it.
+
+A column is a dict: its `kind` (of `compare_snapshots.KINDS`), how many values it has (`n`), their `hash`, and
+the `values` if they are few. An array has its `shape`, hashes of its `columns`, and one of its times (`t`).
+"""
+
+from __future__ import annotations
+
+import csv
+import hashlib
+import json
+import re
+import xml.etree.ElementTree as ET
+from base64 import b64decode
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import fields, is_dataclass
+from html import unescape
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow.parquet
+import scipy.io
+from numpy.typing import NDArray
+
+Columns = dict[str, dict[str, Any]]
+FEW = 4000
+"""Letters of values that are kept beside their hash."""
+
+NUMBER = re.compile(r"(?<![\w.])[-+−]?\d+(?:\.\d+)?(?:e[-+]?\d+)?(?!\w)")
+LOOKS = {"colors", "widths", "radii", "aggregation_policy", "markers", "marker_sizes", "xyz", "show_labels"}
+ATTRIBUTES = {
+    "Run": "t q qd qdd tcp audit warnings log",
+    "Comparison": "verdict runs ranking baseline warnings",
+    "Deviation": "name t delta angle joint_delta statistics sync alignment",
+    "InverseResult": "q branch reasons verdict miss path",
+    "Simulation": "t signals verdicts failed",
+    "Report": "path figures",
+    "Exported": "path files columns",
+    "Chain": "joints coordinates start",
+}
+"""What docs/python.md names of each result; of other classes, all fields."""
+
+normal: Callable[[str], str] = str
+"""Takes out of a text what differs from run to run; `snapshot` sets it."""
+
+
+def contents(path: Path) -> Columns:
+    """Return the columns of a file by its suffix; of JSON its tree, of other text numbers and words."""
+    if path.suffix in READERS:
+        return READERS[path.suffix](path)
+    words = path.read_text(encoding="utf-8", errors="replace")
+    return tree(json.loads(words)) if words.startswith("{") else text(words)
+
+
+def column(kind: str, values: Sequence[str]) -> dict[str, Any]:
+    """Return a column of texts."""
+    words = "\n".join(values)
+    found = {"kind": kind, "n": len(values), "hash": _sha(words.encode("utf-8", "surrogatepass"))}
+    return found | ({"values": list(values)} if len(words) <= FEW or kind == "shown" else {})
+
+
+def array(
+    values: NDArray[Any], times: NDArray[Any] | None = None, kind: str = "arrays", more: bytes = b""
+) -> dict[str, Any]:
+    """Return an array with a row a time, hashed to the bit, whatever the type that holds its numbers."""
+    flat = values.reshape(len(values) if values.ndim else 1, -1) if values.size else np.empty((0, 1))
+    if flat.dtype.kind in "OUSM":
+        return column("words", [normal(str(one)) for one in flat.ravel().tolist()])
+    if flat.dtype.kind in "fb" or not (np.abs(flat) > 2.0**53).any():
+        flat = flat.astype(np.float64)
+    each = [
+        _sha(np.ascontiguousarray(one).tobytes() + more)
+        for one in (flat.T if flat.shape[1] <= 64 else [flat])
+    ]
+    found = {
+        "kind": kind,
+        "n": len(flat),
+        "shape": list(values.shape),
+        "columns": each,
+        "hash": _sha("".join(each).encode()),
+    }
+    return found if times is None else found | {"t": _sha(times.tobytes())}
+
+
+def text(words: str) -> Columns:
+    """Return a text: its numbers in any order, and its words without them."""
+    words = normal(words)
+    lines = [
+        line.rstrip() for line in NUMBER.sub("#", words).splitlines() if not line.startswith("note: building")
+    ]
+    return {"numbers": column("shown", sorted(NUMBER.findall(words))), "words": column("words", lines)}
+
+
+def tree(value: Any, name: str = "") -> Columns:
+    """Return the leaves of a tree of mappings, lists, dataclasses and arrays: a column a key."""
+    return _grouped(
+        (
+            at,
+            one
+            if isinstance(one, np.ndarray)
+            else json.dumps(normal(one) if isinstance(one, str) else one, ensure_ascii=False),
+        )
+        for at, one in _leaves(value, name)
+    )
+
+
+def _leaves(value: Any, at: str) -> Iterator[tuple[str, Any]]:
+    """Yield the leaves in their order, their names without indices."""
+    names = ATTRIBUTES.get(type(value).__name__, "").split()
+    if is_dataclass(value):
+        value = {
+            one: getattr(value, one)
+            for one in names or [one.name for one in fields(value)]
+            if hasattr(value, one)
+        }
+    elif isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, Mapping):
+        for key, one in value.items():
+            yield from _leaves(one, f"{at}.{key}")
+    elif isinstance(value, list | tuple):
+        yield f"{at}.len", len(value)
+        for one in value:
+            yield from _leaves(one, f"{at}[]")
+    else:
+        plain = value is None or isinstance(value, np.ndarray | bool | int | float | str)
+        yield at, value if plain else str(value) if isinstance(value, Path) else type(value).__name__
+
+
+def _grouped(pairs: Iterable[tuple[str, Any]]) -> Columns:
+    """Return a column for each name, and one for each array."""
+    texts: dict[str, list[str]] = defaultdict(list)
+    found: Columns = {}
+    for name, value in pairs:
+        if isinstance(value, np.ndarray):
+            found[f"{name} #{sum(one.startswith(f'{name} #') for one in found)}"] = array(value)
+        else:
+            texts[name].append(value)
+    return found | {
+        name: column("numbers" if all(map(_is_number, some)) else "words", some)
+        for name, some in texts.items()
+    }
+
+
+def _is_number(word: str) -> bool:
+    return (
+        word in {"", "null"}
+        or re.fullmatch(r"[-+]?(\d[\d.]*(e[-+]?\d+)?|nan|inf(inity)?)", word, re.IGNORECASE) is not None
+    )
+
+
+def _table(path: Path) -> Columns:
+    """Return the columns of a CSV, or those of a TUM, which has no names."""
+    with path.open(encoding="utf-8", newline="") as file:
+        rows = list(csv.reader(file)) if path.suffix == ".csv" else [line.split() for line in file]
+    names = rows.pop(0) if path.suffix == ".csv" and rows else ["" for _ in max(rows, key=len, default=[])]
+    cells = (
+        (f"{name} #{k}", normal(row[k]) if k < len(row) else "")
+        for row in rows
+        for k, name in enumerate(names)
+    )
+    return {"names": column("words", names)} | _grouped(cells)
+
+
+def _xml(path: Path) -> Columns:
+    """Return the attributes and texts of an XML file; its properties by their names."""
+    pairs: list[tuple[str, str]] = []
+    for one in ET.parse(path).iter():
+        named = (
+            {one.attrib["name"]: one.attrib["value"]}
+            if one.tag == "property"
+            else one.attrib | {"text": (one.text or "").strip()}
+        )
+        pairs += [(f"{one.tag}.{key}", normal(value)) for key, value in named.items()]
+    return _grouped(pairs)
+
+
+def _parquet(path: Path) -> Columns:
+    read = pyarrow.parquet.read_table(path)
+    about = {
+        key.decode(): value.decode("utf-8", "replace") for key, value in (read.schema.metadata or {}).items()
+    }
+    about.pop("ARROW:schema", None)
+    return {name: array(read.column(name).to_numpy()) for name in read.column_names} | tree(about, "about")
+
+
+def _mat(path: Path) -> Columns:
+    read = scipy.io.loadmat(path, simplify_cells=True)
+    return tree({name: value for name, value in read.items() if not name.startswith("__")})
+
+
+def _page(path: Path) -> Columns:
+    """Return the visible numbers and words of a page or a drawing, and the arrays that its figures draw."""
+    source = path.read_text(encoding="utf-8")
+    found: Columns = {}
+    specs = re.findall(r'<script type="application/json">(.*?)</script>', source, re.DOTALL)
+    for number, spec in enumerate(specs):
+        found |= tree(json.loads(spec, object_hook=_unpacked)["data"], f"figure {number} ")
+    seen = re.sub(r"<(script|style|head)\b.*?</\1>|<[^>]*>", "\n", source, flags=re.DOTALL)
+    return found | text(re.sub(r"\s*\n\s*", "\n", unescape(seen)))
+
+
+def _unpacked(value: dict[str, Any]) -> Any:
+    """Return an array that is packed for plotly.js unpacked, and any other object as it is."""
+    if "bdata" not in value:
+        return value
+    values = np.frombuffer(b64decode(value["bdata"]), value["dtype"])
+    return values.reshape([int(one) for one in str(value.get("shape", values.size)).split(",")])
+
+
+def _recording(path: Path) -> Columns:
+    """Return every component of every entity, whatever the layout, in the order of time."""
+    from rerun.chunk import RrdReader
+
+    reader = RrdReader(path)
+    parts: dict[str, list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]] = defaultdict(list)
+    for chunk in (chunk for entry in reader.recordings() for chunk in reader.store(store=entry).stream()):
+        batch = chunk.to_record_batch()
+        timed = "t" in batch.schema.names
+        t = batch.column("t").cast("int64").to_numpy() if timed else np.zeros(len(batch), np.int64)
+        for about, cells in zip(batch.schema, batch.columns, strict=True):
+            if about.metadata[b"rerun:kind"] == b"data" and about.name != "metadata":
+                there = cells.is_valid().to_numpy(zero_copy_only=False)
+                parts[f"{chunk.entity_path} {about.name}"].append((t[there], *_flat(cells.drop_null())))
+    return {name: _joined(name, some) for name, some in parts.items()}
+
+
+def _flat(cells: Any) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Return how many values each row has, and all of them, of lists of lists."""
+    bounds = np.arange(len(cells) + 1)
+    while hasattr(cells.type, "value_type"):
+        size = getattr(cells.type, "list_size", None)
+        bounds = bounds * size if size else (cells.offsets.to_numpy() - cells.offsets[0].as_py())[bounds]
+        cells = cells.flatten()
+    return np.diff(bounds), cells.to_numpy(zero_copy_only=False)
+
+
+def _joined(name: str, parts: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]) -> dict[str, Any]:
+    """Return the parts of a component as one array, ordered by time."""
+    t, widths, values = (np.concatenate([part[k] for part in parts]) for k in range(3))
+    order = np.argsort(t, kind="stable")
+    rows = np.split(values, np.cumsum(widths)[:-1])
+    values = np.concatenate([rows[k] for k in order]) if len(order) else values
+    component = name.rpartition(":")[2]
+    kind = "arrays" if component == "scalars" else "looks" if component in LOOKS else "scene"
+    if len(np.unique(widths)) == 1 and widths[0]:
+        return array(values.reshape(len(t), -1), t[order], kind)
+    return array(values, t[order], kind, widths[order].tobytes())
+
+
+def _sha(data: bytes) -> str:
+    return hashlib.sha256(data).hexdigest()[:16]
+
+
+READERS: Mapping[str, Callable[[Path], Columns]] = {
+    ".csv": _table,
+    ".tum": _table,
+    ".xml": _xml,
+    ".parquet": _parquet,
+    ".mat": _mat,
+    ".html": _page,
+    ".svg": _page,
+    ".rrd": _recording,
+    ".columns": lambda path: json.loads(path.read_text()),
+}
