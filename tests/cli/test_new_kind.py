@@ -156,7 +156,7 @@ def test_a_report_has_its_section_beside_those_of_other_results() -> None:
         "Swing other",
         "Angle over time",
         "Turns",
-        "17.1887",
+        number(largest, "rad", LIMIT),
     ):
         assert words in page
     assert [one["verdict"] for one in report.to_dict()["recordings"]] == ["fail", "fail"]

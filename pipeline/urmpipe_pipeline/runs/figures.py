@@ -71,7 +71,7 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
         f"{joints} First as in the file, then after {text.counted(wraps, 'repolarization')}.",
         views,
         opened=opened,
-        share=3.0,
+        share=3.4,
     )
 
 
