@@ -1,4 +1,4 @@
-"""`urmpipe --help` against `import click`: python benchmarks/startup.py"""
+"""`urmpipe --help` against `import click`: python benchmarks/startup.py."""
 
 from __future__ import annotations
 

@@ -1,6 +1,5 @@
 """The README's promises: its commands are those that run, its robot is one, its Python works."""
 
-import re
 import tomllib
 from pathlib import Path
 
@@ -29,11 +28,6 @@ def test_each_command_stands_in_both_shells() -> None:
     ]
     assert len(unix) == 2
     assert windows == as_windows
-
-
-@pytest.mark.parametrize("name", re.findall(r"\]\((docs/pictures/[^)]+)\)", README))
-def test_pictures_are_there(name: str) -> None:
-    assert (ROOT / name).read_bytes().startswith(b"\x89PNG")
 
 
 def test_the_robot_of_the_readme_is_one(tmp_path: Path) -> None:

@@ -16,6 +16,8 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any
 
+from urmpipe_models.display import Shown
+
 if TYPE_CHECKING:
     from urmpipe.api.build_fmu import build_fmu as build_fmu
     from urmpipe.api.compare import compare as compare
@@ -32,7 +34,6 @@ if TYPE_CHECKING:
     from urmpipe.api.view import view as view
     from urmpipe.api.write_map import write_map as write_map
     from urmpipe.edge import UrmpipeWarning as UrmpipeWarning
-    from urmpipe.inverse.result import InverseResult as InverseResult
     from urmpipe_fmus.build import BuiltFmu as BuiltFmu
     from urmpipe_models.chains.chain import Chain as Chain
     from urmpipe_models.errors import CosimulationError as CosimulationError
@@ -50,12 +51,13 @@ if TYPE_CHECKING:
     from urmpipe_models.transform import Transform as Transform
     from urmpipe_pipeline.comparison.comparison import Comparison as Comparison
     from urmpipe_pipeline.comparison.deviation import Deviation as Deviation
-    from urmpipe_pipeline.export import Exported as Exported
     from urmpipe_pipeline.joint_log import JointLog as JointLog
     from urmpipe_pipeline.runs.results import Run as Run
     from urmpipe_pipeline.simulations.simulation import Simulation as Simulation
+    from urmpipe_pipeline.solved_targets.result import SolvedTargets as SolvedTargets
     from urmpipe_pipeline.sources import LogMap as LogMap
     from urmpipe_pipeline.sources import ReadOptions as ReadOptions
+    from urmpipe_pipeline.tables import Exported as Exported
 
 __version__ = "0.1.0"
 
@@ -65,9 +67,9 @@ _HOME = {
     "Comparison": "urmpipe_pipeline.comparison.comparison",
     "CosimulationError": "urmpipe_models.errors",
     "Deviation": "urmpipe_pipeline.comparison.deviation",
-    "Exported": "urmpipe_pipeline.export",
+    "Exported": "urmpipe_pipeline.tables",
     "FmuError": "urmpipe_models.errors",
-    "InverseResult": "urmpipe.inverse.result",
+    "SolvedTargets": "urmpipe_pipeline.solved_targets.result",
     "JointLog": "urmpipe_pipeline.joint_log",
     "LogError": "urmpipe_models.errors",
     "LogMap": "urmpipe_pipeline.sources",
@@ -102,6 +104,16 @@ _HOME = {
 }
 
 __all__ = ["__version__", *sorted(_HOME)]  # noqa: PLE0604 - the names are those of _HOME
+
+
+def _page(result: Any) -> str | None:
+    """Return what a notebook shows of a result."""
+    from urmpipe.printing.notebook import notebook_page
+
+    return notebook_page(result)
+
+
+Shown.page = staticmethod(_page)
 
 
 def __getattr__(name: str) -> Any:

@@ -17,6 +17,7 @@ from urmpipe.usage import usage_finding
 
 if TYPE_CHECKING:
     from urmpipe_models.errors import Finding
+    from urmpipe_models.spelling import Voice
 
 SHOWN_FINDINGS = 20
 """Errors printed line by line; the others are counted."""
@@ -73,9 +74,9 @@ def findings_of(error: BaseException) -> Sequence[Finding]:
     return [Finding(said)]
 
 
-def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
+def print_findings(findings: Sequence[Finding], as_json: bool, voice: Voice) -> None:
     """Print errors on standard error, a line each, and as one JSON object if it is asked for."""
-    lines = [f"error: {finding}" for finding in findings[:SHOWN_FINDINGS]]
+    lines = [f"error: {finding.words(voice)}" for finding in findings[:SHOWN_FINDINGS]]
     if len(findings) > SHOWN_FINDINGS:
         lines.append(f"error: and {len(findings) - SHOWN_FINDINGS} more")
     with suppress(OSError):  # where standard error takes no more, the exit code tells it all the same
@@ -83,20 +84,17 @@ def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
     if as_json:
         from urmpipe.printing.terminal import echo_json
 
-        errors = [
-            {name: getattr(one, name) for name in ("file", "line", "row", "column", "message")}
-            for one in findings
-        ]
         with suppress(OSError):  # where standard output takes no more, that is told already
-            echo_json({"schema": 1, "errors": errors})
+            echo_json({"schema": 1, "errors": [one.to_dict(voice) for one in findings]})
 
 
-def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding]) -> None:
+def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding], voice: Voice) -> None:
     """Write errors to the JUnit file that `compare` was to write, whatever went wrong: also its own options.
 
     Args:
         arguments: The words of the command line.
         findings: What went wrong, at least one.
+        voice: In whose words it is told.
     """
     options = [*takewhile(lambda word: word != "--", arguments), ""]
     equal = "--junit="
@@ -109,7 +107,7 @@ def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding]) -> None
         or arguments.count(named[0]) > 1
     ):
         return  # none, two, or one that is an operand, too
-    from urmpipe_pipeline.comparison.junit_errors import tell_junit
+    from urmpipe_pipeline.tables.junit import write_errors
 
     others = [Path(word) for word in arguments if word != named[0]]
-    tell_junit(Path(named[0]), others, findings)
+    write_errors(Path(named[0]), others, findings, voice)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import wraps
 from inspect import signature
 from typing import Any, ParamSpec, TypeVar
@@ -61,15 +62,14 @@ def _doubts(made: Any, given: Iterable[Any]) -> Iterator[str]:
     if not hasattr(made, "to_frame"):
         return
     operands = [one for value in given for one in (value if isinstance(value, (list, tuple)) else (value,))]
-    seen = [warning.message for one in operands for _, warning in _warnings_of(one)]
-    for log, warning in _warnings_of(made):
-        told = warning.message  # of a reference behind its name
-        if not any(told == one or told.endswith(f": {one}") for one in seen):
-            yield (warning if log is None else warning.of(log)).message
+    seen = {replace(warning, about=None) for one in operands for warning in _warnings_of(one)}
+    for warning in _warnings_of(made):
+        if replace(warning, about=None) not in seen:
+            yield str(warning)
 
 
-def _warnings_of(result: Any) -> Iterator[tuple[str | None, LogWarning]]:
+def _warnings_of(result: Any) -> Iterator[LogWarning]:
     """Yield the warnings of a result, and those of the logs that it compares with the log's name."""
-    yield from ((None, one) for one in getattr(result, "warnings", ()))
+    yield from getattr(result, "warnings", ())
     for deviation in getattr(result, "runs", ()):
-        yield from ((deviation.name, one) for one in deviation.run.warnings)
+        yield from (one.of(deviation.name) for one in deviation.run.warnings)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, TypeVar, cast
 
 import numpy as np
 
@@ -17,8 +18,13 @@ from urmpipe_models.inverse.checks import ROTATION_TOLERANCE
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform, from_offset, rpy_of
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import OutputKind, guarded_output
+from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
 from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import write_recording
+from urmpipe_pipeline.simulations.simulation import Result
+from urmpipe_pipeline.text import counted
+
+Made = TypeVar("Made", bound=Result)
 
 PathLike = str | Path
 Robot = Chain | str | Path
@@ -143,7 +149,7 @@ def refuse_others(name: str, given: Sequence[object], kinds: tuple[type, ...], a
 def guarded_outputs(
     named: Mapping[OutputKind, PathLike | None], inputs: Sequence[Path]
 ) -> Iterator[dict[OutputKind, Path]]:
-    """Give the parts to write of all outputs but the recording, which `record` guards: all or none of them.
+    """Give the parts to write of all outputs but the recording, which `recorded` writes: all or none of them.
 
     Args:
         named: The files that are asked for, by kind; None for one that is not.
@@ -154,7 +160,9 @@ def guarded_outputs(
         OutputError: If one may not be written there.
     """
     targets = {kind: Path(path) for kind, path in named.items() if path is not None}
-    refuse_shared(targets)
+    _refuse_shared(targets)
+    if "recording" in targets:
+        refuse_output(targets["recording"], inputs, "recording")
     with ExitStack() as stack:
         yield {
             kind: stack.enter_context(guarded_output(path, inputs, kind))
@@ -163,7 +171,29 @@ def guarded_outputs(
         }
 
 
-def refuse_shared(targets: Mapping[OutputKind, Path]) -> None:
+def recorded(
+    result: Made,
+    output: PathLike | None,
+    inputs: Sequence[Path],
+    progress: Callable[[float], None] | None,
+) -> Made:
+    """Return a result with the recording that was written of it; as it is without an output.
+
+    Args:
+        result: What to record.
+        output: The recording (.rrd) to write; None for none.
+        inputs: Files that are never replaced.
+        progress: Told the share of the recording that is written, 0..1.
+
+    Raises:
+        OutputError: If it may not be written there, or did not read back as it was written.
+    """
+    if output is None:
+        return result
+    return replace(result, recording=write_recording(result, Path(output), inputs, progress))
+
+
+def _refuse_shared(targets: Mapping[OutputKind, Path]) -> None:
     """Raise an `OptionError` if two outputs have one name."""
     places: dict[Path, OutputKind] = {}
     for kind, path in targets.items():
@@ -183,13 +213,8 @@ def refuse_foreign(files: Sequence[Path]) -> None:
 def refuse_warnings(strict: bool, warnings: Sequence[LogWarning]) -> None:
     """Raise a `LogError` with all warnings if they are to be errors."""
     if strict and warnings:
-        raise LogError(*(Finding(f"{_told(one)} (--strict)", row=one.row) for one in warnings))
-
-
-def _told(warning: LogWarning) -> str:
-    """Return a warning with its kind and its row, as the terminal prints it."""
-    row = f"row {warning.row}: " if warning.row else ""
-    return f"{warning.kind}: {row}{warning.message}"
+        found = Finding(parameter="strict", found=counted(len(warnings), "warning"), allowed="none")
+        raise LogError(found, *(one.as_finding() for one in warnings))
 
 
 def offset_of(frame: Transform) -> tuple[float, ...]:

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from html import escape
-from typing import Any
+from typing import Any, ClassVar
 
-from urmpipe_models.errors import one_line
+from urmpipe_models.messages import one_line
 
 LONGEST = 120
 """Characters of the line: it fits into a terminal, and into a list of results."""
@@ -21,13 +21,16 @@ class Shown(ABC):
 
     __slots__ = ()
 
+    page: ClassVar[Callable[[Any], str | None]] = staticmethod(lambda result: None)
+    """Returns what a notebook shows of a result that presents itself; set by who renders presentations."""
+
     @abstractmethod
     def _headline(self) -> str:
         """Return its name and what it holds, in one line."""
 
     def _notes(self) -> Sequence[str]:
         """Return what a person should know, a line each."""
-        return [warning.message for warning in getattr(self, "warnings", ())]
+        return [str(warning) for warning in getattr(self, "warnings", ())]
 
     def _table(self) -> str:
         """Return the head of its table in HTML."""
@@ -43,7 +46,9 @@ class Shown(ABC):
         return f"{line if len(line) <= room else line[: room - 3] + '...'}{ending}"
 
     def _repr_html_(self) -> str:
-        """Return the headline, the warnings and the head of the table, for a notebook."""
+        """Return for a notebook what presents it, else its headline, warnings and the head of its table."""
+        if (page := Shown.page(self)) is not None:
+            return page
         notes = "".join(f"<li>{escape(one_line(note))}</li>" for note in self._notes())
         headline = f"<p><b>{type(self).__name__}</b> {escape(one_line(self._headline()))}</p>"
         return f"{headline}{notes and f'<ul>{notes}</ul>'}{self._table()}"

@@ -8,51 +8,16 @@ allowed. The command line prints these lines and exits with 2.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from dataclasses import dataclass
 from typing import TypeVar
+
+from urmpipe_models.messages import Finding as Finding  # noqa: PLC0414 - errors are made of them
+from urmpipe_models.messages import one_line
 
 SHOWN = 60
 """So many letters of a value stand in a message."""
 
 Given = TypeVar("Given")
 Made = TypeVar("Made")
-
-
-@dataclass(frozen=True, slots=True)
-class Finding:
-    """One thing that is wrong with an input.
-
-    Attributes:
-        message: What was found and what is allowed.
-        file: The file it was found in, as the user named it.
-        line: Line of the file, counted from 1 (header lines count).
-        row: Data row of the file, counted from 1 (header lines do not count).
-        column: Name of the column.
-    """
-
-    message: str
-    file: str | None = None
-    line: int | None = None
-    row: int | None = None
-    column: str | None = None
-
-    def __str__(self) -> str:
-        place = self.file or ""
-        if self.line is not None:
-            place += f":{self.line}"
-        if self.column is not None:
-            place += f"{', ' if place else ''}column {self.column}"
-        return one_line(f"{place}: {self.message}" if place else self.message)
-
-
-def one_line(text: str) -> str:
-    """Return a text with all that is not printable as the escapes of Python's strings.
-
-    Names come from files, and may hold what breaks a line or what a terminal acts on instead of showing it.
-    """
-    if text.isprintable():
-        return text
-    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)
 
 
 def shown(value: object) -> str:

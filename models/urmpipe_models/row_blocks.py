@@ -29,7 +29,7 @@ def side_by_side(
     Args:
         work: Called once a block.
         blocks: Slices, indices of rows, or rows themselves.
-        threads: Blocks worked on at a time; 1 leaves the other cores to whoever needs them meanwhile.
+        threads: Blocks worked on at a time.
 
     Raises:
         Exception: What work raised first, in the order of the blocks.

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TypeAlias
 
 import numpy as np
 
@@ -30,6 +31,9 @@ SINGULAR_SINE = 1e-9
 _QUARTERS = ((1.0, 0.0), (0.0, 1.0), (-1.0, 0.0), (0.0, -1.0))
 """cos and sin of 0, 1, 2 and 3 quarter turns."""
 
+_Numbers: TypeAlias = tuple[float, float, float]
+"""What the elements are of a frame that is stored."""
+
 
 @dataclass(frozen=True, slots=True)
 class Transform:
@@ -40,8 +44,11 @@ class Transform:
         translation: p, three elements in [m].
     """
 
-    rotation: tuple[Vector, Vector, Vector] = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
-    translation: Vector = ZERO
+    rotation: tuple[Vector, Vector, Vector] = field(
+        default=((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)),
+        metadata={"stored": tuple[_Numbers, _Numbers, _Numbers]},
+    )
+    translation: Vector = field(default=ZERO, metadata={"stored": _Numbers})
 
     def __matmul__(self, other: Transform) -> Transform:
         """Return the frame C in A from B in A (self) and C in B (other)."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, fields, replace
 from typing import TYPE_CHECKING, Any, Literal, get_args
 
 import numpy as np
@@ -10,10 +10,16 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_quaternions, continuous_rotations
 from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.messages import Finding, Hint, Message
 from urmpipe_models.orientation import NAMES, RotationForm, quaternions
+from urmpipe_models.spelling import Voice
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+ROW_NS = 1_000_000_000
+"""How much of `t_ns` a row without a time counts: `t` is then the number of the row from 0, and no time."""
 
 
 def seconds(nanoseconds: IntArray) -> FloatArray:
@@ -44,30 +50,70 @@ class Inference:
         what: The subject, such as "delimiter", "time column", "unit of q1".
         value: What was found.
         evidence: Why.
+        kind: A short word to find it by: "unit", "form"; by default its subject.
+        columns: Names of the columns or joints that it is about, where it is not about the whole file.
+        hints: What to give to have it otherwise.
     """
 
     what: str
     value: str
     evidence: str
+    kind: str = ""
+    columns: tuple[str, ...] = ()
+    hints: tuple[Hint, ...] = ()
+
+    def __post_init__(self) -> None:
+        """Take the subject as the kind where none is given."""
+        if not self.kind:
+            object.__setattr__(self, "kind", self.what)
+
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+        """Return its fields for JSON, and `otherwise`."""
+        return asdict(self) | {"otherwise": self.otherwise(voice)}
+
+    def otherwise(self, voice: Voice = "python") -> str:
+        """Return how to have it otherwise; empty where it cannot be."""
+        return ", or ".join(f"{hint.spelled(voice)} {hint.does}".strip() for hint in self.hints)
 
 
 @dataclass(frozen=True, slots=True)
-class LogWarning:
+class LogWarning(Message):
     """Something about a log that a person should know, and that did not stop the work.
 
     Attributes:
         kind: A short word to filter by, such as "missing", "gap", "assumed-unit".
-        message: One line.
+        message: The sentence, in one line.
         row: Data row of the file from 1, where there is one.
+        about: The log or block that it is about, to stand among others.
+        column: Name of the column or joint that it is about.
+        parameter: Keyword of the public function that it is about.
+        found: What was found.
+        allowed: What is allowed.
+        hints: What to give to have it otherwise.
     """
 
     kind: str
     message: str
     row: int | None = None
+    about: str | None = None
+    column: str | None = None
+    parameter: str | None = None
+    found: str | None = None
+    allowed: str | None = None
+    hints: tuple[Hint, ...] = ()
 
     def of(self, name: str) -> LogWarning:
-        """Return it behind the name of what it is about, to stand among others."""
-        return replace(self, message=f"{name}: {self.message}")
+        """Return it as one about a log or a block of this name."""
+        return replace(self, about=name)
+
+    def as_finding(self) -> Finding:
+        """Return it as what is wrong, where warnings are errors."""
+        return Finding(**{one.name: getattr(self, one.name) for one in fields(self)})
+
+    def place(self) -> str:
+        """Return log, row and column: "log: row 5: q1"."""
+        row = None if self.row is None else f"row {self.row}"
+        return ": ".join(filter(None, (self.about, row, self.column)))
 
 
 Role = Literal["time", "joint", "rate", "acceleration", "position", "rotation"]
@@ -113,7 +159,8 @@ class JointLog(Shown):
         name: The file's stem.
         source: Which reader read it, such as "coppeliasim" or "table".
         files: The files it came from.
-        t_ns: Time of each row in integer [ns] from the first row, shape (n,), strictly increasing.
+        t_ns: Time of each row in integer [ns] from the first row, shape (n,), strictly increasing; of rows
+            without times their number from 0, `ROW_NS` a row.
         clock_start_ns: The file's own clock at the first row in integer [ns].
         joints: Names of the joint columns, in the robot's order.
         q: Joint values in [rad] or [m], shape (n, joints); NaN where a sample is missing.
@@ -127,6 +174,7 @@ class JointLog(Shown):
         digits: Significant digits of the joint values where the file was seen to be quantised.
         inferences: What the reader found out.
         warnings: What a person should know.
+        timed: Whether the rows have times; else they are poses that no motion joins.
     """
 
     name: str
@@ -146,6 +194,7 @@ class JointLog(Shown):
     digits: int | None = None
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
+    timed: bool = True
 
     @property
     def t(self) -> FloatArray:
@@ -197,7 +246,7 @@ class JointLog(Shown):
     def _headline(self) -> str:
         """Return its name, its source and how long it is."""
         joints = number_of(len(self.joints), "joint") if self.joints else "a path"
-        rows = f"{number_of(self.rows, 'row')} {self.period:g} s apart"
+        rows = number_of(self.rows, "row") + (f" {self.period:g} s apart" if self.timed else "")
         return line_of(self.name, self.source, joints, rows)
 
     def to_frame(self) -> pd.DataFrame:
@@ -214,8 +263,8 @@ class JointLog(Shown):
                 columns |= {name: values[:, i] for i, name in enumerate(names)}
         return pd.DataFrame(columns)
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return what the log is and how it was read, without its rows."""
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+        """Return what the log is and how it was read, without its rows; messages in somebody's words."""
         return {
             "name": self.name,
             "source": self.source,
@@ -225,6 +274,6 @@ class JointLog(Shown):
             "clock_start": self.clock_start,
             "joints": list(self.joints),
             "units": self.units,
-            "inferences": [asdict(one) for one in self.inferences],
-            "warnings": [asdict(one) for one in self.warnings],
+            "inferences": [one.to_dict(voice) for one in self.inferences],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
         }

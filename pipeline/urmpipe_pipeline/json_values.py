@@ -5,14 +5,10 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Mapping
-from dataclasses import fields
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from _typeshed import DataclassInstance
 
 
 def json_ready(value: Any) -> Any:
@@ -28,11 +24,6 @@ def json_ready(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return str(value) if isinstance(value, Path) else value
-
-
-def flat(item: DataclassInstance) -> dict[str, Any]:
-    """Return a dataclass of plain values as a dictionary, without the deep copies of `asdict`."""
-    return {field.name: getattr(item, field.name) for field in fields(item)}
 
 
 def plain(value: Any) -> str:

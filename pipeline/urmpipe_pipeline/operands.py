@@ -5,23 +5,25 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import TypeAlias
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import is_recording, read_recording
+from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.derivatives import Method
-from urmpipe_pipeline.runs.ingest import UNUSED_PERIOD, ingest_log
+from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.sources import ReadOptions
-from urmpipe_pipeline.sources.options_of_each import options_of_each
 
-COMPARISON = (
-    "found the recording of a comparison, allowed: one that ingest wrote; to hold it against another"
-    " comparison, give it alone, with --baseline OTHER.rrd"
-)
+COMPARISON = "found the recording of a comparison, allowed: one that ingest wrote"
+
+WITH_BASELINE = Hint("baseline", None, "compares it, alone, with an earlier one")
 
 SIMULATION = (
     "found the recording of a simulation, allowed: one that ingest wrote; a simulation is judged by the delta"
@@ -29,46 +31,42 @@ SIMULATION = (
 )
 
 
+MadeRun: TypeAlias = Run | SolvedTargets
+"""Results that are a run, or have one."""
+
+
 def load_runs(
-    operands: Sequence[Path | Run],
+    operands: Sequence[Path | MadeRun],
     *,
     robot: Chain | None = None,
     read: ReadOptions | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
 ) -> list[Run]:
-    """Return the runs of several operands; what is said of their logs holds for those that it fits.
+    """Return the runs of several operands; the reading options hold for every log among them.
 
     Args:
-        operands: Recordings, logs, paths, folders; runs as they are.
+        operands: Recordings, logs, paths, folders; runs, and solved targets as theirs.
         robot: The arm; of a recording or a run it replaces the one inside.
-        read: How to read the CSV files; `options_of_each` tells which of it holds for which.
+        read: How to read the CSV files, all of them.
         tsp: Period of the grid in [s], of the CSV files.
         derivative: How the joints of CSV files are differentiated.
 
     Raises:
         UrmpipeError: With everything that is wrong with any of them.
     """
-    given = read or ReadOptions()
-    logs = [one for one in operands if not isinstance(one, Run) and not _is_recording(one)]
-    each = iter(options_of_each(for_each(log_files, logs), given, robot))
 
-    def run_of(operand: Path | Run) -> Run:
+    def run_of(operand: Path | MadeRun) -> Run:
         """Return the run that an operand is, or is read as."""
-        if isinstance(operand, Run):
-            return on_robot(operand, robot)
-        own = None if _is_recording(operand) else next(each)
-        return load_run(operand, robot=robot, read=own, tsp=tsp, derivative=derivative)
+        if not isinstance(operand, Path):
+            return on_robot(operand.as_run(), robot)
+        try:
+            return load_run(operand, robot=robot, read=read, tsp=tsp, derivative=derivative)
+        except LogError as error:  # of several logs, each is named
+            found = (one if one.file else replace(one, file=str(operand)) for one in error.findings)
+            raise LogError(*found) from error
 
-    return _without_period_doubts(for_each(run_of, operands))
-
-
-def _without_period_doubts(runs: Sequence[Run]) -> list[Run]:
-    """Return the runs; a period that one of them needed is no doubt about the others."""
-    doubted = UNUSED_PERIOD.kind  # its message may be in keywords
-    if all(any(one.kind == doubted for one in run.warnings) for run in runs):
-        return list(runs)
-    return [replace(run, warnings=tuple(one for one in run.warnings if one.kind != doubted)) for run in runs]
+    return for_each(run_of, operands)
 
 
 def load_run(
@@ -99,10 +97,10 @@ def load_run(
         )
     result = read_recording(operand)
     if isinstance(result, Comparison):
-        raise RecordingError(Finding(COMPARISON, file=str(operand)))
+        raise RecordingError(Finding(COMPARISON, str(operand), hints=(WITH_BASELINE,)))
     if isinstance(result, Simulation):
         raise RecordingError(Finding(SIMULATION, file=str(operand)))
-    return on_robot(result, robot)
+    return on_robot(result.as_run(), robot)
 
 
 def load_comparison(operand: Path) -> Comparison | None:

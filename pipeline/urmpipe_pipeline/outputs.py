@@ -9,7 +9,7 @@ import os
 import re
 import uuid
 import zlib
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Literal
@@ -156,6 +156,14 @@ def is_fmu(path: Path) -> bool:
         return False  # no archive, none with a model description, or packed in a way that zipfile cannot read
 
 
+_known: dict[OutputKind, Callable[[Path], bool]] = {"report": is_report, "fmu": is_fmu}
+
+
+def know_own(kind: OutputKind, is_ours: Callable[[Path], bool]) -> None:
+    """Let a function tell which files of a kind are ours: called where the kind is written."""
+    _known[kind] = is_ours
+
+
 def refuse_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
     """Raise an `OutputError` if an output may not be written there: for who works long before it writes.
 
@@ -226,20 +234,10 @@ def _is_text(path: Path) -> bool:
 
 
 def _is_ours(path: Path, kind: OutputKind) -> bool:
-    if kind == "report":
-        return is_report(path)
-    if kind == "fmu":
-        return is_fmu(path)
-    if kind in _MARKS:
-        with path.open("rb") as file:
-            return _MARKS[kind].match(file.read(HEAD)) is not None
-    if kind == "export":
-        from urmpipe_pipeline.export.identity import is_export
-
-        return is_export(path)
-    if kind == "recording":
-        from urmpipe_pipeline.recording.identity import is_ours
-
-        return is_ours(path)
+    if kind in _known:
+        return _known[kind](path)
     with path.open("rb") as file:
-        return file.read(HEAD).startswith(FIRST_LINES[kind].encode())
+        head = file.read(HEAD)
+    if kind in _MARKS:
+        return _MARKS[kind].match(head) is not None
+    return head.startswith(FIRST_LINES[kind].encode())

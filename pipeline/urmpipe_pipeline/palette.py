@@ -50,6 +50,9 @@ NEUTRAL_COLOUR = "#c8d0d4"
 DEVIATION_COLOUR = "#fe046c"
 """The deviation made visible in the 3D view: the enlarged path and the worst place; crimson."""
 
+INK_COLOUR = "#1b2329"
+"""Marks that are no data, such as where a path begins."""
+
 
 def joint_colour(index: int) -> str:
     """Return the colour of a joint as #rrggbb, counted from 0 at the base."""
@@ -64,6 +67,11 @@ def run_colour(index: int) -> str:
 def run_colour_word(index: int) -> str:
     """Return the word for the colour of a run, counted from 0."""
     return list(RUN_COLOURS)[index % len(RUN_COLOURS)]
+
+
+def colour_word(colour: str) -> str:
+    """Return the word for the colour of a run; empty for another colour."""
+    return next((word for word, one in RUN_COLOURS.items() if one == colour), "")
 
 
 def rgb(colour: str) -> tuple[int, int, int]:

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import math
-import shlex
-import sys
 from collections.abc import Sequence
 from typing import Any
 
@@ -21,9 +19,6 @@ FINEST = 1e-3
 
 SHOWN = {si: (unit, factor(si, unit)) for si, unit in (("m", "mm"), ("rad", "deg"))}
 """The units that people read, and how many of them one of the SI unit is."""
-
-_PARTING = frozenset(" \t'&()[]{},;=@#$`^!+%~|<>")
-"""What PowerShell or cmd reads as more than a letter of a word."""
 
 
 def number(value: float | None, unit: str, against: float | None = None) -> str:
@@ -101,6 +96,21 @@ def percent(share: float) -> str:
     return f"{scaled:.2g} %" if scaled < 1.0 else f"{scaled:.1f} %"
 
 
+def portion(share: float) -> str:
+    """Return how much of something is used up, to stand before it: "71.0 % of", "1.2 times".
+
+    Above 1 it has three digits, or as many as tell it from 1, without an exponent.
+    """
+    if share <= 1.0:
+        return f"{percent(share)} of"
+    if share >= 1000.0:
+        return f"{share:.0f} times"
+    digits = 3
+    while digits < 15 and f"{share:.{digits}g}" == "1":
+        digits += 1
+    return f"{share:.{digits}g} times"
+
+
 def counted(count: int, noun: str) -> str:
     """Return a count with its noun in the right number: "1 log", "2 logs"."""
     return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
@@ -109,19 +119,6 @@ def counted(count: int, noun: str) -> str:
 def enumerated(words: Sequence[str]) -> str:
     """Return some words as a list in a sentence: "a", "a and b", "a, b and c"."""
     return " and ".join([", ".join(words[:-1]), words[-1]] if len(words) > 1 else words)
-
-
-def pasted(word: object, platform: str = sys.platform) -> str:
-    """Return a word as it may be pasted into a shell: quoted if this would part it or read it otherwise.
-
-    Args:
-        word: Such as the path of a file.
-        platform: As `sys.platform` tells it: on Windows a backslash parts folders and is not quoted.
-    """
-    said = str(word)
-    if platform != "win32":
-        return shlex.quote(said)
-    return f'"{said}"' if not said or set(said) & _PARTING else said
 
 
 def unique(names: Sequence[str]) -> list[str]:
@@ -145,3 +142,8 @@ def exact(value: Any) -> str:
     if value is None:
         return ""
     return value if isinstance(value, str) else repr(value)
+
+
+def encodable(value: str) -> str:
+    """Return a text without the lone surrogates that stand for undecodable bytes of a file name."""
+    return value.encode("utf-8", "replace").decode("utf-8")

@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from urmpipe_datasets import LOGS
-from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.results import Run
 
 PATH, COPPELIA, MATLAB = LOGS / "path.csv", LOGS / "coppeliasim.csv", LOGS / "matlab.csv"

@@ -12,10 +12,11 @@ from urmpipe.main import run
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import misses, targets_of
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.recording import read_recording
+from urmpipe_models.spelling import pasted
+from urmpipe_pipeline.results import read_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
-from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.text import pasted
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.scene import ghosts
 
 Captured = pytest.CaptureFixture[str]
 
@@ -93,9 +94,9 @@ def test_the_table_has_the_solution_nearest_to_the_start_and_tells_why_others_ar
     lines = out.splitlines()
     assert lines[0] == "FAIL  targets: arm6 reaches 2 of 4 targets (closed form: spherical wrist)"
     first = next(line for line in lines if line.startswith("1 "))
-    assert first.split()[-8:-2] == ["0.0000"] * 6
-    assert lines[-1] == "row 3 not reached: column x: found no number, allowed: a finite number"
-    assert lines[-2].startswith("row 2 not reached: ")
+    assert first.split()[-7:-1] == ["0.0000"] * 6
+    assert lines[1].startswith("      Not reached: row 2: ")
+    assert lines[2] == "      Not reached: row 3: column x: found no number, allowed: a finite number"
     warnings = err.splitlines()
     assert any(line.startswith("warning: row 1: wrist aligned: theta4 and theta6: ") for line in warnings)
 
@@ -107,7 +108,7 @@ def test_all_prints_every_solution_and_start_chooses(capsys: Captured) -> None:
     assert run(["ik", "default.csv", "--robot", "arm6", "--start", "3.1,1.7,0.7,0,0.7,3.1"]) == 0
     (row,) = [line for line in capsys.readouterr().out.splitlines() if line.startswith("1 ")]
     assert np.allclose(
-        np.array(row.split()[-8:-2], float), [180, 98.0503, 41.9932, 0, 39.9565, 180], atol=1e-4
+        np.array(row.split()[-7:-1], float), [180, 98.0503, 41.9932, 0, 39.9565, 180], atol=1e-4
     )
 
 
@@ -221,7 +222,7 @@ def test_targets_without_solution_are_left_out_of_a_log_and_nothing_at_all_is_no
     (folder / "far.csv").write_text("x,y,z,rz,ry,rx\n2,0,0.1,0,0,0\n")
     assert run(["ik", "far.csv", "--robot", "arm6", "-o", "far-log.csv"]) == 1
     out, err = capsys.readouterr()
-    assert "row 1 not reached: " in out
+    assert "Not reached: row 1: " in out
     assert err == "warning: far-log.csv is not written: no target was reached\n"
     assert not (folder / "far-log.csv").exists()
 
@@ -232,13 +233,13 @@ def test_a_recording_shows_the_solution_and_every_other_branch_as_a_ghost(
     assert run(["ik", "targets.csv", "--robot", "arm6", "--all", "-o", "targets.rrd"]) == 1
     assert "Recording: targets.rrd" in capsys.readouterr().out
     made = read_recording(folder / "targets.rrd")
-    assert isinstance(made, Run)
+    assert isinstance(made, SolvedTargets)
     assert np.isfinite(made.q).all(axis=1).tolist() == [True, False, False, True]
-    assert len(made.ghosts) == 8
+    assert len(ghosts(made)) == 8
     found = answer(capsys, 1, "targets.csv", "--robot", "arm6")
-    for target, t in ((0, 0), (3, 3_000_000_000)):
+    for target in (0, 3):
         listed = {one["branch"]: one["q"] for one in found["targets"][target]["solutions"]}
-        shown = {one.name: one.q[one.t_ns == t][0].tolist() for one in made.ghosts if t in one.t_ns}
+        shown = {one.name: one.q[target].tolist() for one in ghosts(made) if np.isfinite(one.q[target]).all()}
         assert len(shown) == 7
         assert all(listed[name] == q for name, q in shown.items())
     head = "x,y,z,rz,ry,rx\n"
@@ -247,13 +248,12 @@ def test_a_recording_shows_the_solution_and_every_other_branch_as_a_ghost(
     )  # stretched: left arm only
     assert run(["ik", "some.csv", "--robot", "arm6", "--all", "-o", "some.rrd", "-q"]) == 0
     some = read_recording(folder / "some.rrd")
-    assert isinstance(some, Run)
-    assert sum(1_000_000_000 in one.t_ns for one in some.ghosts) == 3
-    assert all(np.isfinite(one.q).all() for one in some.ghosts)
+    assert isinstance(some, SolvedTargets)
+    assert sum(bool(np.isfinite(one.q[1]).all()) for one in ghosts(some)) == 3
     assert run(["ik", "targets.csv", "--robot", "arm6", "-o", "targets.rrd", "-q"]) == 1
     alone = read_recording(folder / "targets.rrd")
-    assert isinstance(alone, Run)
-    assert not alone.ghosts
+    assert isinstance(alone, SolvedTargets)
+    assert not ghosts(alone)
 
 
 def test_all_of_a_path_records_the_branches_that_run_beside_it(capsys: Captured, folder: Path) -> None:
@@ -264,11 +264,11 @@ def test_all_of_a_path_records_the_branches_that_run_beside_it(capsys: Captured,
     start = ",".join(map(str, q[0]))
     assert run(["ik", "path.csv", "--robot", "arm6", "--start", start, "--all", "-o", "path.rrd"]) == 0
     made = read_recording(folder / "path.rrd")
-    assert isinstance(made, Run)
+    assert isinstance(made, SolvedTargets)
     assert np.abs(made.q - q).max() < 1e-9
-    assert {len(one.t_ns) for one in made.ghosts} == {40}
+    assert {np.isfinite(one.q).all() for one in ghosts(made)} == {np.True_}
     arm, targets = load_robot("arm6"), targets_of(load_robot("arm6"), q)
-    for ghost in made.ghosts:
+    for ghost in ghosts(made):
         position, turn = misses(arm, ghost.q, targets)
         assert np.abs(position).max() < 1e-10
         assert np.abs(turn).max() < 1e-10

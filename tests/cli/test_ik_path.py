@@ -15,10 +15,8 @@ from urmpipe import ik
 from urmpipe.main import run
 from urmpipe_datasets import LOGS
 from urmpipe_models.robots.catalogue import load_robot
-from urmpipe_pipeline.recording.reader import read_recording
-from urmpipe_pipeline.recording.summary import summary
-from urmpipe_pipeline.report.banner import Banner, solved_banner
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.presentation.section import Presentation
+from urmpipe_pipeline.results import present, read_recording
 
 Captured = pytest.CaptureFixture[str]
 
@@ -40,9 +38,9 @@ def test_a_path_has_a_summary_and_one_solution_a_row_in_json(capsys: Captured, f
     assert run(["ik", "path.csv", "--robot", "arm6", "--start", start]) == 0
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == "PASS  path: arm6 reaches 40 targets (closed form: spherical wrist)"
-    assert lines[1].startswith("      branch: ")
-    assert lines[2].startswith("      nearest to a singularity at t = 0.")
-    assert lines[3].startswith("      off by ")
+    assert lines[1].startswith("      Branch: ")
+    assert lines[2].startswith("      Nearest to a singularity: at t = 0.")
+    assert lines[3].startswith("      Off by: ")
     found = answer(capsys, 0, "path.csv", "--robot", "arm6", "--start", start)
     assert (found["jumps"], found["too_fast"]) == ([], [])
     solved = np.array([one["solutions"][0]["q"] for one in found["targets"]])
@@ -83,17 +81,14 @@ def test_a_joint_that_is_too_fast_fails_the_path(capsys: Captured, folder: Path)
     )
     joint = fast["joint"]
     assert (
-        f"      {joint} too fast: 286.5 deg/s of 180 deg/s allowed, at t = 0.000 s (row 1) to row 30" in lines
+        f"      Too fast: {joint} at 286.5 deg/s of 180 deg/s allowed, at t = 0.000 s (row 1) to row 30"
+        in lines
     )
 
 
-def told(output: Path) -> tuple[list[tuple[int | None, str]], Banner, str]:
-    """Return what a recording says of its path, the verdict of its report, and the head of its summary."""
-    solved = read_recording(output)
-    assert isinstance(solved, Run)
-    kinds = ("jump", "joint-too-fast")
-    said = [(one.row, one.message) for one in solved.warnings if one.kind in kinds]
-    return said, solved_banner([solved]), summary(solved).splitlines()[0]
+def errors(shown: Presentation) -> list[tuple[int | None, str]]:
+    """Return the times and the first words of what fails a path."""
+    return [(one.t_ns, str(one.words).split(": ")[0]) for one in shown.body.events() if one.level == "error"]
 
 
 def test_recording_and_report_of_a_path_that_is_too_fast_fail_as_ik_does(folder: Path) -> None:
@@ -103,13 +98,10 @@ def test_recording_and_report_of_a_path_that_is_too_fast_fail_as_ik_does(folder:
     write_path(folder / "path.csv", "ur5e", q)
     found = ik("path.csv", "ur5e", start=q[0].tolist(), output="path.rrd")
     assert (found.verdict, int(found.reached.sum())) == ("fail", 30)
-    said, verdict, head = told(folder / "path.rrd")
-    fast = "2 joints too fast, here the first: shoulder_pan_joint at 286.5 deg/s of 180 deg/s allowed"
-    assert said == [(1, fast)]
-    assert (verdict.state, verdict.word) == ("fail", "FAIL")
-    assert verdict.headline == "path: ur5e reaches 30 targets, with 2 joints too fast"
-    assert verdict.detail == f"{fast}."
-    assert head == "### FAIL: path: ur5e reaches 30 targets, with 2 joints too fast"
+    kept = present(read_recording(folder / "path.rrd"))
+    assert (kept.verdict, kept.headline) == ("fail", present(found).headline)
+    assert kept.headline.endswith(", with 2 joints too fast")
+    assert errors(kept) == [(0, "too fast")] * 2
 
 
 def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
@@ -129,17 +121,20 @@ def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
     assert (jump["from_row"], jump["row"]) == (16, 24)
     assert jump["steps"] == pytest.approx({"wrist_3_joint": q[23, 5] - q[15, 5] - 2 * np.pi}, abs=1e-9)
     ik("path.csv", "ur5e", start=q[0].tolist(), output="path.rrd")
-    said, verdict, head = told(folder / "path.rrd")
-    steps = f"wrist_3_joint by {np.degrees(jump['steps']['wrist_3_joint']):.4g} deg"
-    assert said[0] == (24, f"1 jump: {steps}")
-    reached = "path: ur5e reaches 33 of 40 targets, with 1 jump and 1 joint too fast"
-    assert (verdict.word, verdict.headline, head) == ("FAIL", reached, f"### FAIL: {reached}")
+    kept = present(read_recording(folder / "path.rrd"))
+    assert kept.verdict == "fail"
+    assert kept.headline.startswith("path: ur5e reaches 33 of 40 targets (")
+    assert kept.headline.endswith("), with 1 jump and 1 joint too fast")
+    when = [(160_000_000, "not reached"), (230_000_000, "jump at t = 0.230 s (row 24), since row 16, at (")]
+    assert [
+        (t, words[: len(begin)]) for (t, words), (_, begin) in zip(errors(kept), when, strict=False)
+    ] == when
     assert run(["ik", "path.csv", "--robot", "ur5e", "--start", start]) == 1
     lines = capsys.readouterr().out.splitlines()
-    assert any(line.startswith("      jump at t = 0.230 s (row 24), since row 16, at (") for line in lines)
-    (last,) = [line.split() for line in lines if line.startswith("wrist_3_joint [deg]")]
+    assert any(line.startswith("      Jump: at t = 0.230 s (row 24), since row 16, at (") for line in lines)
+    (last,) = [line.split() for line in lines if line.startswith("wrist_3_joint ")]
     fastest = np.degrees(abs(jump["steps"]["wrist_3_joint"]) / 0.08)
-    assert float(last[-2]) == pytest.approx(fastest, rel=1e-6)  # over the gap, as the joint that is too fast
+    assert float(last[-4]) == pytest.approx(fastest, rel=1e-6)  # over the gap, as the joint that is too fast
 
 
 def test_all_of_a_path_needs_a_recording_and_a_closed_form(capsys: Captured, folder: Path) -> None:

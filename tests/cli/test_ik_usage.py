@@ -165,9 +165,9 @@ def test_no_row_that_is_a_target(capsys: Captured, folder: Path) -> None:
     out, err = capsys.readouterr()
     assert out.splitlines() == [
         "FAIL  bad: arm6 reaches 0 of 3 targets (iterative)",
-        "row 1 not reached: column x: found no number, allowed: a finite number",
-        "row 2 not reached: column y: found inf, allowed: a finite number",
-        "row 3 not reached: found 2 cells, allowed: 3",
+        "      Not reached: row 1: column x: found no number, allowed: a finite number",
+        "      Not reached: row 2: column y: found inf, allowed: a finite number",
+        "      Not reached: row 3: found 2 cells, allowed: 3",
     ]
     assert err == ""
 

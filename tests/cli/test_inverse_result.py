@@ -124,7 +124,7 @@ def test_progress_is_told_and_changes_nothing(robot: str, every: bool) -> None:
 
 def test_a_notebook_shows_the_table() -> None:
     shown = urmpipe.ik(TARGETS, "arm6")._repr_html_()
-    assert shown.startswith("<p><b>InverseResult</b> targets: pass, arm6, 2 of 2 targets reached, ")
+    assert shown.startswith("<p><b>SolvedTargets</b> targets: pass, arm6, 2 of 2 targets reached, ")
     assert "<th>theta1</th>" in shown
     assert "right, elbow" in shown
 

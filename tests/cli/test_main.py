@@ -62,6 +62,16 @@ def test_every_command_has_help_with_examples_and_every_option_says_what_it_does
     assert [line for line in narrow.splitlines() if len(line) > 80] == []
 
 
+def test_importing_urmpipe_leaves_the_garbage_collection_alone() -> None:
+    code = (
+        "import gc; before = gc.get_threshold();"
+        "import urmpipe; urmpipe.ingest; import urmpipe.main;"
+        "print(gc.get_threshold() == before)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "True\n"
+
+
 def test_version(urmpipe: RunCommand) -> None:
     for words in ((), ("ingest",), ("robot", "list")):
         ran = urmpipe(*words, "--version")

@@ -3,9 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
-import subprocess
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,8 +14,8 @@ import urmpipe
 from urmpipe.api.simulate import simulate
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import UrmpipeError
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.simulations.simulation import Simulation
-from urmpipe_pipeline.text import pasted
 
 RunCommand = Callable[..., Any]
 
@@ -328,29 +325,6 @@ def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
     np.testing.assert_allclose(q, np.radians([[180.0, 90.0], [170.0, 80.0]]), rtol=2.3e-16)
     system.write_text('[blocks.meter]\nunit = "delta_meter"\nmap = "lab.toml"\n', encoding="utf-8")
     assert any("without a log, allowed: with log = ..." in one for one in refusal(system))
-
-
-def test_no_import_meets_those_of_rerun(following: Path, tmp_path: Path) -> None:
-    """While a system is prepared and run Rerun is imported beside: see `load_rerun`."""
-    code = (
-        "import sys, urmpipe.api.simulate as s, urmpipe.process as p\n"
-        "p.tune_pyarrow()\n"
-        "before = set(sys.modules)\n"
-        f"s.simulate({str(following)!r})\n"
-        "own = set(sys.modules) - before\n"
-        "for name in own: del sys.modules[name]\n"
-        "import rerun.blueprint, rerun.chunk\n"
-        "print(*sorted(own & set(sys.modules)))"
-    )
-    paths = {"URMPIPE_CACHE": str(tmp_path / "cache"), "PYTHONPATH": os.pathsep.join(sys.path)}
-    done = subprocess.run(
-        [sys.executable, "-c", code],
-        capture_output=True,
-        text=True,
-        check=True,
-        env={**os.environ, **paths},
-    )
-    assert done.stdout.strip() == ""
 
 
 def test_a_step_and_a_duration_are_positive(following: Path) -> None:

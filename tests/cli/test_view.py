@@ -17,8 +17,8 @@ import pytest
 
 from urmpipe_datasets import LOGS
 from urmpipe_models.errors import ViewerError
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.recording.viewer import refuse_without_display
-from urmpipe_pipeline.text import pasted
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""

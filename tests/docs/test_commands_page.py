@@ -87,39 +87,6 @@ def unknown_names(given: click.Context) -> list[str]:
     ]
 
 
-@pytest.mark.parametrize(
-    ("line", "told"),
-    [
-        ("urmpipe ingset log.csv", "no command ingset"),
-        ("urmpipe robot lst", "no command lst"),
-        ("urmpipe ingest log.csv --robto urm6", "No such option '--robto'"),
-        ("urmpipe ingest log.csv -x run.rrd", "No such option '-x'"),
-        ("urmpipe ik log.csv --derivative savgol", "No such option '--derivative'"),
-        ("urmpipe export log.rrd --to xlsx", "found 'xlsx', allowed: csv"),
-        ("urmpipe ingest log.csv --tsp 5mm", "found '5mm'"),
-    ],
-)
-def test_a_command_that_is_none_is_found(line: str, told: str) -> None:
-    with pytest.raises(click.UsageError) as error:
-        parsed(line)
-    assert told in error.value.message
-
-
-@pytest.mark.parametrize(
-    ("line", "unknown"),
-    [
-        ("urmpipe ingest log.csv --robot urm66", ["robot urm66"]),
-        ("urmpipe ingest log.csv --robot my-arm.toml", []),
-        ("urmpipe compare PATH LOG --robot R", []),
-        ("urmpipe robot show urm66", ["name urm66"]),
-        ("urmpipe fmu list dc_drvie", ["unit dc_drvie"]),
-        ("urmpipe simulate two-drives", ["system two-drives"]),
-    ],
-)
-def test_a_name_that_is_none_is_found(line: str, unknown: list[str]) -> None:
-    assert unknown_names(parsed(line)) == unknown
-
-
 def test_every_option_that_a_page_names_in_its_text_is_one_of_a_command(writer: Any) -> None:
     known = {opt for _, one in writer.commands() for param in one.command.params for opt in param.opts}
     for page in pages():

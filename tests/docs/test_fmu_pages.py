@@ -12,11 +12,9 @@ import pytest
 
 from pages import run_lines, snippets
 from urmpipe.api.simulate import simulate
-from urmpipe.printing.fmu import units_dict
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.cosim import system_names
 from urmpipe_fmus.native import native_missing
-from urmpipe_fmus.units import unit_names
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.robots.catalogue import load_robot
 
@@ -73,17 +71,3 @@ def test_each_shipped_system_has_its_line() -> None:
     page = (DOCS / "simulate.md").read_text(encoding="utf-8")
     section = page.split("\n## The systems that come along\n")[1].split("\n## ")[0]
     assert tuple(sorted(re.findall(r"^- \*\*(.+?)\*\*", section, re.MULTILINE))) == system_names()
-
-
-def test_each_key_of_the_list_of_units_is_named() -> None:
-    assert {"units", "name", "description", "options", "help"} <= NAMED
-    units = units_dict()["units"]
-    assert [one["name"] for one in units] == list(unit_names())
-    assert all(set(one) == {"name", "description", "options"} for one in units)
-
-
-@pytest.mark.parametrize("page", sorted((DOCS / "import").glob("*.md")), ids=lambda page: page.name)
-def test_each_page_tells_units_start_values_and_the_communication_step(page: Path) -> None:
-    text = page.read_text(encoding="utf-8")
-    for word in ("urmpipe fmu build", "SI", "start value", "tep", "Source", "[1]"):
-        assert word in text, word

@@ -92,9 +92,11 @@ def test_the_map_and_the_defaults_of_the_page_are_sound(tmp_path: Path) -> None:
     said = read_map(tmp_path / "lab.toml")
     assert (said.robot, said.read.names, said.read.rotation) == ("ur5e", ("shoulder",), "zyx")
     (tmp_path / "urmpipe.toml").write_text(defaults, encoding="utf-8")
-    command = getattr(import_module("urmpipe.commands.compare"), "compare")  # noqa: B009
-    values = defaults_for(command, tmp_path / "urmpipe.toml", {"compare": command})
-    assert values == {"robot": "ur5e", "log_map": str(tmp_path / "maps/lab.toml"), "tolerance": ["0.002"]}
+    names = ("ingest", "compare")
+    commands = {name: getattr(import_module(f"urmpipe.commands.{name}"), name) for name in names}
+    ingest, compare = (defaults_for(commands[name], tmp_path / "urmpipe.toml", commands) for name in names)
+    assert ingest == {"robot": "ur5e", "log_map": str(tmp_path / "maps/lab.toml")}
+    assert compare == {"robot": "ur5e", "tolerance": ["0.002"]}
 
 
 SPECIMENS = {

@@ -63,14 +63,6 @@ def viewed(page: str) -> set[str]:
     return {word for line in lines for word in line.split()[2:]}
 
 
-def test_files_are_told_and_viewed() -> None:
-    assert files_told("README.md", "urmpipe ingest log.csv --robot urm6") == {"log.rrd"}
-    assert files_told("docs/fmu.md", "urmpipe fmu build kinematic_chain --robot urm6") == {
-        "kinematic_chain.fmu"
-    }
-    assert viewed("README.md") == {"log-against-path.rrd"}
-
-
 def test_every_link_of_a_page_leads_somewhere() -> None:
     for page in pages():
         for link in re.findall(r"\]\(([^)#\s]+)(?:#[^)]*)?\)", text_of(page)):

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from urmpipe_pipeline.inverse.target_file import TargetFile, read_targets
 from urmpipe_pipeline.outputs import TARGET_ROW
+from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
 from urmpipe_pipeline.sources import read_log
 
 PAGE = (Path(__file__).parents[2] / "docs" / "targets.md").read_text(encoding="utf-8")

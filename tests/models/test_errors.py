@@ -7,7 +7,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from urmpipe_models.errors import Finding, one_line, shown
+from urmpipe_models.errors import Finding, shown
+from urmpipe_models.messages import one_line
 from urmpipe_models.transform import Transform
 
 

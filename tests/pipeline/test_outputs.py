@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+import urmpipe_pipeline.recording  # each knows its own files
+import urmpipe_pipeline.tables  # noqa: F401
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.outputs import OutputKind, guarded_output, is_report
 

@@ -6,6 +6,7 @@ import math
 
 import pytest
 
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import Statistics
 from urmpipe_pipeline.comparison.symbols import allowed_words, used_words
@@ -144,5 +145,5 @@ def test_how_much_of_a_tolerance_is_used_is_never_rounded_to_all_of_it(largest: 
     ],
 )
 def test_a_word_is_quoted_where_a_shell_would_part_it(word: str, elsewhere: str, on_windows: str) -> None:
-    assert text.pasted(word, "linux") == text.pasted(word, "darwin") == elsewhere
-    assert text.pasted(word, "win32") == on_windows
+    assert pasted(word, "linux") == pasted(word, "darwin") == elsewhere
+    assert pasted(word, "win32") == on_windows

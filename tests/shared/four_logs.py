@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from urmpipe.main import run
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import read_recording
+from urmpipe_pipeline.results import read_recording
 
 Captured = pytest.CaptureFixture[str]
 

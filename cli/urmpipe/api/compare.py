@@ -17,6 +17,7 @@ from urmpipe.guards import (
     one_or_many,
     paths,
     place_robot,
+    recorded,
     refuse_foreign,
     refuse_others,
     refuse_warnings,
@@ -24,33 +25,37 @@ from urmpipe.guards import (
 from urmpipe.words import by_command_line
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
+from urmpipe_models.spelling import Voice
+from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.doubts import EXCHANGED, LARGE_NOISE, large_noises
-from urmpipe_pipeline.comparison.junit import write_junit
-from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.comparison.left_out import BEYOND
-from urmpipe_pipeline.comparison.statistics_table import write_statistics
 from urmpipe_pipeline.comparison.sync import SyncOption
-from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE, kinds_with_unit, parse_tolerance
+from urmpipe_pipeline.comparison.tables import statistics_rows
+from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.operands import load_comparison, load_runs
+from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
+from urmpipe_pipeline.operands import MadeRun, load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
-from urmpipe_pipeline.recording import is_recording, read_recording, record
+from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import kind_of, present, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
+from urmpipe_pipeline.tables.table_csv import write_table
 
-Operand = PathLike | Run
+Operand = PathLike | MadeRun
 
-OPERANDS = f"a log, a path, a recording or a Run; {WRITTEN_FIRST}"
+OPERANDS = f"a log, a path, a recording, a Run or SolvedTargets; {WRITTEN_FIRST}"
 
 
 @public
 def compare(
-    reference: PathLike | Run | Comparison,
+    reference: Operand | Comparison,
     logs: Operand | Sequence[Operand] = (),
     robot: Robot | None = None,
     *,
@@ -70,6 +75,7 @@ def compare(
     junit: PathLike | None = None,
     statistics: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
+    voice: Voice = "python",
     progress: Callable[[float], None] | None = None,
 ) -> Comparison:
     """Hold logs against a reference, and write what is named: all or none. docs/python.md has the keywords.
@@ -97,6 +103,7 @@ def compare(
         junit: A JUnit file (XML) to write.
         statistics: A table (CSV) to write, one row a log and quantity.
         inputs: Files besides the operands that are never replaced.
+        voice: In whose words `junit` tells what to give: python or command line.
         progress: Told the share of the recording that is written, 0..1.
 
     Raises:
@@ -110,7 +117,7 @@ def compare(
         "recording": output, "junit": junit, "statistics": statistics,
     }  # fmt: skip
     told = None if junit is None else Path(junit)
-    with told_in_junit(told, kept), guarded_outputs(outputs, kept) as parts:
+    with errors_in_junit(told, kept, voice), guarded_outputs(outputs, kept) as parts:
         options = CompareOptions(_allowed(tolerance), tcp, sync, align, _with_unit(tolerance))
         level = _noise_level(noise, baseline)
         given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
@@ -123,16 +130,16 @@ def compare(
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         if told is not None:
-            write_junit(result, parts["junit"], told)
+            write_junit(present(result), parts["junit"], told, voice)
         if statistics is not None:
-            write_statistics(result, parts["statistics"], Path(statistics))
-        return result if output is None else record(lambda early: result, Path(output), kept, progress)
+            write_table(statistics_rows(result), parts["statistics"], Path(statistics))
+        return recorded(result, output, kept, progress)
 
 
 def _operands(reference: Operand | Comparison, logs: Sequence[Operand]) -> list[Any]:
     """Return all that is compared; raise an `OptionError` with everything that is no operand."""
     given = {"reference": [reference]} | ({"logs": logs} if logs else {})
-    for_each(lambda named: refuse_others(*named, (Run, Comparison), OPERANDS), given.items())
+    for_each(lambda named: refuse_others(*named, (Run, SolvedTargets, Comparison), OPERANDS), given.items())
     return [reference, *logs]
 
 
@@ -160,7 +167,7 @@ class _Given:
     def runs(self, operands: Sequence[Operand]) -> list[Run]:
         """Return the runs that operands are, or are read as."""
         return load_runs(
-            [one if isinstance(one, Run) else Path(one) for one in operands],
+            [Path(one) if isinstance(one, (str, Path)) else one for one in operands],
             robot=self.robot, read=self.read, tsp=self.tsp, derivative=self.derivative,
         )  # fmt: skip
 
@@ -179,7 +186,7 @@ class _Given:
 
 def _is_log(operand: Operand | Comparison) -> bool:
     """Return whether an operand is a log that is yet to be read."""
-    if isinstance(operand, (Run, Comparison)):
+    if not isinstance(operand, (str, Path)):
         return False
     path = Path(operand)
     return not (path.suffix == ".rrd" or (path.is_file() and is_recording(path)))
@@ -212,7 +219,7 @@ def _made_before(reference: Operand | Comparison, output: PathLike | None) -> Co
     Raises:
         OptionError: If it is to be recorded again.
     """
-    if isinstance(reference, Run):
+    if isinstance(reference, (Run, SolvedTargets)):
         return None
     made = reference if isinstance(reference, Comparison) else load_comparison(Path(reference))
     if made is not None and output is not None:
@@ -231,10 +238,8 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
     refuse_foreign([path])
     result = read_recording(path)
     if not isinstance(result, Comparison):
-        held = "one log" if isinstance(result, Run) else "a simulation"
-        raise RecordingError(
-            Finding(f"found the recording of {held}, allowed: that of a comparison (--baseline)", str(path))
-        )
+        found = f"found a recording ({kind_of(result).name})"
+        raise RecordingError(Finding(f"{found}, allowed: that of a comparison (--baseline)", str(path)))
     return result
 
 
@@ -252,7 +257,7 @@ def _refuse_doubts(strict: bool, result: Comparison) -> None:
     refuse_warnings(strict, (*of_logs, *doubts))
 
 
-def _files(operands: Sequence[PathLike | Run | Comparison | None]) -> list[Path]:
+def _files(operands: Sequence[Operand | Comparison | None]) -> list[Path]:
     """Return the files that no output may replace: operands, and the recordings of those that are results."""
-    found = [one.recording if isinstance(one, (Run, Comparison)) else one for one in operands]
+    found = [one if isinstance(one, (str, Path)) else getattr(one, "recording", None) for one in operands]
     return [Path(one) for one in found if one is not None]

@@ -4,28 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 from urmpipe.edge import public
 from urmpipe.guards import PathLike, paths, refuse_foreign, refuse_others
-from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import read_recording
-from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.simulations.simulation import Result, Simulation
+from urmpipe_models.display import Shown
+from urmpipe_pipeline import results
+from urmpipe_pipeline.results import read_recording
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.comparison.compare import Tcp
-    from urmpipe_pipeline.export import Exported, Format, Rows
+    from urmpipe_pipeline.tables import Exported, Format, PoseNames, RowNames
 
 
 @public
 def export(
-    result: PathLike | Result,
+    result: PathLike | Shown,
     output: PathLike | None = None,
     *,
     to: Format | None = None,
-    rows: Rows | None = None,
-    tcp: Tcp | None = None,
+    rows: RowNames | None = None,
+    tcp: PoseNames | None = None,
     inputs: Sequence[PathLike] = (),
 ) -> Exported:
     """Write a run, a comparison or a simulation as tables (CSV, Parquet, MAT) or as trajectories (TUM).
@@ -43,14 +41,16 @@ def export(
     Raises:
         UrmpipeError: With everything that is wrong with the recording, the options or the output.
     """
-    from urmpipe_pipeline.export import ExportOptions, export_result, format_of
+    from urmpipe_pipeline.tables import ExportOptions, export_result, format_of
 
     target = None if output is None else Path(output)
     options = ExportOptions(format_of(to, target), rows, tcp)
     kept = paths(inputs)
-    if isinstance(result, (Run, Comparison, Simulation)):
-        own = [result.recording] if result.recording else []
-        return export_result(result, target, options, [*own, *kept])
-    refuse_others("result", [result], (), "a recording, a Run, a Comparison or a Simulation")
-    refuse_foreign([Path(result)])
-    return export_result(read_recording(Path(result)), target, options, [Path(result), *kept])
+    if results.is_result(result):
+        own: Path | None = result.recording  # type: ignore[union-attr]
+    else:
+        refuse_others("result", [result], (), "a recording, or a result such as a Run or a Comparison")
+        own = Path(cast(PathLike, result))
+        refuse_foreign([own])
+        result = read_recording(own)
+    return export_result(results.exports(result), own, target, options, [*([own] if own else []), *kept])

@@ -10,21 +10,26 @@ from typing import Any
 from numpy.typing import ArrayLike
 
 from urmpipe.edge import public
-from urmpipe.guards import Frame, PathLike, Robot, paths, refuse_warnings
-from urmpipe.inverse.asked import Asked, arm_of, refuse_unsolvable, start_of
-from urmpipe.inverse.output import output_kind, run_of_solutions, write_joints
-from urmpipe.inverse.result import InverseResult
-from urmpipe.inverse.solving import solutions_of, solved
-from urmpipe.inverse.targets import TargetsLike, given_targets
+from urmpipe.guards import Frame, PathLike, Robot, paths, place_robot, refuse_warnings
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.errors import for_each
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import Finding, LogError, OptionError, for_each, shown
 from urmpipe_models.inverse.search import USUAL_SEARCH, Search
-from urmpipe_models.inverse.solutions import Solutions
 from urmpipe_models.inverse.solve import Method
+from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.outputs import refuse_output
-from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
+from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.results import write_recording
+from urmpipe_pipeline.solved_targets.given_targets import GivenTargets, TargetsLike, given_targets
+from urmpipe_pipeline.solved_targets.request import Request, refuse_unsolvable, start_of
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.solving import solve_targets
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables.joint_file import write_joint_log
+
+KINDS: dict[str, OutputKind] = {".csv": "joints", ".rrd": "recording"}
+"""Kinds of outputs by their suffix."""
 
 SOLVING = 0.7
 """Share of the work that solving is where something is written, too."""
@@ -54,7 +59,7 @@ def ik(
     output: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
-) -> InverseResult:
+) -> SolvedTargets:
     """Find the joint values that bring an arm's tool to targets, limits kept. docs/ik.md tells how.
 
     Targets without times stand for themselves; with times they are a path, followed without a jump where
@@ -88,20 +93,20 @@ def ik(
     """
     path = None if output is None else Path(output)
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: arm_of(robot, base, tool),
-        lambda: output_kind(path),
-        lambda: given_targets(targets, t, tsp, read),
+        lambda: _arm_of(robot, base, tool),
+        lambda: _kind_of(path),
+        lambda: _given(targets, t, tsp, read),
     )
     arm, kind, given = for_each(lambda make: make(), parts)
     solving, writing = _parts(progress, path is not None)
     search = Search(tolerance, restarts, seed)
-    asked = Asked(arm, given, start_of(arm, start), every, within_pi, method, search, solving)
-    refuse_unsolvable(asked, kind)
+    request = Request(arm, given, start_of(arm, start), every, within_pi, method, search)
+    refuse_unsolvable(request, recorded=kind == "recording")
 
     kept = [*(paths(targets) if isinstance(targets, (str, Path)) else []), *paths(inputs)]
     if path is not None and kind is not None:
         refuse_output(path, kept, kind)
-    result = solved(asked)
+    result = solve_targets(request, solving)
     refuse_warnings(strict, result.warnings)
     if path is None:
         return result
@@ -109,11 +114,62 @@ def ik(
         unwritten = LogWarning("not-written", f"{path} is not written: no target was reached")
         return replace(result, warnings=(*result.warnings, unwritten))
     if kind == "joints":
-        write_joints(result, path, kept)
-    else:
-        run = run_of_solutions(result, _branches(asked, result), given.file, asked.options)
-        write_recording(run, path, kept, writing)
-    return replace(result, output=path)
+        _write_joints(result, path, kept)
+        return replace(result, joint_log=path)
+    result = replace(result, motion=None if result.t_ns is None else result.as_run())
+    write_recording(result, path, kept, writing)
+    return replace(result, recording=path)
+
+
+def _arm_of(robot: Robot | None, base: Frame | None, tool: Frame | None) -> Chain:
+    """Return the arm on its base and with its tool, frames in [m] and [rad] as 6 numbers or of shape (4, 4).
+
+    Raises:
+        OptionError: If there is none.
+        RobotError: If it is unknown, or with everything that is wrong with its file.
+    """
+    arm = place_robot(robot, base, tool)
+    if arm is None:
+        names = ", ".join(robot_names())
+        raise OptionError(f"found no robot; allowed: --robot NAME|FILE, a TOML, a URDF or one of {names}")
+    return arm
+
+
+def _kind_of(output: Path | None) -> OutputKind | None:
+    """Return what an output is by its suffix; None without one.
+
+    Raises:
+        OptionError: If the suffix is another.
+    """
+    if output is None:
+        return None
+    kind = KINDS.get(output.suffix.lower())
+    if kind is None:
+        allowed = "a name that ends in .csv (a joint log) or .rrd (a recording)"
+        raise OptionError(f"-o: found {shown(str(output))}, allowed: {allowed}")
+    return kind
+
+
+def _given(
+    targets: TargetsLike, t: ArrayLike | None, tsp: float | None, read: ReadOptions | None
+) -> GivenTargets:
+    """Return targets with their rows and times; raise a `LogError` if they are a recording."""
+    if isinstance(targets, (str, Path)) and Path(targets).is_file() and is_recording(Path(targets)):
+        raise LogError(Finding("found a recording, allowed: a table (CSV) of targets", str(targets)))
+    return given_targets(targets, t, tsp, read)
+
+
+def _write_joints(result: SolvedTargets, path: Path, kept: Sequence[Path]) -> None:
+    """Write the solutions nearest to the start as a joint log; rows that have none are left out.
+
+    Raises:
+        OutputError: If it may not be written there, or did not read back as it was written.
+    """
+    with guarded_output(path, kept, "joints") as part:
+        write_joint_log(
+            part, path, joints=result.robot.coordinates, units=result.joint_units, q=result.q, row=result.row,
+            t_ns=result.clock_ns,
+        )  # fmt: skip
 
 
 def _parts(
@@ -124,10 +180,3 @@ def _parts(
         return None, None
     share = SOLVING if writes else 1.0
     return lambda done: progress(share * done), lambda done: progress(share + (1.0 - share) * done)
-
-
-def _branches(asked: Asked, result: InverseResult) -> Solutions | None:
-    """Return the solutions that a recording shows as ghosts; None if not all are asked for."""
-    if not asked.every:
-        return None
-    return result.solutions if result.path is None else solutions_of(asked, every=True)

@@ -17,19 +17,20 @@ from urmpipe.guards import (
     one_or_many,
     paths,
     place_robot,
+    recorded,
     refuse_others,
     refuse_warnings,
 )
 from urmpipe_models.errors import Finding, LogError, for_each
-from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.outputs import OutputKind
-from urmpipe_pipeline.recording import is_recording, record
-from urmpipe_pipeline.runs.audit_file import write_audit
+from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.runs.presenter import audit_rows
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables.table_csv import write_table
 
 LOG_ALLOWED = f"a file, several of one log, or a folder of them; {WRITTEN_FIRST}"
 
@@ -81,20 +82,13 @@ def ingest(
     outputs: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": write_map}
     kept = [*files, *paths(inputs)]
     with guarded_outputs(outputs, kept) as written:
-
-        def make(early: Callable[[JointLog | Run], None] | None) -> Run:
-            """Return the run; write its audit and its map."""
-            run = ingest_log(
-                files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name, early=early
-            )
-            refuse_warnings(strict, run.warnings)
-            if audit is not None:
-                write_audit(run, written["audit"], Path(audit))
-            if write_map is not None:
-                write_map_part(run, written["map"], Path(write_map), map_robot)
-            return run
-
-        return make(None) if output is None else record(make, Path(output), kept, progress)
+        run = ingest_log(files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name)
+        refuse_warnings(strict, run.warnings)
+        if audit is not None:
+            write_table(audit_rows(run), written["audit"], Path(audit))
+        if write_map is not None:
+            write_map_part(run, written["map"], Path(write_map), map_robot)
+        return recorded(run, output, kept, progress)
 
 
 def _files_and_name(log: PathLike | Sequence[PathLike]) -> tuple[list[Path], str | None]:

@@ -7,16 +7,14 @@ from pathlib import Path
 
 from urmpipe.edge import public
 from urmpipe.guards import PathLike, paths
-from urmpipe_models.errors import OptionError, shown
-from urmpipe_pipeline import recording
-from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.simulations.simulation import Result, Simulation
+from urmpipe_models.display import Shown
+from urmpipe_models.errors import Finding, OptionError, shown
+from urmpipe_pipeline import results
 
 
 @public
-def read_recording(path: PathLike) -> Result:
-    """Return the run, the comparison or the simulation that a recording holds.
+def read_recording(path: PathLike) -> Shown:
+    """Return the result that a recording holds: a Run, a Comparison, a Simulation, ...
 
     Args:
         path: A recording (.rrd) that urmpipe wrote.
@@ -24,12 +22,13 @@ def read_recording(path: PathLike) -> Result:
     Raises:
         RecordingError: If it is no recording, was cut off, is not of urmpipe, or of a newer layout.
     """
-    return recording.read_recording(Path(path))
+    found: Shown = results.read_recording(Path(path))
+    return found
 
 
 @public
 def write_recording(
-    result: Result,
+    result: Shown,
     output: PathLike,
     *,
     inputs: Sequence[PathLike] = (),
@@ -38,7 +37,7 @@ def write_recording(
     """Write the recording of a result, read it back, and put it in its place.
 
     Args:
-        result: What `ingest`, `compare` or `simulate` returned.
+        result: What `ingest`, `compare`, `simulate` or `ik` returned.
         output: The recording (.rrd) to write; replaced if it is one of urmpipe's.
         inputs: Files that are never replaced.
         progress: Told the share of the recording that is written, 0..1.
@@ -50,7 +49,7 @@ def write_recording(
         OptionError: If it is no such result.
         OutputError: If it may not be written there, or did not read back as it was written.
     """
-    if not isinstance(result, (Run, Comparison, Simulation)):
-        allowed = "a Run, a Comparison or a Simulation; `ik` writes its own (output=FILE.rrd)"
-        raise OptionError(f"result: found {shown(result)}, allowed: {allowed}")
-    return recording.write_recording(result, Path(output), paths(inputs), progress)
+    if not results.is_result(result):
+        allowed = "a result, such as a Run or a Comparison"
+        raise OptionError(Finding(parameter="result", found=shown(result), allowed=allowed))
+    return results.write_recording(result, Path(output), paths(inputs), progress)

@@ -11,11 +11,9 @@ from urmpipe.edge import public
 from urmpipe.guards import PathLike, one_or_many, paths, refuse_foreign, refuse_others
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
-from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.inverse.verdict import verdict_of
-from urmpipe_pipeline.recording import read_recording
-from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.simulations.simulation import Result, Simulation
+from urmpipe_pipeline.presentation.section import Cell, Value
+from urmpipe_pipeline.results import KINDS, present, read_recording
+from urmpipe_pipeline.simulations.simulation import Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -47,21 +45,26 @@ class Report(Shown):
         """Return one row a compared log and quantity, as `Comparison.to_frame`, for all comparisons in it."""
         import pandas as pd
 
-        frames = [result.to_frame() for result in self.results if isinstance(result, Comparison)]
+        shown = (present(one) for one in self.results)
+        tables = [one.rows() for one in shown if one.verdict is not None and one.rows is not None]
+        frames = [
+            pd.DataFrame({one.key: [*map(_plain, one.cells)] for one in table.columns}) for table in tables
+        ]
         return pd.concat(frames, ignore_index=True) if frames else pd.DataFrame()
 
     def to_dict(self) -> dict[str, Any]:
         """Return the object that `urmpipe report --json` prints."""
-        kinds = [
-            {"name": one.name, "verdict": verdict_of(one) if isinstance(one, Run) else one.verdict}
-            for one in self.results
-        ]
         return {
             "schema": 1,
             "report": str(self.path),
-            "recordings": kinds,
+            "recordings": [{"name": one.name, "verdict": present(one).verdict} for one in self.results],
             "figures": [figure.to_dict() for figure in self.figures],
         }
+
+
+def _plain(cell: Cell) -> Any:
+    """Return what a table for programs holds of a cell."""
+    return cell.number if isinstance(cell, Value) else cell
 
 
 SHOWN = "a recording, a Run, a Comparison or a Simulation; ik(..., output=FILE.rrd) writes a recording"
@@ -94,7 +97,7 @@ def report(
 
     wanted = None if figures is None else FigureOptions(Path(figures), tuple(one_or_many(formats)))
     given = one_or_many(results)
-    refuse_others("results", given, (Run, Comparison, Simulation), SHOWN)
+    refuse_others("results", given, tuple(kind.cls for kind in KINDS), SHOWN)
     files = [Path(one) for one in given if isinstance(one, (str, Path))]
     refuse_foreign(files)
     reading, writing = _halves(progress)
@@ -106,9 +109,10 @@ def report(
         reading(number / len(given))
         return found
 
-    shown = for_each(read, enumerate(given, start=1))
+    found = for_each(read, enumerate(given, start=1))
+    shown = [present(one) for one in found]
     written = write_report(shown, Path(output), [*files, *paths(inputs)], wanted, writing)
-    return Report(written.path, tuple(shown), written.figures)
+    return Report(written.path, tuple(found), written.figures)
 
 
 def _halves(progress: Callable[[float], None] | None) -> tuple[Callable[[float], None], ...]:

@@ -4,16 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping
-from contextlib import ExitStack
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import fmpy  # noqa: F401 - Rerun is imported beside: what both import must be there before
-
 from urmpipe import __version__
 from urmpipe.edge import public
-from urmpipe.guards import PathLike, refuse_shared
+from urmpipe.guards import PathLike, guarded_outputs, recorded
 from urmpipe.systems.blocks import Blocks
 from urmpipe.systems.result import check_meters, simulation_of
 from urmpipe.systems.units import Backend
@@ -22,8 +19,7 @@ from urmpipe_fmus.cosim import load_system, prepare, read_system, system_name, s
 from urmpipe_fmus.cosim import simulate as run_plan
 from urmpipe_fmus.cosim.process import Worker
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.outputs import DRAWING_HEADER, OutputKind, guarded_output
-from urmpipe_pipeline.recording import record
+from urmpipe_pipeline.outputs import DRAWING_HEADER, OutputKind
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 if TYPE_CHECKING:
@@ -71,25 +67,16 @@ def simulate(
     bundled = _bundled(system, texts)
     kept = [loaded.path, *_files(loaded)]
     named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
-    refuse_shared({kind: Path(path) for kind, path in named.items() if path is not None})
     running, writing = _halves(progress)
-    with ExitStack() as stack:
-        drawing = None if draw is None else stack.enter_context(guarded_output(Path(draw), kept, "drawing"))
-        worker = stack.enter_context(Worker())  # it loads what it needs meanwhile
-
-        def make() -> Simulation:
-            """Return the simulation; draw it before it is run."""
-            blocks = Blocks(loaded, bundled=bundled, backend=backend, read=read, told=told)
-            plan = prepare(
-                loaded, blocks.make, column=blocks.column, duration=blocks.end, period=blocks.period
-            )
-            check_meters(plan)
-            svg = system_svg(plan)
-            if drawing is not None:
-                _write_drawing(drawing, svg)
-            return simulation_of(plan, run_plan(plan, progress=running, worker=worker), blocks, svg)
-
-        return make() if output is None else record(lambda early: make(), Path(output), kept, writing)
+    with guarded_outputs(named, kept) as parts, Worker() as worker:  # it loads what it needs meanwhile
+        blocks = Blocks(loaded, bundled=bundled, backend=backend, read=read, told=told)
+        plan = prepare(loaded, blocks.make, column=blocks.column, duration=blocks.end, period=blocks.period)
+        check_meters(plan)
+        svg = system_svg(plan)
+        if draw is not None:
+            _write_drawing(parts["drawing"], svg)
+        made = simulation_of(plan, run_plan(plan, progress=running, worker=worker), blocks, svg)
+        return recorded(made, output, kept, writing)
 
 
 def _bundled(system: PathLike, arguments: Mapping[str, str]) -> set[str]:

@@ -15,8 +15,7 @@ from urmpipe.options.grouped import Command
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import LogOptions, log_options
 from urmpipe.options.types import TIMES, OneOf, ParsedType, parsed, quantity
-from urmpipe.process import tune_pyarrow
-from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE
+from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.comparison import Comparison
@@ -149,7 +148,6 @@ def compare(
 
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
     """
-    tune_pyarrow()
     said = about_recordings(ctx, (reference, *logs))
     if said:
         terminal.note(said)
@@ -166,6 +164,7 @@ def compare(
             robot=reading.arm,
             read=reading.options,
             output=target,
+            voice="command line",
             progress=progress,
             **options,
         )
@@ -173,7 +172,7 @@ def compare(
         terminal.warn(one.run.warnings, one.name)
     terminal.warn(result.warnings)
     written = {"JUnit": options["junit"], "Statistics": options["statistics"]}
-    terminal.answer(result.to_dict, lambda: _print(result, replaces, written))
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, written))
     if terminal.quiet and result.verdict == "fail":
         _tell_failure(result)
     return 0 if result.verdict == "pass" else 1
@@ -181,10 +180,11 @@ def compare(
 
 def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) -> None:
     """Print a comparison, and what was written."""
-    from urmpipe.printing.comparison import print_comparison
+    from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_pipeline.results import present
 
-    print_comparison(result)
+    print_presentation(present(result))
     for title, path in written.items():
         if path:
             say(f"{title}: {path}")
@@ -193,9 +193,10 @@ def _print(result: Comparison, replaces: bool, written: dict[str, Path | None]) 
 
 def _tell_failure(result: Comparison) -> None:
     """Print the verdict alone on standard error: a job that fails says why, however quiet it is."""
-    from urmpipe.printing.comparison import print_verdict
+    from urmpipe.printing.presentation import print_verdict
+    from urmpipe_pipeline.results import present
 
-    print_verdict(result, err=True)
+    print_verdict(present(result), err=True)
 
 
 def _made_before(ctx: click.Context, reference: Path) -> Comparison | None:

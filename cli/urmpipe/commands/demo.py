@@ -9,7 +9,6 @@ import click
 
 import urmpipe
 from urmpipe.options.output import Terminal, output_options
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
     from urmpipe.api.report import Report
@@ -48,7 +47,6 @@ def demo(output: Path, terminal: Terminal) -> int:
       urmpipe demo
       urmpipe demo -o somewhere --json
     """
-    tune_pyarrow()
     from urmpipe_datasets import LOGS
 
     output.mkdir(parents=True, exist_ok=True)
@@ -67,7 +65,7 @@ def demo(output: Path, terminal: Terminal) -> int:
     got = {one.name: one.verdict for one in result.runs}
     as_expected = list(got.values()) == list(EXPECTED.values())
     terminal.answer(
-        lambda: result.to_dict() | {"as_expected": as_expected, "report": str(report.path)},
+        lambda: result.to_dict("command line") | {"as_expected": as_expected, "report": str(report.path)},
         lambda: _print(result, report, as_expected),
     )
     return 0 if as_expected else 1
@@ -75,12 +73,13 @@ def demo(output: Path, terminal: Terminal) -> int:
 
 def _print(result: Comparison, report: Report, as_expected: bool) -> None:
     """Print the verdicts, and how to go on from there."""
-    from urmpipe.printing.comparison import print_comparison
+    from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
     from urmpipe_datasets import LOGS
+    from urmpipe_pipeline.results import present
 
     click.echo(f"{EXPLAINED}\n")
-    print_comparison(result)
+    print_presentation(present(result))
     click.echo(AS_EXPECTED if as_expected else f"These are not the verdicts expected: {EXPECTED}")
     say(f"Logs:      {LOGS}  (to look at, or to try the commands with)")
     say(f"Report:    {report.path}  (open it in any browser)")

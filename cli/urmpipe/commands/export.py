@@ -10,10 +10,9 @@ import click
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.types import OneOf
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.export import Exported
+    from urmpipe_pipeline.tables import Exported
 
 
 @click.command(short_help="Write a recording as CSV, Parquet, MAT or TUM.")
@@ -56,10 +55,9 @@ def export(recording: Path, output: Path | None, terminal: Terminal, **options: 
       urmpipe export log-against-path.rrd -o deviations.parquet --json
       urmpipe export one-drive.rrd -o one-drive.csv
     """
-    tune_pyarrow()
     result = urmpipe.export(recording, output, **options)
     terminal.warn(result.warnings)
-    terminal.answer(result.to_dict, lambda: _print(result))
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result))
     return 0
 
 

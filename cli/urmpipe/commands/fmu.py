@@ -140,7 +140,7 @@ def build(
     read = read_map(log_map).read if log_map else None
     table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm, read=read)
     if table:
-        terminal.warn(table.warnings)
+        terminal.warn(table.warnings, voice="system file")
     with prints_apart(), terminal.working(f"Building {unit}"):
         made = urmpipe.build_fmu(
             unit,

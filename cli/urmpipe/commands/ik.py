@@ -12,10 +12,9 @@ import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import TableOptions, table_options
 from urmpipe.options.types import DURATION, JointValuesType, OneOf, WholeType
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
-    from urmpipe.inverse.result import InverseResult
+    from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 
 def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> float | None:
@@ -104,7 +103,6 @@ def ik(
     Exit codes: 0 every target reached, 1 not so (rows that hold no target count, and along a path jumps and
     joints that are too fast), 2 bad input or usage.
     """
-    tune_pyarrow()
     reading = table.reading()
     replaces = output is not None and output.exists()
     with terminal.progress(f"Solving {targets}") as progress:
@@ -119,17 +117,18 @@ def ik(
             **options,
         )
     terminal.warn(result.warnings)
-    terminal.answer(result.to_dict, lambda: _print(result, every, reading.robot, replaces))
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, reading.robot, replaces))
     return 0 if result.verdict == "pass" else 1
 
 
-def _print(result: InverseResult, every: bool, robot: str | None, replaces: bool) -> None:
+def _print(result: SolvedTargets, robot: str | None, replaces: bool) -> None:
     """Print what was found, and what was written: how to read it names the robot as the caller does."""
-    from urmpipe.printing.inverse import print_inverse
+    from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
-    from urmpipe_pipeline.text import pasted
+    from urmpipe_models.spelling import pasted
+    from urmpipe_pipeline.results import present
 
-    print_inverse(result, every=every)
+    print_presentation(present(result))
     written = result.output
     if written is not None and written.suffix == ".rrd":
         print_recording(written, replaced=replaces)

@@ -10,7 +10,6 @@ import click
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.reading import LogOptions, log_options
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.runs.results import Run
@@ -67,7 +66,6 @@ def ingest(
         raise click.UsageError(
             f"-o: found {output} with --explain, which writes no recording, allowed: one of both"
         )
-    tune_pyarrow()
     target = None if explain else output or Path(default_name(logs))
     replaces = target is not None and target.exists()
     reading = log.reading()
@@ -85,16 +83,20 @@ def ingest(
             **options,
         )
     terminal.warn(run.warnings)
-    terminal.answer(run.to_dict, lambda: _print(run, explain, replaces, audit, map_output))
+    terminal.answer(
+        lambda: run.to_dict("command line"), lambda: _print(run, explain, replaces, audit, map_output)
+    )
     return 0
 
 
 def _print(run: Run, explain: bool, replaces: bool, audit: Path | None, map_output: Path | None) -> None:
     """Print what was found in a log, and what was written."""
-    from urmpipe.printing.terminal import print_recording, print_run, say
+    from urmpipe.printing.presentation import print_presentation
+    from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_pipeline.results import present
     from urmpipe_pipeline.text import counted
 
-    print_run(run, alternatives=explain)
+    print_presentation(present(run), every=explain)
     if run.recording:
         print_recording(run.recording, replaced=replaces)
     if audit:

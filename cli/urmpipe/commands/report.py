@@ -11,7 +11,6 @@ import urmpipe
 from urmpipe.options.given import options_given
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.types import OneOf
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
     from urmpipe.api.report import Report
@@ -66,7 +65,6 @@ def report(
     """
     if figures is None and options_given(ctx, "figure_format".__eq__):
         raise click.UsageError("--format: found without --figures, allowed: with --figures DIR")
-    tune_pyarrow()
     target = output or Path(f"{recordings[0].stem}.html")
     replaces = target.is_file()
     with terminal.progress(f"Writing {target}") as progress:

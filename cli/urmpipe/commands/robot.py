@@ -43,14 +43,14 @@ def list_(terminal: Terminal) -> int:
     return 0
 
 
-@robot.command(short_help="Print the parameters of a robot and draw it.")
+@robot.command(short_help="Print the parameters of a robot, or draw it.")
 @click.argument("name", metavar="NAME|FILE", type=ROBOT)
 @click.option(
     "--q",
     type=JointValuesType(),
-    help="Pose to draw, in rad and m [default: the start pose].",
+    help="Its pose, in rad and m [default: the start pose].",
 )
-@click.option("--picture", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw into a file, too.")
+@click.option("--picture", metavar="FILE.svg", type=click.Path(path_type=Path), help="Draw it into a file.")
 @placing_options
 @output_options
 def show(
@@ -60,7 +60,7 @@ def show(
     placing: PlacingOptions,
     terminal: Terminal,
 ) -> int:
-    """Print the parameters of a robot, where its points are, and draw it from two sides.
+    """Print the parameters of a robot and where its points are; --picture draws it from two sides.
 
     The points p1..pn are the ends of its segments, the last one the tool centre point.
 
@@ -72,11 +72,11 @@ def show(
     """
     import numpy as np
 
-    from urmpipe.inverse.wording import start_warnings
     from urmpipe.printing.chain_drawing import chain_svg
     from urmpipe.printing.robot import chain_at, print_chain
     from urmpipe_models.errors import OptionError
     from urmpipe_models.robots.written import write_export
+    from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
     chain = _placed(name, placing)
     q = chain.start if q is None else q

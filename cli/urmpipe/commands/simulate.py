@@ -11,7 +11,6 @@ import urmpipe
 from urmpipe.options.named import NamedType, argument_names, named_values
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.types import DURATION, SYSTEM, OneOf
-from urmpipe.process import tune_pyarrow
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.simulations.simulation import Simulation
@@ -89,7 +88,6 @@ def simulate(
     if copy is not None:
         _refuse_run_options({"output": output, "draw": draw, **asked})
         return _write(system, copy, terminal)
-    tune_pyarrow()
     target = output or Path(default_name(system))
     return _run(system, target, draw, terminal, asked)
 
@@ -108,8 +106,10 @@ def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked
             system, output=target, draw=draw, told=terminal.note, progress=progress, **asked
         )
     wall = perf_counter() - started
-    terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
-    terminal.answer(result.to_dict, lambda: _print(result, wall, replaces, draw))
+    terminal.warn(
+        [one for one in result.warnings if one.kind != ON_PYTHON], voice="system file"
+    )  # that is told already
+    terminal.answer(lambda: result.to_dict("system file"), lambda: _print(result, wall, replaces, draw))
     if result.failed is not None:
         say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
     return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0
@@ -117,10 +117,12 @@ def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked
 
 def _print(result: Simulation, wall: float, replaces: bool, draw: Path | None) -> None:
     """Print what a simulation, which took `wall` seconds, came to."""
-    from urmpipe.printing.simulation import print_simulation
+    from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
+    from urmpipe_pipeline.results import present
 
-    print_simulation(result, wall)
+    print_presentation(present(result))
+    say(f"Simulated in {wall:.2g} s, {result.duration / wall:.3g} times as fast as real time")
     if draw:
         say(f"Drawing: {draw}")
     print_recording(result.recording, replaced=replaces)
@@ -128,7 +130,7 @@ def _print(result: Simulation, wall: float, replaces: bool, draw: Path | None) -
 
 def _list(terminal: Terminal) -> int:
     """List the shipped systems."""
-    from urmpipe.printing.simulation import print_systems
+    from urmpipe.printing.systems import print_systems
     from urmpipe_fmus.cosim import load_system, system_names
 
     systems = [load_system(name, {}) for name in system_names()]
@@ -154,8 +156,8 @@ def _write(system: str, path: Path, terminal: Terminal) -> int:
     from urmpipe.api.simulate import own_logs
     from urmpipe.printing.terminal import say
     from urmpipe_fmus.cosim import system_text
+    from urmpipe_models.spelling import pasted
     from urmpipe_pipeline.outputs import guarded_output
-    from urmpipe_pipeline.text import pasted
 
     text = system_text(system)
     with guarded_output(path, [], "system") as part:

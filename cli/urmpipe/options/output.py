@@ -14,6 +14,7 @@ from urmpipe import __version__
 from urmpipe.options.grouped import Command, grouped, with_options
 
 if TYPE_CHECKING:
+    from urmpipe_models.spelling import Voice
     from urmpipe_pipeline.joint_log import LogWarning
 
 
@@ -47,12 +48,12 @@ class Terminal:
         except BrokenPipeError:  # the reader left, as head does: the exit code is what it is all the same
             leave_output()
 
-    def warn(self, warnings: Sequence[LogWarning], log: str = "") -> None:
+    def warn(self, warnings: Sequence[LogWarning], log: str = "", voice: Voice = "command line") -> None:
         """Print warnings on standard error, behind the name of their log if given."""
         if not self.quiet:
             from urmpipe.printing.terminal import print_warnings
 
-            print_warnings(warnings, log)
+            print_warnings(warnings, log, voice)
 
     def note(self, line: str) -> None:
         """Print what is no warning and yet good to know, on standard error."""

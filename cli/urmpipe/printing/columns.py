@@ -27,12 +27,14 @@ class Column:
     Attributes:
         head: Its head, which may have several lines.
         cells: One a row; None where there is nothing.
-        key: Whether it names the rows: it stands at the left of every part, and holds words.
+        key: Whether it names the rows: it stands at the left of every part.
+        words: Whether it holds words, which stand to the left and are folded; else numbers.
     """
 
     head: str
     cells: Sequence[str | Text | None]
     key: bool = False
+    words: bool = False
 
     @property
     def width(self) -> int:
@@ -41,7 +43,7 @@ class Column:
 
         lines = [*self.head.split("\n"), *(str(cell or NOTHING) for cell in self.cells)]
         width = max(map(cell_len, lines))
-        return min(width, KEY_WIDTH) if self.key else width
+        return min(width, KEY_WIDTH) if self.key or self.words else width
 
 
 def print_columns(console: Console, title: str, columns: Sequence[Column]) -> None:
@@ -81,9 +83,9 @@ def _table(columns: Sequence[Column]) -> Table:
         # Blanks between columns: one of the box, the others of the padding.
         table.add_column(
             column.head,
-            justify="left" if column.key else "right",
+            justify="left" if column.key or column.words else "right",
             width=column.width,
-            no_wrap=not column.key,
+            no_wrap=not (column.key or column.words),
             overflow="fold",
         )
     for row in zip(*(column.cells for column in columns), strict=True):

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,20 +10,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe.inverse.wording import method_words
-from urmpipe.printing.chain_drawing import chain_text
 from urmpipe.printing.terminal import new_console, new_table
 from urmpipe_models.chains.chain import Chain, Joint
-from urmpipe_models.inverse.closed.closed_form import closed_form
+from urmpipe_models.inverse.closed.closed_form import closed_form, method_words
 from urmpipe_models.kinematics.forward import forward, points_over_log
 from urmpipe_models.robots.robot_file import chain_to_dict
 from urmpipe_models.transform import Transform, euler_zyx, rpy_of
 
 if TYPE_CHECKING:
     from rich.table import Table
-
-WIDEST = 120
-"""Columns that a drawing takes at most."""
 
 
 def robots_dict(robots: Sequence[Chain]) -> dict[str, Any]:
@@ -99,7 +93,7 @@ def print_robots(robots: Sequence[Chain]) -> None:
 
 
 def print_chain(posed: PosedChain) -> None:
-    """Print an arm's parameters, where its points are, and two views of it."""
+    """Print an arm's parameters, and where its points are."""
     console, chain = new_console(), posed.chain
     console.print(posed.title, soft_wrap=True)
     if chain.source:
@@ -107,9 +101,6 @@ def print_chain(posed: PosedChain) -> None:
     console.print(f"Inverse: {method_words(posed.inverse)}", soft_wrap=True)
     console.print(_parameters(posed))
     console.print(_points(posed))
-    console.print(
-        chain_text(posed.skeleton, min(console.width, WIDEST), unicode=_takes_unicode()), soft_wrap=True
-    )
 
 
 def _parameters(posed: PosedChain) -> Table:
@@ -169,11 +160,3 @@ def _figures(values: Any) -> str:
 def _figure(value: float) -> str:
     """Return a number for people: a nanometre is nothing, and nothing has no sign."""
     return f"{round(float(value), 9) + 0.0:.6g}"
-
-
-def _takes_unicode() -> bool:
-    try:
-        "⣿●■".encode(sys.stdout.encoding or "ascii")
-    except UnicodeEncodeError:
-        return False
-    return True

@@ -12,15 +12,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from urmpipe_models.errors import one_line
+from urmpipe_models.messages import one_line
 
 if TYPE_CHECKING:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
 
+    from urmpipe_models.spelling import Voice
     from urmpipe_pipeline.joint_log import LogWarning
-    from urmpipe_pipeline.runs.results import Run
 
 LISTED = 30
 """Rows of a list that are printed; the others are counted (the recording and --json have them all)."""
@@ -53,7 +53,7 @@ def say(line: str, *, err: bool = False) -> None:
 
 def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     """Print where a recording is, and how to open it with the urmpipe that is running."""
-    from urmpipe_pipeline.text import pasted
+    from urmpipe_models.spelling import pasted
 
     command = "urmpipe"
     if shutil.which(command) is None:  # not on the path, as in an environment that was not activated
@@ -63,66 +63,13 @@ def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     say(f"Recording: {recording}  (open it: {pasted(command)} view {pasted(recording)}{earlier})")
 
 
-def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
+def print_warnings(warnings: Sequence[LogWarning], log: str = "", voice: Voice = "command line") -> None:
     """Print warnings on standard error, one unwrapped line each, behind the name of their log if given."""
     named = f"{log}: " if log else ""
     for warning in warnings[:LISTED]:
-        place = f"row {warning.row}: " if warning.row is not None else ""
-        say(f"warning: {named}{place}{warning.message}", err=True)
+        say(f"warning: {named}{warning.words(voice)}", err=True)
     if len(warnings) > LISTED:
         say(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
-
-
-def print_run(run: Run, *, alternatives: bool = False) -> None:
-    """Print what ingest inferred and what it changed; if asked for, how to have it otherwise."""
-    from urmpipe_pipeline.runs.explain import otherwise
-
-    console = new_console()
-    log = run.log
-    columns = ("What", "Found", "Because", "Otherwise")[: 4 if alternatives else 3]
-    table = new_table(*columns, title=f"{log.name}: {log.rows} rows, {run.duration:.6g} s")
-    for inference in log.inferences:
-        cells = (inference.what, inference.value, inference.evidence, otherwise(inference))
-        table.add_row(*cells[: len(columns)])
-    grid = f"{len(run.t_ns)} samples every {run.tsp * 1e3:.6g} ms"
-    resampled = any(warning.kind == "resampled" for warning in run.warnings)
-    made = [("grid", grid, "resampled" if resampled else "the log's own rows", "--tsp SECONDS")]
-    if not any(inference.what == "robot" for inference in log.inferences):
-        name = run.robot.name if run.robot else "none"
-        made.append(("robot", name, _why_robot(run), "--robot NAME|FILE"))
-    for row in made:
-        table.add_row(*row[: len(columns)])
-    console.print(table)
-    _print_audit(console, run)
-
-
-def _why_robot(run: Run) -> str:
-    """Say why a run has the robot that it has, where it was not inferred."""
-    if run.robot:
-        return run.robot.description
-    tried = run.log.joints and run.log.tcp_position is not None
-    why = "not given, and none of the catalogue alone fits the recorded TCP" if tried else "not given"
-    return f"{why}: no kinematics (--robot NAME|FILE)"
-
-
-def _print_audit(console: Console, run: Run) -> None:
-    """Print what the repolarizer did, and what it could not decide."""
-    from urmpipe_pipeline.text import counted
-
-    if not run.audit:
-        console.print("No repolarization.")
-        return
-    wraps = len(run.repolarizations)
-    others = f", {counted(len(run.audit) - wraps, 'other finding')}" if len(run.audit) > wraps else ""
-    title = f"{counted(wraps, 'repolarization')}{others}"
-    audit = new_table("What", "Joint", "Data row", "Time [s]", "Step [rad]", "Turns", title=title)
-    for one in run.audit[:LISTED]:
-        instant = f"{one.t:.6g} ± {one.half_period:.4g}"
-        turns = f"{one.before:+d} → {one.after:+d}"
-        audit.add_row(one.kind, one.joint, str(one.row), instant, f"{one.step:+.5f}", turns)
-    console.print(audit)
-    if len(run.audit) > LISTED:
-        console.print(f"... and {len(run.audit) - LISTED} more; --audit FILE.csv lists all")
 
 
 @contextmanager

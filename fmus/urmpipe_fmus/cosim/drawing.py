@@ -9,7 +9,6 @@ from textwrap import wrap
 from urmpipe_fmus.cosim.diagram import CHARACTER, HEAD, PAD, ROW, Box, Diagram, Pin, Wire, cut, diagram
 from urmpipe_fmus.cosim.layout import Layout
 from urmpipe_fmus.cosim.plan import Plan
-from urmpipe_fmus.cosim.routing import route
 
 MARGIN = 24.0
 """Around the drawing in [px]."""
@@ -43,14 +42,13 @@ def system_svg(plan: Plan) -> str:
     """
     shown = diagram(plan)
     layout = Layout(shown)
-    routes = route(layout)
-    width = max(routes.width, NARROWEST)
+    width = max(layout.width, NARROWEST)
     titles = wrap(plan.system.name, int(width / (LARGER * CHARACTER)))
     lines = wrap(plan.system.description, int(width / CHARACTER))
     below = MARGIN + TITLE * (len(titles) - 1)
     top = below + 2.0 * LINE + LINE * len(lines)
     key = [line for said in _key(layout) for line in wrap(said, int(width / CHARACTER))]
-    full = (width + 2.0 * MARGIN, top + routes.height + MARGIN + LINE * len(key))
+    full = (width + 2.0 * MARGIN, top + layout.height + MARGIN + LINE * len(key))
     body = [
         f'<svg xmlns="http://www.w3.org/2000/svg" width="{full[0]:.0f}" height="{full[1]:.0f}"'
         f' viewBox="0 0 {full[0]:.0f} {full[1]:.0f}" role="img">',
@@ -66,13 +64,13 @@ def system_svg(plan: Plan) -> str:
             f'<text class="quiet" x="{MARGIN:g}" y="{below + 14 + LINE * (i + 1):g}">{_text(line)}</text>'
         )
     body.append(f'<g transform="translate({MARGIN:g} {top:.1f})">')
-    for wire, points in routes.points.items():
-        body += _wire(wire, points, layout.back(wire))
+    for wire in layout.wires:
+        body += _wire(wire, layout.way(wire), layout.back(wire))
     for name, box in shown.boxes.items():
         body += _box(name, box, _feeding(shown))
     for i, line in enumerate(key):
         body.append(
-            f'<text class="quiet" x="0" y="{routes.height + LINE * (i + 1):.1f}">{_text(line)}</text>'
+            f'<text class="quiet" x="0" y="{layout.height + LINE * (i + 1):.1f}">{_text(line)}</text>'
         )
     return "\n".join([*body, "</g></svg>", ""])
 
@@ -101,7 +99,8 @@ def _feeding(shown: Diagram) -> set[tuple[str, str]]:
 
 def _wire(wire: Wire, points: list[tuple[float, float]], back: bool) -> Iterator[str]:
     """Yield a wire with its tip, and how many scalars go through it."""
-    way = " ".join(f"{'L' if i else 'M'}{x:.1f} {y:.1f}" for i, (x, y) in enumerate(points))
+    start, *curves = (f"{x:.1f} {y:.1f}" for x, y in points)
+    way = f"M{start} C{' '.join(curves)}"
     kinds = " ".join(["wire", *(["array"] if wire.size > 1 else []), *(["back"] if back else [])])
     kinds += " held" if wire.held else ""
     ends = f"{wire.source}.{wire.output} → {wire.target}.{wire.input}"

@@ -18,6 +18,7 @@ from urmpipe_fmus.cosim.system import STEP, SYSTEMS, Block, LogInput, Port, Syst
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.errors import CosimulationError, Finding, UrmpipeError
+from urmpipe_models.messages import Hint
 
 Make = Callable[[Block], Unit | Path]
 
@@ -194,7 +195,10 @@ def _count(step: float, length: float, faults: list[Finding | str]) -> int:
     """Return the number of communication steps of a length in [s]."""
     if not (length > 0.0 and math.isfinite(length)):
         faults.append(
-            "system.duration: not found, and no log tells it; allowed: a number above 0, in s, or --duration"
+            Finding(
+                "system.duration: not found, and no log tells it, allowed: a number above 0, in s",
+                hints=(Hint("duration", None, "sets it"),),
+            )
         )
         return 0
     if step < NANOSECOND:

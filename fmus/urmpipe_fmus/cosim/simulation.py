@@ -33,7 +33,8 @@ from urmpipe_fmus.cosim.process import Worker
 from urmpipe_fmus.cosim.system import Port
 from urmpipe_fmus.fmu_process import ending
 from urmpipe_fmus.python_fmu.place import why_not_in
-from urmpipe_models.errors import CosimulationError, one_line
+from urmpipe_models.errors import CosimulationError
+from urmpipe_models.messages import one_line
 
 LAST_LINES = 5
 """So many of a block's last log lines are told with an error."""

@@ -9,11 +9,9 @@ from urmpipe_fmus.values import Values
 from urmpipe_fmus.variable import Input, Output, Parameter
 from urmpipe_models.delta import delta, outside
 from urmpipe_models.elementwise import Element
+from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 OPTIONS: Mapping[str, str] = {}
-
-TOLERANCE = 0.0035
-"""What the paper allows of each component in [m]."""
 
 
 def delta_meter() -> Unit:
@@ -30,7 +28,7 @@ def delta_meter() -> Unit:
                 description="Largest deviation allowed along x, y and z",
                 unit="m",
                 display_unit="mm",
-                start=TOLERANCE,
+                start=DEFAULT_TOLERANCE,
                 minimum=0.0,
             ),
             Input(name="reference", description="Where the point should be: x, y, z", unit="m", size=3),

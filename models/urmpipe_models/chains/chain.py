@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from html import escape
-from typing import Any, Literal
+from typing import Literal
 
 from urmpipe_models.chains.visual import Visual
 from urmpipe_models.display import Shown, line_of, number_of
@@ -52,6 +52,16 @@ class Joint:
     upper: float = math.inf
     velocity: float = math.inf
     mimic: Mimic | None = None
+
+    def faults(self) -> Iterator[str]:
+        """Yield what is wrong with its axis and its limits."""
+        length = math.hypot(*self.axis)
+        if abs(length - 1.0) > AXIS_TOLERANCE:
+            yield f"joint {self.name}: axis {list(self.axis)} has length {length:g}; allowed: 1"
+        if not self.lower <= self.upper:
+            yield f"joint {self.name}: lower limit {self.lower:g} above upper {self.upper:g}"
+        if not self.velocity > 0.0:
+            yield f"joint {self.name}: velocity {self.velocity:g}; allowed: more than 0"
 
 
 @dataclass(frozen=True, repr=False)
@@ -100,13 +110,7 @@ class Chain(Shown):
         if not self.coordinates:
             yield "has no moving joint; at least one is needed"
         for joint in self.joints:
-            length = math.hypot(*joint.axis)
-            if abs(length - 1.0) > AXIS_TOLERANCE:
-                yield f"joint {joint.name}: axis {list(joint.axis)} has length {length:g}; allowed: 1"
-            if not joint.lower <= joint.upper:
-                yield f"joint {joint.name}: lower limit {joint.lower:g} above upper {joint.upper:g}"
-            if not joint.velocity > 0.0:
-                yield f"joint {joint.name}: velocity {joint.velocity:g}; allowed: more than 0"
+            yield from joint.faults()
             if joint.mimic is not None and joint.mimic.joint not in self.coordinates:
                 yield (
                     f"joint {joint.name} mimics {joint.mimic.joint}, no moving joint of the chain;"
@@ -138,12 +142,6 @@ class Chain(Shown):
     def placed(self, base: Transform | None = None, tool: Transform | None = None) -> Chain:
         """Return the same arm on another base or with another tool."""
         return replace(self, base=base or self.base, tool=tool or self.tool)
-
-    def to_dict(self) -> dict[str, Any]:
-        """Return the arm as a robot file of kind `joints` has it."""
-        from urmpipe_models.robots.robot_file import chain_to_dict
-
-        return chain_to_dict(self)
 
     def _headline(self) -> str:
         """Return its name, what it is, and its coordinates."""

@@ -58,6 +58,11 @@ def read_xml(path: Path) -> Node:
     except OSError as error:
         meant = meant_by(path, (".urdf",)) if isinstance(error, FileNotFoundError) else ""
         raise RobotError(Finding(f"cannot be read: {error.strerror}{meant}", str(path))) from error
+    return _parsed(content, path)
+
+
+def _parsed(content: bytes, path: Path) -> Node:
+    """Return the root element of a document, whose path is for the errors."""
     parser = expat.ParserCreate()
     document = Node("", {}, 0)
     ancestors = [document]

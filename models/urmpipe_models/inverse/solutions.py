@@ -11,8 +11,6 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import BoolArray, FloatArray, TextArray
 
-"""Texts as Python objects: most are empty, and one object then."""
-
 SingularFamily = Literal[
     "wrist on axis 1",
     "wrist beside axis 1",
@@ -171,26 +169,40 @@ def no_solutions(reasons: Sequence[str], branches: tuple[str, ...], joints: int)
 def joined(parts: Sequence[Solutions]) -> Solutions:
     """Return solutions of targets one after the other from those of parts of them, one part at least.
 
-    All have the same branches; a family of singular poses is one where its name and its texts are.
+    Parts with fewer branches than the widest are filled up with solutions that there are not. A family of
+    singular poses is one where its name and its texts are.
     """
+    branches = max((part.branches for part in parts), key=len)
+    count = len(branches)
     families = dict.fromkeys((one.family, one.free, one.chosen) for part in parts for one in part.singular)
     return Solutions(
-        np.concatenate([part.q for part in parts]),
-        parts[0].branches,
-        np.concatenate([part.reasons for part in parts]),
-        tuple(Singular(family, _where(parts, (family, *texts)), *texts) for family, *texts in families),
-        np.concatenate([part.shortfall for part in parts]),
-        np.concatenate([part.labels for part in parts]),
+        np.concatenate([_filled(part.q, count, np.nan) for part in parts]),
+        branches,
+        np.concatenate([_filled(part.reasons, count, "") for part in parts]),
+        tuple(
+            Singular(family, _where(parts, (family, *texts), count), *texts) for family, *texts in families
+        ),
+        np.concatenate([_filled(part.shortfall, count, 0.0) for part in parts]),
+        np.concatenate([_filled(part.labels, count, "") for part in parts]),
     )
 
 
-def _where(parts: Sequence[Solutions], family: tuple[str, ...]) -> BoolArray:
-    """Return where the solutions of all parts lie in a family of singular poses."""
+def _filled(values: NDArray[Any], count: int, nothing: float | str) -> NDArray[Any]:
+    """Return values of shape (n, k, ...) with `count` columns."""
+    if values.shape[1] == count:
+        return values
+    wide = np.full((len(values), count, *values.shape[2:]), nothing, dtype=values.dtype)
+    wide[:, : values.shape[1]] = values
+    return wide
+
+
+def _where(parts: Sequence[Solutions], family: tuple[str, ...], count: int) -> BoolArray:
+    """Return where the solutions of all parts lie in a family of singular poses, shape (n, count)."""
     where = []
     for part in parts:
-        of_part = np.zeros(part.q.shape[:2], dtype=bool)
+        of_part = np.zeros((len(part), count), dtype=bool)
         for one in part.singular:
             if (one.family, one.free, one.chosen) == family:
-                of_part |= one.where
+                of_part[:, : one.where.shape[1]] |= one.where
         where.append(of_part)
     return np.concatenate(where)

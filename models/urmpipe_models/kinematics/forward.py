@@ -18,7 +18,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.elementwise import ZERO, Element, Vector, cross, plus, subtract, times
 from urmpipe_models.kinematics.frames import frames, joint_values, moved
 from urmpipe_models.kinematics.motion import each_motion
-from urmpipe_models.row_blocks import THREADS, row_blocks, side_by_side
+from urmpipe_models.row_blocks import row_blocks, side_by_side
 from urmpipe_models.transform import Transform, euler_zyx
 
 
@@ -165,8 +165,6 @@ def point_over_log(
     qd: FloatArray,
     qdd: FloatArray,
     point: int = -1,
-    *,
-    threads: int = THREADS,
 ) -> PointLog:
     """Return the motion of one point p1..pn over a log.
 
@@ -176,7 +174,6 @@ def point_over_log(
         qd: Their rates in [rad/s] or [m/s], shape (n, joints).
         qdd: Their second derivatives in [rad/s2] or [m/s2], shape (n, joints).
         point: Index of the point, -1 for the tool centre point.
-        threads: Blocks worked on side by side; 1 leaves the other cores to whoever needs them meanwhile.
     """
     count, place = len(q), range(len(chain.joints))[point]
     position, velocity, acceleration, euler = (np.empty((3, count)) for _ in range(4))
@@ -192,7 +189,7 @@ def point_over_log(
         _fill(acceleration[:, block], motion.acceleration)
         _fill(euler[:, block], (rz, ry, rx))
 
-    side_by_side(work, row_blocks(count), threads)
+    side_by_side(work, row_blocks(count))
     return PointLog(position.T, velocity.T, acceleration.T, euler.T, singular)
 
 

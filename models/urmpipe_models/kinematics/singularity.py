@@ -22,6 +22,10 @@ A calibrated arm has axes that were meant to be parallel and are not by 1e-4 rad
 stands, some hundred metres away, says nothing about its size.
 """
 
+NEAR_SINGULAR = 1e-4
+"""Smallest singular value [-] below which a pose counts as nearly singular: a spherical wrist is aligned
+within some 0.05 deg, and joints turn ten thousand times as far as the tool."""
+
 Line: TypeAlias = tuple[FloatArray, FloatArray]
 """A point [m] and the unit vector of an axis."""
 

@@ -9,6 +9,7 @@ from pathlib import Path
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.visual import Visual
 from urmpipe_models.errors import RobotError, shown
+from urmpipe_models.messages import Hint
 from urmpipe_models.names import did_you_mean
 from urmpipe_models.robots.urdf_tree import (
     BASE_JOINT,
@@ -114,17 +115,21 @@ def _default_tip(tree: UrdfTree, ways: dict[str, list[Edge]]) -> str | None:
     parents = {edge.parent for edge in tree.edges.values()}
     moving = {link: sum(map(_moves, way)) for link, way in ways.items() if link not in parents}
     most = [link for link, count in moving.items() if count == max(moving.values())]
-    choose = "choose a tip link (--tip)"
     if len(most) > 1:
         found = f"{len(most)} ends with {moving[most[0]]} moving joints"
-        tree.fault(f"found {found}; {choose}: {_listed(moving)}")
+        tree.fault(f"found {found}", hints=(_choose_tip(moving),))
         return None
     carried = {edge.joint.name: fork for edge, fork in _carried(ways, most[0])}
     if carried:
         found = f"{_listed(carried)} on the arm beside the way to {most[0]}, as of a gripper"
-        tree.fault(f"found {found}; {choose}: {_listed(dict.fromkeys((*carried.values(), *moving)))}")
+        tree.fault(f"found {found}", hints=(_choose_tip(dict.fromkeys((*carried.values(), *moving))),))
         return None
     return most[0]
+
+
+def _choose_tip(links: Iterable[str]) -> Hint:
+    """Return that one of some links is to be chosen as the tip."""
+    return Hint("tip_link", None, f"chooses one: {_listed(links)}")
 
 
 def _carried(ways: dict[str, list[Edge]], tip: str) -> Iterator[tuple[Edge, str]]:

@@ -11,6 +11,7 @@ from typing import Literal
 from urmpipe_models.chains.chain import Joint, JointKind, Mimic
 from urmpipe_models.errors import Finding, RobotError, shown
 from urmpipe_models.files.xml_tree import Node, read_xml
+from urmpipe_models.messages import Hint
 from urmpipe_models.names import did_you_mean
 from urmpipe_models.transform import Transform, from_rpy
 
@@ -75,9 +76,9 @@ class UrdfTree:
     faults: list[Finding] = field(default_factory=list)
     sound: bool = True
 
-    def fault(self, message: str, line: int | None = None) -> None:
+    def fault(self, message: str, line: int | None = None, hints: tuple[Hint, ...] = ()) -> None:
         """Note that something is wrong."""
-        self.faults.append(Finding(message, self.file, line=line))
+        self.faults.append(Finding(message, self.file, line=line, hints=hints))
 
 
 def read_tree(path: Path) -> UrdfTree:

@@ -9,10 +9,10 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.orientation import angle_between, best_rotation, conjugate, matrices, product, quaternions
 from urmpipe_models.transform import rpy_of, translation
-from urmpipe_pipeline.comparison.matching import Matched, lacking
+from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, lacking
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
 from urmpipe_pipeline.runs.results import Run
 
@@ -34,7 +34,7 @@ rounding leaves as much."""
 def check_align(mode: str) -> None:
     """Raise an `OptionError` if there is no such alignment."""
     if mode not in ALIGN_MODES:
-        raise OptionError(f"--align: found {mode}, allowed: {', '.join(ALIGN_MODES)}")
+        raise OptionError(Finding(parameter="align", found=mode, allowed=", ".join(ALIGN_MODES)))
 
 
 def align(matched: Matched, mode: AlignMode, run: Run) -> Matched:
@@ -58,7 +58,7 @@ def align(matched: Matched, mode: AlignMode, run: Run) -> Matched:
 
 
 def tool_with(robot: Chain, alignment: Alignment) -> tuple[float, ...]:
-    """Return the tool of a robot moved by the offset of an alignment, as `--tool` takes it.
+    """Return the tool of a robot moved by the offset of an alignment, as `tool` takes it.
 
     Args:
         robot: The arm of the log, with the tool that it has.
@@ -94,7 +94,7 @@ def _rigid(matched: Matched, run: Run) -> Alignment:
     rotation, common = best_rotation(wanted.T @ done / len(done))
     size, breadth = zip(*map(_extent, (wanted, done)), strict=True)
     if min(breadth) < RESOLVED or common[1] + common[2] <= IN_COMMON * breadth[0] * breadth[1]:
-        raise LogError(lacking(run, _open_rotation(min(size), min(breadth))))
+        raise LogError(lacking(run, _open_rotation(min(size), min(breadth)), parameter="align"))
     shift = matched.reference.mean(axis=0) - rotation @ matched.actual.mean(axis=0)
     return _alignment("rigid", rotation, shift)
 
@@ -114,7 +114,7 @@ def _open_rotation(size: float, breadth: float) -> str:
         found = f"compared positions on one line (within {breadth * 1e3:.4f} mm rms)"
     else:
         found = "two motions without anything in common"
-    return f"--align rigid: found {found}, which leaves the rotation open, allowed: start, tool, none"
+    return f"rigid: found {found}, which leaves the rotation open, allowed: start, tool, none"
 
 
 def _alignment(mode: AlignMode, rotation: FloatArray, shift: FloatArray) -> Alignment:
@@ -138,13 +138,13 @@ def _with_tool(matched: Matched, run: Run) -> Matched:
     quat = matched.actual_quat
     known = np.zeros(0, np.intp) if quat is None else np.flatnonzero(np.isfinite(quat).all(axis=1))
     if quat is None or not len(known):
-        found = "--align tool: found no orientation of the log"
-        raise LogError(lacking(run, f"{found}, allowed: joints with a --robot, or a recorded orientation"))
+        said = f"tool: found no orientation of the log, allowed: {ORIENTED}"
+        raise LogError(lacking(run, said, parameter="align"))
     turned = float(angle_between(quat[known], np.broadcast_to(quat[known[0]], (len(known), 4))).max())
     if turned < TURNED:
-        found = f"--align tool: found a tool that turns by {np.degrees(turned):.4f} deg in all"
+        found = f"tool: found a tool that turns by {np.degrees(turned):.4f} deg in all"
         said = "which any offset of the base explains as well, allowed: a log that turns it; start, none"
-        raise LogError(lacking(run, f"{found}, {said}"))
+        raise LogError(lacking(run, f"{found}, {said}", parameter="align"))
     posed = matched if len(known) == len(quat) else matched.at(known)
     rotation = matrices(quat[known])
     x, y, z = np.einsum("nji,nj->ni", rotation, posed.reference - posed.actual).mean(axis=0).tolist()

@@ -39,7 +39,7 @@ def parse_noise(text: str) -> dict[str, float]:
     Raises:
         OptionError: With everything that is wrong.
     """
-    return DEFAULT_NOISE | parse_tolerance(text, "--noise", LENGTHS, zero=True)
+    return DEFAULT_NOISE | parse_tolerance(text, "noise", LENGTHS, zero=True)
 
 
 def complete_noise(noise: float | Mapping[str, float] | None) -> dict[str, float]:
@@ -50,7 +50,7 @@ def complete_noise(noise: float | Mapping[str, float] | None) -> dict[str, float
     """
     given = noise if isinstance(noise, Mapping) else {} if noise is None else dict.fromkeys(LENGTHS, noise)
     if given:
-        check_tolerance(given, "--noise", zero=True)
+        check_tolerance(given, "noise", zero=True)
     return DEFAULT_NOISE | dict(given)
 
 
@@ -200,7 +200,7 @@ def _made(result: Comparison) -> dict[str, Any]:
 
 
 def _frame(frame: Transform) -> list[float]:
-    """Return a frame as --base and --tool take it: x, y, z in [m], rx, ry, rz in [rad]."""
+    """Return a frame as `base` and `tool` take it: x, y, z in [m], rx, ry, rz in [rad]."""
     return [float(value) + 0.0 for value in (*frame.translation, *rpy_of(frame.rotation))]  # + 0.0: no -0.0
 
 

@@ -7,9 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.presentation.section import Advice
 
 IN_SPACE = 0.1
 """Share of the largest norm that a log may be off the path by, and still be late rather than elsewhere."""
@@ -22,8 +24,8 @@ MOVED = 10.0
 off by more has another cause, whatever rounding left of the joint."""
 
 
-def causes(run: Deviation, reference: Trajectory) -> Iterator[str]:
-    """Yield what a log that is out of tolerance looks like, a sentence each; nothing of one that passes.
+def causes(run: Deviation, reference: Trajectory) -> Iterator[Advice]:
+    """Yield what a log that is out of tolerance looks like, and what may be done; nothing of one that passes.
 
     Late or early: out of a tolerance of position at the same time, but off the path by at most a tenth of
     that. The zero of a joint: its deviation is the same throughout, no joint's is larger, and it is large
@@ -38,26 +40,27 @@ def causes(run: Deviation, reference: Trajectory) -> Iterator[str]:
         yield from _zeros(run)
 
 
-def _late(run: Deviation, reference: Trajectory) -> Iterator[str]:
+def _late(run: Deviation, reference: Trajectory) -> Iterator[Advice]:
     norm, path = run.statistics["norm"], run.statistics["path"]
     position = (run.statistics[axis] for axis in AXES)
     beyond = any(one.tolerance is not None and one.max > one.tolerance for one in position)
     if beyond and path.max <= IN_SPACE * norm.max and path.verdict != "fail":
-        remedy = "; --sync auto finds an offset of the clocks" if _has_own_clock(run, reference) else ""
+        hint = Hint("sync", "auto", "finds an offset of the clocks")
         most, least = text.quantity(norm.max, "m"), text.quantity(path.max, "m")
-        yield f"on the path but not in time (‖Δ‖ {most}, path {least}): late or early{remedy}"
+        said = f"on the path but not in time (‖Δ‖ {most}, path {least}): late or early"
+        yield Advice(said, (hint,) if _has_own_clock(run, reference) else ())
 
 
 def _has_own_clock(run: Deviation, reference: Trajectory) -> bool:
     """Tell whether an offset may be looked for: not in one file, nor between targets without times."""
-    return run.sync.mode == "start" and run.run.log.files != reference.files and not run.run.single_poses
+    return run.sync.mode == "start" and run.run.log.files != reference.files and run.run.timed
 
 
-def _zeros(run: Deviation) -> Iterator[str]:
+def _zeros(run: Deviation) -> Iterator[Advice]:
     for unit in ("rad", "m"):
         one = run.furthest_joint(unit)
         if one is None or MOVED * one.max < run.decisive.max:
             continue
         if one.max > 0.0 and one.std <= STEADY * abs(one.mean):
             mean = f"{text.quantity(one.mean, unit)}, std {text.quantity(one.std, unit)}"
-            yield f"{one.quantity} is off by the same throughout (reference - log = {mean}): another zero?"
+            yield Advice(f"constant offset of {one.quantity} (reference - log = {mean}): another zero?")

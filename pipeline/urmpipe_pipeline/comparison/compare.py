@@ -8,24 +8,34 @@ from typing import Literal, get_args
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.continuity import continuous_quaternions
-from urmpipe_models.errors import LogError, OptionError, for_each
+from urmpipe_models.errors import Finding, LogError, OptionError, for_each
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import quaternions
+from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import align, check_align
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.doubts import exchanged, large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.comparison.left_out import left_out_warnings
-from urmpipe_pipeline.comparison.matching import Matched, as_recorded, by_kinematics, lacking, match
+from urmpipe_pipeline.comparison.matching import (
+    NO_ROBOT,
+    Matched,
+    as_recorded,
+    by_kinematics,
+    file_of,
+    lacking,
+    match,
+)
 from urmpipe_pipeline.comparison.measure import measure, unheld
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
-from urmpipe_pipeline.comparison.tolerance import DEFAULT_TOLERANCE, check_tolerance
+from urmpipe_pipeline.comparison.tolerance import check_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
+from urmpipe_pipeline.comparison.warnings import exchanged, large_tolerances, recorded_apart, thin_evidence
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit import audit_log
-from urmpipe_pipeline.runs.meshes import missing_visuals
 from urmpipe_pipeline.runs.recorded_tcp import lacking_tool
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources.columns.tcp_like import TCP_NOT_READ
@@ -62,7 +72,8 @@ class CompareOptions:
     def __post_init__(self) -> None:
         check_tolerance(self.tolerance)
         if self.tcp not in get_args(Tcp):
-            raise OptionError(f"--tcp: found {self.tcp}, allowed: {', '.join(get_args(Tcp))}")
+            allowed = ", ".join(get_args(Tcp))
+            raise OptionError(Finding(parameter="tcp", found=self.tcp, allowed=allowed))
         check_sync(self.sync)
         check_align(self.align)
 
@@ -127,13 +138,14 @@ def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOptio
 
     Single poses are held against single poses row by row; any other offset would interpolate between them.
     """
-    single = [run for run in (reference, *runs) if run.single_poses]
+    single = [run for run in (reference, *runs) if not run.timed]
     if single and len(single) <= len(runs):
-        said = "found targets without times, which are no motion; allowed: a log or a path of its own times"
-        hint = "urmpipe ik --tsp S gives the targets some"
-        raise LogError(*(lacking(run, f"{said}; {hint}") for run in single))
+        said = "found targets without times, which are no motion, allowed: a log or a path of its own times"
+        hint = Hint("tsp", None, "gives the targets some", call="ik")
+        raise LogError(*(lacking(run, said, hint) for run in single))
     if single and sync != "start":
-        raise OptionError(f"--sync: found {sync} of targets without times, allowed: start, row by row")
+        found = f"{sync} of targets without times"
+        raise OptionError(Finding(parameter="sync", found=found, allowed="start, row by row"))
 
 
 def _told_of(reference: Run) -> list[LogWarning]:
@@ -163,16 +175,19 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     """
     chosen = options or CompareOptions()
     if chosen.sync != "start":
-        raise OptionError(f"--sync: found {chosen.sync} for one log, allowed: start, since {ONE_CLOCK}")
+        allowed = f"start, since {ONE_CLOCK}"
+        raise OptionError(Finding(parameter="sync", found=f"{chosen.sync} for one log", allowed=allowed))
     log = run.log
     if not log.joints:
         raise LogError(lacking(run, "a path alone, which has no joints; allowed: a log to hold against it"))
     if run.robot is None:
-        raise LogError(lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
+        raise LogError(lacking(run, *NO_ROBOT))
     if log.tcp_position is None:
         said = "one log, which recorded no tool centre point; allowed: a reference before the log"
-        alike = next((f"; {one.message}" for one in log.warnings if one.kind == TCP_NOT_READ), "")
-        raise LogError(lacking(run, f"{said}{alike}"))
+        alike = (
+            replace(one.as_finding(), file=file_of(run)) for one in log.warnings if one.kind == TCP_NOT_READ
+        )
+        raise LogError(lacking(run, said), *alike)
     recorded = Trajectory(
         f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files, quat_xyzw=log.tcp_quat_xyzw
     )
@@ -234,9 +249,9 @@ def _comparison(
 def _shapes_gone(deviations: Sequence[Deviation]) -> list[LogWarning]:
     """Return what cannot be drawn of the arms any more: a recording keeps the names of mesh files only."""
     arms = [one.run for one in deviations if one.run.robot]
-    told = {warning.message for run in arms for warning in run.warnings}
+    told = {warning for run in arms for warning in run.warnings}
     gone = dict.fromkeys(warning for run in arms if run.robot for warning in missing_visuals(run.robot))
-    return [warning for warning in gone if warning.message not in told]
+    return [warning for warning in gone if warning not in told]
 
 
 def _lacks_joints(reference: Trajectory, one: Deviation) -> bool:
@@ -246,9 +261,8 @@ def _lacks_joints(reference: Trajectory, one: Deviation) -> bool:
 
 def _joints_not_compared(reference: Trajectory, one: Deviation) -> LogWarning:
     """Return the warning that says why."""
-    return LogWarning(
-        "joints-not-compared", f"{one.name}: no joint is compared: {unheld(reference, one.run)}"
-    )
+    said = f"no joint is compared: {unheld(reference, one.run)}"
+    return LogWarning("joints-not-compared", said, about=one.name)
 
 
 def _deviation(

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import HEAD, Shown, line_of
+from urmpipe_models.display import Shown, line_of
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
@@ -45,7 +46,7 @@ class Comparison(Shown):
     tolerance: Mapping[str, float]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
-    recording: Path | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
     baseline: BaselineComparison | None = None
 
     @property
@@ -64,9 +65,14 @@ class Comparison(Shown):
         return 1.0 - run.reference_left_out / len(self.reference.t_ns)
 
     def warnings_of(self, run: Deviation) -> tuple[LogWarning, ...]:
-        """Return the warnings of a log: those from before, and what the comparison says of it by its name."""
-        told = (one for one in self.warnings if one.message.startswith(f"{run.name}: "))
-        return (*run.run.warnings, *told)
+        """Return the warnings of a log: those from before, and what the comparison says of it."""
+        return (*run.run.warnings, *(one for one in self.warnings if one.about == run.name))
+
+    @property
+    def own_warnings(self) -> tuple[LogWarning, ...]:
+        """The warnings that are about no single log."""
+        names = {run.name for run in self.runs}
+        return tuple(one for one in self.warnings if one.about not in names)
 
     @property
     def ranking(self) -> tuple[Deviation, ...]:
@@ -110,23 +116,8 @@ class Comparison(Shown):
 
     def _notes(self) -> list[str]:
         """Return what is to be known of it, and of its logs."""
-        of_logs = [w.of(one.name).message for one in self.runs for w in one.run.warnings]
-        return [*(warning.message for warning in self.warnings), *of_logs]
-
-    def _table(self) -> str:
-        """Return for a notebook one row a log, the worst first; of one log the head of its table."""
-        if len(self.runs) == 1:
-            return Shown._table(self)
-        import pandas as pd
-
-        rows = [
-            {"run": one.name, "verdict": one.verdict}
-            | {f"max {name} [{found.unit}]": found.max for name, found in one.statistics.items()}
-            for one in reversed(self.ranking)
-        ]
-        shown = pd.DataFrame(rows[:HEAD]).to_html(index=False, float_format="{:.4g}".format)
-        shares = f"{min(HEAD, len(rows))} of {len(rows)} logs, the worst first"
-        return f"{shown}<p>{shares}; to_frame() has a row a log and quantity</p>"
+        of_logs = [one.of(run.name) for run in self.runs for one in run.run.warnings]
+        return [str(one) for one in (*self.warnings, *of_logs)]
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a log and quantity, as `rows`."""
@@ -134,16 +125,16 @@ class Comparison(Shown):
 
         return pd.DataFrame(list(self.rows()))
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the object that `urmpipe compare --json` prints."""
         return {
             "schema": SCHEMA,
             "verdict": self.verdict,
             "tolerance": dict(self.tolerance),
             "reference": self.reference.name,
-            "runs": [run.to_dict() for run in self.runs],
+            "runs": [run.to_dict(voice) for run in self.runs],
             "ranking": [run.name for run in self.ranking],
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
             "baseline": None if self.baseline is None else self.baseline.to_dict(),
             "recording": str(self.recording) if self.recording else None,
         }

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.runs.results import Run
@@ -210,14 +211,23 @@ class Deviation(Shown):
         joints = [one for one in self.joint_statistics.values() if one.unit == unit]
         return max(joints, key=lambda one: one.max, default=None)
 
+    def peak(self, one: Statistics) -> int:
+        """Return the index into the compared samples at which one of its quantities is largest."""
+        return int(np.searchsorted(self.sample, one.sample_max))
+
+    @property
+    def decided_at(self) -> int:
+        """Index into the compared samples of what decides; the norm need not be largest there."""
+        return self.peak(self.decisive)
+
     def place(self, one: Statistics) -> FloatArray:
         """Return where the log was when one of its quantities was largest, in [m], shape (3,)."""
-        return np.asarray(self.actual[np.searchsorted(self.sample, one.sample_max)])
+        return np.asarray(self.actual[self.peak(one)])
 
     def row(self, one: Statistics) -> int:
         """Return the log's row of numbers, from 1, that is nearest to where a quantity was largest."""
         t_ns = self.run.log.t_ns
-        at = int(self.t_ns[np.searchsorted(self.sample, one.sample_max)])
+        at = int(self.t_ns[self.peak(one)])
         return int(np.argmin(np.abs(t_ns - at))) + 1
 
     @property
@@ -234,7 +244,7 @@ class Deviation(Shown):
 
     def _notes(self) -> list[str]:
         """Return what is to be known of the log."""
-        return [warning.message for warning in self.run.warnings]
+        return [str(warning) for warning in self.run.warnings]
 
     def to_frame(self) -> pd.DataFrame:
         """Return one row a compared sample: t [s], then every quantity, in [m] or [rad].
@@ -246,7 +256,7 @@ class Deviation(Shown):
         names = [one.quantity for one in self.all_statistics]
         return pd.DataFrame({"t": self.t, **dict(zip(names, self.values, strict=True))})
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the JSON object of one run."""
         worst, longest = self.worst, self.longest_out
         angle = self.statistics.get("angle")
@@ -275,5 +285,5 @@ class Deviation(Shown):
             "longest_out": None if longest is None else asdict(longest),
             "speed_correlation": self.speed_correlation,
             "verdict": self.verdict,
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.run.warnings],
+            "warnings": [one.to_dict(voice) for one in self.run.warnings],
         }

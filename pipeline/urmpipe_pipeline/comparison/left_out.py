@@ -17,7 +17,7 @@ BEYOND = "sync-left-out"
 def left_out_warnings(one: Deviation, reference: Trajectory) -> list[LogWarning]:
     """Return what was not compared of a log and of the reference.
 
-    Samples that an offset moves beyond the reference's time are what --sync asks for; they are told apart
+    Samples that an offset moves beyond the reference's time are what `sync` asks for; they are told apart
     from those that lack a value, lie in a gap, or come after a reference that started together with the log.
     A part of the reference that was not judged is told however the clocks were put together.
 
@@ -29,15 +29,15 @@ def left_out_warnings(one: Deviation, reference: Trajectory) -> list[LogWarning]
     beyond = _beyond(one, reference) if one.sync.offset else 0
     warnings = []
     if one.left_out > beyond:
-        said = f"{one.name}: {one.left_out - beyond} of {samples} samples have no reference or no value"
-        warnings.append(LogWarning("left-out", said))
+        said = f"{one.left_out - beyond} of {samples} samples have no reference or no value"
+        warnings.append(LogWarning("left-out", said, about=one.name))
     partly = one.reference_left_out > (1.0 - WHOLE) * len(reference.t_ns)
     if partly:
-        warnings.append(LogWarning("not-covered", f"{one.name}: {_covered(one, reference)}"))
+        warnings.append(LogWarning("not-covered", _covered(one, reference), about=one.name))
     if one.sync.offset and (beyond or (one.reference_left_out and not partly)):
         theirs = f"{one.reference_left_out} of {len(reference.t_ns)} samples of {reference.name}"
         said = f"the offset of {one.sync.offset:.6g} s leaves {beyond} of {samples} samples and {theirs}"
-        warnings.append(LogWarning(BEYOND, f"{one.name}: {said} without the other side"))
+        warnings.append(LogWarning(BEYOND, f"{said} without the other side", about=one.name))
     return warnings
 
 

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_quaternions
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import quaternions, slerp
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync, Trajectory
 from urmpipe_pipeline.runs.grid import ROUNDING_NS, interpolate
@@ -69,6 +70,13 @@ class Matched:
         )
 
 
+ORIENTED = "joints with a robot, or a recorded orientation"
+"""What tells an orientation."""
+
+NO_ROBOT = ("no robot, so no forward kinematics", Hint("robot", None, "gives one"))
+"""What a run without kinematics lacks, and what to give."""
+
+
 def by_kinematics(run: Run) -> Trajectory:
     """Return where a run's tool centre point was by its joints, on its grid.
 
@@ -76,7 +84,7 @@ def by_kinematics(run: Run) -> Trajectory:
         LogError: If it has no kinematics.
     """
     if run.tcp is None:
-        raise LogError(lacking(run, "no robot, so no forward kinematics; allowed: --robot NAME|FILE"))
+        raise LogError(lacking(run, *NO_ROBOT))
     quat = continuous_quaternions(quaternions(run.tcp.euler_zyx, "zyx"))
     return Trajectory(
         run.name,
@@ -97,7 +105,8 @@ def as_recorded(run: Run) -> Trajectory:
         LogError: If it recorded none.
     """
     if run.tcp_recorded is None:
-        raise LogError(lacking(run, "no recorded tool centre point; allowed: --tcp fk with a --robot"))
+        hint = Hint("tcp", "fk", "goes by the joints of a log with a robot")
+        raise LogError(lacking(run, "no recorded tool centre point", hint))
     joints = run.log.joints
     units = tuple(run.joint_units) if joints else ()
     return Trajectory(
@@ -165,9 +174,14 @@ def joints_apart(reference: Trajectory, joints: tuple[str, ...], units: tuple[st
     return f"{', '.join(apart)} turn on one side and slide on the other" if apart else ""
 
 
-def lacking(run: Run, message: str) -> Finding:
+def lacking(run: Run, message: str, *hints: Hint, parameter: str | None = None) -> Finding:
     """Return what a run lacks, with the name of its file."""
-    return Finding(message, file=run.log.files[0].name if run.log.files else run.name)
+    return Finding(message, file_of(run), parameter=parameter, hints=hints)
+
+
+def file_of(run: Run) -> str:
+    """Return what a run is called in an error: by its file, where it has one."""
+    return run.log.files[0].name if run.log.files else run.name
 
 
 def joint_order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int] | None:

@@ -12,12 +12,13 @@ from urmpipe_models.errors import LogError
 from urmpipe_models.orientation import angle_between
 from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Kind
-from urmpipe_pipeline.comparison.matching import Matched, joints_apart, lacking
+from urmpipe_pipeline.comparison.matching import ORIENTED, Matched, joints_apart, lacking
 from urmpipe_pipeline.comparison.nearest_path import distance_from_path
 from urmpipe_pipeline.comparison.statistics import Measured, correlation, describe, overall
 from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.gaps import gaps_behind
 from urmpipe_pipeline.joint_log import seconds
-from urmpipe_pipeline.runs.grid import apart, interpolate
+from urmpipe_pipeline.runs.grid import interpolate
 from urmpipe_pipeline.runs.results import Run
 
 KINDS: tuple[Kind, ...] = ("axis", "axis", "axis", "norm")
@@ -45,7 +46,7 @@ def measure(
     Source: [UrmArm2021]_ eq. 19-23.
     """
     values = np.column_stack(delta(_columns(matched.reference), _columns(matched.actual)))
-    path = distance_from_path(matched.actual, reference.position, ~apart(reference.t_ns))
+    path = distance_from_path(matched.actual, reference.position, ~gaps_behind(reference.t_ns))
     path = np.minimum(path, values[:, 3])  # the reference of that time is on its path, but for rounding
     angle = _angle(matched)
     joint_delta, turns = _joint_delta(run, matched)
@@ -149,11 +150,11 @@ def _refuse_unheld(
     """Raise a `LogError` if there is a tolerance for what a side does not have: nothing would be judged."""
     faults = []
     if "angle" in tolerance and angle is None:
-        found = "--tolerance angle: found a side without an orientation"
-        faults.append(lacking(run, f"{found}, allowed: joints with a --robot, or a recorded orientation"))
+        said = f"angle: found a side without an orientation, allowed: {ORIENTED}"
+        faults.append(lacking(run, said, parameter="tolerance"))
     if "joint" in tolerance and joint_delta is None:
-        found = f"--tolerance joint: found that {unheld(reference, run)}"
-        faults.append(lacking(run, f"{found}, allowed: the same joints on both sides"))
+        said = f"joint: found that {unheld(reference, run)}, allowed: the same joints on both sides"
+        faults.append(lacking(run, said, parameter="tolerance"))
     if faults:
         raise LogError(*faults)
 
@@ -172,7 +173,7 @@ def _speed_by_positions(matched: Matched) -> FloatArray:
     NaN without a neighbour. Between two the slopes are weighted so that a parabola's is exact.
     """
     step = np.diff(seconds(matched.t_ns))[:, np.newaxis]
-    joined = (np.diff(matched.sample) == 1) & ~apart(matched.t_ns)
+    joined = (np.diff(matched.sample) == 1) & ~gaps_behind(matched.t_ns)
     slope = np.where(joined[:, np.newaxis], np.diff(matched.actual, axis=0) / step, 0.0)
     weight = np.where(joined[:, np.newaxis], 1.0 / step, 0.0)  # of the nearer neighbour the more
     none = np.zeros((1, 1))

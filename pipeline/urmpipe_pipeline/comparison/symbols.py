@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 
 from urmpipe_pipeline.comparison.deviation import AXES, Statistics
-from urmpipe_pipeline.text import SHOWN, limit, percent
+from urmpipe_pipeline.text import SHOWN, limit, portion
 
 SYMBOLS = dict(zip(AXES, ("Δx", "Δy", "Δz", "‖Δ‖"), strict=True))
 """The quantities of a deviation as people read them."""
@@ -37,17 +37,7 @@ def used_words(statistics: Statistics) -> str:
 
 def portion_words(share: float) -> str:
     """Return a share of a tolerance: "71.0 % of the tolerance", "1.2 times the tolerance"."""
-    return f"{percent(share)} of the tolerance" if share <= 1.0 else f"{_times(share)} times the tolerance"
-
-
-def _times(factor: float) -> str:
-    """Return a factor above 1 with three digits, or as many as tell it from 1, without an exponent."""
-    if factor >= 1000.0:
-        return f"{factor:.0f}"
-    digits = 3
-    while digits < 15 and f"{factor:.{digits}g}" == "1":
-        digits += 1
-    return f"{factor:.{digits}g}"
+    return f"{portion(share)} the tolerance"
 
 
 def allowed_words(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",)) -> str:

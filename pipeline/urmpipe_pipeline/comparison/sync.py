@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.sync_coarse import FLOOR, mean_rates, peaks
 from urmpipe_pipeline.comparison.sync_fine import Estimate, refine
@@ -43,7 +44,9 @@ CERTAIN = 0.1
 ENOUGH = 0.99
 """With more similarity, no other view can be clearly better: it is not looked at."""
 
-ALLOWED = "one motion that does not repeat itself, half of it in both; --sync SECONDS or start"
+ALLOWED = "one motion that does not repeat itself, half of it in both"
+
+BY_HAND = (Hint("sync", "start", "starts both together"), Hint("sync", None, "says the offset"))
 
 SHOWN = 5
 """Offsets that a message names, the best ones."""
@@ -69,9 +72,8 @@ def check_sync(option: SyncOption) -> None:
             return
     elif abs(option) < LONGEST_OFFSET:
         return
-    raise OptionError(
-        f"--sync: found {option}, allowed: start, auto, or a time in s below {LONGEST_OFFSET:g}"
-    )
+    allowed = f"start, auto, or a time in s below {LONGEST_OFFSET:g}"
+    raise OptionError(Finding(parameter="sync", found=str(option), allowed=allowed))
 
 
 def synchronise(
@@ -110,8 +112,8 @@ def synchronise(
             break
     if best is None:
         fault = max(faults, key=lambda one: one.similarity).message
-        message = f"--sync auto: found {fault}; allowed: {ALLOWED}"
-        raise LogError(Finding(message, log.files[0].name if log.files else log.name))
+        file = log.files[0].name if log.files else log.name
+        raise LogError(Finding("auto", file, parameter="sync", found=fault, allowed=ALLOWED, hints=BY_HAND))
     return Sync("auto", best.offset, by, best.precision, best.similarity)
 
 
@@ -166,12 +168,13 @@ def sync_doubts(name: str, sync: Sync, period: float) -> list[LogWarning]:
         sync: The offset.
         period: The log's, in [s].
     """
-    said = f"{name}: the offset of {sync.offset:.6g} s, estimated by the {sync.by},"
+    said = f"the offset of {sync.offset:.6g} s, estimated by the {sync.by},"
     doubts = []
     if sync.precision is not None and sync.precision > CERTAIN * period:
         error = f"is known to +-{text.standard_error(sync.precision)} (standard error)"
-        doubts.append(LogWarning("sync-uncertain", f"{said} {error}; the period is {1e3 * period:.6g} ms"))
+        said_period = f"{said} {error}; the period is {1e3 * period:.6g} ms"
+        doubts.append(LogWarning("sync-uncertain", said_period, about=name))
     if sync.similarity is not None and sync.similarity < ALIKE:
         like = f"leaves the two motions alike by {sync.similarity:.2f} only, of 1: are they one motion?"
-        doubts.append(LogWarning("sync-unlike", f"{said} {like}"))
+        doubts.append(LogWarning("sync-unlike", f"{said} {like}", about=name))
     return doubts

@@ -8,11 +8,9 @@ from collections.abc import Mapping, Sequence
 from decimal import Decimal
 from numbers import Real
 
-from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.measure_units import units_of
-
-DEFAULT_TOLERANCE = 0.0035
-"""Largest deviation allowed on an axis in [m]. Source: [UrmArm2021]_ section 2.4."""
+from urmpipe_models.messages import Hint
 
 LENGTHS, ANGLES = ({"": Decimal(1), **units_of(si)} for si in ("m", "rad"))
 UNITS: dict[str, dict[str, Decimal]] = {
@@ -43,13 +41,13 @@ DECIMAL_COMMA = re.compile(r"\s*[0-9]+,[0-9]+\s*[a-z]*\s*")
 
 
 def parse_tolerance(
-    text: str, option: str = "--tolerance", bare: Sequence[str] = ("axis",), *, zero: bool = False
+    text: str, parameter: str = "tolerance", bare: Sequence[str] = ("axis",), *, zero: bool = False
 ) -> dict[str, float]:
     """Return what is allowed in [m] and [rad] by kind, from "0.0035", "3.5mm" or "axis=3.5mm,angle=0.5deg".
 
     Args:
         text: One length, or some kinds with theirs. What is not named has no tolerance.
-        option: Where it was given, for messages.
+        parameter: The keyword that gave it, for messages.
         bare: The kinds that a length without a name is for.
         zero: Whether 0 is allowed.
 
@@ -58,7 +56,8 @@ def parse_tolerance(
     """
     if DECIMAL_COMMA.fullmatch(text):
         point = text.strip().replace(",", ".")
-        raise OptionError(f"{option}: found {shown(text)}, allowed: a point before the decimals, {point}")
+        allowed = f"a point before the decimals, {point}"
+        raise OptionError(Finding(parameter=parameter, found=shown(text), allowed=allowed))
     found: dict[str, float] = {}
     named: set[str] = set()
     faults = []
@@ -69,8 +68,16 @@ def parse_tolerance(
         twice = " twice" if number is not None and not named.isdisjoint(kinds) else ""
         if number is None or twice:
             angle = not sign and _number(value, ANGLES, zero) is not None and not twice
-            hint = f"; here angle={part.strip()} or joint={part.strip()}" if angle else ""
-            faults.append(f"{option}: found {shown(part.strip())}{twice}, allowed: {ALLOWED}{hint}")
+            hints = (Hint(parameter, f"{one}={part.strip()}", "says of what") for one in ("angle", "joint"))
+            found_part = f"{shown(part.strip())}{twice}"
+            faults.append(
+                Finding(
+                    parameter=parameter,
+                    found=found_part,
+                    allowed=ALLOWED,
+                    hints=tuple(hints) if angle else (),
+                )
+            )
             continue
         named.update(kinds)
         found |= dict.fromkeys(kinds, number)
@@ -96,23 +103,23 @@ def kinds_with_unit(text: str, bare: Sequence[str] = ("axis",)) -> frozenset[str
 
 
 def check_tolerance(
-    tolerance: Mapping[str, float], option: str = "--tolerance", *, zero: bool = False
+    tolerance: Mapping[str, float], parameter: str = "tolerance", *, zero: bool = False
 ) -> None:
     """Raise an `OptionError` with everything in a tolerance that is no kind or no positive number.
 
     Args:
         tolerance: In [m] or [rad], by kind.
-        option: Where it was given, for messages.
+        parameter: The keyword that gave it, for messages.
         zero: Whether 0 is allowed.
     """
     sign = "0 or positive" if zero else "positive"
     faults = [
-        f"{option}: found {kind}={value}, allowed: {ALLOWED_NUMBERS}; {sign}"
+        Finding(parameter=parameter, found=f"{kind}={value}", allowed=f"{ALLOWED_NUMBERS}; {sign}")
         for kind, value in tolerance.items()
         if kind not in UNITS or not isinstance(value, Real) or not _fits(float(value), zero)
     ]
     if not tolerance:
-        faults = [f"{option}: found nothing, allowed: {ALLOWED_NUMBERS}"]
+        faults = [Finding(parameter=parameter, found="nothing", allowed=ALLOWED_NUMBERS)]
     if faults:
         raise OptionError(*faults)
 

@@ -1,10 +1,12 @@
-"""Recordings (.rrd): every array and all metadata of a run or a comparison, and a layout for the viewer.
+"""Recordings (.rrd): every array and all metadata of a result, and what the viewer shows of it.
 
-The only part of urmpipe that knows Rerun. What stands where is told in `entities`.
+The only part of urmpipe that knows Rerun. Data goes one way: result -> `codec` (JSON and arrays by the types
+of its fields) -> `writer` -> .rrd -> `reader` -> `codec` -> result; what is shown comes from `views`.
 """
 
+from urmpipe_pipeline.outputs import know_own
 from urmpipe_pipeline.recording.identity import is_ours, is_recording
-from urmpipe_pipeline.recording.reader import read_recording
-from urmpipe_pipeline.recording.writer import record, write_recording
 
-__all__ = ["is_ours", "is_recording", "read_recording", "record", "write_recording"]
+know_own("recording", is_ours)
+
+__all__ = ["is_ours", "is_recording"]

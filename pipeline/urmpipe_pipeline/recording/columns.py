@@ -1,54 +1,43 @@
-"""Arrays as Rerun takes them: times in integer nanoseconds, rows of scalars as lists."""
+"""Arrays as Rerun takes them: times in integer nanoseconds, rows of scalars as lists, or many rows as one."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.recording.entities import Block
+from urmpipe_pipeline.recording.array_form import Column
+from urmpipe_pipeline.recording.sending import scalar_column, times_column
+from urmpipe_pipeline.recording.store import PACKED, ROW
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from rerun import ComponentColumn, TimeColumn
 
 
-def time_columns(
-    t_ns: IntArray, name: str | None = None, numbers: IntArray | None = None
-) -> list[TimeColumn]:
-    """Return the time columns: t in integer [ns], and a sequence if one is named.
+@dataclass(frozen=True)
+class _Packed:
+    """Values of any type as Rerun takes those of a component."""
 
-    Rerun truncates seconds given as floats, which puts some times off by a nanosecond; integers are exact.
+    values: NDArray[Any]
 
-    Args:
-        t_ns: In integer [ns], shape (n,).
-        name: Of the sequence.
-        numbers: The sequence, shape (n,).
-    """
+    def as_arrow_array(self) -> pa.Array:
+        import pyarrow as pa
+
+        return pa.array(self.values.reshape(-1))
+
+
+def column_rows(column: Column, rows: slice) -> tuple[list[TimeColumn], list[ComponentColumn]]:
+    """Return the times and the values of some rows of an array, one by one where it is plotted."""
     import rerun as rr
 
-    columns = [rr.TimeColumn("t", duration=t_ns.astype("timedelta64[ns]"))]
-    if name is not None and numbers is not None:
-        columns.append(rr.TimeColumn(name, sequence=numbers))
-    return columns
-
-
-def scalar_column(values: FloatArray) -> ComponentColumn:
-    """Return an array as a column of lists; `Scalars.columns` takes six times as long over it.
-
-    Args:
-        values: In the unit of their plot, shape (n, k).
-    """
-    import rerun as rr
-
-    offsets = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.shape[1])
-    return rr.ComponentColumn(
-        rr.Scalars.descriptor_scalars(), rr.components.ScalarBatch(values), offsets=offsets
-    )
-
-
-def block_columns(block: Block, rows: slice) -> tuple[list[TimeColumn], ComponentColumn]:
-    """Return the times and the values of some rows of an array."""
-    name, numbers = block.numbers or (None, None)
-    times = time_columns(block.t_ns[rows], name, None if numbers is None else numbers[rows])
-    return times, scalar_column(block.values[rows])
+    values = np.asarray(column.values[rows] if column.values.ndim else column.values)
+    if not column.plotted:
+        packed = rr.ComponentColumn(PACKED, _Packed(values), lengths=[values.size])
+        return [rr.TimeColumn(ROW, sequence=np.array([rows.start + 1]))], [packed]
+    times = [rr.TimeColumn(ROW, sequence=np.arange(rows.start + 1, rows.stop + 1))]
+    if column.t_ns is not None:
+        times.insert(0, times_column(column.t_ns[rows]))
+    return times, [scalar_column(values.reshape(len(values), -1))]

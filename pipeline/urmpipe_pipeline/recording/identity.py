@@ -7,7 +7,7 @@ import warnings
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-import numpy as np
+from urmpipe_pipeline.outputs import know_own
 
 if TYPE_CHECKING:
     from rerun.chunk import RrdReader, StoreEntry
@@ -28,27 +28,6 @@ WHOLE = b"RRF2FOOT\x01\0\0\0"
 """How a whole .rrd ends that has one footer."""
 
 
-def load_rerun() -> None:
-    """Import all of Rerun that is used.
-
-    No other thread may import meanwhile what Rerun imports too: of two threads that import the same
-    packages at once, one can see them half initialized.
-    """
-    import rerun.blueprint
-    import rerun.chunk  # noqa: F401
-
-
-def settle_pyarrow() -> None:
-    """Let pyarrow import here and now what it imports when it first converts a list and an array.
-
-    That is pandas (0.4 s, 32 MB), to see whether the list is a Series, and numpy.ma.
-    """
-    import pyarrow as pa
-
-    pa.array([0])
-    pa.array(np.zeros(1))
-
-
 def is_recording(path: Path) -> bool:
     """Tell whether a file is a Rerun recording, whoever wrote it and whether it is whole or not."""
     with path.open("rb") as file:
@@ -65,6 +44,9 @@ def is_ours(path: Path) -> bool:
         return bool(our_entries(open_reader(path)))
     except (RuntimeError, ValueError):
         return False
+
+
+know_own("recording", is_ours)
 
 
 def _begins_as_ours(path: Path) -> bool:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.files.missing import meant_by
 from urmpipe_pipeline.recording.identity import APPLICATION_ID, is_recording, open_reader, our_entries
@@ -19,25 +20,22 @@ if TYPE_CHECKING:
     from rerun.chunk import LazyStore
 
 SCALARS = "Scalars:scalars"
-"""The column of a chunk that holds the values of an array."""
+"""The component with the values of an array whose rows stand by themselves, so that they can be plotted."""
+
+PACKED = "urmpipe:packed"
+"""The component with the values of any other array, of its own type: many of its rows stand as one."""
+
+ROW = "row"
+"""The timeline of the rows of every array, from 1; of what is packed the first row of each pack."""
+
+SLICE = 65_536
+"""Rows sent at a time: few enough to keep memory low, many enough to keep the overhead low."""
+
+LAYOUT_VERSION = 6
+"""The version that a recording says; raised when what is stored changes otherwise than by a default."""
 
 PROPERTY = "urmpipe"
 """Name of the recording's property that holds the metadata."""
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Chunk:
-    """Some rows of one array.
-
-    Attributes:
-        t_ns: Times in integer [ns], shape (m,).
-        values: In SI, shape (m, k).
-        numbers: The other timeline, row or sample, shape (m,); None without one.
-    """
-
-    t_ns: IntArray
-    values: FloatArray
-    numbers: IntArray | None
 
 
 class Store:
@@ -48,6 +46,7 @@ class Store:
         rows: How many rows each entity has.
         metadata: The JSON text in its property.
         opens_at_ns: Where the viewer should stand in [ns]; 0 if nothing is said.
+        opens_at_row: The row, from 1, at which it should stand where there are no times; else None.
     """
 
     def __init__(self, path: Path) -> None:
@@ -61,41 +60,40 @@ class Store:
         self.rows = _row_counts(self._store.summary())
         self.metadata = self._metadata()
         self.opens_at_ns = int(self._property("opens_at_ns") or 0)
+        row = self._property("opens_at_row")
+        self.opens_at_row = None if row is None else int(row)
 
     def error(self, message: str) -> RecordingError:
         """Return an error that names this file."""
         return RecordingError(Finding(message, str(self.path)))
 
-    def chunks(self, entity: str) -> Iterator[Chunk]:
-        """Yield the rows of an array, some at a time, in the order in which they were written.
-
-        Raises:
-            RecordingError: If they cannot be decoded.
-        """
-        try:
-            for chunk in self._store.stream().filter(content=entity, components=SCALARS):
-                yield _decoded(chunk.to_record_batch())
-        except (RuntimeError, ValueError) as error:
-            raise self.error(f"found damaged data in {entity}: {_one_line(error)}") from error
-
-    def read(self, entity: str, width: int) -> Chunk:
-        """Return an array whole, by time; without rows if it is not there.
+    def read(
+        self, entity: str, first: int, end: int, width: tuple[int, ...], dtype: np.dtype[Any]
+    ) -> NDArray[Any]:
+        """Return some rows of an array; only the chunks up to the last of them are read.
 
         Args:
             entity: Its path.
-            width: Values a row.
+            first: The first of the rows, from 0.
+            end: The row after the last of them.
+            width: Shape of a row.
+            dtype: Type of the values.
+
+        Raises:
+            RecordingError: If some of them are missing, or are none of that type and shape.
         """
-        parts = sorted(self.chunks(entity), key=lambda part: int(part.t_ns[0]))
-        if not parts:
-            return Chunk(np.empty(0, np.int64), np.empty((0, width)), np.empty(0, np.int64))
-        numbers = [part.numbers for part in parts if part.numbers is not None]
-        return _by_time(
-            Chunk(
-                np.concatenate([part.t_ns for part in parts]),
-                np.concatenate([part.values for part in parts]),
-                np.concatenate(numbers) if numbers else None,
-            )
-        )
+        found, filled = np.empty((end - first, *width), dtype), 0
+        try:
+            for chunk in self._store.stream().filter(content=entity, components=[SCALARS, PACKED]):
+                if filled == len(found):
+                    break
+                for numbers, values in _decoded(chunk.to_record_batch(), width, dtype):
+                    filled += _copy(values, numbers - first, found)
+        except (RuntimeError, ValueError, KeyError) as error:
+            raise self.error(f"found damaged data in {entity}: {_one_line(error)}") from error
+        if filled != len(found):
+            raise self.error(f"found {filled} of {len(found)} rows in {entity}, allowed: all as were written")
+        return found
 
     def _open(self) -> LazyStore:
         """Return the store of the recording that urmpipe wrote."""
@@ -136,26 +134,42 @@ class Store:
         return None
 
 
-def _decoded(batch: RecordBatch) -> Chunk:
-    names = set(batch.schema.names)
-    column = batch.column(SCALARS)
-    first, last = column.offsets[0].as_py(), column.offsets[-1].as_py()  # flatten() loads pyarrow.compute
-    values = column.values[first:last].to_numpy().reshape(len(column), -1)
-    other = next((name for name in ("row", "sample") if name in names), None)
-    return Chunk(
-        batch.column("t").to_numpy(zero_copy_only=False).astype(np.int64),
-        values,
-        None if other is None else batch.column(other).to_numpy(),
-    )
+def document(kind: str, tree: Any) -> str:
+    """Return the metadata of a result of a kind as JSON."""
+    return json.dumps({"layout_version": LAYOUT_VERSION, "kind": kind, "result": tree})
 
 
-def _by_time(chunk: Chunk) -> Chunk:
-    """Return the rows in the order of time, in which all but a rewritten recording has them already."""
-    if np.all(chunk.t_ns[1:] >= chunk.t_ns[:-1]):
-        return chunk
-    order = np.argsort(chunk.t_ns, kind="stable")
-    numbers = None if chunk.numbers is None else chunk.numbers[order]
-    return Chunk(chunk.t_ns[order], chunk.values[order], numbers)
+def _decoded(
+    batch: RecordBatch, width: tuple[int, ...], dtype: np.dtype[Any]
+) -> Iterator[tuple[IntArray, NDArray[Any]]]:
+    """Yield the numbers of rows, from 0, and the rows."""
+    packed = PACKED in batch.schema.names
+    column, starts = batch.column(PACKED if packed else SCALARS), batch.column(ROW).to_numpy() - 1
+    offsets = column.offsets.to_numpy()
+    every = column.values[offsets[0] : offsets[-1]].to_numpy(
+        zero_copy_only=False
+    )  # flatten() is slow to load
+    if every.dtype != dtype:
+        raise ValueError(f"values of type {every.dtype} instead of {dtype}")
+    if not packed:
+        yield starts, every.reshape(len(starts), *width)
+        return
+    for start, pack in zip(starts.tolist(), np.split(every, offsets[1:-1] - offsets[0]), strict=True):
+        rows = pack.reshape(-1, *width)
+        yield np.arange(start, start + len(rows)), rows
+
+
+def _copy(rows: NDArray[Any], places: IntArray, into: NDArray[Any]) -> int:
+    """Copy rows to their places, as far as these are within, and return how many they are."""
+    first = int(places[0]) if len(places) else 0
+    if np.array_equal(places, np.arange(first, first + len(places))):  # as the writer sends them
+        low, high = max(first, 0), min(first + len(places), len(into))
+        if low < high:
+            into[low:high] = rows[low - first : high - first]
+        return max(high - low, 0)
+    within = (places >= 0) & (places < len(into))
+    into[places[within]] = rows[within]
+    return int(within.sum())
 
 
 def _row_counts(summary: str) -> dict[str, int]:
@@ -166,7 +180,7 @@ def _row_counts(summary: str) -> dict[str, int]:
     counts: dict[str, int] = {}
     for line in summary.splitlines():
         entity, _, rest = line.rpartition(" rows=")
-        if f"'{SCALARS}'" in rest and "static=False" in rest:
+        if (f"'{SCALARS}'" in rest or f"'{PACKED}'" in rest) and "static=False" in rest:
             counts[entity] = counts.get(entity, 0) + int(rest.split(" ", 1)[0])
     return counts
 

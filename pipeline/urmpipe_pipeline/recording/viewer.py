@@ -18,8 +18,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from urmpipe_models.errors import ViewerError, for_each
+from urmpipe_models.spelling import pasted
 from urmpipe_pipeline.recording.store import Store
-from urmpipe_pipeline.text import pasted
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
@@ -101,7 +101,7 @@ def open_window(
 
     Args:
         path: The recording.
-        at_ns: The time on the timeline t in [ns].
+        at_ns: The time on the timeline t in [ns]; a recording without times opens at a row that it tells.
         headless: Without a window, such as to take a picture; needs a Vulkan driver, be it in software.
 
     Yields:
@@ -164,12 +164,12 @@ def _shown(process: subprocess.Popen[bytes], url: str, path: Path, at_ns: int) -
     """Wait until the viewer shows the recording at the time, and return what it is controlled by."""
     from rerun.experimental import ViewerClient
 
-    end = time.monotonic() + PATIENCE
+    end, row = time.monotonic() + PATIENCE, Store(path).opens_at_row
     while process.poll() is None and time.monotonic() < end:
         try:
             client = ViewerClient.connect(url)
             client.open(str(path.resolve()))
-            while not _stands(client, at_ns) and time.monotonic() < end:
+            while not _stands(client, at_ns, row) and time.monotonic() < end:
                 time.sleep(0.1)
             return client
         except OSError:  # it does not listen yet, or has just ended
@@ -184,11 +184,21 @@ def _shown(process: subprocess.Popen[bytes], url: str, path: Path, at_ns: int) -
     )
 
 
-def _stands(client: ViewerClient, at_ns: int) -> bool:
-    """Tell whether the viewer stands at a time, and put it there if not: it must know the timeline first."""
+def _stands(client: ViewerClient, at_ns: int, row: int | None) -> bool:
+    """Tell whether the viewer stands at a time, and put it there if not: it must know the timeline first.
+
+    Args:
+        client: What controls the viewer.
+        at_ns: The time on the timeline t in [ns].
+        row: The row on the timeline row instead; None for the time.
+    """
+    name, at = ("t", at_ns) if row is None else ("row", row)
     for one in client.get_state().recordings:
-        if any(timeline.name == "t" for timeline in one.timelines):
-            if one.current_timeline == "t" and one.current_time == at_ns:
+        if any(timeline.name == name for timeline in one.timelines):
+            if one.current_timeline == name and one.current_time == at:
                 return True
-            client.set_time("t", duration=np.timedelta64(at_ns, "ns"), play_state="paused")
+            if row is None:
+                client.set_time(name, duration=np.timedelta64(at, "ns"), play_state="paused")
+            else:
+                client.set_time(name, sequence=row, play_state="paused")
     return False

@@ -13,7 +13,9 @@ from numpy.typing import NDArray
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.in_between import beside_wraps, off_line, repair
+from urmpipe_models.messages import Hint
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized, repolarize
+from urmpipe_pipeline.gaps import MISSED_SAMPLE
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogWarning, seconds
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
 from urmpipe_pipeline.repolarization.interval import Interval, double_turns, given_periods, said_intervals
@@ -21,14 +23,11 @@ from urmpipe_pipeline.repolarization.interval import Interval, double_turns, giv
 LISTED = 8
 """Warnings of a kind that are told one by one; the others are counted, and listed by the audit."""
 
-ALL = "; ingest --audit FILE.csv lists all"
+ALL = (Hint("audit", None, "lists all", call="ingest"),)
 """Where the others are."""
 
 MOST = 10_000
 """Entries of a kind that are no wraps: a log with more of them is none of joints; a warning counts all."""
-
-GAP = 1.5
-"""Two values of a joint further apart than this many median periods have a gap between them."""
 
 NEAR = 3.0
 """A step misses 4 pi by no more than this times what the joint moves at its largest speed."""
@@ -219,13 +218,12 @@ def _ambiguous(
     steps = np.diff(log.t_ns)
     rows, joints = [np.empty(0, dtype=np.int64)], [np.empty(0, dtype=np.int64)]
     speeds = np.zeros(len(periods))
-    usual = (
-        float(np.median(steps)) if len(steps) and steps.max() > GAP * steps.min() else steps.max(initial=0)
-    )
-    wide = np.flatnonzero(steps > GAP * usual)
+    uneven = len(steps) and steps.max() > MISSED_SAMPLE * steps.min()
+    usual = float(np.median(steps)) if uneven else steps.max(initial=0)
+    wide = np.flatnonzero(steps > MISSED_SAMPLE * usual)
     sparse = _sparse(log)
     for j in np.flatnonzero(np.isfinite(periods)).tolist():
-        after, before = _wide_steps(log, j, GAP * usual) if sparse[j] else (wide + 1, wide)
+        after, before = _wide_steps(log, j, MISSED_SAMPLE * usual) if sparse[j] else (wide + 1, wide)
         if not len(after):
             continue
         odd = fixed.unexplained[fixed.unexplained[:, 1] == j, 0]
@@ -310,7 +308,7 @@ def _warn_unexplained(log: JointLog, odd: _Places, periods: FloatArray) -> Itera
         )
         yield LogWarning("large-step", said, row + 1)
     if len(odd.rows) > LISTED:
-        yield LogWarning("large-step", f"{len(odd.rows) - LISTED} more steps that are no wraps{ALL}")
+        yield LogWarning("large-step", f"{len(odd.rows) - LISTED} more steps that are no wraps", hints=ALL)
 
 
 def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
@@ -318,11 +316,11 @@ def _warn_in_between(log: JointLog, between: _Places) -> Iterator[LogWarning]:
     for row, j, _, off in zip(*(part[:LISTED].tolist() for part in between), strict=True):
         said = (
             f"{log.joints[j]} lies between the ends of a wrap, {abs(off):.4g} rad off the line of its"
-            " neighbours, where a linear resampling left it: --repair puts it there"
+            " neighbours, where a linear resampling left it"
         )
-        yield LogWarning("in-between", said, row + 1)
+        yield LogWarning("in-between", said, row + 1, hints=(Hint("repair", True, "puts it there"),))
     if len(between.rows) > LISTED:
-        yield LogWarning("in-between", f"{len(between.rows) - LISTED} more samples on wraps{ALL}")
+        yield LogWarning("in-between", f"{len(between.rows) - LISTED} more samples on wraps", hints=ALL)
 
 
 def _warn_ambiguous(log: JointLog, unsure: _Places, speeds: FloatArray) -> Iterator[LogWarning]:
@@ -341,4 +339,4 @@ def _warn_ambiguous(log: JointLog, unsure: _Places, speeds: FloatArray) -> Itera
         yield LogWarning("ambiguous-turn", said, row + 1)
     if len(gaps) > LISTED:
         left = len(gaps) - LISTED
-        yield LogWarning("ambiguous-turn", f"{left} more gaps in which joints can have turned{ALL}")
+        yield LogWarning("ambiguous-turn", f"{left} more gaps in which joints can have turned", hints=ALL)

@@ -13,10 +13,10 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError
+from urmpipe_models.messages import Hint
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import over_rows
-from urmpipe_pipeline.sources.option_text import option
 
 Interval = tuple[float, float]
 
@@ -46,7 +46,8 @@ def check_interval(name: str, low: float, high: float) -> Interval:
     """
     if not (math.isfinite(low) and math.isfinite(high) and 0.0 < high - low < math.inf):
         found = f"{name}={low:g}:{high:g}" if name else f"{low:g}:{high:g}"
-        raise OptionError(f"--interval: found {found}, allowed: LOW:HIGH with LOW below HIGH, both finite")
+        allowed = "LOW:HIGH with LOW below HIGH, both finite"
+        raise OptionError(Finding(parameter="interval", found=found, allowed=allowed))
     return low, high
 
 
@@ -69,9 +70,8 @@ def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, In
     able = [name for name, turns in zip(log.joints, turning, strict=True) if turns]
     unknown = [name for name in given if name and name not in able]
     if unknown:
-        raise OptionError(
-            f"--interval: found {', '.join(unknown)}, allowed: joints that turn: {', '.join(able) or 'none'}"
-        )
+        allowed = f"joints that turn: {', '.join(able) or 'none'}"
+        raise OptionError(Finding(parameter="interval", found=", ".join(unknown), allowed=allowed))
     periods, findings = np.full(len(log.joints), SLIDING), []
     for j, name in enumerate(log.joints):
         if not turning[j]:
@@ -112,10 +112,10 @@ def double_turns(
     findings = [
         Finding(
             f"found {np.count_nonzero(doubles == j)} steps of about 4 pi and"
-            f" {np.count_nonzero(fixed.joints == j)} of about 2 pi, allowed: wraps of one interval;"
-            f" say which with {option('--interval', f'{log.joints[j]}=LOW:HIGH')}",
+            f" {np.count_nonzero(fixed.joints == j)} of about 2 pi, allowed: wraps of one interval",
             log.files[0].name if log.files else log.name,
             column=log.joints[j],
+            hints=(Hint("interval", {log.joints[j]: None}, "says which"),),
         )
         for j in found
         if (fixed.joints == j).any()
@@ -160,16 +160,14 @@ def said_intervals(
                 warnings.append(_too_wide(column, low, high, period))
             else:
                 groups.setdefault((_shown(_likely(low, high, period), column), False), []).append(j)
-    said = [
-        Inference(
-            f"interval of {', '.join(log.joints[j] for j in joints)}",
-            value,
-            "given as an option"
-            if is_given
-            else _evidence(log, fixed, periods, {j: ends[j] for j in joints}),
+    said = []
+    for (value, is_given), joints in groups.items():
+        names = tuple(log.joints[j] for j in joints)
+        why = (
+            "given as an option" if is_given else _evidence(log, fixed, periods, {j: ends[j] for j in joints})
         )
-        for (value, is_given), joints in groups.items()
-    ]
+        hints = (Hint("interval", {names[0]: None}),)
+        said.append(Inference(f"interval of {', '.join(names)}", value, why, "interval", names, hints))
     return said, [*(_no_turns(names, *one) for one, names in broken.items()), *warnings]
 
 
@@ -192,7 +190,8 @@ def _whole_turns(width: float) -> float:
 
 def _no_turns(names: Sequence[str], interval: str, period: float) -> LogWarning:
     said = f"{', '.join(names)}: the interval {interval} is {period / FULL_TURN:.6g} turns wide"
-    return LogWarning("interval", f"{said}: angles wrap by whole turns; check the unit and --interval")
+    said = f"{said}: angles wrap by whole turns; check the unit and the interval"
+    return LogWarning("interval", said, parameter="interval")
 
 
 def _outside(
@@ -206,9 +205,10 @@ def _outside(
     row = int(rows[0])
     message = (
         f"found {len(rows)} values outside, first {_in_file(column, log.q[row, joint]):.6g} {column.unit} in"
-        f" row {row + 1}, allowed: {_shown(interval, column)} (--interval)"
+        f" row {row + 1}, allowed: {_shown(interval, column)}"
     )
-    return [Finding(message, log.files[0].name if log.files else log.name, row=row + 1, column=column.name)]
+    file = log.files[0].name if log.files else log.name
+    return [Finding(message, file, row=row + 1, column=column.name, parameter="interval")]
 
 
 def _in_file(column: LogColumn, value: float) -> float:
@@ -232,9 +232,9 @@ def _likely(low: float, high: float, period: float) -> Interval:
 def _too_wide(column: LogColumn, low: float, high: float, period: float) -> LogWarning:
     said = (
         f"{column.name} wraps by {period:.6g} {column.unit}, but its values span {high - low:.6g}"
-        f" {column.unit}, more than a period: --interval says how it is limited"
+        f" {column.unit}, more than a period"
     )
-    return LogWarning("interval", said)
+    return LogWarning("interval", said, hints=(Hint("interval", {column.name: None}, "says its limits"),))
 
 
 def _evidence(log: JointLog, fixed: Repolarized, periods: FloatArray, ends: Mapping[int, Interval]) -> str:

@@ -47,7 +47,8 @@ class FigureOptions:
     def __post_init__(self) -> None:
         unknown = [name for name in self.formats if name not in FORMATS]
         if unknown or not self.formats:
-            raise OptionError(f"--format: found {', '.join(unknown) or 'nothing'}, allowed: svg, png, both")
+            found = ", ".join(unknown) or "nothing"
+            raise OptionError(Finding(parameter="formats", found=found, allowed="svg, png, both"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -127,7 +128,7 @@ def _made_folder(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
     except OSError as error:
         said = "found a file, allowed: a folder" if folder.is_file() else error.strerror or str(error)
-        raise OutputError(Finding(f"--figures: {said}", str(folder))) from error
+        raise OutputError(Finding(said, str(folder), parameter="figures")) from error
     try:
         yield
     except BaseException:

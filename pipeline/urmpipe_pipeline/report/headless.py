@@ -24,10 +24,16 @@ PNG_SCALE = 2
 FONT = "Arial, Helvetica, Liberation Sans, sans-serif"
 """Fonts of the same widths on every system, so that an SVG looks everywhere as it was laid out."""
 
-NO_KALEIDO = "--figures: found no kaleido, which draws them; allowed: pip install 'urmpipe[figures]'"
-NO_BROWSER = (
-    "--figures: found no Chromium or Chrome, which draws them; allowed: an installed one (Debian: apt-get"
-    " install chromium), or the environment variable BROWSER_PATH with its place"
+NO_KALEIDO = Finding(
+    parameter="figures",
+    found="no kaleido, which draws them",
+    allowed="pip install 'urmpipe[figures]'",
+)
+NO_BROWSER = Finding(
+    parameter="figures",
+    found="no Chromium or Chrome, which draws them",
+    allowed="an installed one (Debian: apt-get install chromium), or the environment variable BROWSER_PATH"
+    " with its place",
 )
 
 Draw = Sequence[tuple[Figure, FigureFormat]]
@@ -75,7 +81,8 @@ async def _opened() -> Kaleido:
     except ChromeNotFoundError as error:
         raise OutputError(NO_BROWSER) from error
     except (RuntimeError, OSError, TimeoutError) as error:
-        raise OutputError(f"--figures: the browser that draws them did not start: {_said(error)}") from error
+        said = f"the browser that draws them did not start: {_said(error)}"
+        raise OutputError(Finding(said, parameter="figures")) from error
     return browser
 
 
@@ -91,7 +98,8 @@ async def _drawn(browser: Kaleido, figure: Figure, suffix: FigureFormat) -> byte
     try:
         drawn: bytes = await browser.calc_fig(spec, opts=size)
     except (KaleidoError, DevtoolsProtocolError, RuntimeError, OSError, TimeoutError) as error:
-        finding = Finding(f"--figures: {figure.title!r} could not be drawn: {_said(error)}")
+        said = f"{figure.title!r} could not be drawn: {_said(error)}"
+        finding = Finding(said, parameter="figures")
         raise OutputError(finding) from error
     return drawn
 

@@ -1,61 +1,65 @@
-"""The parts of the page: which facts, tables and figures stand where."""
+"""The page: which parts of the presentations stand where, under which anchors."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import base64
+from collections import Counter
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import TypeAlias
+from typing import Literal, TypeAlias
 
-from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.trajectory import Trajectory
-from urmpipe_pipeline.comparison.wording import tolerance_words
-from urmpipe_pipeline.inverse.verdict import verdict_of
-from urmpipe_pipeline.report import (
-    gallery,
-    log_tables,
-    simulation_parts,
-    simulation_tables,
-    verdict_tables,
-)
-from urmpipe_pipeline.report.banner import (
-    Banner,
-    comparison_banner,
-    ingested_banner,
-    joined,
-    solved_banner,
-)
-from urmpipe_pipeline.report.baseline_table import baseline_table
-from urmpipe_pipeline.report.cards import Card, card
-from urmpipe_pipeline.report.drawings import Drawing, Listing, system_drawing, system_file
-from urmpipe_pipeline.report.facts import Fact, comparison_facts, deviation_facts, made, run_facts
+from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure, Text
+from urmpipe_pipeline.presentation.figure import Figure as GivenFigure
+from urmpipe_pipeline.presentation.section import Block, Presentation, Ref, Section, Table
+from urmpipe_pipeline.report.figures import SMALL_PX, Links, Span, drawn_figures, span_of
+from urmpipe_pipeline.report.space import drawn_space
 from urmpipe_pipeline.report.spec import Figure
-from urmpipe_pipeline.report.tables import Table
-from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.simulations.answers import answers_of
-from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
-from urmpipe_pipeline.simulations.simulation import Result, Simulation
-
-Block: TypeAlias = Table | Figure | Drawing | Listing
+from urmpipe_pipeline.report.summary import (
+    PLAIN,
+    Banner,
+    Card,
+    Summary,
+    banner_of,
+    cards_of,
+    side_by_side,
+    word_of,
+    worst_first,
+)
+from urmpipe_pipeline.report.tables import Anchors, Grid, ShownFact, grid, shown_facts, warnings_table
 
 
 @dataclass(frozen=True, slots=True)
-class Summary:
-    """What a minute is enough to read about a comparison, the simulations, or the logs only ingested.
+class Image:
+    """A drawing in SVG, embedded as an image.
+
+    Browsers run no script in an image, load nothing for it and let nobody click in it, whatever the file
+    says that it came from.
 
     Attributes:
-        title: The heading.
-        cards: One a compared log, best to worst.
-        tables: One line a log.
-        note: A line under the cards.
+        title: Its heading.
+        alt: What it shows, for who does not see it.
+        source: A data address of the SVG.
+        kind: What the template draws it as.
     """
 
     title: str
-    cards: tuple[Card, ...]
-    tables: tuple[Table, ...]
-    note: str = ""
+    alt: str
+    source: str
+    kind: Literal["drawing"] = "drawing"
+
+
+@dataclass(frozen=True, slots=True)
+class Listing:
+    """A text that is shown letter by letter; `kind` is what the template draws it as."""
+
+    title: str
+    text: str
+    folded: bool
+    kind: Literal["text"] = "text"
+
+
+Shown: TypeAlias = Grid | Figure | Image | Listing
 
 
 @dataclass(frozen=True, slots=True)
@@ -64,25 +68,33 @@ class Part:
 
     Attributes:
         title: The heading.
+        ident: Its anchor.
+        state: pass, fail or plain, shown at the heading; empty where there is none.
+        word: The verdict in capitals.
+        explained: Facts that need a word each, in a list of their own.
+        facts: What else it is about.
+        notice: What must not be overseen; empty for nothing.
         blocks: Its tables, figures, drawings and texts, in order.
         parts: The parts below it.
-        ident: Its anchor.
-        verdict: pass or fail, shown at the heading; empty where there is none.
-        facts: What it is about.
-        explained: Facts that need a word each, in a list of their own.
-        notice: What must not be overseen; empty for nothing.
-        link: What its figures, side by side, share their time axis by; empty for its anchor.
+        link: What its figures share their time axis by.
     """
 
     title: str
-    blocks: tuple[Block, ...] = ()
-    parts: tuple[Part, ...] = ()
-    ident: str = ""
-    verdict: str = ""
-    facts: tuple[Fact, ...] = ()
-    explained: tuple[Fact, ...] = ()
-    notice: str = ""
-    link: str = ""
+    ident: str
+    state: str
+    word: str
+    explained: tuple[ShownFact, ...]
+    facts: tuple[ShownFact, ...]
+    notice: str
+    blocks: tuple[Shown, ...]
+    parts: tuple[Part, ...]
+    link: str
+
+    @property
+    def pairs(self) -> bool:
+        """Whether its blocks stand side by side: small figures and nothing else."""
+        small = (isinstance(block, Figure) and block.height <= SMALL_PX for block in self.blocks)
+        return bool(self.blocks) and all(small) and not self.parts
 
     def figures(self) -> list[tuple[str, Figure]]:
         """Return every figure of the part and of those below, each with the title of its part."""
@@ -98,7 +110,7 @@ class Page:
         title: The names of what it shows.
         banner: The verdict.
         summaries: What a minute is enough for.
-        parts: All there is, one a comparison, one a simulation and one a log that was only ingested.
+        parts: All there is, one a result.
     """
 
     title: str
@@ -112,191 +124,103 @@ class Page:
         return [found for part in self.parts for found in part.figures()]
 
 
-def lay_out(results: Sequence[Result]) -> Page:
-    """Return the page about some results: comparisons first, then simulations, then logs only ingested."""
-    comparisons = [result for result in results if isinstance(result, Comparison)]
-    runs = [result for result in results if isinstance(result, Run)]
-    simulations = [result for result in results if isinstance(result, Simulation)]
-    simulated = [f"#s{i}" for i in range(1, len(simulations) + 1)]
-    links = [
-        [f"#c{i}-{k}" for k in range(1, len(comparison.runs) + 1)]
-        for i, comparison in enumerate(comparisons, start=1)
-    ]
-    several = len(comparisons) > 1
-    summaries = [_side_by_side(comparisons, links)] if several else []
-    summaries += [_summary(*pair, several) for pair in zip(comparisons, links, strict=True)]
-    if simulations:
-        summaries.append(_simulations_summary(simulations, simulated))
-    if runs:
-        table = log_tables.ingest_table(runs, [f"#r{i}" for i in range(1, len(runs) + 1)])
-        summaries.append(Summary(_logs_title(runs), (), (table,)))
+def lay_out(presentations: Sequence[Presentation]) -> Page:
+    """Return the page about some results, in the order in which they are given."""
+    shown = [(one, Anchors(one.body, f"r{number}")) for number, one in enumerate(presentations, start=1)]
+    titles = Counter(one.body.title for one in presentations)
     return Page(
-        title=", ".join(result.name for result in results),
-        banner=_banner(comparisons, simulations, runs, links, simulated),
-        summaries=tuple(summaries),
-        parts=(
-            *(_comparison_part(one, f"c{i}", several) for i, one in enumerate(comparisons, start=1)),
-            *(_simulation_part(one, f"s{i}") for i, one in enumerate(simulations, start=1)),
-            *(_run_part(run, f"r{i}") for i, run in enumerate(runs, start=1)),
-        ),
-    )
-
-
-def _logs_title(runs: Sequence[Run]) -> str:
-    """Return what is above runs that were not compared: logs, targets of inverse kinematics, or both."""
-    kinds = ("Ingested logs" if run.goals is None else "Solved targets" for run in runs)
-    return " and ".join(sorted(set(kinds))).replace("and Solved", "and solved")
-
-
-def _banner(
-    comparisons: Sequence[Comparison],
-    simulations: Sequence[Simulation],
-    runs: Sequence[Run],
-    links: Sequence[Sequence[str]],
-    simulated: Sequence[str],
-) -> Banner:
-    """Return the verdict over all that was judged, or what was simulated or ingested."""
-    aimed = [run for run in runs if run.goals is not None]
-    logs = [run for run in runs if run.goals is None]
-    found = [comparison_banner(comparisons, links)] if comparisons else []
-    found += [simulation_parts.simulation_banner(simulations, simulated)] if simulations else []
-    found += [solved_banner(aimed)] if aimed else []
-    found += [ingested_banner(logs)] if logs else []
-    return joined(found)
-
-
-def _simulations_summary(simulations: Sequence[Simulation], links: Sequence[str]) -> Summary:
-    """Return the cards of the simulations, and of several a table of them."""
-    several = len(simulations) > 1
-    cards = (simulation_parts.simulation_card(*pair) for pair in zip(simulations, links, strict=True))
-    tables = (simulation_tables.simulations_table(simulations, links),) if several else ()
-    return Summary("Simulations" if several else "Simulation", tuple(cards), tables)
-
-
-def _signals_part(simulation: Simulation, groups: Sequence[Group], link: str) -> Part:
-    """Return the part of a block, or of several like ones: its signals."""
-    block = groups[0].block
-    title = block if groups[0].wanted else f"{'Blocks' if groups[0].family else 'Block'} {block}"
-    return Part(title, tuple(gallery.signal_figures(simulation, groups)), link=link)
-
-
-def _simulation_part(simulation: Simulation, ident: str) -> Part:
-    """Return the part of a simulation: the system, its verdicts, then what each block did, meters first."""
-    meters = (simulation_tables.meters_table(simulation.verdicts),) if simulation.verdicts else ()
-    drawing, file = system_drawing(simulation), system_file(simulation)
-    judged = {one.block for one in simulation.verdicts}
-    every = [*answers_of(simulation), *groups_of(simulation)]
-    groups = sorted(every, key=lambda group: group.block not in judged)  # what decides first
-    blocks = [
-        _signals_part(simulation, list(some), ident)
-        for _, some in groupby(groups, key=lambda group: group.block)
-    ]
-    made = (
-        simulation_tables.signals_table(simulation),
-        simulation_tables.settings_table(simulation),
-        log_tables.warnings_table(simulation),
-        *((file,) if file else ()),
-        log_tables.inputs_table("Input files", simulation.provenance.inputs),
-        log_tables.provenance_table(simulation.provenance),
-    )
-    return Part(
-        f"Simulation {simulation.name}",
-        (
-            *((drawing,) if drawing else ()),
-            *meters,
-            simulation_tables.blocks_table(simulation),
-            simulation_tables.connections_table(simulation),
-            *gallery.simulation_figures(simulation),
-        ),
-        (*(part for part in blocks if part.blocks), Part("Values and provenance", made)),
-        ident,
-        simulation.verdict or "",
-        simulation_parts.simulation_facts(simulation),
-        notice="" if simulation.failed is None else f"Failed: {simulation.failed}",
-    )
-
-
-def _side_by_side(comparisons: Sequence[Comparison], links: Sequence[Sequence[str]]) -> Summary:
-    """Return several comparisons, such as this month's and last month's, in one table."""
-    table = verdict_tables.side_by_side(comparisons, links)
-    return Summary(f"{len(comparisons)} comparisons side by side", (), (table,))
-
-
-def _which(comparison: Comparison, several: bool) -> str:
-    """Return which of several comparisons it is: they may all have one name."""
-    return f" ({comparison.recording or made(comparison)})" if several else ""
-
-
-def _summary(comparison: Comparison, links: Sequence[str], beside: bool) -> Summary:
-    """Return the cards of a comparison, what changed since its baseline, and how several logs rank."""
-    several = len(comparison.runs) > 1
-    changed = () if comparison.baseline is None else (baseline_table(comparison.baseline),)
-    return Summary(
-        f"Verdict{'s' if several else ''} against {comparison.reference.name}"
-        f"{', best to worst' if several else ''}{_which(comparison, beside)}",
+        ", ".join(one.name for one in presentations),
+        banner_of(shown),
+        tuple(_summaries(shown)),
         tuple(
-            card(run, link, comparison.covered(run), len(comparison.warnings_of(run)))
-            for run, link in zip(comparison.ranking, links, strict=True)
+            _part(one.body, anchors, Links(), _made(one) if titles[one.body.title] > 1 else "")
+            for one, anchors in shown
         ),
-        (*changed, *(verdict_tables.ranking_tables(comparison, links) if several else ())),
-        f"Tolerance: {tolerance_words(comparison)}. The bars show how much of it is used up.",
     )
 
 
-def _comparison_part(comparison: Comparison, ident: str, beside: bool) -> Part:
-    """Return the part of a comparison: all logs together, one part a log, then how it was made."""
-    about = Part(
-        "Provenance of the comparison",
-        (
-            log_tables.inputs_table("Reference files", comparison.reference.files),
-            log_tables.provenance_table(comparison.provenance),
-        ),
-    )
-    logs = (
-        _deviation_part(run, f"{ident}-{k}", comparison.reference)
-        for k, run in enumerate(comparison.ranking, start=1)
-    )
-    warnings = (log_tables.warnings_table(comparison),) if comparison.warnings else ()
+def _made(one: Presentation) -> str:
+    """Return what tells a result from others of its title: when it was made, to the minute."""
+    return f" ({one.created[:16].replace('T', ' ')})" if one.created else ""
+
+
+def _summaries(shown: Sequence[tuple[Presentation, Anchors]]) -> Iterator[Summary]:
+    """Yield the results side by side, then cards: of each result that ranks its parts, of the others."""
+    beside = tuple(side_by_side(shown))
+    if beside:
+        yield Summary("Side by side", (), beside)
+    for ranked, some in groupby(worst_first(shown), lambda pair: bool(_ranking(pair[0].body))):
+        for group in [[pair] for pair in some] if ranked else [list(some)]:
+            cards = cards_of(group, plain=not beside)
+            tables = tuple(
+                grid(table, anchors.href, folds=False)
+                for one, anchors in group
+                for table in _ranking(one.body)
+            )
+            if cards or tables:
+                which = f": {group[0][0].body.title}" if ranked and len(shown) > 1 else ""
+                yield Summary(f"{_heading(cards)}{which}", cards, tables)
+
+
+def _heading(cards: Sequence[Card]) -> str:
+    """Return what stands above some cards."""
+    if all(card.state == PLAIN for card in cards):
+        return "Results" if len(cards) > 1 else "Result"
+    return "Verdicts, the worst first" if len(cards) > 1 else "Verdict"
+
+
+def _ranking(body: Section) -> list[Table]:
+    """Return the tables about the parts of a result, which stand with their cards."""
+    return [
+        one
+        for one in body.tables
+        if one.columns and any(isinstance(cell, Ref) for cell in one.columns[0].cells)
+    ]
+
+
+def _part(section: Section, anchors: Anchors, links: Links, which: str = "") -> Part:
+    """Return a section as a part of the page.
+
+    Args:
+        section: What it shows.
+        anchors: Where the sections of its result are.
+        links: Which figures of its result share their time axis.
+        which: What tells a result from others of its title.
+    """
+    ident = anchors.ident(section)
+    facts = tuple(shown_facts(section.facts, anchors.href))
+    blocks = [*section.figures(), *section.blocks()]
+    figures = [block for block in blocks if isinstance(block, GivenFigure)]
+    span, link = span_of(figures), links.of(figures, ident)
+    first = [one for one in section.tables if not (anchors.is_body(section) and one in _ranking(section))]
     return Part(
-        f"Comparison {comparison.name}{_which(comparison, beside)}",
-        (*warnings, *gallery.comparison_figures(comparison)),
-        (*logs, about),
+        f"{section.title}{which}",
         ident,
-        comparison.verdict,
-        comparison_facts(comparison),
-    )
-
-
-def _deviation_part(deviation: Deviation, ident: str, reference: Trajectory) -> Part:
-    """Return the part of one compared log."""
-    return Part(
-        deviation.name,
+        section.verdict or "",
+        word_of(section.verdict),
+        tuple(fact for fact in facts if fact.help),
+        tuple(fact for fact in facts if not fact.help),
+        section.notice,
         (
-            *verdict_tables.statistics_tables(deviation),
-            *gallery.deviation_figures(deviation),
-            *_run_tables(deviation.run),
+            *(grid(table, anchors.href, folds=False) for table in first),
+            *([grid(warnings_table(section.warnings), anchors.href)] if section.warnings else []),
+            *(shown for block in blocks for shown in _shown(block, anchors, span)),
         ),
-        (),
-        ident,
-        deviation.verdict,
-        (*run_facts(deviation.run), Fact("Compared", text.counted(len(deviation.sample), "sample"))),
-        deviation_facts(deviation, reference),
+        tuple(_part(one, anchors, links) for one in sorted(section.sections, key=lambda one: one.rank)),
+        link,
     )
 
 
-def _run_part(run: Run, ident: str) -> Part:
-    """Return the part of one log that was only ingested."""
-    missed = log_tables.missed_table(run)
-    blocks = (*((missed,) if missed else ()), *gallery.run_figures(run), *_run_tables(run))
-    title = f"Log {run.name}" if run.goals is None else f"Targets {run.name}"
-    return Part(title, blocks, (), ident, verdict_of(run) or "", run_facts(run))
-
-
-def _run_tables(run: Run) -> tuple[Block, ...]:
-    return (
-        *((log_tables.audit_table(run),) if run.log.joints else ()),
-        log_tables.warnings_table(run),
-        log_tables.inference_table(run),
-        log_tables.inputs_table("Input files", run.log.files),
-        log_tables.provenance_table(run.provenance),
-    )
+def _shown(block: Block, anchors: Anchors, span: Span) -> Iterator[Shown]:
+    match block:
+        case Table():
+            yield grid(block, anchors.href)
+        case GivenFigure():
+            yield from drawn_figures(block, span)
+        case SpaceFigure():
+            yield drawn_space(block)
+        case Drawing():
+            data = base64.b64encode(block.svg.encode("utf-8", "replace")).decode("ascii")
+            yield Image(block.title, block.alt, f"data:image/svg+xml;base64,{data}")
+        case Text():
+            yield Listing(block.title, block.text, block.folded)

@@ -9,10 +9,10 @@ from pathlib import Path
 
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions, figure_stem, write_figures
 from urmpipe_pipeline.report.markup import asset, environment, script_hash
 from urmpipe_pipeline.report.page import Page, lay_out
-from urmpipe_pipeline.simulations.simulation import Result
 
 
 @dataclass(frozen=True, slots=True)
@@ -28,24 +28,24 @@ class Written:
     figures: tuple[FigureFile, ...] = ()
 
 
-def render_report(results: Sequence[Result]) -> str:
+def render_report(presentations: Sequence[Presentation]) -> str:
     """Return the report as one HTML file that needs no network.
 
-    The verdict stands first, then a card a log, then a part a log with its statistics, figures, audit,
-    warnings and provenance. Everything that came from a file is escaped, and a content security policy
-    lets only the page's own two scripts run, known by their hashes.
+    The verdict stands first, then a card for each judged part, then all parts with their facts, tables and
+    figures. Everything that came from a file is escaped, and a content security policy lets only the page's
+    own two scripts run, known by their hashes.
 
     Args:
-        results: Ingested logs, comparisons and simulations, in the order in which they are shown.
+        presentations: What the results show of themselves, in the order in which they stand on the page.
 
     Raises:
         OptionError: If there is nothing to report.
     """
-    return _render(_lay_out(results))
+    return _render(_lay_out(presentations))
 
 
 def write_report(
-    results: Sequence[Result],
+    presentations: Sequence[Presentation],
     path: Path,
     inputs: Sequence[Path] = (),
     figures: FigureOptions | None = None,
@@ -56,7 +56,7 @@ def write_report(
     An existing file is replaced only if it is a report or a figure of ours and no input.
 
     Args:
-        results: As `render_report` takes them.
+        presentations: As `render_report` takes them.
         path: Where to.
         inputs: Files that must not be overwritten.
         figures: Where the figures go, and in which formats.
@@ -66,7 +66,7 @@ def write_report(
         OptionError: If there is nothing to report.
         OutputError: If it may not be written there, or the figures cannot be drawn.
     """
-    page = _lay_out(results)
+    page = _lay_out(presentations)
     with guarded_output(path, inputs, kind="report") as part:
         part.write_bytes(_render(page).encode("utf-8", "replace"))  # a file name may hold bytes of no text
         if progress and figures is None:
@@ -75,11 +75,11 @@ def write_report(
     return Written(path, files)
 
 
-def _lay_out(results: Sequence[Result]) -> Page:
+def _lay_out(presentations: Sequence[Presentation]) -> Page:
     """Return the page about at least one result."""
-    if not results:
+    if not presentations:
         raise OptionError("a report needs at least one run, comparison or simulation; found none")
-    return lay_out(results)
+    return lay_out(presentations)
 
 
 def _render(page: Page) -> str:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import base64
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from typing import Any, Literal, TypeAlias
 
 import numpy as np
@@ -39,6 +39,7 @@ class Figure:
         height: In [px].
         space: True for a scene in 3D.
         over: What its horizontal axis measures: figures of one part that share it move together.
+        kind: What the template draws it as.
     """
 
     title: str
@@ -53,21 +54,21 @@ class Figure:
 
 @dataclass(frozen=True, slots=True)
 class Panel:
-    """One of some plots that stand on one time axis.
+    """One of some plots that stand on one horizontal axis.
 
     Attributes:
         title: The quantity and its unit.
         traces: Its lines; the axes are filled in by `stacked`.
         shapes: What stands behind its lines, from `level`, `band` and `shaded`.
         share: Height relative to the others.
-        from_zero: True for a size, whose axis begins at 0.
+        look: Further settings of its vertical axis.
     """
 
     title: str
     traces: Sequence[Spec]
     shapes: Sequence[Spec] = ()
     share: float = 1.0
-    from_zero: bool = False
+    look: Spec = field(default_factory=dict)
 
 
 def typed(values: NDArray[Any], dtype: Literal["f4", "f8"] = "f4") -> Spec:
@@ -85,12 +86,12 @@ def typed(values: NDArray[Any], dtype: Literal["f4", "f8"] = "f4") -> Spec:
     return spec if values.ndim == 1 else spec | {"shape": ", ".join(map(str, values.shape))}
 
 
-def stacked(panels: Sequence[Panel], duration: float, shapes: Sequence[Spec] = ()) -> Spec:
-    """Return panels one under the other on a common time axis.
+def stacked(panels: Sequence[Panel], across: Spec, shapes: Sequence[Spec] = ()) -> Spec:
+    """Return panels one under the other on a common horizontal axis.
 
     Args:
         panels: From the top.
-        duration: Where the time axis ends, in [s].
+        across: That axis, from `time_axis`, `row_axis` or `quantity_axis`.
         shapes: Drawn through all of them.
     """
     layout = base_layout() | {"hovermode": "x unified", "hoversubplots": "axis"}
@@ -98,35 +99,31 @@ def stacked(panels: Sequence[Panel], duration: float, shapes: Sequence[Spec] = (
     drawn = list(shapes)
     for number, (panel, domain) in enumerate(zip(panels, _domains(panels), strict=True), start=1):
         suffix = "" if number == 1 else str(number)
-        layout[f"yaxis{suffix}"] = axis(panel.title) | {
-            "domain": domain,
-            "rangemode": "tozero" if panel.from_zero else "normal",
-        }
+        layout[f"yaxis{suffix}"] = axis(panel.title) | {"domain": domain} | panel.look
         data += [trace | {"xaxis": "x", "yaxis": f"y{suffix}"} for trace in panel.traces]
         drawn += [shape | {"yref": f"y{suffix}{shape.get('yref', '')}"} for shape in panel.shapes]
-    bottom = "y" if len(panels) == 1 else f"y{len(panels)}"
-    layout["xaxis"] = axis("t [s]") | {
-        "anchor": bottom,
-        "range": [0.0, duration or 1.0],
-        "hoverformat": ".6~f",
-        "unifiedhovertitle": {"text": "t = %{x} s"},
-        "nticks": 10,
-    }
+    layout["xaxis"] = across | {"anchor": "y" if len(panels) == 1 else f"y{len(panels)}"}
     layout["shapes"] = drawn
     return {"data": data, "layout": layout}
 
 
-def unjoined(figure: Figure) -> Figure:
-    """Return a figure of single poses: points over the rows that nothing joins."""
-    data = [
-        {name: value for name, value in trace.items() if name != "line"}
-        | {"mode": "markers", "marker": {"color": trace["line"]["color"], "size": 7}, "cliponaxis": False}
-        for trace in figure.spec["data"]
-    ]
-    layout = figure.spec["layout"]
-    title = layout["xaxis"]["title"] | {"text": "row, the first is 0"}
-    axis_of_rows = layout["xaxis"] | {"title": title, "unifiedhovertitle": {"text": "row %{x}"}}
-    return replace(figure, spec={"data": data, "layout": layout | {"xaxis": axis_of_rows}})
+def time_axis(start: float, end: float) -> Spec:
+    """Return an axis of time from `start` to `end`, both in [s]."""
+    return axis("t [s]") | {
+        "range": [start, end if end > start else start + 1.0],
+        "hoverformat": ".6~f",
+        "unifiedhovertitle": {"text": "t = %{x} s"},
+        "nticks": 10,
+    }
+
+
+def row_axis(start: float, end: float) -> Spec:
+    """Return an axis of row numbers, with room for the points at both ends."""
+    return axis("row, the first is 0") | {
+        "range": [start - 0.5, end + 0.5],
+        "unifiedhovertitle": {"text": "row %{x}"},
+        "nticks": 10,
+    }
 
 
 def base_layout() -> Spec:

@@ -1,12 +1,25 @@
-"""What a table of the report is made of."""
+"""Tables and facts of a presentation as the page shows them: cells as text, and where they lead."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import Literal, TypeAlias
 
 from urmpipe_pipeline import text
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.presentation.digits import held, unit_of, written
+from urmpipe_pipeline.presentation.section import (
+    Cell,
+    Column,
+    Fact,
+    Judged,
+    Place,
+    Ref,
+    Section,
+    Table,
+    Value,
+)
 
 LONG = 12
 """A table with more rows is folded away."""
@@ -15,16 +28,50 @@ MOST = 500
 """Rows of a table at most; what is left out is counted. The JSON output holds them all."""
 
 
+Href: TypeAlias = Callable[[Cell], str]
+"""Returns where a cell leads; empty if it leads nowhere."""
+
+
+class Anchors:
+    """Where the sections of a result are on the page."""
+
+    def __init__(self, body: Section, ident: str) -> None:
+        """Number the sections below a result's own: 1, 1-2, 1-2-1."""
+        self._body = body
+        self._of: dict[int, str] = {}
+        self._titled: dict[str, str] = {}
+        self._number(body, ident)
+
+    def _number(self, section: Section, ident: str) -> None:
+        self._of[id(section)] = ident
+        self._titled.setdefault(section.title, ident)
+        for number, child in enumerate(section.sections, start=1):
+            self._number(child, f"{ident}-{number}")
+
+    def ident(self, section: Section) -> str:
+        """Return the anchor of a section."""
+        return self._of[id(section)]
+
+    def is_body(self, section: Section) -> bool:
+        """Tell whether a section is the result's own, above all others."""
+        return section is self._body
+
+    def href(self, cell: Cell) -> str:
+        """Return where a cell leads, such as "#r1-2": the first section of its title; empty without one."""
+        return f"#{self._titled[cell.title]}" if isinstance(cell, Ref) and cell.title in self._titled else ""
+
+
 @dataclass(frozen=True, slots=True)
-class Cell:
-    """One cell.
+class ShownCell:
+    """A cell of a table.
 
     Attributes:
-        text: What stands there.
+        text: What is written there.
         state: pass or fail, shown as a sign and a word; empty where it is no judgement.
-        href: Where it leads, such as "#r1".
-        used: Share of the tolerance that is used up, 0..1, shown as a bar under the number.
+        href: Where it leads.
+        used: Share of the limit that is used up, 0..1, shown as a bar under the number.
         most: True for what stands out of its column: shown bold.
+        colour: As #rrggbb, in which its subject is drawn in figures; empty if it has none.
     """
 
     text: str
@@ -32,63 +79,111 @@ class Cell:
     href: str = ""
     used: float | None = None
     most: bool = False
+    colour: str = ""
 
 
 @dataclass(frozen=True, slots=True)
-class Column:
-    """One column: its head, and whether it holds numbers (set to the right) or words."""
-
-    title: str
-    number: bool = False
-
-
-@dataclass(frozen=True, slots=True)
-class Table:
-    """One table; the first cell of a row is the row's head.
+class Grid:
+    """A table; the first cell of a row is the row's head.
 
     Attributes:
         title: Its heading.
-        columns: From the left.
+        heads: The head of each column, and whether it holds numbers (set to the right) or words.
         rows: One cell a column.
         folded: True if it is closed until someone opens it.
         note: A line under it.
+        kind: What the template draws it as.
     """
 
     title: str
-    columns: tuple[Column, ...]
-    rows: tuple[tuple[Cell, ...], ...]
-    folded: bool = False
-    note: str = ""
+    heads: tuple[tuple[str, bool], ...]
+    rows: tuple[tuple[ShownCell, ...], ...]
+    folded: bool
+    note: str
     kind: Literal["table"] = "table"
 
 
-def words(*titles: str) -> tuple[Column, ...]:
-    """Return columns of words."""
-    return tuple(Column(title) for title in titles)
+@dataclass(frozen=True, slots=True)
+class ShownFact:
+    """A fact.
+
+    Attributes:
+        name: What it is of.
+        value: What it is.
+        help: What that means; empty where it explains itself.
+        href: Where the value leads.
+    """
+
+    name: str
+    value: str
+    help: str = ""
+    href: str = ""
 
 
-def numbers(*titles: str) -> tuple[Column, ...]:
-    """Return columns of numbers."""
-    return tuple(Column(title, True) for title in titles)
+def grid(table: Table, href: Href, *, folds: bool = True) -> Grid:
+    """Return a table without its empty columns, cut where it is very long.
+
+    Args:
+        table: What is shown.
+        href: Where its cells lead.
+        folds: Whether it is folded if it is long.
+    """
+    rows = max((len(column.cells) for column in table.columns), default=0)
+    drawn = [(column, list(_cells(column, href))) for column in table.columns]
+    kept = [pair for pair in drawn if any(cell.text != text.NOTHING for cell in pair[1])]
+    more = f"{rows - MOST} more; the JSON output lists them all." if rows > MOST else ""
+    return Grid(
+        table.title,
+        tuple((_head(column), _is_number(column)) for column, _ in kept),
+        tuple(zip(*(cells for _, cells in kept), strict=True)),
+        table.folded or (folds and rows > LONG),
+        " ".join(filter(None, (more, table.note))),
+    )
 
 
-def listing(
-    title: str, columns: tuple[Column, ...], rows: Iterable[Sequence[str]], *, folded: bool | None = None
-) -> Table:
-    """Return a table of plain cells: folded when it is long, cut with a note when it is very long."""
-    cells = [tuple(Cell(value) for value in row) for row in rows]
-    left = len(cells) - MOST
-    note = f"{left} more; the JSON output lists them all." if left > 0 else ""
-    return Table(title, columns, tuple(cells[:MOST]), len(cells) > LONG if folded is None else folded, note)
+def warnings_table(warnings: Sequence[LogWarning]) -> Table:
+    """Return what a person should know, one line a warning."""
+    return Table(
+        f"Warnings ({len(warnings)})",
+        (
+            Column("kind", "Kind", [one.kind for one in warnings]),
+            Column("about", "About", [": ".join(filter(None, (one.about, one.column))) for one in warnings]),
+            Column("row", "Row", [Value(one.row) for one in warnings]),
+            Column("message", "What", [one.sentence("command line") for one in warnings]),
+        ),
+    )
 
 
-def without_empty_columns(table: Table) -> Table:
-    """Return a table without the columns in which no row has a value."""
-    kept = [i for i in range(len(table.columns)) if any(row[i].text != text.NOTHING for row in table.rows)]
-    rows = tuple(tuple(row[i] for i in kept) for row in table.rows)
-    return replace(table, columns=tuple(table.columns[i] for i in kept), rows=rows)
+def shown_facts(facts: Sequence[Fact], href: Href) -> Iterator[ShownFact]:
+    """Yield the facts that have a value, with what is allowed of it."""
+    for fact in facts:
+        value = held(fact.value) if isinstance(fact.value, Value) else written(fact.value, unit=True)
+        if value != text.NOTHING:
+            yield ShownFact(fact.name, value, fact.help, href(fact.value))
 
 
-def judged(verdict: str | None) -> Cell:
-    """Return a verdict as a sign and a word."""
-    return Cell(text.NOTHING) if verdict is None else Cell(verdict.upper(), verdict)
+def _head(column: Column) -> str:
+    unit = unit_of(column.cells)
+    return f"{column.title} [{unit}]" if unit else column.title
+
+
+def _is_number(column: Column) -> bool:
+    return any(isinstance(cell, (Value, Place)) for cell in column.cells[:MOST])
+
+
+def _cells(column: Column, href: Href) -> Iterator[ShownCell]:
+    """Yield the cells of a column; each has its unit if they differ."""
+    units = {cell.unit for cell in column.cells if isinstance(cell, Value) and cell.number is not None}
+    for cell in column.cells[:MOST]:
+        shown = ShownCell(written(cell, unit=len(units) > 1), href=href(cell))
+        match cell:
+            case Ref():
+                yield replace(shown, colour=cell.colour)
+            case Judged(verdict=str(verdict)):
+                yield replace(shown, state=verdict)
+            case Value(number=int() | float()):
+                state = "fail" if cell.verdict == "fail" else ""
+                used = None if cell.used is None else min(cell.used, 1.0)
+                yield replace(shown, state=state, used=used, most=cell.most)
+            case _:
+                yield shown

@@ -3,26 +3,37 @@
 from __future__ import annotations
 
 import html
+from collections.abc import Sequence
 from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
-from urmpipe_models.arrays import FloatArray
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline import text
 from urmpipe_pipeline.decimate import POINTS, decimate
 from urmpipe_pipeline.report.spec import BAND, FAULT, INK, MUTED, Spec, typed
 
 DASHES = ("solid", "dash", "dot", "dashdot")
 """Tells the ninth joint from the first: colours repeat, dashes do not."""
 
-DIGITS = 4
+DIGITS = text.DIGITS
 """Digits after the point of a value under the pointer, as many as the tables have."""
+
+FINE_DIGITS = 6
+"""Digits after the point of a value in SI: micrometres; angles in [rad] and rates have `DIGITS`."""
+
+SIGNIFICANT = 7
+"""Digits that a value in SI has at most: what single precision holds."""
 
 SMALL = 1e-3
 """Values below this are told in exponent form, as in the tables."""
 
 EXPONENT = ".3e"
 """Exponent form with four digits."""
+
+UNEVEN = 8.0
+"""Longest over shortest time between rows: from there on a bucket of time hides more than a pixel should."""
 
 NEAR = 1 / 200
 """Stretches of time nearer to each other than this share of the whole are shaded as one."""
@@ -31,9 +42,9 @@ THINNEST = 1 / 1000
 """What is shaded is at least this share of the whole wide, so that a single sample is seen."""
 
 
-def label(text: str) -> str:
+def label(said: str) -> str:
     """Return a text from a file so that plotly.js, which reads HTML, draws it letter by letter."""
-    return html.escape(text, quote=False)
+    return html.escape(said, quote=False)
 
 
 def line(
@@ -43,8 +54,8 @@ def line(
     colour: str,
     unit: str,
     *,
-    digits: int = DIGITS,
     points: int = POINTS,
+    keep: Sequence[int] = (),
     **more: Any,
 ) -> Spec:
     """Return a line over time, decimated.
@@ -55,22 +66,48 @@ def line(
         name: What the legend and the pointer call it.
         colour: As CSS writes it.
         unit: Unit of the values; empty without one.
-        digits: Digits after the point under the pointer.
         points: How many of its samples may stay.
+        keep: Samples that stay in any case.
         **more: Further settings of the trace.
     """
-    kept = decimate(values, points, t)
-    drawn = values[kept]
-    alone = np.count_nonzero(np.isfinite(drawn)) == 1  # a line through one point is nothing to see
+    kept: IntArray = np.union1d(decimate(values, points, t), np.asarray(keep, dtype=np.int64))
+    shown = values[kept]
+    digits = pointer_digits(unit, shown)
+    alone = np.count_nonzero(np.isfinite(shown)) == 1  # a line through one point is nothing to see
     settings = {"line": stroke(colour), "mode": "lines+markers" if alone else "lines"} | more
     return {
         "type": "scatter",
         "name": label(name),
         "x": typed(t[kept], "f8"),
-        "y": typed(drawn, precision(drawn, digits)),
-        "hovertemplate": f"%{{y:{told(drawn, digits)}}} {unit}".rstrip(),
+        "y": typed(shown, precision(shown, digits)),
+        "hovertemplate": f"%{{y:{told(shown, digits)}}} {label(unit)}".rstrip(),
         "showlegend": False,
     } | settings
+
+
+def points_for(t_ns: IntArray | None) -> int:
+    """Return how many points a line may have: twice as many where it leaves its course within a few rows.
+
+    Args:
+        t_ns: Times of its rows in [ns], shape (n,); None without times.
+    """
+    if t_ns is None or len(t_ns) < 3:
+        return POINTS
+    between = np.diff(t_ns[:])
+    return 2 * POINTS if between.max() > UNEVEN * between.min() else POINTS
+
+
+def pointer_digits(unit: str, values: FloatArray) -> int:
+    """Return how many digits after the point values have under the pointer.
+
+    Args:
+        unit: Their unit; those in [mm] and [deg] have as many as in the tables.
+        values: In `unit`, shape (n,).
+    """
+    if unit in {shown for shown, _ in text.SHOWN.values()}:
+        return DIGITS
+    most = DIGITS if unit == "rad" or "/s" in unit else FINE_DIGITS
+    return max(min(most, SIGNIFICANT - len(f"{_largest(values):.0f}")), 0)
 
 
 def told(values: FloatArray, digits: int = DIGITS) -> str:
@@ -133,10 +170,10 @@ def marks(t: FloatArray, values: FloatArray, colour: str, symbols: str | list[st
     } | more
 
 
-def level(value: float, text: str = "", *, above: bool = False) -> Spec:
-    """Return a dashed line at one value, as wide as the plot, with a word at its end, below it or above."""
+def level(value: float, words: str = "", *, above: bool = False) -> Spec:
+    """Return a dashed line at one value, as wide as the plot, with words at its end, below it or above."""
     ends = {"xref": "x domain", "x0": 0, "x1": 1, "y0": value, "y1": value}
-    word: Spec = {"text": text, "textposition": "end", "font": {"color": MUTED, "size": 10}}
+    word: Spec = {"text": words, "textposition": "end", "font": {"color": MUTED, "size": 10}}
     word["yanchor"] = "bottom" if above else "top"
     return {"type": "line", "line": {"color": INK, "width": 1, "dash": "dash"}, "label": word} | ends
 
@@ -168,11 +205,12 @@ def shaded(t: FloatArray, where: NDArray[np.bool_], duration: float, colour: str
     return [look | height | {"x0": start, "x1": end} for start, end in spans]
 
 
-def instant(t: float, text: str, duration: float) -> Spec:
-    """Return a line at one time through all panels, with a word at its head that stays inside."""
-    ends = {"xref": "x", "x0": t, "x1": t, "yref": "paper", "y0": 0, "y1": 1}
-    side = "left" if t < 0.1 * duration else "right" if t > 0.9 * duration else "center"
-    head = {"text": text, "textposition": "end", "textangle": 0, "xanchor": side}
+def instant(at: float, words: str, start: float, end: float) -> Spec:
+    """Return a line at one place of an axis through all panels, with words at its head that stay inside."""
+    ends = {"xref": "x", "x0": at, "x1": at, "yref": "paper", "y0": 0, "y1": 1}
+    share = (at - start) / ((end - start) or 1.0)
+    side = "left" if share < 0.1 else "right" if share > 0.9 else "center"
+    head = {"text": words, "textposition": "end", "textangle": 0, "xanchor": side}
     font = {"color": FAULT, "size": 11}
     return {
         "type": "line",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 
@@ -24,12 +24,31 @@ AGREEMENT = 0.1
 RESTING = 0.01
 """... or by less than this rms, in [rad/s] or [m/s]: a robot that stands still has rates of noise only."""
 
+
+class OtherUnit(NamedTuple):
+    """The unit in which recorded derivatives would agree with the differences.
+
+    Attributes:
+        said: Which, behind "would agree".
+        time: The unit that the times have then, where it is theirs.
+    """
+
+    said: str
+    time: str | None = None
+
+
 _OTHER_UNITS = {
     order: {
-        **{10.0 ** (-k * order): f"with the time in {unit}" for k, unit in ((3, "ms"), (6, "us"), (9, "ns"))},
-        **{10.0 ** (k * order): f"with the time in s, not in {unit}" for k, unit in ((3, "ms"), (6, "us"))},
-        np.pi / 180.0: "in deg",
-        180.0 / np.pi: "with the joints in deg",
+        **{
+            10.0 ** (-k * order): OtherUnit(f"with the time in {unit}", unit)
+            for k, unit in ((3, "ms"), (6, "us"), (9, "ns"))
+        },
+        **{
+            10.0 ** (k * order): OtherUnit(f"with the time in s, not in {unit}", "s")
+            for k, unit in ((3, "ms"), (6, "us"))
+        },
+        np.pi / 180.0: OtherUnit("in deg"),
+        180.0 / np.pi: OtherUnit("with the joints in deg"),
     }
     for order in (1, 2)
 }
@@ -121,8 +140,8 @@ def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
     return error <= max(AGREEMENT * size, RESTING)
 
 
-def other_unit(recorded: FloatArray, computed: FloatArray, order: int) -> str:
-    """Return in which other unit recorded derivatives would agree with the differences; empty if in none.
+def other_unit(recorded: FloatArray, computed: FloatArray, order: int) -> OtherUnit | None:
+    """Return in which other unit recorded derivatives would agree with the differences; None if in none.
 
     Args:
         recorded: Derivatives as the file has them, in [rad/s^order] or [m/s^order], shape (g, joints).
@@ -132,12 +151,12 @@ def other_unit(recorded: FloatArray, computed: FloatArray, order: int) -> str:
     both = np.isfinite(recorded) & np.isfinite(computed)
     own, wanted = recorded[both], computed[both]
     if not own.any() or not wanted.any():
-        return ""
+        return None
     ratio = float(own @ wanted / (own @ own))  # least squares
     if np.linalg.norm(wanted - ratio * own) > AGREEMENT * np.linalg.norm(wanted):
-        return ""
-    near = [said for factor, said in _OTHER_UNITS[order].items() if abs(ratio / factor - 1.0) <= AGREEMENT]
-    return near[0] if near else ""
+        return None
+    near = [unit for factor, unit in _OTHER_UNITS[order].items() if abs(ratio / factor - 1.0) <= AGREEMENT]
+    return near[0] if near else None
 
 
 def _window(count: int) -> int:

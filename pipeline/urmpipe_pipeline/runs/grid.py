@@ -13,14 +13,13 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.gaps import inside_gaps
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.sources.clocks.quantised import Regular, behind_rounded
 
 REGULAR = 0.01
 """A log is regular if no sample is further from its place on the grid than this share of the period."""
-
-GAP = 3.0
-"""Two rows further apart than this many median periods have a gap between them."""
 
 ROUNDING_NS = 1000
 """Clocks are printed to the microsecond or finer: so much beyond the last known time is still at it."""
@@ -140,29 +139,6 @@ def inside_spans(
     return np.asarray(np.cumsum(depth, axis=0)[:-1] > 0)
 
 
-def apart(known_ns: IntArray) -> NDArray[np.bool_]:
-    """Return which of `known_ns`, shape (n,), are over 3 median periods from the next, shape (n - 1,)."""
-    step = np.diff(known_ns)
-    return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
-
-
-def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> NDArray[np.bool_]:
-    """Tell which times lie strictly between two known ones that are more than 3 median periods apart.
-
-    Args:
-        at_ns: Times in [ns], shape (n,).
-        known_ns: Rising times in [ns], shape (k,).
-
-    Returns:
-        Shape (n,).
-    """
-    if len(known_ns) < 2:
-        return np.zeros(len(at_ns), dtype=np.bool_)
-    after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)
-    wide = apart(known_ns)[after - 1]
-    return np.asarray(wide & (at_ns > known_ns[after - 1]) & (at_ns < known_ns[after]))
-
-
 def make_grid(log: JointLog, tsp: float | None = None) -> Grid:
     """Return the grid of a log.
 
@@ -203,8 +179,9 @@ def _refuse_endless(log: JointLog, wanted: float, count: int) -> None:
         row = int(np.argmax(steps)) + 2
         found = f"found {count} samples every {wanted / 1e6:.6g} ms for {log.rows} rows"
         gap = f"{float(steps.max()) / 1e9:.6g} s pass before row {row}"
-        message = f"{found}, {gap}, allowed: {MOST} samples; a clock without such a gap, or --tsp SECONDS"
-        raise LogError(Finding(message, log.files[0].name if log.files else log.name, row=row))
+        message = f"{found}, {gap}, allowed: {MOST} samples; a clock without such a gap"
+        hints = (Hint("tsp", None, "sets a longer period"),)
+        raise LogError(Finding(message, log.files[0].name if log.files else log.name, row=row, hints=hints))
 
 
 def _rounded(clock: Regular) -> LogWarning:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Any, get_args
@@ -11,21 +11,21 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import LogError, OptionError
+from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.kinematics.forward import PointLog, point_over_log
-from urmpipe_models.row_blocks import THREADS
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.meshes import missing_visuals
+from urmpipe_pipeline.provenance import Provenance, provenance
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.derivatives import Method, derivatives, other_unit, recorded_agree
 from urmpipe_pipeline.runs.grid import Grid, make_grid
-from urmpipe_pipeline.runs.meshes import missing_visuals
 from urmpipe_pipeline.runs.plausibility import implausible
 from urmpipe_pipeline.runs.recorded_tcp import far_from_recorded
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.runs.robot_inference import infer_robot
 from urmpipe_pipeline.sources import ReadOptions, read_log
-from urmpipe_pipeline.sources.option_text import option
+from urmpipe_pipeline.sources.clocks.clock import unused_period
 
 QUANTISED_DIGITS = 5
 """Joint values with this many significant digits or fewer are differentiated with smoothing."""
@@ -33,9 +33,7 @@ QUANTISED_DIGITS = 5
 LONGEST_TSP = 1e9
 """Periods in [s] from this one on are no times that integers of 64 bits hold in [ns]."""
 
-UNUSED_PERIOD = LogWarning(
-    "period-not-used", "--period is not used, since the log has a clock; --time none leaves that out"
-)
+UNUSED_PERIOD = unused_period("period")
 
 EULER_SINGULAR = "euler-singular"
 
@@ -48,7 +46,6 @@ def ingest_log(
     tsp: float | None = None,
     derivative: Method | None = None,
     name: str | None = None,
-    early: Callable[[JointLog | Run], None] | None = None,
 ) -> Run:
     """Return the run of one log.
 
@@ -62,8 +59,6 @@ def ingest_log(
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
         name: What to call it; default: the file's stem.
-        early: Told the log when it is read and the run before its kinematics are computed, so that they
-            can be written meanwhile.
 
     Raises:
         LogError: With everything that is wrong with the files.
@@ -76,8 +71,6 @@ def ingest_log(
     if inferred:
         robot, because = inferred
         log = replace(log, inferences=(*log.inferences, because))
-    if early:
-        early(log)
     given = {
         "robot": robot.name if robot else None,
         "tsp": tsp,
@@ -85,7 +78,13 @@ def ingest_log(
         "read": _given(options),
     }
     return run_of(
-        log, robot, options, tsp=tsp, derivative=derivative, name=name, early=early, made=("ingest", given)
+        log,
+        robot,
+        options,
+        tsp=tsp,
+        derivative=derivative,
+        name=name,
+        made=provenance("ingest", given, log.files),
     )
 
 
@@ -94,11 +93,10 @@ def run_of(
     robot: Chain | None,
     options: ReadOptions,
     *,
-    made: tuple[str, Mapping[str, Any]],
+    made: Provenance,
     tsp: float | None = None,
     derivative: Method | None = None,
     name: str | None = None,
-    early: Callable[[JointLog | Run], None] | None = None,
 ) -> Run:
     """Return the run of a log that is there: what `ingest_log` does once it has read it.
 
@@ -106,11 +104,10 @@ def run_of(
         log: The log, its times strictly increasing.
         robot: The arm, with base and tool; None for no kinematics.
         options: How it was read: `interval`, `repair` and `period` matter here.
-        made: Which command makes the run, and the options it was given.
+        made: How to repeat it.
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for logs seen to be quantised, else central.
         name: What to call it; default: the log's name.
-        early: Told the run before its kinematics are computed, so that it can be written meanwhile.
 
     Raises:
         LogError: If the log's joints are not the robot's, or its times need a grid without end.
@@ -127,7 +124,8 @@ def run_of(
     warnings += [*grid.warnings, *left_open, *([UNUSED_PERIOD] if clocked and options.period else [])]
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
-    run = Run(
+    tcp, noticed = kinematics(robot, q, qd, qdd)
+    return Run(
         name=name or log.name,
         log=log,
         robot=robot,
@@ -136,25 +134,22 @@ def run_of(
         q=q,
         qd=qd,
         qdd=qdd,
-        tcp=None,
+        tcp=tcp,
         tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
         audit=found.entries,
-        warnings=tuple(warnings),
-        provenance=provenance(*made, log.files),
+        warnings=(*warnings, *noticed),
+        provenance=made,
     )
-    if early:
-        early(run)
-    # The joints are being written meanwhile: that takes a core of its own.
-    tcp, noticed = kinematics(robot, q, qd, qdd, threads=1 if early else THREADS)
-    return replace(run, tcp=tcp, warnings=(*warnings, *noticed))
 
 
 def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
     """Raise an `OptionError` for a period or a method that makes no sense."""
     if tsp is not None and not 0 < tsp < LONGEST_TSP:
-        raise OptionError(f"--tsp: found {tsp:g} s, allowed: a positive time below {LONGEST_TSP:g} s")
+        allowed = f"a positive time below {LONGEST_TSP:g} s"
+        raise OptionError(Finding(parameter="tsp", found=f"{tsp:g} s", allowed=allowed))
     if derivative is not None and derivative not in get_args(Method):
-        raise OptionError(f"--derivative: found {derivative}, allowed: {', '.join(get_args(Method))}")
+        allowed = ", ".join(get_args(Method))
+        raise OptionError(Finding(parameter="derivative", found=derivative, allowed=allowed))
 
 
 def _given(options: ReadOptions) -> dict[str, Any] | None:
@@ -181,22 +176,20 @@ def _rates(
         result.append(values)
         said = f"the recorded {word} do not agree with the differences of the joint values"
         unit = other_unit(on_grid, values, order)
-        because = f", but would {unit}{_option_of(log, unit)}" if unit else ""
-        warnings.append(LogWarning(f"recorded-{word}", f"{said}{because}; the differences are used"))
+        said += f", but would {unit.said}" if unit else ""
+        hints = _hints_of(log, unit.time) if unit else ()
+        warnings.append(LogWarning(f"recorded-{word}", f"{said}; the differences are used", hints=hints))
     return result[0], result[1]
 
 
-def _option_of(log: JointLog, unit: str) -> str:
-    """Return the option that reads the clock in the unit in which the recorded rates agree."""
+def _hints_of(log: JointLog, unit: str | None) -> tuple[Hint, ...]:
+    """Return what reads the clock in the unit in which the recorded rates agree, if that is one of time."""
     name = next((column.name for column in log.columns if column.role == "time"), None)
-    wanted = unit.removeprefix("with the time in ").split(",")[0]
-    if name is None or wanted == unit:
-        return ""
-    return f" ({option('--unit', f'{name}={wanted}')})"
+    return (Hint("unit", {name: unit}, "reads the time so"),) if name and unit else ()
 
 
 def kinematics(
-    robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray, *, threads: int = THREADS
+    robot: Chain | None, q: FloatArray, qd: FloatArray, qdd: FloatArray
 ) -> tuple[PointLog | None, list[LogWarning]]:
     """Return the motion of the tool centre point, if there is a robot, and what there is to say about it.
 
@@ -205,7 +198,6 @@ def kinematics(
         q: Joint values in [rad] or [m], shape (g, joints).
         qd: Their rates in [rad/s] or [m/s], shape (g, joints).
         qdd: Their second derivatives in [rad/s2] or [m/s2], shape (g, joints).
-        threads: Blocks of samples worked on side by side.
 
     Raises:
         LogError: If the log has another number of joints than the robot.
@@ -216,7 +208,7 @@ def kinematics(
         raise LogError(
             f"found {q.shape[1]} joints, allowed: {len(robot.coordinates)}, as robot {robot.name} has"
         )
-    tcp = point_over_log(robot, q, qd, qdd, threads=threads)
+    tcp = point_over_log(robot, q, qd, qdd)
     notices = missing_visuals(robot)
     if not tcp.singular.any():
         return tcp, notices

@@ -9,9 +9,9 @@ import numpy as np
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.meshes import VISUAL_MISSING
 from urmpipe_pipeline.repolarization.audit import audit_log, turning
 from urmpipe_pipeline.runs.ingest import EULER_SINGULAR, kinematics
-from urmpipe_pipeline.runs.meshes import VISUAL_MISSING
 from urmpipe_pipeline.runs.plausibility import JOINT_LIMIT, SPEED_LIMIT, implausible
 from urmpipe_pipeline.runs.recorded_tcp import FAR_RECORDED, far_from_recorded
 from urmpipe_pipeline.runs.results import Run
@@ -24,8 +24,7 @@ OF_ROBOT = (EULER_SINGULAR, VISUAL_MISSING, FAR_RECORDED, *BY_LIMITS)
 def on_robot(run: Run, robot: Chain | None) -> Run:
     """Return a run with the kinematics of an arm; as it is without one.
 
-    Its joint values, their audit and their rates stay; the other branches of what inverse kinematics solved
-    are those of the arm before, and are left out.
+    Its joint values, their audit and their rates stay.
 
     Raises:
         LogError: If the joints of the run are not the robot's.
@@ -37,7 +36,7 @@ def on_robot(run: Run, robot: Chain | None) -> Run:
     others = [warning for warning in run.warnings if warning.kind not in OF_ROBOT]
     doubts = [*far_from_recorded(robot, run.log), *_beyond_limits(run, robot), *noticed]
     made = replace(run.provenance, options={**run.provenance.options, "robot": robot.name})
-    return replace(run, robot=robot, tcp=tcp, warnings=(*others, *doubts), provenance=made, ghosts=())
+    return replace(run, robot=robot, tcp=tcp, warnings=(*others, *doubts), provenance=made)
 
 
 def _refuse_other_kinds(run: Run, robot: Chain) -> None:
@@ -61,7 +60,7 @@ def _unit(turns: np.bool_) -> str:
 
 def _beyond_limits(run: Run, robot: Chain) -> list[LogWarning]:
     """Return what the log's rows say against the arm's limits of place and speed."""
-    if not run.log.joints or run.single_poses:
+    if not run.log.joints or not run.timed:
         return []
     read = run.provenance.options.get("read") or {}
     repaired = bool(read.get("repair"))

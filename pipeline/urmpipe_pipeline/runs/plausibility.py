@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import JointMotion, over_rows
 from urmpipe_pipeline.sources.units.unit_evidence import FASTEST
@@ -149,8 +150,9 @@ def repeated_samples(motion: JointMotion, rows: float) -> list[LogWarning]:
     repeats, time = _repeats(motion.q), rows * motion.period
     said = f"the joint values change only every {rows:.3g} rows ({time * 1e3:.4g} ms)"
     count = f"{int(repeats.sum())} of {len(motion.q)} rows repeat the row before"
-    hint = f"a slow controller polled fast? --tsp {time:.4g} takes each value once"
-    return [LogWarning("repeated-samples", f"{said}, {count}: {hint}", int(np.argmax(repeats)) + 2)]
+    said = f"{said}, {count}: a slow controller polled fast?"
+    hints = (Hint("tsp", float(f"{time:.4g}"), "takes each value once"),)
+    return [LogWarning("repeated-samples", said, int(np.argmax(repeats)) + 2, hints=hints)]
 
 
 def _repeats(q: FloatArray) -> NDArray[np.bool_]:

@@ -11,9 +11,10 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_models.messages import Hint
 from urmpipe_models.transform import Transform, rpy_of
 from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.sources.option_text import joints_option, option
+from urmpipe_pipeline.sources.columns.joint_names import joint_names
 from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, fit, spread
 
 LACKING_TOOL = "recorded-tcp-tool"
@@ -50,8 +51,8 @@ def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
         f" ({found.with_tool * 1e3:.1f} mm with the tool that fits best)"
     )
     unknown = "robot, base, units, zeros, signs or order of the joints may differ"
-    remedy = next(_remedies(robot, log, q, recorded), unknown)
-    return [LogWarning(FAR_RECORDED, f"{said}: {remedy}")]
+    remedy, *hints = next(_remedies(robot, log, q, recorded), (unknown,))
+    return [LogWarning(FAR_RECORDED, f"{said}: {remedy}", hints=tuple(hints))]
 
 
 def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
@@ -71,47 +72,50 @@ def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
     apart = f"the kinematics of {robot.name} stay {found.distance * 1e3:.1f} mm (rms) from the recorded TCP"
     if not np.isfinite(found.with_tool):
         said = f"{apart}, and the log moves too little to tell why: {_asked(robot)}"
-    else:
-        base, distance = _base(robot, q, recorded)
-        remedies = {f"--tool {_frame(bare.tool)}": found.with_tool, f"--base {base}": distance}
-        near = min(CLOSE_WITH_TOOL, found.distance / CLEARLY)
-        helping = [f"{left * 1e3:.2f} mm with {said}" for said, left in remedies.items() if left <= near]
-        if not helping:
-            return []
-        said = f"{apart}, but {' or '.join(helping)}"
-    return [LogWarning(LACKING_TOOL, said)]
+        return [LogWarning(LACKING_TOOL, said)]
+    base, distance = _base(robot, q, recorded)
+    near = min(CLOSE_WITH_TOOL, found.distance / CLEARLY)
+    remedies = (("tool", _frame(bare.tool), found.with_tool), ("base", base, distance))
+    hints = tuple(
+        Hint(name, frame, f"brings them within {left * 1e3:.2f} mm")
+        for name, frame, left in remedies
+        if left <= near
+    )
+    return [LogWarning(LACKING_TOOL, apart, hints=hints)] if hints else []
 
 
 def _asked(robot: Chain) -> str:
     """Return what to look at first: a tool or a base that is not there, or the tool that is."""
     length = float(np.linalg.norm(robot.tool.translation))
     if not length:
-        return "is a --tool or a --base missing?"
-    return f"is the --tool, {length * 1e3:.1f} mm long, the right one, or a --base missing?"
+        return "is a tool or a base missing?"
+    return f"is the tool, {length * 1e3:.1f} mm long, the right one, or a base missing?"
 
 
-def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[str]:
-    """Yield what brings kinematics and recorded points together."""
+def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) -> Iterator[tuple[str, Hint]]:
+    """Yield what brings kinematics and recorded points together, and what to give then."""
     columns = [column for column in log.columns if column.role == "joint"]
     for first, second in combinations(range(q.shape[1]), 2):
         order = list(range(q.shape[1]))
         order[first], order[second] = second, first
         found = fit(robot, q[:, order], recorded)
         if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
-            names = option("--joints", ",".join(log.joints[j] for j in order))
-            said = joints_option([columns[j] for j in order]) if columns else names
-            yield f"with {log.joints[first]} and {log.joints[second]} exchanged they agree ({said})"
+            names = joint_names([columns[j] for j in order]) if columns else [log.joints[j] for j in order]
+            said = f"with {log.joints[first]} and {log.joints[second]} exchanged they agree"
+            yield said, Hint("joints", names, "exchanges them")
     for j, name in enumerate(log.joints):
         found = fit(robot, q * np.where(np.arange(q.shape[1]) == j, -1.0, 1.0), recorded)
         if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
-            yield f"with {name} counted the other way they agree (sign = -1 of its column in a map, --map)"
+            said = f"with {name} counted the other way they agree"
+            yield said, Hint("log_map", None, "says so with sign = -1 for its column")
     base, distance = _base(robot, q, recorded)
     if distance <= CLOSE_WITH_TOOL:
-        yield f"on another base they agree within {distance * 1e3:.2f} mm (--base {base})"
+        said = f"on another base they agree within {distance * 1e3:.2f} mm"
+        yield said, Hint("base", base, "puts the arm there")
 
 
-def _base(robot: Chain, q: FloatArray, recorded: FloatArray) -> tuple[str, float]:
-    """Return the base with which the points agree best, as an option, and the rms distance left in [m].
+def _base(robot: Chain, q: FloatArray, recorded: FloatArray) -> tuple[list[float], float]:
+    """Return the base with which the points agree best, in [m] and [rad], and the rms distance left in [m].
 
     Source: Kabsch 1976: with the singular values of sum (a - mean a)(b - mean b)^T = U S V^T the rotation is
     V diag(1, 1, det V U^T) U^T.
@@ -128,7 +132,7 @@ def _base(robot: Chain, q: FloatArray, recorded: FloatArray) -> tuple[str, float
     return _frame(numbers), float(np.sqrt((miss**2).sum(axis=1).mean()))
 
 
-def _frame(numbers: Sequence[float]) -> str:
+def _frame(numbers: Sequence[float]) -> list[float]:
     """Return X,Y,Z[,RX,RY,RZ] with tenths of a millimetre or of a milliradian; no turn if it is none."""
-    told = [f"{round(value, 4) + 0.0:.4f}" for value in numbers]  # + 0.0: no -0.0
-    return ",".join(told if any(map(float, told[3:])) else told[:3])
+    told = [round(float(value), 4) + 0.0 for value in numbers]  # + 0.0: no -0.0
+    return told if any(told[3:]) else told[:3]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -13,10 +13,10 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.orientation import NAMES, angles
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, seconds
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
-from urmpipe_pipeline.runs.ghosts import Ghost, Goals
 from urmpipe_pipeline.runs.grid import interpolate
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class Run(Shown):
         name: The log's name.
         log: The file's own rows.
         robot: The arm, or None for a log without kinematics.
-        tsp: Sampling period of the grid in [s].
+        tsp: Sampling period of the grid in [s]; 0 without times.
         t_ns: Grid times in integer [ns], shape (g,).
         q: Repolarized joint values in [rad] or [m], shape (g, joints).
         qd: Rates in [rad/s] or [m/s], shape (g, joints).
@@ -44,8 +44,6 @@ class Run(Shown):
         warnings: What a person should know.
         provenance: How to repeat it.
         recording: Where it was written.
-        ghosts: The other branches of what inverse kinematics solved, times from the log's first row.
-        goals: What it was solved for, times from the log's first row; None for a run of anything else.
     """
 
     name: str
@@ -61,9 +59,7 @@ class Run(Shown):
     audit: tuple[AuditEntry, ...]
     warnings: tuple[LogWarning, ...]
     provenance: Provenance
-    recording: Path | None = None
-    ghosts: tuple[Ghost, ...] = ()
-    goals: Goals | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
 
     @property
     def t(self) -> FloatArray:
@@ -81,9 +77,9 @@ class Run(Shown):
         return float(self.log.t_ns[-1] - self.log.t_ns[0]) / 1e9
 
     @property
-    def single_poses(self) -> bool:
-        """True of solved targets without times: no motion joins one pose and the next."""
-        return self.goals is not None and not any(column.role == "time" for column in self.log.columns)
+    def timed(self) -> bool:
+        """Whether its rows have times; else they are poses that no motion joins, and it has no rates."""
+        return self.log.timed
 
     @property
     def rotation_recorded(self) -> FloatArray | None:
@@ -122,11 +118,15 @@ class Run(Shown):
         """
         return " or ".join(f"{unit}{per}" for unit in sorted(set(self.joint_units) or {"rad"}, reverse=True))
 
+    def as_run(self) -> Run:
+        """Return this run: what results that have a run return of it."""
+        return self
+
     def _headline(self) -> str:
         """Return its name, its arm and how long it is."""
         arm = self.robot.name if self.robot else "no robot"
         rows = number_of(self.log.rows, "row")
-        if self.single_poses:
+        if not self.timed:
             return line_of(self.name, arm, rows)
         grid = f"grid of {number_of(len(self.t_ns), 'sample')}"
         return line_of(self.name, arm, f"{rows} in {self.duration:g} s", grid)
@@ -146,7 +146,7 @@ class Run(Shown):
             columns |= {name: self.tcp.euler_zyx[:, i] for i, name in enumerate(("rz", "ry", "rx"))}
         return pd.DataFrame(columns)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the object that `urmpipe ingest --json` prints."""
         return {
             "schema": SCHEMA,
@@ -161,9 +161,9 @@ class Run(Shown):
             "source": self.log.source,
             "robot": self.robot.name if self.robot else None,
             "units": dict(self.log.units),
-            "inferences": [asdict(inference) for inference in self.log.inferences],
+            "inferences": [one.to_dict(voice) for one in self.log.inferences],
             "repolarizations": [entry.to_dict() for entry in self.repolarizations],
             "audit": [entry.to_dict() for entry in self.audit],
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }

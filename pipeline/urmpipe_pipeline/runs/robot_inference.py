@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from urmpipe_models.chains.chain import Chain
+from urmpipe_models.messages import Hint
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_pipeline.joint_log import Inference, JointLog
 from urmpipe_pipeline.sources.units.evidence import Fit, fit, single_out, spread
@@ -26,7 +27,12 @@ def infer_robot(log: JointLog) -> tuple[Chain, Inference] | None:
     robots = [robot for robot in map(load_robot, robot_names()) if len(robot.moving) == len(log.joints)]
     named = [robot for robot in robots if robot.name in words]
     if len(named) == 1:
-        return named[0], Inference("robot", named[0].name, "its name in the names of the joint columns")
+        return named[0], Inference(
+            "robot",
+            named[0].name,
+            "its name in the names of the joint columns",
+            hints=(Hint("robot"),),
+        )
     return _by_kinematics(log, named or robots)
 
 
@@ -60,8 +66,8 @@ def _said(name: str, fits: dict[str, Fit], needs_tool: bool) -> Inference:
     said = f"its kinematics come within {distance[name] * 1e3:.2f} mm (rms) of the recorded TCP"
     if needs_tool:
         x, y, z = fits[name].tool
-        said += f" with --tool {x:.4f},{y:.4f},{z:.4f}, which is not applied"
+        said += f" with the tool {x:.4f},{y:.4f},{z:.4f}, which is not applied"
     if others:
         second = min(others, key=others.__getitem__)
         said += f", those of {second} within {others[second] * 1e3:.2f} mm"
-    return Inference("robot", name, said)
+    return Inference("robot", name, said, hints=(Hint("robot"),))

@@ -15,6 +15,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import CosimulationError
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
@@ -32,6 +33,12 @@ ValueType = Literal["Real", "Integer", "Boolean"]
 
 BlockKind = Literal["unit", "file", "fmu"]
 """A unit of urmpipe's own, a user's unit in a Python file, or any FMU."""
+
+
+def _floats(values: FloatArray) -> FloatArray:
+    """Return values as floats: those that are stay as they are, also where they are not read yet."""
+    known = getattr(values, "dtype", None) == np.float64
+    return values if known else np.asarray(values, dtype=np.float64)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -57,7 +64,7 @@ class Signal:
     description: str = ""
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "values", np.asarray(self.values, dtype=np.float64))
+        object.__setattr__(self, "values", _floats(self.values))
 
     @property
     def name(self) -> str:
@@ -137,7 +144,7 @@ class Arm:
     q: FloatArray
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "q", np.asarray(self.q, dtype=np.float64))
+        object.__setattr__(self, "q", _floats(self.q))
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
@@ -176,7 +183,7 @@ class Simulation(Shown):
     connections: Mapping[str, str] = field(default_factory=dict)
     arms: tuple[Arm, ...] = ()
     verdicts: tuple[DeltaVerdict, ...] = ()
-    recording: Path | None = None
+    recording: Path | None = field(default=None, metadata={"stored": False})
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "t_ns", np.asarray(self.t_ns, dtype=np.int64))
@@ -253,7 +260,7 @@ class Simulation(Shown):
             columns |= dict(zip(one.names, one.columns.T, strict=True))
         return pd.DataFrame(columns)
 
-    def to_dict(self) -> dict[str, Any]:
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return the object that `urmpipe simulate --json` prints."""
         t = self.t
         return {
@@ -270,7 +277,7 @@ class Simulation(Shown):
             "failed": self.failed,
             "verdict": self.verdict,
             "verdicts": [one.to_dict() for one in self.verdicts],
-            "warnings": [{"kind": w.kind, "row": w.row, "message": w.message} for w in self.warnings],
+            "warnings": [one.to_dict(voice) for one in self.warnings],
             "recording": str(self.recording) if self.recording else None,
         }
 

@@ -1,8 +1,8 @@
 """Sources: log files in, a `JointLog` out. Only this package knows who wrote a file.
 
 A file goes through `text` (is it text?), `sniff` (how is it written?), `clock` and `roles` (what are its
-columns?), `table` (its numbers, fast), `diagnose` (where it is wrong, with line and column), `units` and
-`read` (SI). The words by which columns, units and sources are known are in `vocabulary.toml`.
+columns?), `table` (its numbers, and where it is wrong, with line and column), `units` and `assemble` (SI).
+The words by which columns, units and sources are known are in `vocabulary.toml`.
 """
 
 from urmpipe_pipeline.sources.log_map import LogMap, map_of, read_map

@@ -24,6 +24,7 @@ from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import PATH, TABLE
 from urmpipe_pipeline.sources.units.kinematic_units import by_kinematics
 from urmpipe_pipeline.sources.units.rotation import settle_rotation
+from urmpipe_pipeline.sources.units.unit_hints import called
 from urmpipe_pipeline.sources.units.units import UnitFinder
 from urmpipe_pipeline.sources.vocabulary import Unit
 
@@ -52,6 +53,7 @@ class _Measured:
     form: RotationForm | None
     inferences: Sequence[Inference]
     warnings: Sequence[LogWarning]
+    by_source: bool
 
     @property
     def named(self) -> Iterator[tuple[FloatArray, list[str]]]:
@@ -110,7 +112,7 @@ def assemble(
             *_about_digits(digits),
         ),
         warnings=(
-            *_not_used(plan, options, (*clock.inferences, *measured.inferences)),
+            *_not_used(plan, options, by_source=clock.by_source or measured.by_source),
             *content.warnings,
             *clock.warnings,
             *noticed,
@@ -126,21 +128,20 @@ def _lacking(t_ns: IntArray, measured: _Measured) -> list[LogWarning]:
     return [*missing_samples(measured.named), *gaps(t_ns)]
 
 
-def _not_used(plan: Plan, options: ReadOptions, units: Sequence[Inference]) -> Iterator[LogWarning]:
+def _not_used(plan: Plan, options: ReadOptions, *, by_source: bool) -> Iterator[LogWarning]:
     """Yield the options that say what the log does not have.
 
     Args:
         plan: What was read.
         options: What the user says.
-        units: Why its units are what they are: a source tells them where names do not.
+        by_source: Whether the source told a unit, as it does where names do not.
     """
-    told = any(one.evidence.startswith(f"{options.source} writes") for one in units)
-    if plan.tables.foreign and not told:
-        said = f"--source {options.source} changes nothing: the log has none of its columns or graphs"
-        yield LogWarning("source-not-used", said)
+    if plan.tables.foreign and not by_source:
+        said = f"{options.source} has no effect: the log has none of its columns or graphs"
+        yield LogWarning("source-not-used", said, parameter="source")
     if options.rotation and not plan.roles.rotation:
-        said = f"--rotation {options.rotation} changes nothing, since no orientation was found in the log"
-        yield LogWarning("rotation-not-used", said)
+        said = f"{options.rotation} has no effect: no orientation was found in the log"
+        yield LogWarning("rotation-not-used", said, parameter="rotation")
 
 
 def _measured(
@@ -181,6 +182,7 @@ def _measured(
         form=turned.form,
         inferences=(*finder.inferences, *turned.inferences),
         warnings=(*finder.warnings, *turned.warnings),
+        by_source=finder.by_source,
     )
 
 
@@ -190,7 +192,7 @@ def _times(
     """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say."""
     if content.clock is None:
         like = None if options.time else _like_a_time(plan, content.roles.columns)
-        t_ns, said, noticed = even_clock(content.rows, options.period, column=like.name if like else "")
+        t_ns, said, noticed = even_clock(content.rows, options.period, like=called(like) if like else "")
         return t_ns, 0, said, noticed
     start = int(content.clock[0])
     counted = Inference(

@@ -9,18 +9,17 @@ import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.gaps import GAP, gaps_behind
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.text_cells import LONGEST_CELL
 from urmpipe_pipeline.sources.clocks.clock import Clock
-from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS
+from urmpipe_pipeline.sources.clocks.clock_units import EVEN, EXPONENTS
 from urmpipe_pipeline.sources.clocks.quantised import behind_repeated
-from urmpipe_pipeline.sources.option_text import option
-from urmpipe_pipeline.sources.tables.diagnose import SHOWN_FINDINGS, lines_of_rows
+from urmpipe_pipeline.sources.tables.numbers import NO_TIME, UNREADABLE, Numbers
+from urmpipe_pipeline.sources.tables.row_reader import SHOWN_FINDINGS, lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import NO_TIME, UNREADABLE, Numbers
-
-GAP = 3.0
-"""Times the median period: more than this between two rows is a gap."""
+from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 
 FAR_BACK = 10.0
 """Median periods: a clock that falls back by more, to about its first time, begins again."""
@@ -103,7 +102,7 @@ def rebuilt(numbers: Numbers) -> Numbers:
         return numbers
     period, resolution = f"{clock.period / 1e9:.9g} s", f"{clock.resolution / 1e9:.9g} s"
     seen = f"times in steps of {resolution} stand in {clock.resolution / clock.period:.4g} rows each"
-    found = Inference("clock", f"rebuilt with a period of {period}", seen)
+    found = Inference("clock", f"rebuilt with a period of {period}", seen, hints=EVEN)
     warning = LogWarning("clock-rebuilt", f"{seen}: a regular clock of {period} is taken in their place")
     return replace(
         numbers,
@@ -125,18 +124,21 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
     Returns:
         The first findings, and one that counts the others.
     """
-    wrong: list[tuple[int, str, str]] = []
+    wrong: list[Finding] = []
     total = numbers.wrong
     for found in (_clock_errors(numbers, clock), _infinities(numbers, names)):
         rows = list(found)
         total += len(rows)
         wrong += rows
-    wrong = sorted(wrong)[:SHOWN_FINDINGS]
-    rows_in_file = [numbers.file_row(row) for row, _, _ in wrong]
+    wrong = sorted(wrong, key=lambda one: (one.row or 0, one.column or "", one.message))[:SHOWN_FINDINGS]
+    rows_in_file = [numbers.file_row(one.row or 0) for one in wrong]
     lines = lines_of_rows(layout, rows_in_file) if wrong else {}
     file = str(layout.segment.path)
-    about = zip(wrong, rows_in_file, strict=True)
-    findings = [*numbers.findings, *(Finding(m, file, lines.get(row), row, c) for (_, c, m), row in about)]
+    placed = zip(wrong, rows_in_file, strict=True)
+    findings = [
+        *numbers.findings,
+        *(replace(one, file=file, line=lines.get(row), row=row) for one, row in placed),
+    ]
     findings = sorted(findings, key=lambda finding: finding.line or 0)[:SHOWN_FINDINGS]
     if total > len(findings):
         findings.append(Finding(f"{total - len(findings)} more findings", file=file))
@@ -184,8 +186,8 @@ def refuse_empty(values: FloatArray, names: Sequence[str], file: str) -> None:
         raise LogError(*findings)
 
 
-def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, str]]:
-    """Yield row, column and message where the time is missing, repeated or runs backwards."""
+def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
+    """Yield row and column where the time is missing, repeated or runs backwards."""
     times = numbers.clock
     if times is None or not len(times) or not clock.columns:
         return
@@ -202,18 +204,19 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
         row = int(valid[repeats[0] + 1])
         shown = clock.shown(int(times[row]))
         said = f"found {shown} again, as {len(repeats)} of {len(times)} rows repeat a time"
-        hint = "times that increase from row to row, or --time none with --period SECONDS"
-        yield row + 1, name, f"{said}: too coarse for a clock to be rebuilt, allowed: {hint}"
+        said = f"{said}: too coarse for a clock to be rebuilt, allowed: times that increase from row to row"
+        yield Finding(said, row=row + 1, column=name, hints=EVEN)
         repeats = repeats[:0]
     for k in sorted([*repeats.tolist(), *np.flatnonzero(steps < 0).tolist()]):
         now, before = (clock.shown(int(times[valid[i]])) for i in (k + 1, k))
         found = f"found {now} again" if steps[k] == 0 else f"found {now} after {before}"
         again = ": a second log begins here, from about the same time" if k in begins else ""
-        yield int(valid[k + 1]) + 1, name, f"{found}, allowed: times that increase from row to row{again}"
+        said = f"{found}, allowed: times that increase from row to row{again}"
+        yield Finding(said, row=int(valid[k + 1]) + 1, column=name)
 
 
-def unknown_times(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, str]]:
-    """Yield row, column and message where a row has no time, or one that cannot be read.
+def unknown_times(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
+    """Yield row and column where a row has no time, or one that cannot be read.
 
     Args:
         numbers: What was read of a table, its times that of the file.
@@ -223,13 +226,14 @@ def unknown_times(numbers: Numbers, clock: Clock) -> Iterable[tuple[int, str, st
         return
     name = clock.columns[0].header
     for index in np.flatnonzero(numbers.clock == NO_TIME).tolist():
-        yield index + 1, name, "found no time, allowed: a time in every row"
+        yield Finding("found no time, allowed: a time in every row", row=index + 1, column=name)
     for index in np.flatnonzero(numbers.clock == UNREADABLE).tolist():
         text = " ".join(cells.text(index).strip() for cells in numbers.texts)
-        yield index + 1, name, f"found {text[:LONGEST_CELL]!r}, allowed: times as in the other rows"
+        said = f"found {text[:LONGEST_CELL]!r}, allowed: times as in the other rows"
+        yield Finding(said, row=index + 1, column=name)
 
 
-def _folds(times: IntArray, clock: Clock) -> Iterable[tuple[int, str, str]]:
+def _folds(times: IntArray, clock: Clock) -> Iterable[Finding]:
     """Yield where numbers go on as times of day written hhmmss do: 101159 is followed by 101200."""
     if clock.told or clock.unit not in EXPONENTS or len(times) < 3 or times.min() <= UNREADABLE:
         return
@@ -245,9 +249,11 @@ def _folds(times: IntArray, clock: Clock) -> Iterable[tuple[int, str, str]]:
     row = int(np.flatnonzero(jumps)[0])
     after, before = (f"{times[k] / one:.15g}" for k in (row + 1, row))
     said = f"found {after} after {before}, as a time of day hhmmss goes on, allowed: a clock of one unit"
-    hint = "write it as hh:mm:ss, or say that it is no time of day with"
-    told = option("--unit", f"{clock.columns[0].name}={clock.unit}")
-    yield row + 2, clock.columns[0].header, f"{said}; {hint} {told}"
+    hints = (
+        Hint("", does="write it as hh:mm:ss"),
+        *unit_hints(clock.columns[:1], clock.unit, "takes it as no time of day"),
+    )
+    yield Finding(said, row=row + 2, column=clock.columns[0].header, hints=hints)
 
 
 def _second_logs(times: IntArray, steps: IntArray) -> set[int]:
@@ -260,11 +266,12 @@ def _second_logs(times: IntArray, steps: IntArray) -> set[int]:
     return set(np.flatnonzero(far & near & goes_on).tolist())
 
 
-def _infinities(numbers: Numbers, names: Sequence[str]) -> Iterable[tuple[int, str, str]]:
+def _infinities(numbers: Numbers, names: Sequence[str]) -> Iterable[Finding]:
     for j in _unusual(numbers.values):
         column = numbers.values[:, j]
         for row in np.flatnonzero(np.isinf(column)).tolist():
-            yield row + 1, names[j], f"found {column[row]}, allowed: finite numbers"
+            said = f"found {column[row]}, allowed: finite numbers"
+            yield Finding(said, row=row + 1, column=names[j])
 
 
 def _unusual(values: FloatArray) -> list[int]:
@@ -274,7 +281,7 @@ def _unusual(values: FloatArray) -> list[int]:
 
 
 def gaps(t_ns: IntArray) -> list[LogWarning]:
-    """Return a warning with each place where more than `GAP` median periods pass between two rows.
+    """Return a warning with each gap between two rows.
 
     Args:
         t_ns: Times in [ns], shape (n,).
@@ -283,7 +290,7 @@ def gaps(t_ns: IntArray) -> list[LogWarning]:
     if len(steps) < 2:
         return []
     period = float(np.median(steps))
-    places = np.flatnonzero(steps > GAP * period).tolist()
+    places = np.flatnonzero(gaps_behind(t_ns)).tolist()
     if not places:
         return []
     found = [f"{_passed(steps, k)} before row {k + 2}" for k in places[1:SHOWN_GAPS]]

@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, for_each
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.checks import (
     MOST_SKIPPED,
@@ -22,10 +23,10 @@ from urmpipe_pipeline.sources.clocks.text_times import timed
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.plan import Plan
-from urmpipe_pipeline.sources.tables.blockwise import read_blockwise
-from urmpipe_pipeline.sources.tables.diagnose import lines_of_rows
+from urmpipe_pipeline.sources.tables.numbers import Numbers
+from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import Numbers, read_fast
+from urmpipe_pipeline.sources.tables.table import read_table
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -98,24 +99,24 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     """Return the numbers of one table; raise what is wrong with them."""
     layout, clock = plan.tables.layouts[table], plan.clocks[table]
     places = [column.index for column in columns]
-    numbers = read_fast(layout, places, clock.parts) or read_blockwise(layout, places, clock.parts)
+    numbers = read_table(layout, places, clock.parts)
     unread = f"{len(numbers.unread)} of {len(numbers.values)} rows cannot be read"
-    hint, warnings = "", _about_other_lines(layout, numbers)
+    too_many, warnings = None, _about_other_lines(layout, numbers)
+    file = str(layout.segment.path)
     if skip_bad and may_skip(numbers):
         numbers, skipped = without_unread(numbers)
         warnings += skipped
     elif skip_bad and numbers.unread:
-        hint = f"{unread}, allowed with --skip-bad: {MOST_SKIPPED:.0%} of them"
+        too_many = Finding(unread, file, parameter="skip_bad", allowed=f"{MOST_SKIPPED:.0%} of them")
     elif may_skip(numbers):
-        hint = f"{unread}; --skip-bad leaves them out"
+        too_many = Finding(unread, file, hints=(Hint("skip_bad", True, "leaves them out"),))
     numbers = rebuilt(trimmed(timed(layout, clock.parts, numbers)))
-    file = str(layout.segment.path)
     if not len(numbers.values) and not numbers.findings:
         message = "found no row with a time or a number in the columns that are used, allowed: at least one"
         raise LogError(Finding(message, file))
     findings = find_errors(layout, numbers, [column.header for column in columns], clock)
     if findings:
-        raise LogError(*findings, *([Finding(hint, file)] if hint else []))
+        raise LogError(*findings, *([too_many] if too_many else []))
     return replace(numbers, warnings=(*warnings, *numbers.warnings))
 
 

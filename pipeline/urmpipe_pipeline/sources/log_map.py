@@ -42,7 +42,7 @@ from urmpipe_models.files.toml_text import parse_toml, toml_lines, toml_text
 from urmpipe_models.orientation import FORMS
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, Role
 from urmpipe_pipeline.outputs import MAP_HEADER
-from urmpipe_pipeline.sources.clocks.time_file import NOTHING_BUT
+from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
@@ -142,7 +142,7 @@ def map_of(
     """
     asked = given or {}
     intervals = asked.get("interval", {})
-    found = {inference.what: inference.value for inference in log.inferences}
+    found = {inference.kind: inference.value for inference in log.inferences}
     top = {
         "source": log.source,
         "delimiter": found.get("delimiter"),
@@ -240,7 +240,7 @@ def _clock(log: JointLog, found: Mapping[str, str]) -> dict[str, Any]:
     columns = _of(log, "time")
     if not columns:
         return {"column": "none", "period": log.period or None}
-    apart = any(one.what == "time column" and NOTHING_BUT in one.evidence for one in log.inferences)
+    apart = any(one.kind == TIME_FILE for one in log.inferences)
     if len(columns) > 1 or apart:
         return {}
     named = vocabulary().unit(split_unit(columns[0].header)[1] or "") is not None

@@ -7,7 +7,8 @@ from dataclasses import dataclass, replace
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock import Clock, find_clock
 from urmpipe_pipeline.sources.clocks.time_file import clock_of_file, time_file
 from urmpipe_pipeline.sources.columns.columns import (
@@ -17,7 +18,7 @@ from urmpipe_pipeline.sources.columns.columns import (
     refuse_twins,
 )
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
-from urmpipe_pipeline.sources.columns.roles import Roles, assign
+from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH, Tables
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -88,7 +89,7 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
     )
     for i, clock in enumerate(() if options.time else clocks):
         own = [column for column in columns if column.table == i]
-        refuse_twins(clock.columns, own, tables.layouts, "give the number of the right one with --time")
+        refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "says which: give its number"))
     times = {column for clock in clocks for column in clock.columns}
     rest = [column for column in columns if column not in times]
     roles = _renamed(_roles(rest, tables, options, robot), options.names)
@@ -142,8 +143,10 @@ def _by_names(
     """Return the roles of columns with names, each of which is there once."""
     roles = assign(columns, layouts, options, robot, path=options.source == PATH)
     if not options.joints:
-        refuse_twins(roles.joints, columns, layouts, "give the numbers of the right ones with --joints")
-    refuse_twins((*roles.position, *roles.rotation), columns, layouts, "rename or remove the others")
+        refuse_twins(roles.joints, columns, layouts, Hint("joints", None, "says which: give their numbers"))
+    refuse_twins(
+        (*roles.position, *roles.rotation), columns, layouts, Hint("", does="rename or remove the others")
+    )
     return roles
 
 
@@ -188,5 +191,5 @@ def _plots(plots: Sequence[Column], warnings: tuple[LogWarning, ...], tables: Ta
     names = [column.header for column in plots]
     if len(set(names)) < len(names) or tables.layouts[0].header is None:
         plots = [replace(column, name=tables.titles[column.table]) for column in plots]
-    said = Inference("joint columns", ", ".join(column.name for column in plots), "one plot a file")
+    said = joint_inference(plots, "one plot a file")
     return Roles(joints=tuple(plots), inferences=(said,), warnings=warnings)

@@ -14,7 +14,6 @@ from urmpipe_pipeline.sources.content import read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import make_plan
 from urmpipe_pipeline.sources.tables.opening import open_tables
-from urmpipe_pipeline.sources.tables.table import release_memory
 from urmpipe_pipeline.sources.tables.text import fingerprint
 
 
@@ -39,9 +38,7 @@ def read_log(
         hashed = [beside.submit(fingerprint, file) for file in files]
         plan = make_plan(tables, options, robot)
         content = read_content(plan, skip_bad=options.skip_bad)
-        log = assemble(plan, content, options, robot, _name(files), [future.result() for future in hashed])
-    release_memory()
-    return log
+        return assemble(plan, content, options, robot, _name(files), [future.result() for future in hashed])
 
 
 def _name(files: Sequence[Path]) -> str:

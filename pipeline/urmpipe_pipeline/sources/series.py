@@ -61,7 +61,7 @@ def read_series(file: Path, names: Sequence[str], options: ReadOptions | None = 
     options = options or ReadOptions()
     tables = open_tables([file], options)
     columns = columns_of(tables.layouts, tables.titles)
-    chosen = for_each(lambda name: find_column(columns, name, str(file)), names)
+    chosen = for_each(lambda name: find_column(columns, name, file=str(file)), names)
     units = given_units(columns, options)
     plan = _plan(tables, columns, chosen, options, units)
     content = read_content(plan, skip_bad=options.skip_bad)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 import tomllib
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import lru_cache
 from importlib.resources import files
 from typing import Any, Literal
@@ -72,6 +72,7 @@ class Container:
     suffixes: tuple[str, ...]
     magic: tuple[bytes, ...]
     advice: str
+    parameters: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, slots=True)
@@ -80,42 +81,6 @@ class RotationWords:
 
     patterns: Patterns
     forms: tuple[RotationForm, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class GonWords:
-    """Words for the gon, 0.9 deg, and what tells them from the German word for degrees.
-
-    Attributes:
-        words: What means nothing else.
-        or_degrees: What may mean degrees, too, in lower case.
-        degrees: Those of them that are written so for degrees alone.
-        beside: What stands in the name of a German column.
-    """
-
-    words: frozenset[str]
-    or_degrees: frozenset[str]
-    degrees: frozenset[str]
-    beside: re.Pattern[str]
-
-    def doubted(self, unit: str, name: str) -> bool:
-        """Return whether a unit that was taken as degrees may be the gon.
-
-        Args:
-            unit: The unit as the file has it.
-            name: The name of its column for comparison.
-        """
-        word = _PER_SECOND.sub("", unit.strip())
-        german = word in self.degrees or self.beside.search(name)
-        return word.lower() in self.or_degrees and not german
-
-    def about(self, unit: str) -> tuple[str, str]:
-        """Return what is said behind a unit that may be the gon, and what at the end; nothing of others."""
-        word = _PER_SECOND.sub("", unit.strip().lower())
-        if word not in self.words | self.or_degrees:
-            return "", ""
-        either = ", which is deg in German and gon elsewhere" if word in self.or_degrees else ""
-        return either, "; 1 gon is 0.9 deg: multiply values in gon by 0.9"
 
 
 @dataclass(frozen=True, slots=True)
@@ -142,7 +107,6 @@ class Vocabulary:
     missing: frozenset[str]
     sources: tuple[KnownSource, ...]
     containers: tuple[Container, ...]
-    gon: GonWords
 
     def unit(self, text: str) -> Unit | None:
         """Return the unit that a text means, such as deg, "°", mm or rad/s^2; None if it means none."""
@@ -196,7 +160,6 @@ def vocabulary() -> Vocabulary:
         missing=frozenset(data["missing"]["words"]),
         sources=tuple(_source(entry, units) for entry in data["source"]),
         containers=tuple(_container(entry) for entry in data["container"]),
-        gon=_gon_words(data["gon"]),
     )
 
 
@@ -233,11 +196,6 @@ def _units(data: Mapping[Quantity, Mapping[str, Any]]) -> Iterator[tuple[str, Un
                 yield word, Unit(name, quantity, entry["factor"])
 
 
-def _gon_words(data: Mapping[str, Any]) -> GonWords:
-    words, or_degrees, degrees = (frozenset(data[name]) for name in ("words", "or_degrees", "degrees"))
-    return GonWords(words, or_degrees, degrees, re.compile(data["beside"]))
-
-
 def _source(entry: Mapping[str, Any], units: Mapping[str, Unit]) -> KnownSource:
     return KnownSource(
         entry["name"],
@@ -252,4 +210,5 @@ def _container(entry: Mapping[str, Any]) -> Container:
         tuple(entry["suffixes"]),
         tuple(magic.encode("latin-1") for magic in entry["magic"]),
         entry["advice"],
+        entry.get("parameters", {}),
     )

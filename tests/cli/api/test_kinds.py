@@ -16,8 +16,9 @@ from urmpipe.systems.units import Backend
 from urmpipe_models.inverse.solve import METHODS
 from urmpipe_pipeline.comparison.compare import Tcp
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.export.options import Format, Rows
 from urmpipe_pipeline.runs.derivatives import Method
+from urmpipe_pipeline.tables.options import Format
+from urmpipe_pipeline.tables.options import RowNames as Rows
 
 FUNCTIONS = {name: getattr(urmpipe, name) for name in urmpipe.__all__ if isfunction(getattr(urmpipe, name))}
 

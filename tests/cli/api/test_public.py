@@ -92,7 +92,7 @@ def test_arrays_and_tables_are_told_the_way() -> None:
         assert str(error.value) == f"log: found {found}, allowed: {allowed}; {way}"
         with pytest.raises(urmpipe.OptionError) as error:
             urmpipe.compare("path.csv", given)  # type: ignore[arg-type]
-        allowed = "a log, a path, a recording or a Run"
+        allowed = "a log, a path, a recording, a Run or SolvedTargets"
         assert str(error.value) == f"logs: found {found}, allowed: {allowed}; {way}"
 
 
@@ -183,12 +183,12 @@ def test_an_unknown_backend_is_refused() -> None:
         urmpipe.build_fmu("dc_drive", backend="cc")  # type: ignore[arg-type]
 
 
-def test_a_result_without_a_page_is_refused(tmp_path: Path) -> None:
-    solved = urmpipe.ik([[0.3, 0.1, 0.4]], "ur5e")
-    with pytest.raises(urmpipe.OptionError, match=r"^results: found an InverseResult, allowed: a rec"):
-        urmpipe.report([solved], tmp_path / "report.html")  # type: ignore[list-item]
-    with pytest.raises(urmpipe.OptionError, match=r"^result: found an InverseResult, allowed: a Run"):
-        urmpipe.write_recording(solved, tmp_path / "solved.rrd")  # type: ignore[arg-type]
+def test_what_shows_nothing_of_itself_is_refused(tmp_path: Path) -> None:
+    arm = urmpipe.load_robot("ur5e")
+    with pytest.raises(urmpipe.OptionError, match=r"^results: found a Chain, allowed: a rec"):
+        urmpipe.report([arm], tmp_path / "report.html")  # type: ignore[list-item]
+    with pytest.raises(urmpipe.OptionError, match=r"^result: found a Chain, allowed: a result"):
+        urmpipe.write_recording(arm, tmp_path / "solved.rrd")  # type: ignore[arg-type]
 
 
 def test_files_may_be_text(folder: Path, run: urmpipe.Run, tmp_path: Path) -> None:

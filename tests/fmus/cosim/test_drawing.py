@@ -16,7 +16,7 @@ from foreign_fmus import COUNTER, INTEGRATOR, Foreign, Scalar, gain, planned
 from urmpipe_fmus.cosim import LogColumn, LogInput, Plan, Port, system_svg
 from urmpipe_fmus.cosim.diagram import Box, Diagram, Pin, Wire, diagram
 from urmpipe_fmus.cosim.layout import Layout
-from urmpipe_fmus.cosim.routing import route
+from urmpipe_models.arrays import FloatArray
 
 SVG = "{http://www.w3.org/2000/svg}"
 
@@ -41,42 +41,35 @@ def diagrams(draw: st.DrawFn) -> Diagram:
     return Diagram(boxes, tuple(wires))
 
 
+def sampled(points: list[tuple[float, float]]) -> FloatArray:
+    """Points along the cubic curves of a wire, shape (n, 2)."""
+    t = np.linspace(0.0, 1.0, 33)[:, np.newaxis]
+    weights = ((1.0 - t) ** 3, 3.0 * t * (1.0 - t) ** 2, 3.0 * t**2 * (1.0 - t), t**3)
+    corners = [points[k : k + 4] for k in range(0, len(points) - 1, 3)]
+    curves = [sum(w * np.array(p) for w, p in zip(weights, one, strict=True)) for one in corners]
+    return np.concatenate(curves)
+
+
 @settings(deadline=None)  # a slow computer is no fault
 @given(diagrams())
-def test_boxes_stand_apart(shown: Diagram) -> None:
-    route(Layout(shown))
-    for a, b in combinations(shown.boxes.values(), 2):
+def test_boxes_stand_apart_and_wires_go_from_port_to_port_around_them(shown: Diagram) -> None:
+    layout, boxes = Layout(shown), shown.boxes.values()
+    for a, b in combinations(boxes, 2):
         beside = a.x + a.width <= b.x or b.x + b.width <= a.x
         assert beside or a.y + a.height <= b.y or b.y + b.height <= a.y
-
-
-@settings(deadline=None)  # a slow computer is no fault
-@given(diagrams())
-def test_wires_go_upright_or_level_from_port_to_port_around_the_boxes(shown: Diagram) -> None:
-    layout = Layout(shown)
-    routes = route(layout)
-    assert set(routes.points) == set(shown.wires)
-    for wire, points in routes.points.items():
+    corners = [(box.x, box.y) for box in boxes] + [(box.x + box.width, box.y + box.height) for box in boxes]
+    for wire in shown.wires:
         source, target = shown.boxes[wire.source], shown.boxes[wire.target]
-        assert points[0] == (source.x + source.width, layout.start(wire))
-        assert points[-1] == (target.x, layout.end(wire))
-        for (x0, y0), (x1, y1) in pairwise(points):
-            assert x0 == x1 or abs(y0 - y1) < 1.0  # px: what is drawn as straight may lean by less
-            for box in shown.boxes.values():
-                level = max(min(x0, x1), box.x) < min(max(x0, x1), box.x + box.width)
-                upright = max(min(y0, y1), box.y) < min(max(y0, y1), box.y + box.height)
-                through = box.x < x0 < box.x + box.width if x0 == x1 else box.y < y0 < box.y + box.height
-                assert not (through and (upright if x0 == x1 else level))
-
-
-@settings(deadline=None)  # a slow computer is no fault
-@given(diagrams())
-def test_all_is_inside_the_drawing(shown: Diagram) -> None:
-    routes = route(Layout(shown))
-    corners = [one for points in routes.points.values() for one in points]
-    corners += [(box.x + box.width, box.y + box.height) for box in shown.boxes.values()]
-    corners += [(box.x, box.y) for box in shown.boxes.values()]
-    assert all(0.0 <= x <= routes.width + 1e-9 and 0.0 <= y <= routes.height + 1e-9 for x, y in corners)
+        way = sampled(layout.way(wire))
+        start = (source.x + source.width, source.y + source.offset(source.right, wire.output))
+        assert np.allclose(
+            way[[0, -1]], [start, (target.x, target.y + target.offset(target.left, wire.input))]
+        )
+        corners += [(x, y) for x, y in way]
+        for box in boxes:
+            inside = (way > (box.x + 1e-6, box.y)) & (way < (box.x + box.width - 1e-6, box.y + box.height))
+            assert not inside.all(axis=1).any()
+    assert all(0.0 <= x <= layout.width and 0.0 <= y <= layout.height for x, y in corners)
 
 
 def test_wires_lead_to_the_right_but_for_those_that_close_a_ring() -> None:

@@ -9,7 +9,6 @@ import pytest
 from urmpipe_models.chains.chain import AXIS_TOLERANCE, Chain, Joint, Mimic
 from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.errors import RobotError
-from urmpipe_models.robots.robot_file import chain_to_dict
 from urmpipe_models.transform import Transform, translation
 
 
@@ -97,11 +96,6 @@ def test_a_chain_shows_itself_by_its_coordinates_and_a_row_a_joint() -> None:
         "<tr><td>d</td><td>fixed</td><td>-inf</td><td>inf</td></tr></table>"
     )
     assert repr(Chain("rod", (Joint("a"),))) == "<Chain rod: 1 coordinate (a)>"
-
-
-def test_a_chain_is_the_dictionary_of_its_robot_file() -> None:
-    chain = Chain("arm", (Joint("a"),))
-    assert chain.to_dict() == chain_to_dict(chain)
 
 
 def test_urm_modules_are_joints_about_z_and_a_tilted_effector() -> None:

@@ -317,18 +317,6 @@ def test_a_text_without_quotes_is_told_how_to_be_written(robot: Any) -> None:
     )
 
 
-@pytest.mark.parametrize(("value", "hint"), [("True", "; allowed: name = true"), ("1,5", ""), (".5", "")])
-def test_what_is_no_text_gets_no_quotes(robot: Any, value: str, hint: str) -> None:
-    (said,) = complaint(robot, f'kind = "urm"\nname = {value}')
-    assert said.startswith("arm.toml:2: not valid TOML: ")
-    assert said.endswith(f"){hint}")
-
-
-def test_toml_that_is_none_names_its_line(robot: Any) -> None:
-    (said,) = complaint(robot, 'kind = "dh"\nname = \n')
-    assert said.startswith("arm.toml:2: not valid TOML: ")
-
-
 def test_other_bytes_and_missing_files_are_one_line(tmp_path: Path) -> None:
     path = tmp_path / "arm.toml"
     with pytest.raises(RobotError) as caught:

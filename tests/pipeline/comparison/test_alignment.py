@@ -165,7 +165,7 @@ def test_positions_that_leave_the_rotation_open_are_refused(
     with pytest.raises(LogError) as error:
         aligned(pose_run(reference), pose_run(log, name="log"), "rigid")
     assert str(error.value) == (
-        f"log.csv: --align rigid: found {said}, which leaves the rotation open, allowed: start, tool, none"
+        f"log.csv: align: rigid: found {said}, which leaves the rotation open, allowed: start, tool, none"
     )
 
 
@@ -217,7 +217,7 @@ def test_samples_without_an_orientation_cannot_carry_a_tool_and_are_left_out() -
     found = result.runs[0]
     assert (found.left_out, len(found.sample), found.sample[0]) == (2, 198, 1)
     assert found.statistics["norm"].max < ROUNDING
-    assert [w.message for w in result.warnings] == ["log: 2 of 200 samples have no reference or no value"]
+    assert [w.message for w in result.warnings] == ["2 of 200 samples have no reference or no value"]
 
 
 @pytest.mark.parametrize("quat", [None, np.full((200, 4), np.nan)])
@@ -226,7 +226,7 @@ def test_a_tool_without_an_orientation_is_refused(quat: FloatArray | None) -> No
     with pytest.raises(LogError) as error:
         aligned(pose_run(position, turn.as_quat()), pose_run(position, quat, "log"), "tool")
     assert str(error.value) == (
-        "log.csv: --align tool: found no orientation of the log, allowed: joints with a --robot, or a"
+        "log.csv: align: tool: found no orientation of the log, allowed: joints with a robot, or a"
         " recorded orientation"
     )
 
@@ -237,8 +237,8 @@ def test_a_tool_that_hardly_turns_is_refused_since_a_base_explains_as_much() -> 
     with pytest.raises(LogError) as error:
         aligned(pose_run(position + SHIFT), pose_run(position, turned.as_quat(), "log"), "tool")
     assert str(error.value) == (
-        "log.csv: --align tool: found a tool that turns by 0.9000 deg in all, which any offset of the base"
-        " explains as well, allowed: a log that turns it; start, none"
+        "log.csv: align: tool: found a tool that turns by 0.9000 deg in all, which any offset of the"
+        " base explains as well, allowed: a log that turns it; start, none"
     )
 
 

@@ -280,10 +280,10 @@ def test_a_noise_is_of_all_lengths_or_of_kinds() -> None:
     )
     with pytest.raises(OptionError) as error:
         parse_noise("lots,angle=-1")
-    assert str(error.value) == (f"--noise: found 'lots', {allowed}\n--noise: found 'angle=-1', {allowed}")
+    assert str(error.value) == (f"noise: found 'lots', {allowed}\nnoise: found 'angle=-1', {allowed}")
     with pytest.raises(OptionError) as error:
         complete_noise({"axis": -1.0})
     assert str(error.value) == (
-        "--noise: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in rad"
+        "noise: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in rad"
         " (m of a joint that slides); 0 or positive"
     )

@@ -17,10 +17,10 @@ from urmpipe_models.kinematics.forward import point_over_log, positions_over_log
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit import audit_log
 from urmpipe_pipeline.runs.derivatives import derivatives
-from urmpipe_pipeline.runs.meshes import missing_visuals
 from urmpipe_pipeline.runs.results import Run
 
 URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
@@ -113,7 +113,7 @@ def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q: Floa
     assert deviation.left_out == 101
     assert 7 not in deviation.sample
     assert deviation.sample[-1] == 399
-    assert [w.message for w in result.warnings] == ["log: 101 of 500 samples have no reference or no value"]
+    assert [w.message for w in result.warnings] == ["101 of 500 samples have no reference or no value"]
 
 
 def test_an_offset_shifts_the_log_against_the_reference(q: FloatArray) -> None:
@@ -134,16 +134,18 @@ def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: 
     assert late.statistics["norm"].max < 1e-12  # the same samples
     assert (late.left_out, late.reference_left_out) == (51, 100)
     assert result.warnings == (
-        LogWarning("left-out", "log: 1 of 400 samples have no reference or no value"),
+        LogWarning("left-out", "1 of 400 samples have no reference or no value", about="log"),
         LogWarning(
             "not-covered",
-            "log: it covers 1.745 s of the 2.245 s of path (77.8 %) at the offset of 0.5 s: the rest was not"
-            " judged",
+            "it covers 1.745 s of the 2.245 s of path (77.8 %) at the offset of 0.5 s: the rest was"
+            " not judged",
+            about="log",
         ),
         LogWarning(
             "sync-left-out",
-            "log: the offset of 0.5 s leaves 50 of 400 samples and 100 of 450 samples of path without the"
+            "the offset of 0.5 s leaves 50 of 400 samples and 100 of 450 samples of path without the"
             " other side",
+            about="log",
         ),
     )
 
@@ -166,7 +168,7 @@ def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
         with pytest.raises(OptionError) as error:
             compare_recorded(log, CompareOptions(sync=sync))
         assert str(error.value) == (
-            f"--sync: found {sync} for one log, allowed: start, since its joints and its recorded tool centre"
+            f"sync: found {sync} for one log, allowed: start, since its joints and its recorded tool centre"
             " point stand in the same rows"
         )
 
@@ -205,8 +207,7 @@ def test_a_log_that_misses_a_path_for_want_of_a_tool_says_so(q: FloatArray) -> N
     (warning,) = result.warnings
     assert (warning.kind, warning.message) == (
         "recorded-tcp-tool",
-        "log: the kinematics of urm6 stay 150.0 mm (rms) from the recorded TCP,"
-        " but 0.00 mm with --tool 0.0000,0.0000,0.1500",
+        "the kinematics of urm6 stay 150.0 mm (rms) from the recorded TCP",
     )
     assert compare_runs(wanted, [bare], CompareOptions(tcp="recorded")).warnings == ()
     assert compare_runs(wanted, [arm_run(q)]).warnings == ()  # nothing was recorded that could tell
@@ -217,7 +218,7 @@ def test_a_path_held_against_a_log_is_told(q: FloatArray) -> None:
     (warning,) = compare_runs(arm_run(q), [path]).warnings
     assert (warning.kind, warning.message) == (
         "path-as-log",
-        "path: a path without joints, held against log, which has joints: the reference stands first, then"
+        "a path without joints, compared with log, which has joints: the reference comes first, then"
         " the logs",
     )
     assert compare_runs(path, [arm_run(q)]).warnings == compare_runs(path, [path]).warnings == ()
@@ -227,7 +228,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     with pytest.raises(LogError) as error:
         compare_runs(wanted, [arm_run(q, robot=None)])
-    assert str(error.value) == ("log.csv: no robot, so no forward kinematics; allowed: --robot NAME|FILE")
+    assert str(error.value) == ("log.csv: no robot, so no forward kinematics; robot=NAME|FILE gives one")
     with pytest.raises(LogError) as error:
         compare_recorded(arm_run(q))
     assert str(error.value) == (
@@ -235,7 +236,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     )
     doubt = LogWarning("tcp-not-read", "tcp_xx, tcp_yy look like a recorded TCP")
     with pytest.raises(
-        LogError, match=r"a reference before the log; tcp_xx, tcp_yy look like a recorded TCP$"
+        LogError, match=r"a reference before the log\nlog\.csv: tcp_xx, tcp_yy look like a recorded TCP$"
     ):
         compare_recorded(replace(run := arm_run(q), log=replace(run.log, warnings=(doubt,))))
     with pytest.raises(LogError) as error:
@@ -244,7 +245,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     with pytest.raises(OptionError) as option_error:
         CompareOptions({"axis": -1.0})
     assert str(option_error.value) == (
-        "--tolerance: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in"
+        "tolerance: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in"
         " rad (m of a joint that slides); positive"
     )
 
@@ -270,14 +271,14 @@ def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
 def test_an_unknown_tool_centre_point_is_refused() -> None:
     with pytest.raises(OptionError) as error:
         CompareOptions(tcp="x")  # type: ignore[arg-type]
-    assert str(error.value) == "--tcp: found x, allowed: fk, recorded"
+    assert str(error.value) == "tcp: found x, allowed: fk, recorded"
 
 
 def test_what_is_wrong_with_the_reference_is_told(q: FloatArray) -> None:
     doubt = LogWarning("assumed-unit", "taken as m", 3)
     reference = replace(path_run(positions_over_log(URM6, q)), warnings=(doubt,))
     result = compare_runs(reference, [arm_run(q)])
-    assert result.warnings == (LogWarning("assumed-unit", "path: taken as m", 3),)
+    assert result.warnings == (LogWarning("assumed-unit", "taken as m", 3, "path"),)
 
 
 def test_an_offset_that_no_clock_holds_is_refused() -> None:

@@ -13,17 +13,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from exported import export_result
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.export import ExportOptions, export_result
 from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables import ExportOptions
 
 METRES = 1e-12
 """Positions of some metres, turned and moved: some tens of rounding errors of 1e-15 m."""

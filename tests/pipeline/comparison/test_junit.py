@@ -17,9 +17,9 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, LogError, OutputError
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.junit import write_junit
-from urmpipe_pipeline.comparison.junit_errors import told_in_junit
 from urmpipe_pipeline.outputs import guarded_output
+from urmpipe_pipeline.results import present
+from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 
 Compared = Callable[..., Comparison]
 
@@ -32,7 +32,7 @@ def off(x: float, samples: int = 100) -> FloatArray:
 def written(result: Comparison, path: Path) -> ET.Element:
     """Write a JUnit file as the command does, and parse it."""
     with guarded_output(path, [], "junit") as part:
-        write_junit(result, part, path)
+        write_junit(present(result), part, path)
     root = ET.parse(path).getroot()
     assert_consumers_take_it(root)
     return root
@@ -108,8 +108,12 @@ def test_the_properties_are_the_statistics_bit_for_bit(arms: Compared, tmp_path:
 def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared, tmp_path: Path) -> None:
     result = arms({"a": np.full((20, 6), 0.01)}, tolerance={"axis": 1.0, "joint": 0.002})
     run = result.runs[0]
+    assert run.joint_delta is not None
     renamed = {"x": replace(run.joint_statistics["q1"], quantity="x")}
-    changed = replace(result, runs=(replace(run, joint_statistics=renamed),))
+    changed = replace(
+        result,
+        runs=(replace(run, joint_statistics=renamed, joint_turns=(0,), joint_delta=run.joint_delta[:, :1]),),
+    )
     cases = written(changed, tmp_path / "verdict.xml")[0].findall("testcase")
     assert [case.get("name") for case in cases] == ["x", "y", "z", "joint x"]
 
@@ -157,9 +161,9 @@ def test_the_warnings_of_a_log_stand_behind_its_cases(paths: Compared, tmp_path:
     result = paths({"short": off(0.001, 50), "long": off(0.001)}, tolerance={"norm": 0.15})
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
     covered = "it covers 0.245 s of the 0.495 s of path (50.0 %)"
-    for_all = "large-tolerance: a tolerance of 150 mm (norm) lets anything pass: 0.15 is in m; 0.15mm meant?"
-    for_all += " If not: --tolerance norm=0.15m"
-    assert told == [f"{for_all}\nnot-covered: short: {covered}: the rest was not judged", for_all]
+    for_all = "large-tolerance: a tolerance of 150 mm (norm) lets anything pass: 0.15 is in m;"
+    for_all += ' tolerance="norm=0.15mm" if mm was meant; tolerance="norm=0.15m" if not'
+    assert told == [f"not-covered: short: {covered}: the rest was not judged\n{for_all}", for_all]
     result = paths({"short": off(0.001, 50), "long": off(0.001)})
     told = [suite.findtext("system-out") for suite in written(result, tmp_path / "verdict.xml")]
     assert told == [f"not-covered: short: {covered}: the rest was not judged", None]
@@ -171,7 +175,7 @@ def test_what_could_not_be_compared_takes_the_place_of_a_verdict_from_before(
     path = tmp_path / "verdict.xml"
     written(paths({"a": off(0.0, 5)}), path)
     wrong = LogError(Finding("found 'x', allowed: a number", "a.csv", line=7, column="q1"), Finding("no arm"))
-    with pytest.raises(LogError), told_in_junit(path, []):
+    with pytest.raises(LogError), errors_in_junit(path, []):
         raise wrong
     root = ET.parse(path).getroot()
     assert_consumers_take_it(root)
@@ -190,10 +194,10 @@ def test_an_error_replaces_no_file_of_another_and_no_input(paths: Compared, tmp_
     other.write_text("<testsuites/>")
     for path, inputs in ((mine, [mine]), (other, []), (tmp_path / "nowhere" / "v.xml", [])):
         before = path.read_bytes() if path.exists() else None
-        with pytest.raises(LogError, match=r"^broken$"), told_in_junit(path, inputs):
+        with pytest.raises(LogError, match=r"^broken$"), errors_in_junit(path, inputs):
             raise LogError("broken")
         assert (path.read_bytes() if path.exists() else None) == before
-    with pytest.raises(LogError, match=r"^broken$"), told_in_junit(None, []):
+    with pytest.raises(LogError, match=r"^broken$"), errors_in_junit(None, []):
         raise LogError("broken")
 
 

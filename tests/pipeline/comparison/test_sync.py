@@ -1,4 +1,4 @@
-"""`--sync auto`: the offset between two clocks by the motion, and what is said where it does not tell."""
+"""`sync="auto"`: the offset between two clocks by the motion, and what is said where it does not tell."""
 
 from __future__ import annotations
 
@@ -25,7 +25,10 @@ from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 Motion = Callable[[FloatArray], FloatArray]
 
 JOINTS = tuple(f"q{k}" for k in range(1, 7))
-ALLOWED = "allowed: one motion that does not repeat itself, half of it in both; --sync SECONDS or start"
+ALLOWED = (
+    'allowed: one motion that does not repeat itself, half of it in both; sync="start" starts both'
+    " together; sync=SECONDS says the offset"
+)
 CLEAN = 1e-5
 """In [s]: a fiftieth of the tenth of a period of 5 ms that is asked for. Lines between samples 5 to 10 ms
 apart miss the motions here by 1e-4 of their size, and that is nearly orthogonal to the rate."""
@@ -111,7 +114,7 @@ def test_any_offset_between_two_logs_of_the_joints_is_found_or_too_little_is_in_
     try:
         sync = synchronise(reference, log, "auto")
     except LogError as error:
-        assert str(error).endswith(f"; {ALLOWED}")
+        assert str(error).endswith(f", {ALLOWED}")
         # A period of up to 0.1 s at either end, of 8 s in both, is cut off: 0.02 of the motion.
         assert shared(q, wanted, done) < 0.52
         return
@@ -258,10 +261,10 @@ def test_no_motion_tells_no_offset() -> None:
     still = np.ones((len(t), 6))
     moving, resting = joints(smooth(7, 6)(t), t, "wanted"), joints(still, t)
     assert refused(moving, resting) == (
-        f"log.csv: --sync auto: found no motion of the joints in this log; {ALLOWED}"
+        f"log.csv: sync: auto: found no motion of the joints in this log, {ALLOWED}"
     )
     assert refused(resting, moving) == (
-        f"wanted.csv: --sync auto: found no motion of the joints in log; {ALLOWED}"
+        f"wanted.csv: sync: auto: found no motion of the joints in log, {ALLOWED}"
     )
     one, other = np.random.default_rng(1).normal(scale=1e-4, size=(2, len(t), 6))
     assert "found no likeness of the joints" in refused(joints(one, t), joints(other, t))
@@ -271,8 +274,8 @@ def test_a_motion_that_repeats_itself_names_the_offsets() -> None:
     t = times(0.0, 10.0, 0.005)
     swing = np.column_stack([np.sin(np.pi * t), np.cos(np.pi * t)])  # every 2 s
     assert refused(joints(swing, t, "wanted"), joints(swing[100:], t[100:])) == (
-        "log.csv: --sync auto: found a motion of the joints that several offsets to wanted explain alike"
-        " (similarity): 0.5 s (1.000), -1.5 s (1.000), 2.5 s (1.000), -3.5 s (1.000), 4.5 s (1.000);"
+        "log.csv: sync: auto: found a motion of the joints that several offsets to wanted explain alike"
+        " (similarity): 0.5 s (1.000), -1.5 s (1.000), 2.5 s (1.000), -3.5 s (1.000), 4.5 s (1.000),"
         f" {ALLOWED}"
     )
 
@@ -288,8 +291,8 @@ def test_a_steady_motion_tells_no_offset_but_its_ramps_do() -> None:
     t = times(0.0, 10.0, 0.005)
     steady = joints(np.outer(t, [1.0, -0.5]), t, "wanted")
     said = refused(steady, joints(np.outer(t, [1.0, -0.5]), t))
-    assert said.startswith("log.csv: --sync auto: found no clear best offset to wanted by the joints: about ")
-    assert said.endswith(f" s with a similarity of 1.000; {ALLOWED}")
+    assert said.startswith("log.csv: sync: auto: found no clear best offset to wanted by the joints: about ")
+    assert said.endswith(f" s with a similarity of 1.000, {ALLOWED}")
     ramp = np.outer(np.clip(t - 2.0, 0.0, 6.0), [1.0, -0.5])
     assert synchronise(joints(ramp, t), joints(ramp[50:], t[50:]), "auto").offset == 0.25
 
@@ -304,8 +307,8 @@ def test_a_turn_on_a_circle_tells_an_offset_only_where_the_frames_are_known() ->
 def test_two_motions_without_likeness_are_told() -> None:
     t = times(0.0, 20.0, 0.005)
     said = refused(joints(smooth(8, 6)(t), t, "wanted"), joints(smooth(9, 6)(t), t))
-    assert said.startswith("log.csv: --sync auto: found no likeness of the joints to wanted: ")
-    assert said.endswith(f" at best, 0.8 is needed; {ALLOWED}")
+    assert said.startswith("log.csv: sync: auto: found no likeness of the joints to wanted: ")
+    assert said.endswith(f" at best, 0.8 is needed, {ALLOWED}")
 
 
 def test_random_motions_are_not_taken_for_each_other() -> None:
@@ -314,7 +317,7 @@ def test_random_motions_are_not_taken_for_each_other() -> None:
         make = (smooth, moves)[seed % 2]
         for side, channels in ((joints, 6), (path, 3)):
             one, other = (side(make(1000 + 2 * seed + k, channels)(t), t) for k in (0, 1))
-            assert refused(one, other).startswith("log.csv: --sync auto: found no ")
+            assert refused(one, other).startswith("log.csv: sync: auto: found no ")
 
 
 def test_logs_without_samples_to_speak_of_are_refused() -> None:
@@ -324,7 +327,7 @@ def test_logs_without_samples_to_speak_of_are_refused() -> None:
     for log in (joints(q[:1], t[:1]), joints(np.full_like(q, np.nan), t)):
         assert "found no motion of the joints in this log" in refused(whole, log)
     for rows in (2, 3, 5):
-        assert refused(whole, joints(q[:rows], t[:rows])).startswith("log.csv: --sync auto: found ")
+        assert refused(whole, joints(q[:rows], t[:rows])).startswith("log.csv: sync: auto: found ")
 
 
 def test_a_log_without_two_values_in_a_row_has_no_rates() -> None:
@@ -335,7 +338,7 @@ def test_a_log_without_two_values_in_a_row_has_no_rates() -> None:
     crossed[::2, 0] = crossed[1::4, 1] = np.nan  # each joint has rates, but never both
     for log in (holes, crossed):
         assert refused(joints(q, t, "wanted"), joints(log, t)) == (
-            f"log.csv: --sync auto: found no offset at which the joints move as in wanted; {ALLOWED}"
+            f"log.csv: sync: auto: found no offset at which the joints move as in wanted, {ALLOWED}"
         )
 
 
@@ -345,13 +348,15 @@ def test_what_is_not_known_well_is_told() -> None:
     assert sync_doubts("log", Sync("auto", 0.25, "joints", 0.00084, 0.85), 0.005) == [
         LogWarning(
             "sync-uncertain",
-            "log: the offset of 0.25 s, estimated by the joints, is known to +-0.84 ms (standard error); the"
-            " period is 5 ms",
+            "the offset of 0.25 s, estimated by the joints, is known to +-0.84 ms (standard error);"
+            " the period is 5 ms",
+            about="log",
         ),
         LogWarning(
             "sync-unlike",
-            "log: the offset of 0.25 s, estimated by the joints, leaves the two motions alike by 0.85 only,"
+            "the offset of 0.25 s, estimated by the joints, leaves the two motions alike by 0.85 only,"
             " of 1: are they one motion?",
+            about="log",
         ),
     ]
 
@@ -389,9 +394,9 @@ def test_the_offsets_of_the_demo_logs_are_found(demo: dict[str, Trajectory]) -> 
 
 def test_an_arm_that_counts_one_joint_backwards_makes_another_motion(demo: dict[str, Trajectory]) -> None:
     assert refused(demo["path"], demo["counter_rotating"]) == (
-        "counter_rotating.csv: --sync auto: found no likeness of the position to path: -1.36 s with a"
-        f" similarity of 0.598 at best, 0.8 is needed; {ALLOWED}"
+        "counter_rotating.csv: sync: auto: found no likeness of the position to path: -1.36 s with a"
+        f" similarity of 0.598 at best, 0.8 is needed, {ALLOWED}"
     )
-    assert "counter_rotating.csv: --sync auto: found no clear best offset to coppeliasim by the joints" in (
+    assert "counter_rotating.csv: sync: auto: found no clear best offset to coppeliasim by the joints" in (
         refused(demo["coppeliasim"], demo["counter_rotating"])
     )

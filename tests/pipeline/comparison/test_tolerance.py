@@ -91,27 +91,30 @@ def test_a_degree_is_that_of_pi() -> None:
 def test_what_is_no_tolerance_is_one_line(part: str, said: str) -> None:
     with pytest.raises(OptionError) as error:
         parse_tolerance(part)
-    assert str(error.value) == f"--tolerance: found {said}, {ALLOWED}"
+    assert str(error.value) == f"tolerance: found {said}, {ALLOWED}"
 
 
 def test_an_angle_alone_and_a_decimal_comma_are_told_how_to_be_written() -> None:
     with pytest.raises(OptionError) as error:
         parse_tolerance("0.5deg")
-    assert str(error.value) == (f"--tolerance: found '0.5deg', {ALLOWED}; here angle=0.5deg or joint=0.5deg")
+    assert str(error.value) == (
+        f"tolerance: found '0.5deg', {ALLOWED};"
+        ' tolerance="angle=0.5deg" or tolerance="joint=0.5deg" says of what'
+    )
     with pytest.raises(OptionError) as error:
         parse_tolerance("3,5mm")
-    assert str(error.value) == ("--tolerance: found '3,5mm', allowed: a point before the decimals, 3.5mm")
+    assert str(error.value) == ("tolerance: found '3,5mm', allowed: a point before the decimals, 3.5mm")
 
 
 def test_everything_that_is_wrong_is_told_at_once() -> None:
     with pytest.raises(OptionError) as error:
-        parse_tolerance("1mm, foo=2, axis=3mm,norm=x,,norm=4mm,norm=5mm", "--noise")
+        parse_tolerance("1mm, foo=2, axis=3mm,norm=x,,norm=4mm,norm=5mm", "noise")
     assert [str(one) for one in error.value.findings] == [
-        f"--noise: found 'foo=2', {ALLOWED}",
-        f"--noise: found 'axis=3mm' twice, {ALLOWED}",
-        f"--noise: found 'norm=x', {ALLOWED}",
-        f"--noise: found '', {ALLOWED}",
-        f"--noise: found 'norm=5mm' twice, {ALLOWED}",
+        f"noise: found 'foo=2', {ALLOWED}",
+        f"noise: found 'axis=3mm' twice, {ALLOWED}",
+        f"noise: found 'norm=x', {ALLOWED}",
+        f"noise: found '', {ALLOWED}",
+        f"noise: found 'norm=5mm' twice, {ALLOWED}",
     ]
 
 
@@ -125,12 +128,12 @@ def test_a_tolerance_in_numbers_is_checked_whole() -> None:
     with pytest.raises(OptionError) as error:
         check_tolerance({"foo": 1.0, "axis": 0.0, "norm": math.nan, "path": "1mm"})  # type: ignore[dict-item]
     assert [str(one) for one in error.value.findings] == [
-        f"--tolerance: found {found}, {NUMBERS}; positive"
+        f"tolerance: found {found}, {NUMBERS}; positive"
         for found in ("foo=1.0", "axis=0.0", "norm=nan", "path=1mm")
     ]
     with pytest.raises(OptionError) as error:
         check_tolerance({})
-    assert str(error.value) == f"--tolerance: found nothing, {NUMBERS}"
+    assert str(error.value) == f"tolerance: found nothing, {NUMBERS}"
 
 
 def test_a_coordinate_goes_before_the_axes_and_a_joint_of_that_name_does_not() -> None:

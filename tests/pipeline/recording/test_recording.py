@@ -20,9 +20,9 @@ from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import Inference, LogColumn, LogWarning, SourceFile
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.recording import read_recording, record, write_recording
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Result
 
@@ -302,19 +302,6 @@ def test_progress_is_told_up_to_one(make_run: MakeRun, tmp_path: Path) -> None:
     assert shares == sorted(shares)
     assert len(shares) > 8
     assert (shares[0] > 0.0, shares[-1]) == (True, 1.0)
-
-
-def test_what_is_written_early_counts_as_progress(make_run: MakeRun, tmp_path: Path) -> None:
-    run = replace(make_run(rows=10), robot=None, tcp=None)
-    shares: list[float] = []
-
-    def make(early: Callable[[JointLog | Run], None]) -> Run:
-        early(run.log)
-        early(run)
-        return run
-
-    record(make, tmp_path / "run.rrd", progress=shares.append)
-    assert shares == [1.0]
 
 
 def test_a_recording_is_replaced_by_a_new_one(

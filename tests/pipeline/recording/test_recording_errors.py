@@ -16,10 +16,11 @@ import rerun as rr
 
 from urmpipe_models.errors import OutputError, RecordingError
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import is_ours, is_recording, read_recording, write_recording
-from urmpipe_pipeline.recording.entities import LAYOUT_VERSION, blocks
-from urmpipe_pipeline.recording.metadata import to_json
+from urmpipe_pipeline.recording import is_ours, is_recording
+from urmpipe_pipeline.recording.codec import encode
+from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store, document
 from urmpipe_pipeline.recording.verify import verify
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
@@ -36,13 +37,13 @@ def trouble(path: Path) -> str:
 
 
 def foreign(path: Path, application: str, *properties: rr.AnyValues, rows: int = 3) -> Path:
-    """Write a recording with Rerun alone: joints/raw and joints/repolarized of two joints, and properties."""
+    """Write a recording with Rerun alone: two arrays of two columns, and properties."""
     with rr.RecordingStream(application, send_properties=False) as stream:
         stream.save(path)
         for one in properties:
             stream.send_property("urmpipe", one)
-        for entity in ("/joints/raw", "/joints/repolarized"):
-            times = [rr.TimeColumn("t", duration=np.arange(rows).astype("timedelta64[ns]"))]
+        for entity in ("/q", "/log/q"):
+            times = [rr.TimeColumn("row", sequence=np.arange(1, rows + 1))]
             stream.send_columns(entity, times, rr.Scalars.columns(scalars=np.ones((rows, 2))))
     return path
 
@@ -101,55 +102,77 @@ def test_a_recording_without_metadata(tmp_path: Path) -> None:
     assert trouble(path) == "found a recording without urmpipe's metadata, allowed: one that urmpipe wrote"
 
 
-def test_a_recording_of_a_newer_layout(tmp_path: Path) -> None:
-    newer = rr.AnyValues(metadata=json.dumps({"layout_version": 99, "something": "new"}))
-    path = foreign(tmp_path / "newer.rrd", "urmpipe", newer)
-    assert trouble(path) == "found layout version 99, allowed: up to 5; a newer urmpipe wrote it"
+MADE_BY = {"provenance": {"command": "compare", "inputs": [{"name": "asked.csv"}, {"name": "log.csv"}]}}
+"""What recordings of all layouts have said of where they come from."""
 
 
-@pytest.mark.parametrize(("kind", "known"), [("run", 4), ("comparison", 4), ("simulation", 5)])
-def test_each_kind_has_a_newest_layout_of_its_own(tmp_path: Path, kind: str, known: int) -> None:
-    """A run of layout 5 is of a newer urmpipe, though simulations of layout 5 are known."""
-    newer = rr.AnyValues(metadata=json.dumps({"layout_version": known + 1, "kind": kind}))
-    path = foreign(tmp_path / "newer.rrd", "urmpipe", newer)
-    assert trouble(path) == (
-        f"found layout version {known + 1}, allowed: up to {known}; a newer urmpipe wrote it"
+@pytest.mark.parametrize(
+    ("version", "said", "again"),
+    [
+        (
+            4,
+            MADE_BY,
+            "an older urmpipe wrote it: make it again: urmpipe compare asked.csv log.csv and its options",
+        ),
+        (5, {"provenance": []}, "an older urmpipe wrote it: make it again from what it was made of"),
+        (99, None, "a newer urmpipe wrote it: make it again from what it was made of"),
+    ],
+)
+def test_a_recording_of_another_layout_says_how_to_make_it_again(
+    version: int, said: object, again: str, tmp_path: Path
+) -> None:
+    other = rr.AnyValues(
+        metadata=json.dumps({"layout_version": version, "kind": "comparison", "result": said})
     )
-
-
-def test_a_recording_of_an_older_layout(tmp_path: Path) -> None:
-    older = rr.AnyValues(metadata=json.dumps({"layout_version": LAYOUT_VERSION - 1}))
-    path = foreign(tmp_path / "older.rrd", "urmpipe", older)
-    assert trouble(path) == (
-        f"found layout version {LAYOUT_VERSION - 1}, allowed: {LAYOUT_VERSION}; an older urmpipe wrote it:"
-        " make it again from its log"
-    )
+    path = foreign(tmp_path / "other.rrd", "urmpipe", other)
+    assert trouble(path) == f"found layout version {version}, allowed: {LAYOUT_VERSION}; {again}"
 
 
 @pytest.mark.parametrize(
     ("metadata", "reason"),
     [
+        ("{", "found damaged metadata (JSONDecodeError("),
+        ("[]", "found damaged metadata (TypeError("),
+        ("{}", "found damaged metadata (KeyError('layout_version'))"),
+        (document("", {}), "found a result of kind '', allowed: run, comparison, simulation"),
+        (document("run", None), "found damaged metadata, /: found None, allowed: Run"),
+        (document("run", {"name": 1}), "found damaged metadata, /name: found 1, allowed: str"),
         (
-            "{",
-            "JSONDecodeError('Expecting property name enclosed in double quotes: line 1 column 2 (char 1)')",
+            document("run", {"name": "a"}),
+            "found damaged metadata, /: found None, allowed: the field log of Run",
         ),
-        ("[]", "TypeError('list indices must be integers or slices, not str')"),
-        ("{}", "KeyError('layout_version')"),
-        ('{"layout_version": 4, "kind": "run"}', "KeyError('arrays')"),
-        ('{"layout_version": 4, "kind": "run", "arrays": {}, "result": {"place": {"key": 1}}}', None),
     ],
 )
-def test_a_recording_with_damaged_metadata(tmp_path: Path, metadata: str, reason: str | None) -> None:
+def test_a_recording_with_damaged_metadata(tmp_path: Path, metadata: str, reason: str) -> None:
     message = trouble(foreign(tmp_path / "bad.rrd", "urmpipe", rr.AnyValues(metadata=metadata)))
-    assert message.startswith(f"found damaged metadata ({reason or 'TypeError('}")
-    assert message.endswith("), allowed: what urmpipe wrote")
+    assert message.startswith(reason)
 
 
-def test_a_recording_with_other_arrays_than_were_written(make_run: MakeRun, tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("rows", "said"),
+    [
+        (2, "found 0 of 3 rows in /log/t_ns, allowed: all as were written"),
+        (3, "found 0 of 3 rows in /log/t_ns, allowed: all as were written"),
+    ],
+)
+def test_a_recording_without_an_array(make_run: MakeRun, rows: int, said: str, tmp_path: Path) -> None:
     """As `rerun rrd optimize` leaves it when the end of the data is lost."""
-    run = make_run(rows=3)
-    path = foreign(tmp_path / "less.rrd", "urmpipe", rr.AnyValues(metadata=to_json(run, blocks(run))), rows=2)
-    assert trouble(path) == "found 2 x 2 values in /joints/raw, allowed: 3 x 6, as were written"
+    metadata = document("run", encode(make_run(rows=3)).tree)
+    path = foreign(tmp_path / "less.rrd", "urmpipe", rr.AnyValues(metadata=metadata), rows=rows)
+    assert trouble(path) == said
+
+
+def test_an_array_of_another_size_or_type_is_one_line(tmp_path: Path) -> None:
+    store = Store(foreign(tmp_path / "a.rrd", "urmpipe", rr.AnyValues(metadata="{}"), rows=3))
+    double = np.dtype(np.float64)
+    assert store.read("/q", 0, 3, (2,), double).tolist() == [[1.0, 1.0]] * 3
+    for width, rows, dtype, said in (
+        ((2,), 4, double, "found 3 of 4 rows in /q"),
+        ((3,), 3, double, "found damaged data in /q: cannot reshape"),
+        ((2,), 3, np.dtype(np.int64), "found damaged data in /q: values of type float64 instead of int64"),
+    ):
+        with pytest.raises(RecordingError, match=said):
+            store.read("/q", 0, rows, width, dtype)
 
 
 @pytest.fixture
@@ -180,7 +203,7 @@ from pathlib import Path
 sys.path.insert(0, sys.argv[1])
 import conftest
 from urmpipe_models.errors import OutputError
-from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.results import write_recording
 try:
     write_recording(conftest.build_run(rows=5), Path(sys.argv[2]))
 except OutputError as error:
@@ -213,33 +236,31 @@ def test_rerun_is_not_imported_before_it_is_needed(tmp_path: Path) -> None:
 
 
 def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp_path: Path) -> None:
-    """The first, the last and the worst sample of each array, the number of rows, and the metadata."""
+    """The first, the middle and the last row of each array, the number of rows, and the metadata."""
     comparison = make_comparison(("coppeliasim",), rows=70_000)
     path = write_recording(comparison, tmp_path / "one.rrd")
-    every = blocks(comparison)
-    metadata = to_json(comparison, every)
-    verify(path, path, every, metadata)
-    worst = comparison.runs[0].worst
-    assert 0 < worst < 69_999
-    altered = []
-    rows = iter((0, 69_999, worst))
-    for block in every:
-        values = block.values.copy()
-        if block.entity == "/joints/raw":
-            altered.append(replace(block, t_ns=block.t_ns[:-1], values=values[:-1]))
-        elif block.entity in ("/joints/velocity", "/tcp/position", "/delta/coppeliasim"):
+    found = encode(comparison)
+    metadata = document("comparison", found.tree)
+    verify(path, path, found.columns, metadata)
+    altered, rows = [], iter((0, 69_999, 35_000))
+    for column in found.columns:
+        values = column.values.copy()
+        if column.at == "/runs/coppeliasim/run/log/q":
+            values = values[:-1]
+        elif column.at.endswith(("/qd", "/tcp/position", "/coppeliasim/delta")):
             values[next(rows), 0] += 1e-12
-            altered.append(replace(block, values=values))
-        else:
-            altered.append(block)
+        altered.append(replace(column, values=values))
     with pytest.raises(OutputError) as caught:
         verify(path, Path("name.rrd"), altered, "{}")
     assert str(caught.value).splitlines() == [
-        "name.rrd: reads back otherwise than written: the metadata",
-        "name.rrd: reads back otherwise than written: /joints/raw has 70000 rows of 69999",
-        "name.rrd: reads back otherwise than written: /joints/velocity in row 0",
-        "name.rrd: reads back otherwise than written: /tcp/position in row 69999",
-        f"name.rrd: reads back otherwise than written: /delta/coppeliasim in row {worst}",
+        f"name.rrd: reads back otherwise than written: {one}"
+        for one in (
+            "the metadata",
+            "/runs/coppeliasim/run/log/q has 70000 rows of 69999",
+            "/runs/coppeliasim/run/qd in row 1",
+            "/runs/coppeliasim/run/tcp/position in row 70000",
+            "/runs/coppeliasim/delta in row 35001",
+        )
     ]
 
 
@@ -247,9 +268,19 @@ def test_what_cannot_be_read_back_is_named(make_run: MakeRun, tmp_path: Path) ->
     run = make_run(rows=5)
     path = write_recording(run, tmp_path / "one.rrd")
     path.write_bytes(path.read_bytes()[:-20])
-    every = blocks(run)
+    found = encode(run)
     with pytest.raises(OutputError) as caught:
-        verify(path, Path("name.rrd"), every, to_json(run, every))
+        verify(path, Path("name.rrd"), found.columns, document("run", found.tree))
     assert str(caught.value).startswith(
         "name.rrd: could not be read back: found a recording that was cut off"
     )
+
+
+def test_what_could_not_be_read_back_is_not_written(make_run: MakeRun, tmp_path: Path) -> None:
+    run = replace(make_run(rows=5), tsp="5 ms")
+    with pytest.raises(OutputError) as caught:
+        write_recording(run, tmp_path / "one.rrd")
+    assert (
+        str(caught.value) == f"{tmp_path / 'one.rrd'}: cannot be recorded: /tsp: found '5 ms', allowed: float"
+    )
+    assert list(tmp_path.iterdir()) == []

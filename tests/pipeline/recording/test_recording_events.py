@@ -11,8 +11,8 @@ import numpy as np
 from recording_contents import columns
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
-from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]

@@ -13,15 +13,15 @@ from rerun.chunk import RrdReader
 
 from recording_contents import views
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.entities import places_of
-from urmpipe_pipeline.recording.eye import FIELD_OF_VIEW, FILLED, WIDE
 from urmpipe_pipeline.recording.layout import eye_and_target, viewer_layout
 from urmpipe_pipeline.recording.plots import SHARED_AXIS, Plots
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.shown_units import MARGIN, span_with_numbers
 from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, FILLED, WIDE
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]

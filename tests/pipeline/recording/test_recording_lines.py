@@ -14,9 +14,9 @@ from rerun.chunk import RrdReader
 from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import JOINT_COLOURS, REFERENCE_COLOUR, run_colour
-from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.scene import scene_of
 from urmpipe_pipeline.recording.ways import DASHES, LEAST_DASH, MOST
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
@@ -93,4 +93,4 @@ def test_there_is_no_scene_without_positions(make_run: MakeRun, tmp_path: Path) 
     assert scene_of(run).empty
     path = write_recording(run, tmp_path / "run.rrd")
     entities = {chunk.entity_path.split("/")[1] for chunk in RrdReader(path).store().stream()}
-    assert entities == {"__properties", "events", "joints", "marks", "summary"}
+    assert entities == {"__properties", "events", "log", "marks", "q", "qd", "qdd", "summary"}

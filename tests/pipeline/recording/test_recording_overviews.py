@@ -11,8 +11,8 @@ from rerun.chunk import RrdReader
 
 from recording_contents import columns, times_of, views
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.overview import LONG, ROWS, SPEED_ROWS
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
@@ -26,12 +26,12 @@ def test_a_long_array_has_an_overview_that_keeps_every_extreme(
     path = write_recording(comparison, tmp_path / "long.rrd")
     one = comparison.runs[0]
     arrays = {
-        "/joints/raw": one.run.log.q, "/joints/repolarized": one.run.q, "/delta/coppeliasim": 1e3 * one.delta,
-        "/matched/coppeliasim/speed": one.speed[:, np.newaxis],
+        "run/log/q": one.run.log.q, "run/q": one.run.q, "delta": 1e3 * one.delta,
+        "speed": one.speed[:, np.newaxis],
     }  # fmt: skip
     for entity, values in arrays.items():
-        few = np.array(columns(path, f"/overview{entity}", "Scalars:scalars"))
-        times = times_of(path, f"/overview{entity}")
+        few = np.array(columns(path, f"/overview/runs/coppeliasim/{entity}", "Scalars:scalars"))
+        times = times_of(path, f"/overview/runs/coppeliasim/{entity}")
         assert len(few) <= ROWS
         np.testing.assert_array_equal(few, values[np.searchsorted(one.run.t_ns, times)])
         np.testing.assert_array_equal(few.min(axis=0), values.min(axis=0))
@@ -49,13 +49,13 @@ def test_deviations_are_plotted_with_all_their_rows_in_the_units_of_the_summary(
     one = comparison.runs[0]
     assert one.angle is not None and one.joint_delta is not None
     wanted = {
-        "/delta/coppeliasim": 1e3 * one.delta,
-        "/matched/coppeliasim/path": 1e3 * one.path[:, np.newaxis],
-        "/matched/coppeliasim/angle": np.degrees(one.angle)[:, np.newaxis],
-        "/matched/coppeliasim/joints": np.degrees(one.joint_delta),
+        "delta": 1e3 * one.delta,
+        "path": 1e3 * one.path[:, np.newaxis],
+        "angle": np.degrees(one.angle)[:, np.newaxis],
+        "joint_delta": np.degrees(one.joint_delta),
     }
     for entity, values in wanted.items():
-        found = np.array(columns(path, f"/overview{entity}", "Scalars:scalars"))
+        found = np.array(columns(path, f"/overview/runs/coppeliasim/{entity}", "Scalars:scalars"))
         np.testing.assert_allclose(found, values, rtol=1e-15)  # a rounding of pi / 180
 
 
@@ -68,7 +68,7 @@ def test_a_long_path_has_an_overview_of_its_positions(make_run: MakeRun, tmp_pat
         run, log=log, robot=None, tcp=None, q=none, qd=none, qdd=none, tcp_recorded=position, audit=()
     )
     file = write_recording(path, tmp_path / "path.rrd")
-    few = np.array(columns(file, "/overview/tcp/recorded", "Scalars:scalars"))
+    few = np.array(columns(file, "/overview/log/tcp_position", "Scalars:scalars"))
     assert len(few) <= ROWS
     np.testing.assert_array_equal(few.max(axis=0), position.max(axis=0))
     assert "Recorded TCP [m], every peak of 50,001 rows" in views(file)["ViewBlueprint:display_name"]

@@ -20,17 +20,16 @@ from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.transform import rotation_x, translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.wording import amount_words
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.meshes import drawable, missing_visuals
 from urmpipe_pipeline.recording.bodies import bodies_over_log, lacks_shapes
 from urmpipe_pipeline.recording.enlarged import LEAST_SEEN
 from urmpipe_pipeline.recording.scene import Mark, scene_of
 from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import kinematics
-from urmpipe_pipeline.runs.meshes import drawable, missing_visuals
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
@@ -98,7 +97,7 @@ def test_meshes_are_in_the_recording_and_not_in_its_metadata(
     blob = column(path, "/robot/joint/turn3/visual\\ 1", "Asset3D:blob")
     assert bytes(blob.reshape(-1).astype(np.uint8)) == mesh.read_bytes()
     told = json.loads(Store(path).metadata)["result"]["robot"]["visuals"][3]
-    assert (told["mesh"], told["scale"]) == (str(mesh), [1.0, 1.0, 1.0])
+    assert told["shape"] == {"$is": "Mesh", "file": str(mesh), "scale": [1.0, 1.0, 1.0]}
 
 
 def test_an_arm_read_back_looks_as_it_did_and_without_its_meshes_has_lines(
@@ -216,7 +215,7 @@ def test_the_deviation_is_drawn_fifty_times_as_large(make_comparison: MakeCompar
     np.testing.assert_array_equal(way.strips[0], one.reference + 50 * (one.actual - one.reference))
     rows = np.searchsorted(one.sample, way.track.sample)
     np.testing.assert_array_equal(way.track.position, way.strips[0][rows])
-    assert decided_row(one) in rows
+    assert one.decided_at in rows
 
 
 def test_of_several_runs_only_the_deviation_of_the_one_whose_arm_stands_there_is_enlarged(
@@ -266,7 +265,7 @@ def test_the_place_that_decides_has_its_size_and_its_time(
 ) -> None:
     comparison = make_comparison(("one",))
     (one,) = comparison.runs
-    decisive, row = one.decisive, decided_row(one)
+    decisive, row = one.decisive, one.decided_at
     assert decisive.quantity == "x" and row != one.worst
     assert abs(one.delta[row, 0]) == decisive.max
     x, y, z = one.actual[row].tolist()

@@ -23,7 +23,6 @@ from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
 from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.recording import read_recording, write_recording
 from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
 from urmpipe_pipeline.recording.overview import LONG
 from urmpipe_pipeline.recording.plots import Plots
@@ -33,6 +32,7 @@ from urmpipe_pipeline.recording.simulation_summary import simulation_summary
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.viewer import opening_times
 from urmpipe_pipeline.recording.writer import SLICE
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.signal_groups import Group
 from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation

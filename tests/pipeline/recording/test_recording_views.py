@@ -14,10 +14,10 @@ from rerun.chunk import RrdReader
 from recording_contents import columns, packed, times_of
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR
-from urmpipe_pipeline.recording import write_recording
 from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.summary import summary
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry, AuditKind
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]
@@ -27,17 +27,17 @@ MakeComparison = Callable[..., Comparison]
 def test_series_have_the_names_and_colours_of_the_joints(make_run: MakeRun, tmp_path: Path) -> None:
     run = make_run(rows=50)
     path = write_recording(run, tmp_path / "run.rrd")
-    for entity in ("raw", "repolarized", "velocity", "acceleration"):
-        assert columns(path, f"/joints/{entity}", "SeriesLines:names") == [list(run.log.joints)]
+    for entity in ("/log/q", "/q", "/qd", "/qdd"):
+        assert columns(path, entity, "SeriesLines:names") == [list(run.log.joints)]
         wanted = [packed(colour) for colour in JOINT_COLOURS[:6]]
-        assert columns(path, f"/joints/{entity}", "SeriesLines:colors") == [wanted]
+        assert columns(path, entity, "SeriesLines:colors") == [wanted]
     assert columns(path, "/tcp/euler_zyx", "SeriesLines:names") == [["rz", "ry", "rx"]]
 
 
 def test_peaks_are_drawn_where_samples_are_closer_than_pixels(make_run: MakeRun, tmp_path: Path) -> None:
     path = write_recording(make_run(rows=50), tmp_path / "run.rrd")
     wanted = rr.components.AggregationPolicy.MinMax.value
-    assert columns(path, "/joints/raw", "SeriesLines:aggregation_policy") == [[wanted]]
+    assert columns(path, "/log/q", "SeriesLines:aggregation_policy") == [[wanted]]
 
 
 def test_a_colour_is_an_axis_whatever_the_order(make_run: MakeRun, tmp_path: Path) -> None:
@@ -52,9 +52,9 @@ def test_each_tolerance_stands_in_the_plot_of_its_unit(
 ) -> None:
     allowed = {"axis": 0.0035, "z": 0.002, "norm": 0.005, "path": 0.003, "angle": 0.01, "joint": 0.02}
     path = write_recording(replace(make_comparison(rows=50), tolerance=allowed), tmp_path / "both.rrd")
-    assert columns(path, "/delta/coppeliasim", "SeriesLines:names") == [["x", "y", "z", "norm"]]
+    assert columns(path, "/runs/coppeliasim/delta", "SeriesLines:names") == [["x", "y", "z", "norm"]]
     wanted = [packed(colour) for colour in AXIS_COLOURS.values()]
-    assert columns(path, "/delta/matlab", "SeriesLines:colors") == [wanted]
+    assert columns(path, "/runs/matlab/delta", "SeriesLines:colors") == [wanted]
     turned = math.degrees(0.01)
     lines = {
         "delta/axis": ([3.5, -3.5], ["+tolerance 3.5 mm", "-tolerance 3.5 mm"], REFERENCE_COLOUR),
@@ -135,7 +135,7 @@ def test_the_one_sample_of_a_log_is_a_point(make_run: MakeRun, tmp_path: Path) -
     """The viewer draws no line through it."""
     run = make_run(rows=1)
     path = write_recording(run, tmp_path / "one.rrd")
-    for entity in ("/joints/raw", "/joints/repolarized"):
+    for entity in ("/log/q", "/q"):
         assert columns(path, entity, "SeriesPoints:names") == [list(run.log.joints)]
         assert columns(path, entity, "SeriesPoints:colors") == [[packed(c) for c in JOINT_COLOURS[:6]]]
         assert columns(path, entity, "SeriesLines:names") == []
@@ -161,17 +161,16 @@ def test_a_line_through_the_sample_that_decides_stands_in_every_plot(
         np.testing.assert_allclose(columns(path, entity, "Scalars:scalars"), ends, rtol=1e-15)  # pi / 180
 
 
-def test_times_are_exact_and_samples_count_from_zero(make_run: MakeRun, tmp_path: Path) -> None:
+def test_times_are_exact_and_rows_count_from_one(make_run: MakeRun, tmp_path: Path) -> None:
     path = write_recording(make_run(rows=40_000), tmp_path / "run.rrd")
-    found: dict[str, list[int]] = {"t": [], "sample": [], "row": []}
-    for entity in ("/joints/repolarized", "/joints/raw"):
+    found: dict[str, list[int]] = {"t": [], "row": []}
+    for entity in ("/q", "/log/q"):
         for chunk in RrdReader(path).store().stream().filter(content=entity, is_static=False):
             batch = chunk.to_record_batch()
             for name in set(found) & set(batch.schema.names):
                 found[name] += batch.column(name).cast("int64").to_pylist()
     assert sorted(found["t"]) == sorted([*range(0, 200_000_000_000, 5_000_000)] * 2)
-    assert sorted(found["sample"]) == list(range(40_000))
-    assert sorted(found["row"]) == list(range(1, 40_001))
+    assert sorted(found["row"]) == sorted([*range(1, 40_001)] * 2)
 
 
 def test_nothing_stands_on_the_clock_of_the_writer(make_comparison: MakeComparison, tmp_path: Path) -> None:

@@ -9,7 +9,8 @@ from pathlib import Path
 import pytest
 
 from urmpipe_models.errors import ViewerError
-from urmpipe_pipeline.recording import viewer, write_recording
+from urmpipe_pipeline.recording import viewer
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 
 MakeRun = Callable[..., Run]

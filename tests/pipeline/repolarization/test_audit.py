@@ -14,8 +14,8 @@ from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.repolarizer import FULL_TURN
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.joint_log import JointLog, LogColumn
-from urmpipe_pipeline.recording import read_recording, write_recording
 from urmpipe_pipeline.repolarization.audit import LISTED, Audited, audit_log
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method, derivatives
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.sources import ReadOptions
@@ -70,7 +70,7 @@ def test_a_wrap_an_unexplained_step_and_an_in_between_sample_stand_in_the_audit(
         ("large-step", 31, f"q1 steps by more than 90 deg from the value before, to {q[30]:.6g} rad, which"
          " is no wrap: it stays"),
         ("in-between", 21, f"q1 lies between the ends of a wrap, {abs(between.step):.4g} rad off the line of"
-         " its neighbours, where a linear resampling left it: --repair puts it there"),
+         " its neighbours, where a linear resampling left it"),
     ]  # fmt: skip
 
 
@@ -125,7 +125,7 @@ def test_findings_are_capped_and_counted() -> None:
     found = audit_log(log_of(q))
     assert len(found.entries) == 99
     assert len(found.warnings) == LISTED + 1
-    assert found.warnings[-1].message == "91 more steps that are no wraps; ingest --audit FILE.csv lists all"
+    assert found.warnings[-1].message == "91 more steps that are no wraps"
 
 
 @pytest.mark.parametrize(
@@ -155,8 +155,8 @@ def test_jumps_of_one_and_of_two_turns_in_one_joint_are_asked_for() -> None:
     with pytest.raises(LogError) as error:
         audit_log(log_of(q))
     assert str(error.value) == (
-        "log, column q1: found 2 steps of about 4 pi and 2 of about 2 pi, allowed: wraps of one interval; say"
-        " which with --interval q1=LOW:HIGH"
+        "log, column q1: found 2 steps of about 4 pi and 2 of about 2 pi, allowed: wraps of one"
+        ' interval; interval={"q1": (LOW, HIGH)} says which'
     )
     assert len(audit_log(log_of(q), interval={"q1": (-FULL_TURN, FULL_TURN)}).entries) == 4
 
@@ -186,8 +186,9 @@ def test_an_interval_holds_for_one_joint_or_for_all_in_the_unit_of_the_file() ->
         audit_log(log, interval={"": (-90.0, 90.0)})
     outside = [np.flatnonzero(np.abs(column / DEG) > 90.0018) for column in q.T]
     assert str(error.value).splitlines() == [
-        f"log, column {name}: found {len(rows)} values outside, first {q[rows[0], j] / DEG:.6g} deg in row"
-        f" {rows[0] + 1}, allowed: -90..90 deg (--interval)"
+        f"log, row {rows[0] + 1}, column {name}: interval: found {len(rows)} values outside, first"
+        f" {q[rows[0], j] / DEG:.6g} deg in row"
+        f" {rows[0] + 1}, allowed: -90..90 deg"
         for j, (name, rows) in enumerate(zip(("q1", "q2"), outside, strict=True))
     ]
 
@@ -195,10 +196,10 @@ def test_an_interval_holds_for_one_joint_or_for_all_in_the_unit_of_the_file() ->
 @pytest.mark.parametrize(
     ("interval", "said"),
     [
-        ({"": (1.0, 1.0)}, f"--interval: found 1:1, {ALLOWED}"),
-        ({"q1": (0.0, math.inf)}, f"--interval: found q1=0:inf, {ALLOWED}"),
-        ({"": (math.nan, 1.0)}, f"--interval: found nan:1, {ALLOWED}"),
-        ({"q7": (0.0, 6.0)}, "--interval: found q7, allowed: joints that turn: q1"),
+        ({"": (1.0, 1.0)}, f"interval: found 1:1, {ALLOWED}"),
+        ({"q1": (0.0, math.inf)}, f"interval: found q1=0:inf, {ALLOWED}"),
+        ({"": (math.nan, 1.0)}, f"interval: found nan:1, {ALLOWED}"),
+        ({"q7": (0.0, 6.0)}, "interval: found q7, allowed: joints that turn: q1"),
     ],
 )  # fmt: skip
 def test_intervals_that_make_no_sense_are_refused(
@@ -287,12 +288,12 @@ def test_an_interval_that_is_no_whole_turns_is_told() -> None:
     assert [(warning.kind, warning.message) for warning in found.warnings] == [
         (
             "interval",
-            "q1: the interval -180..180 rad is 57.2958 turns wide: angles wrap by whole turns; check the unit"
-            " and --interval",
+            "q1: the interval -180..180 rad is 57.2958 turns wide: angles wrap by whole turns; check"
+            " the unit and the interval",
         )
     ]
     both = log_of(np.column_stack([wrap(moving())] * 3))
-    said = "turns wide: angles wrap by whole turns; check the unit and --interval"
+    said = "turns wide: angles wrap by whole turns; check the unit and the interval"
     told = audit_log(both, interval={"": (-180.0, 180.0), "q2": (-90.0, 90.0)}).warnings
     assert [warning.message for warning in told] == [
         f"q1, q3: the interval -180..180 rad is 57.2958 {said}",

@@ -10,12 +10,15 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.report import render_report
+from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
+from urmpipe_pipeline.presentation.section import Presentation, Section
+from urmpipe_pipeline.report import render_report, spec
 from urmpipe_pipeline.report.page import lay_out
-from urmpipe_pipeline.report.spec import Figure
+from urmpipe_pipeline.results import present
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
@@ -68,20 +71,20 @@ def browser() -> Iterator[Browser]:
 
 
 @pytest.fixture(scope="module")
-def shown(comparison: Comparison, bare_run: Run) -> list[Run | Comparison]:
+def shown(comparison: Comparison, bare_run: Run) -> list[Presentation]:
     """A comparison and a log of which only the joints are known."""
-    return [comparison, bare_run]
+    return [present(comparison), present(bare_run)]
 
 
 @pytest.fixture(scope="module")
-def report(shown: list[Run | Comparison], tmp_path_factory: pytest.TempPathFactory) -> Path:
+def report(shown: list[Presentation], tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("report") / "report.html"
     path.write_text(render_report(shown), encoding="utf-8")
     return path
 
 
 @pytest.fixture(scope="module")
-def figures(shown: list[Run | Comparison]) -> list[Figure]:
+def figures(shown: list[Presentation]) -> list[spec.Figure]:
     """Every figure of the page, from the top."""
     return [figure for _, figure in lay_out(shown).figures]
 
@@ -121,24 +124,41 @@ def sideways(page: Page) -> int:
     return int(page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
 
 
-def test_a_simulation_is_drawn_and_its_drawing_runs_no_script(
+def test_a_drawing_is_seen_and_runs_no_script(
     browser: Browser, make_simulation: Callable[..., Simulation], tmp_path: Path
 ) -> None:
     script = "<script>alert(1)</script><rect onclick='alert(2)' width='9' height='9'/></svg>"
     sound = make_simulation(3000)
     svg = sound.system_svg.replace("<svg ", "<svg onload='alert(3)' ").replace("</svg>", script)
     path = tmp_path / "simulation.html"
-    path.write_text(render_report([replace(sound, system_svg=svg)]), encoding="utf-8")
+    path.write_text(render_report([present(replace(sound, system_svg=svg))]), encoding="utf-8")
     with opened(browser, path) as page:
         scroll_through(page)
         image = page.locator(".drawing img")
         assert image.evaluate("image => [image.complete, image.naturalWidth]") == [True, 640]
         image.click()
+    with opened(browser, path, width=390, phone=True) as page:
+        scroll_through(page)
+        assert sideways(page) == 0
+
+
+def test_small_figures_stand_side_by_side(browser: Browser, tmp_path: Path) -> None:
+    t_ns = np.arange(100, dtype=np.int64) * 10_000_000
+    line = Line(np.sin(t_ns / 1e8), ("wave",), ("#c25000",))
+    small = Figure(
+        "Wave", "A wave.", "A wave over time.", (View("wave", (Panel("wave", "m", (line,), t_ns),)),)
+    )
+    two, one = Section("two", figures=lambda: [small, small]), Section("one", figures=lambda: [small])
+    toy = Presentation("toy", "it is", None, (), Section("toy", sections=(two, one)))
+    path = tmp_path / "toy.html"
+    path.write_text(render_report([toy]), encoding="utf-8")
+    with opened(browser, path) as page:
+        scroll_through(page)
         plots = page.locator(".pairs .plot")
         first, second, alone = (box for box in (plots.nth(k).bounding_box() for k in range(3)) if box)
-        assert first["y"] == second["y"]  # the two plots of the meter, side by side
+        assert first["y"] == second["y"]
         assert first["x"] + first["width"] <= second["x"]
-        assert alone["width"] == second["x"] + second["width"] - first["x"]  # the only one of its block
+        assert alone["width"] == second["x"] + second["width"] - first["x"]  # the only one of its part
     with opened(browser, path, width=390, phone=True) as page:
         scroll_through(page)
         assert sideways(page) == 0
@@ -159,7 +179,7 @@ def test_the_verdict_is_seen_first(browser: Browser, report: Path) -> None:
 
 
 def test_figures_are_drawn_before_anybody_scrolls(
-    browser: Browser, report: Path, figures: list[Figure]
+    browser: Browser, report: Path, figures: list[spec.Figure]
 ) -> None:
     """So a picture of the whole page has no empty box."""
     spaces = sum(figure.space for figure in figures)
@@ -210,7 +230,7 @@ def test_the_pointer_tells_the_number_that_the_table_has(
         plot.locator(".hoverlayer .legend, .hoverlayer .hovertext").first.wait_for()
         said = plot.locator(".hoverlayer").text_content() or ""
         assert "t = " in said
-        (row,) = page.locator("#c1-1 tr", has=page.locator("th[scope=row]", has_text="‖Δ‖")).all()
+        (row,) = page.locator("#r1-1 tr", has=page.locator("th[scope=row]", has_text="‖Δ‖")).all()
         (largest,) = [cell for cell in row.locator("td").all_inner_texts() if cell == f"{one.max * 1e3:.4f}"][
             :1
         ]
@@ -228,7 +248,7 @@ def test_nothing_offers_to_send_the_data_away(browser: Browser, report: Path) ->
 
 
 def test_time_axes_of_a_log_are_linked(browser: Browser, report: Path) -> None:
-    own = '.plot[data-link="c1-1"]:not(.space)'
+    own = '.plot[data-link="r1-1"]:not(.space)'
     ranges = """[...document.querySelectorAll(".plot:not(.space)")]
         .map(p => [p.dataset.link, p.layout.xaxis.range])"""
     with opened(browser, report) as page:
@@ -241,8 +261,8 @@ def test_time_axes_of_a_log_are_linked(browser: Browser, report: Path) -> None:
             f"[...document.querySelectorAll('{own}')].every(p => p.layout.xaxis.range[0] === 5)"
         )
         after = page.evaluate(ranges)
-        assert [one for one in after if one[0] == "c1-1"] == [["c1-1", [5, 9]]] * siblings
-        assert [one for one in after if one[0] != "c1-1"] == [one for one in before if one[0] != "c1-1"]
+        assert [one for one in after if one[0] == "r1-1"] == [["r1-1", [5, 9]]] * siblings
+        assert [one for one in after if one[0] != "r1-1"] == [one for one in before if one[0] != "r1-1"]
 
 
 def open_all(page: Page) -> None:
@@ -254,7 +274,7 @@ def test_a_phone_shows_it_without_sideways_scroll(
     browser: Browser, everything: Comparison, bare_run: Run, tmp_path: Path
 ) -> None:
     path = tmp_path / "report.html"
-    path.write_text(render_report([everything, bare_run]), encoding="utf-8")
+    path.write_text(render_report([present(everything), present(bare_run)]), encoding="utf-8")
     with opened(browser, path, width=390, phone=True) as page:
         open_all(page)
         scroll_through(page)
@@ -307,10 +327,11 @@ def test_a_keyboard_reaches_the_links_and_what_is_folded(browser: Browser, repor
 def test_a_card_leads_to_its_part(browser: Browser, report: Path, comparison: Comparison) -> None:
     with opened(browser, report) as page:
         names = [name.strip() for name in page.locator(".card h3 a").all_inner_texts()]
-        assert names == [run.name for run in comparison.ranking]
-        page.locator(".card h3 a").last.click()
-        part = page.locator("#c1-2")
-        assert part.locator("h3").inner_text().startswith(names[-1])
+        worst, best = (run.name for run in reversed(comparison.ranking))
+        assert names == [worst, best, "Log bare"]
+        page.locator(".card h3 a").first.click()
+        part = page.locator("#r1-2")
+        assert part.locator("h3").inner_text().startswith(worst)
         box = part.bounding_box()
         assert box is not None
         assert 0 <= box["y"] < 200
@@ -357,7 +378,7 @@ def test_without_scripts_the_numbers_are_there(browser: Browser, report: Path) -
 
 def test_hostile_texts_do_nothing(browser: Browser, hostile: Comparison, tmp_path: Path) -> None:
     path = tmp_path / "hostile.html"
-    path.write_text(render_report([hostile, hostile.runs[0].run]), encoding="utf-8")
+    path.write_text(render_report([present(hostile), present(hostile.runs[0].run)]), encoding="utf-8")
     with opened(browser, path) as page:
         scroll_through(page)
         assert page.locator("img, b").count() == 0
@@ -365,4 +386,4 @@ def test_hostile_texts_do_nothing(browser: Browser, hostile: Comparison, tmp_pat
         assert hostile.runs[0].run.log.joints[0] in legend
         names = {plot.get_attribute("data-name") or "" for plot in page.locator(".plot").all()}
         assert all(re.fullmatch(r"[a-z0-9-]+", name) for name in names)
-        assert hostile.name in page.locator("#c1 > h2").inner_text()
+        assert hostile.name in page.locator("#r1 > h2").inner_text()

@@ -21,6 +21,7 @@ from urmpipe_pipeline.report import FigureOptions, headless, write_report
 from urmpipe_pipeline.report.figure_files import figure_stem, write_figures
 from urmpipe_pipeline.report.page import lay_out
 from urmpipe_pipeline.report.spec import Figure
+from urmpipe_pipeline.results import present
 
 CHROMIUM = Path("/usr/bin/chromium")
 SVG = "{http://www.w3.org/2000/svg}"
@@ -66,9 +67,9 @@ def test_a_name_is_one_that_every_system_takes(title: str, part: str, stem: str)
 
 
 def test_formats_are_svg_and_png(tmp_path: Path) -> None:
-    with pytest.raises(OptionError, match=r"^--format: found pdf, allowed: svg, png, both$"):
+    with pytest.raises(OptionError, match=r"^format: found pdf, allowed: svg, png, both$"):
         FigureOptions(tmp_path, ("pdf",))  # type: ignore[arg-type]
-    with pytest.raises(OptionError, match=r"^--format: found nothing, allowed: svg, png, both$"):
+    with pytest.raises(OptionError, match=r"^format: found nothing, allowed: svg, png, both$"):
         FigureOptions(tmp_path, ())
 
 
@@ -90,7 +91,7 @@ def test_a_file_is_no_folder(figure: Figure, tmp_path: Path) -> None:
     path.write_text("mine")
     with pytest.raises(OutputError) as caught:
         write_figures([("log", figure)], FigureOptions(path))
-    assert str(caught.value) == f"{path}: --figures: found a file, allowed: a folder"
+    assert str(caught.value) == f"{path}: figures: found a file, allowed: a folder"
 
 
 def test_without_kaleido_one_line_says_how_to_install_it(
@@ -110,7 +111,9 @@ def test_without_a_browser_one_line_says_so_and_no_report_is_written(
     pytest.importorskip("kaleido")
     monkeypatch.setenv("BROWSER_PATH", str(tmp_path / "nowhere"))
     with pytest.raises(OutputError) as caught:
-        write_report([comparison], tmp_path / "report.html", figures=FigureOptions(tmp_path / "figures"))
+        write_report(
+            [present(comparison)], tmp_path / "report.html", figures=FigureOptions(tmp_path / "figures")
+        )
     assert str(caught.value) == headless.NO_BROWSER
     assert list(tmp_path.iterdir()) == []
 
@@ -121,7 +124,7 @@ def folder(comparison: Comparison, tmp_path_factory: pytest.TempPathFactory) -> 
     pytest.importorskip("kaleido")
     folder = tmp_path_factory.mktemp("report") / "figures"
     one = replace(comparison, runs=comparison.runs[:1])
-    written = write_report([one], folder.parent / "report.html", figures=FigureOptions(folder))
+    written = write_report([present(one)], folder.parent / "report.html", figures=FigureOptions(folder))
     assert {file.path for file in written.figures} == set(folder.iterdir())
     assert {file.part for file in written.figures} >= {"shifted"}
     return folder
@@ -160,7 +163,7 @@ def test_a_png_is_whole_twice_as_fine_and_not_blank(folder: Path) -> None:
 
 @drawn
 def test_spaces_in_3d_are_drawn(comparison: Comparison, folder: Path) -> None:
-    page = lay_out([replace(comparison, runs=comparison.runs[:1])])
+    page = lay_out([present(replace(comparison, runs=comparison.runs[:1]))])
     spaces = [figure_stem(figure.title, part) for part, figure in page.figures if figure.space]
     assert spaces
     for stem in spaces:

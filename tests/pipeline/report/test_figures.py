@@ -1,389 +1,377 @@
-"""The figures are what plotly.js understands, and hold the data of the results."""
+"""Figures of a presentation become what plotly.js understands, and hold the data with every peak and mark."""
 
 from __future__ import annotations
 
 import base64
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import plotly.graph_objects as go
 import pytest
 
-from urmpipe_models.arrays import FloatArray
-from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
+from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, run_colour
-from urmpipe_pipeline.report import gallery
-from urmpipe_pipeline.report.figures_deviation import deviation_figure, pose_figure, speed_figure
-from urmpipe_pipeline.report.figures_motion import motion_figure
-from urmpipe_pipeline.report.figures_overview import overview_figure
-from urmpipe_pipeline.report.figures_repolarization import joints_figure, point_figure
-from urmpipe_pipeline.report.paths import path_figure, repolarized_path_figure
-from urmpipe_pipeline.report.spec import Figure
-from urmpipe_pipeline.runs.playback import play_back
+from urmpipe_pipeline.presentation.figure import (
+    Drawing,
+    Figure,
+    Line,
+    Mark,
+    Over,
+    Panel,
+    SpaceFigure,
+    Text,
+    View,
+)
+from urmpipe_pipeline.presentation.scene import Path, Spot
+from urmpipe_pipeline.presentation.section import Block, Fact, Presentation, Section
+from urmpipe_pipeline.report import spec
+from urmpipe_pipeline.report.figures import drawn_figures, span_of
+from urmpipe_pipeline.report.page import Image, Listing, Page, lay_out
+from urmpipe_pipeline.report.space import drawn_space
+from urmpipe_pipeline.results import present
 from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
+
+RED, BLUE = "#c25000", "#21c3ff"
+COUNT = 3000  # more than a drawn line has points
+T_NS: IntArray = np.arange(COUNT, dtype=np.int64) * 5_000_000
+T = T_NS / 1e9
+WAVE: FloatArray = 0.004 * np.sin(T)
 
 
-def numbers(spec: dict[str, Any]) -> FloatArray:
+def numbers(array: dict[str, Any]) -> FloatArray:
     """The array that plotly.js reads from a typed one."""
-    values = np.frombuffer(base64.b64decode(spec["bdata"]), f"<{spec['dtype']}").astype(np.float64)
-    return values.reshape([int(n) for n in spec["shape"].split(",")]) if "shape" in spec else values
+    values = np.frombuffer(base64.b64decode(array["bdata"]), f"<{array['dtype']}").astype(np.float64)
+    return values.reshape([int(n) for n in array["shape"].split(",")]) if "shape" in array else values
 
 
-def all_figures(comparison: Comparison) -> list[Figure]:
-    found = gallery.comparison_figures(comparison)
-    for deviation in comparison.runs:
-        found += gallery.deviation_figures(deviation) + gallery.run_figures(deviation.run)
+def panel(values: FloatArray, title: str = "Δx", unit: str = "m", **more: Any) -> Panel:
+    columns = 1 if values.ndim == 1 else values.shape[1]
+    names = (title,) if columns == 1 else tuple("xyz"[:columns])
+    return Panel(title, unit, (Line(values, names, (RED, BLUE, RED)[:columns]),), **({"t_ns": T_NS} | more))
+
+
+def figure(*panels: Panel, **more: Any) -> Figure:
+    return Figure("Title", "Caption.", "Alt.", (View("view", panels),), **more)
+
+
+def drawn(one: Figure) -> spec.Figure:
+    (found,) = drawn_figures(one, span_of([one]))
+    go.Figure(found.spec)  # raises on an unknown word or a wrong value
     return found
 
 
-def trace(figure: Figure, name: str) -> dict[str, Any]:
+def trace(found: spec.Figure, name: str) -> dict[str, Any]:
     """The one trace of a figure that is called so."""
-    (found,) = [one for one in figure.spec["data"] if one.get("name") == name]
-    return dict(found)
+    (one,) = [one for one in found.spec["data"] if one.get("name") == name]
+    return dict(one)
 
 
-def by_title(found: list[Figure], start: str) -> Figure:
-    """The one figure whose title starts so."""
-    (figure,) = [figure for figure in found if figure.title.startswith(start)]
-    return figure
+def shapes(found: spec.Figure, axis: str) -> list[dict[str, Any]]:
+    return [one for one in found.spec["layout"]["shapes"] if one.get("yref") == axis]
 
 
-def assert_drawn(spec: dict[str, Any], t: FloatArray, values: FloatArray) -> None:
-    """Assert that a line holds samples of some values at their own times, the extremes among them."""
-    at, drawn = numbers(spec["x"]), numbers(spec["y"])
-    places = np.searchsorted(t, at)
-    np.testing.assert_array_equal(t[places], at)
-    exact = values[places]
-    # single precision at most: 24 bits of mantissa
-    np.testing.assert_allclose(drawn, exact, rtol=2**-24, atol=0)
-    assert np.nanmax(exact) == np.nanmax(values)
-    assert np.nanmin(exact) == np.nanmin(values)
+def levels(found: spec.Figure, axis: str = "y") -> list[float]:
+    return [one["y0"] for one in shapes(found, axis) if one["type"] == "line"]
 
 
-TITLES = [
-    "Deviation and speed over time",
-    "Path in space",
-    "Deviation of orientation and joints",
-    "Deviation over speed",
-    "Motion of the tool centre point",
-    "Joints before and after repolarization",
-    "Tool centre point before and after repolarization",
-    "Path in space before and after repolarization",
-]
+def page_of(*blocks: Block, sections: tuple[Section, ...] = (), **more: Any) -> Page:
+    section = Section("toy", blocks=lambda: blocks, sections=sections, **more)
+    return lay_out([Presentation("toy", "it is", None, (), section)])
 
 
-def test_the_gallery_of_each_kind_of_log(comparison: Comparison, bare_run: Run) -> None:
-    assert [one.title for one in gallery.comparison_figures(comparison)] == ["Deviation of all logs"]
-    single = replace(comparison, runs=comparison.runs[:1])
-    assert gallery.comparison_figures(single) == []
-    deviation = comparison.runs[0]
-    assert [one.title for one in gallery.deviation_figures(deviation)] == TITLES
-    assert [one.title for one in gallery.run_figures(deviation.run)] == [*TITLES[5:], TITLES[4], TITLES[1]]
-    assert [one.title for one in gallery.run_figures(bare_run)] == ["Joints before and after repolarization"]
-    calm = replace(bare_run, audit=())
-    (joints,) = gallery.run_figures(calm)
-    assert joints.title == "Joints"
-    assert joints.caption == "No joint had to be repolarized: they are as in the file."
-    assert_drawn(trace(joints, "phi1"), calm.t, calm.q[:, 0])
+def test_a_line_keeps_its_extremes_and_its_times() -> None:
+    found = trace(drawn(figure(panel(WAVE, small=True))), "Δx")
+    at = np.searchsorted(T, numbers(found["x"]))
+    np.testing.assert_array_equal(T[at], numbers(found["x"]))
+    # single precision: 24 bits of mantissa
+    np.testing.assert_allclose(numbers(found["y"]), 1e3 * WAVE[at], rtol=2**-23, atol=0)
+    assert len(at) <= 2000
+    assert {int(np.argmax(WAVE)), int(np.argmin(WAVE))} <= set(at)
+    assert found["hovertemplate"] == "%{y:.4f} mm"
 
 
-def test_plotly_accepts_every_figure(comparison: Comparison, hostile: Comparison, bare_run: Run) -> None:
-    found = [*all_figures(comparison), *all_figures(hostile), *gallery.run_figures(bare_run)]
-    # both logs together, each as compared and as ingested; a log without a jump; joints alone
-    assert len(found) == 1 + 2 * (8 + 5) + 6 + 3 + 1
-    for figure in found:
-        go.Figure(figure.spec)  # raises on an unknown word or a wrong value
-
-
-def test_the_drawn_deviation_is_that_of_the_tables_with_its_tolerance(comparison: Comparison) -> None:
-    deviation = comparison.runs[1]
-    figure = deviation_figure(deviation)
-    names = (("Δx", "x"), ("Δy", "y"), ("Δz", "z"), ("‖Δ‖", "norm"), ("path", "path"))
-    for (name, quantity), values in zip(names, [*deviation.delta.T, deviation.path], strict=True):
-        drawn = trace(figure, name)
-        assert_drawn(drawn, deviation.t, values * 1e3)
-        statistics = deviation.statistics[quantity]
-        said = f"{np.abs(numbers(drawn['y'])).max():.4f}"
-        assert drawn["hovertemplate"] == "%{y:.4f} mm"
-        assert said == text.millimetres(statistics.max)
-        assert f"{name} {said} mm at {text.seconds(statistics.t_max)} s" in figure.alt
-        assert len(numbers(drawn["y"])) < len(deviation.t)
-    assert_drawn(trace(figure, "speed"), deviation.t, deviation.speed)
-    shapes = figure.spec["layout"]["shapes"]
-    levels = sorted(shape["y0"] for shape in shapes if shape["type"] == "line" and shape["yref"] == "y")
-    assert levels == [-3.5, 3.5]
-    assert f"Out of tolerance: {text.percent(deviation.share_out)} of the samples." in figure.alt
-
-
-@pytest.fixture(scope="module")
-def strict(comparison: Comparison) -> Deviation:
-    """The log whose joint is 1 deg off, held against a tolerance of each kind."""
-    first, second = (deviation.run for deviation in comparison.runs)
-    given = CompareOptions(tolerance={"x": 0.004, "norm": 0.009, "angle": 0.015, "joint": 0.01})
-    (found,) = compare_runs(first, [second], given).runs
-    return found
-
-
-def test_where_a_quantity_is_out_of_tolerance_is_tinted(strict: Deviation) -> None:
-    shapes = deviation_figure(strict).spec["layout"]["shapes"]
-    for axis, values, tolerance in (
-        ("y domain", np.abs(strict.delta[:, 0]), 0.004),
-        ("y4 domain", strict.delta[:, 3], 0.009),
-    ):
-        spans = [(shape["x0"], shape["x1"]) for shape in shapes if shape["yref"] == axis]
-        assert spans
-        outside = values > tolerance
-        tinted = np.any([(strict.t >= start) & (strict.t <= end) for start, end in spans], axis=0)
-        assert tinted[outside].all()
-        # What is tinted besides lies in a gap below a two-hundredth of the 15 s.
-        away = np.abs(strict.t[tinted][:, np.newaxis] - strict.t[outside]).min(axis=1)
-        assert away.max() < 15 / 400
-    assert not [shape for shape in shapes if shape["yref"] == "y2 domain"]
-
-
-def test_angle_and_joints_are_drawn_in_degrees_with_their_tolerances(strict: Deviation) -> None:
-    figure = pose_figure(strict)
-    assert figure is not None
-    assert strict.angle is not None
-    assert strict.joint_delta is not None
-    assert_drawn(trace(figure, "angle"), strict.t, np.degrees(strict.angle))
-    colours = []
-    for name, values in zip(strict.run.log.joints, strict.joint_delta.T, strict=True):
-        drawn = trace(figure, name)
-        at = np.searchsorted(strict.t, numbers(drawn["x"]))
-        # factor and single precision: two roundings
-        np.testing.assert_allclose(numbers(drawn["y"]), np.degrees(values)[at], rtol=1e-7, atol=1e-15)
-        colours.append(drawn["line"]["color"])
-    assert colours == list(JOINT_COLOURS[:6])
-    assert numbers(trace(figure, "phi2")["y"]).min() == pytest.approx(-1.0, abs=1e-6)
-    levels = {shape["y0"] for shape in figure.spec["layout"]["shapes"] if shape["type"] == "line"}
-    assert levels == {np.degrees(0.015), np.degrees(0.01), -np.degrees(0.01)}
-    assert f"phi2 {np.degrees(strict.joint_statistics['phi2'].max):.4f} deg" in figure.alt
-
-
-def test_lengths_of_joints_stand_in_a_panel_of_their_own(strict: Deviation) -> None:
-    slide = replace(strict.joint_statistics["phi6"], unit="m")
-    mixed = replace(
-        strict,
-        joint_statistics=strict.joint_statistics | {"phi6": slide},
-        statistics={name: one for name, one in strict.statistics.items() if name != "angle"},
-        angle=None,
-    )
-    figure = pose_figure(mixed)
-    assert figure is not None
-    layout = figure.spec["layout"]
-    titles = [layout[axis]["title"]["text"] for axis in ("yaxis", "yaxis2")]
-    assert titles == ["Δ joints [mm]", "Δ joints [deg]"]
-    assert trace(figure, "phi6")["yaxis"] == "y"
-    assert figure.title == "Deviation of joints"
-    assert pose_figure(replace(mixed, joint_statistics={}, joint_delta=None)) is None
-
-
-def test_each_point_over_speed_is_a_sample_and_the_worst_is_there(comparison: Comparison) -> None:
-    deviation = comparison.runs[1]
-    figure = speed_figure(deviation)
-    assert figure is not None
-    (cloud,) = figure.spec["data"]
-    at = np.searchsorted(deviation.t, numbers(cloud["customdata"]))
-    assert deviation.worst in at
-    assert len(at) in (1500, 1501)
-    np.testing.assert_allclose(numbers(cloud["x"]), deviation.speed[at], rtol=2**-24)
-    np.testing.assert_allclose(numbers(cloud["y"]), deviation.delta[at, 3] * 1e3, rtol=2**-24)
-    assert {one.over for one in gallery.deviation_figures(deviation)} == {"t", "v"}
-    assert figure.over == "v"
-    silent = replace(deviation, speed=np.full(len(deviation.t), np.nan))
-    assert speed_figure(silent) is None
+def test_uneven_times_keep_more_points() -> None:
+    t_ns = np.sort(np.concatenate([T_NS, 7_000_000_000 + np.arange(3000, dtype=np.int64)]))
+    values = np.where((t_ns > 7e9) & (t_ns < 7e9 + 2000), 1.0, 0.0)
+    found = trace(drawn(figure(panel(values, t_ns=t_ns, small=True))), "Δx")
+    assert 2000 < len(numbers(found["y"])) <= 4000
+    assert numbers(found["y"]).max() == 1e3
 
 
 @pytest.mark.parametrize(
-    ("r", "said"),
+    ("unit", "small", "title", "factor"),
     [
-        (0.95, "r = +0.950: the deviation grows strongly with the speed, as a lag in time makes it grow."),
-        (-0.5, "r = -0.500: the deviation shrinks moderately with the speed."),
-        (0.25, "r = +0.250: the deviation grows weakly with the speed, as a lag in time makes it grow."),
-        (0.1, "r = +0.100: the deviation does not go with the speed."),
-        (None, "The norm or the speed does not change, so nothing can be said of how they go together."),
+        ("m", True, "Δx [mm]", 1e3), ("m", False, "Δx [m]", 1.0), ("rad", True, "Δx [deg]", 180 / np.pi),
+        ("rad", False, "Δx [rad]", 1.0), ("m/s2", False, "Δx [m/s²]", 1.0), ("", False, "Δx [-]", 1.0),
     ],
-)
-def test_the_correlation_is_said_in_words(comparison: Comparison, r: float | None, said: str) -> None:
-    figure = speed_figure(replace(comparison.runs[0], speed_correlation=r))
-    assert figure is not None
-    assert said in figure.caption
-    assert said in figure.alt
+)  # fmt: skip
+def test_deviations_are_drawn_in_millimetres_and_degrees_and_places_in_si(
+    unit: str, small: bool, title: str, factor: float
+) -> None:
+    found = drawn(figure(panel(WAVE, unit=unit, small=small)))
+    assert found.spec["layout"]["yaxis"]["title"]["text"] == title
+    most = numbers(trace(found, "Δx")["y"]).max()
+    assert most == pytest.approx(factor * WAVE.max(), rel=2**-23)
 
 
-def test_the_motion_is_the_run_s(comparison: Comparison) -> None:
-    run = comparison.runs[0].run
-    figure = motion_figure(run)
-    assert figure is not None
-    assert run.tcp is not None
-    for symbol, values in (("p", run.tcp.position), ("v", run.tcp.velocity), ("a", run.tcp.acceleration)):
-        for i, axis in enumerate("xyz"):
-            drawn = trace(figure, f"{symbol}{axis}")
-            assert_drawn(drawn, run.t, values[:, i])
-            assert drawn["line"]["color"] == AXIS_COLOURS[axis]
-    assert_drawn(trace(figure, "‖a‖"), run.t, np.linalg.norm(run.tcp.acceleration, axis=1))
-    layout = figure.spec["layout"]
-    titles = [layout[f"yaxis{k}"]["title"]["text"] for k in ("", "2", "3", "4")]
-    assert titles == ["p7 [m]", "v [m/s]", "a [m/s²]", "rz, ry, rx [rad]"]
-    fastest = np.linalg.norm(run.tcp.velocity, axis=1).max()
-    assert f"its speed reaches {fastest:.4f} m/s" in figure.alt
+def test_a_unit_that_people_prefer_is_taken_where_it_measures_the_same() -> None:
+    for wanted, factor in (("deg", 180 / np.pi), ("mm", 1.0), ("nonsense", 1.0)):
+        found = trace(drawn(figure(panel(WAVE, unit="rad", display_unit=wanted))), "Δx")
+        assert numbers(found["y"]).max() == pytest.approx(factor * WAVE.max(), rel=2**-23)
 
 
-def test_euler_angles_do_not_jump_and_are_open_where_they_are_not_defined(comparison: Comparison) -> None:
-    run = comparison.runs[0].run
-    tcp = run.tcp
-    assert tcp is not None
-    assert np.abs(np.diff(tcp.euler_zyx[:, 0])).max() > 6  # the angle itself jumps by a turn
-    singular = np.zeros(len(run.t), dtype=np.bool_)
-    singular[1000:1010] = True
-    figure = motion_figure(replace(run, tcp=replace(tcp, singular=singular)))
-    assert figure is not None
-    for i, name in enumerate(("rz", "ry", "rx")):
-        drawn = trace(figure, name)
-        at, angle = np.searchsorted(run.t, numbers(drawn["x"])), numbers(drawn["y"])
-        inside = (at >= 1000) & (at < 1010)
-        assert inside.any()
-        assert np.isnan(angle[inside]).all()
-        assert np.nanmax(np.abs(np.diff(angle))) < 1.0
-        # This motion stays away from ry = 90 deg, so that only whole turns are added.
-        turns = (angle - tcp.euler_zyx[at, i])[~inside] / (2 * np.pi)
-        np.testing.assert_allclose(turns, np.rint(turns), rtol=0, atol=1e-6)
-    (tint,) = [shape for shape in figure.spec["layout"]["shapes"] if shape["yref"] == "y4 domain"]
-    assert tint["x0"] <= run.t[1000]
-    assert tint["x1"] >= run.t[1009]
-    assert "10 samples with ry at ±π/2" in figure.caption
+def test_a_limit_is_a_band_and_what_is_out_of_it_is_tinted() -> None:
+    signed, size = (
+        panel(WAVE, small=True, limit=0.0035),
+        panel(abs(WAVE), "‖Δ‖", small=True, limit=0.001, signed=False),
+    )
+    found = drawn(figure(signed, size))
+    assert levels(found) == [3.5, -3.5]
+    assert levels(found, "y2") == [1.0]
+    bands = [
+        (one["y0"], one["y1"]) for axis in ("y", "y2") for one in shapes(found, axis) if one["type"] == "rect"
+    ]
+    assert bands == [(-3.5, 3.5), (0.0, 1.0)]
+    words = [one["label"]["text"] for axis in ("y", "y2") for one in shapes(found, axis) if "label" in one]
+    assert words == ["±3.5 mm", "", "1 mm"]
+    assert found.spec["layout"]["yaxis2"]["rangemode"] == "tozero"
+    for axis, limit in (("y domain", 0.0035), ("y2 domain", 0.001)):
+        spans = [(one["x0"], one["x1"]) for one in shapes(found, axis)]
+        outside = np.abs(WAVE) > limit
+        tinted = np.any([(start <= T) & (end >= T) for start, end in spans], axis=0)
+        assert tinted[outside].all()
+        # What is tinted besides lies in a gap below a two-hundredth of the 15 s.
+        assert np.abs(T[tinted][:, np.newaxis] - T[outside]).min(axis=1).max() < 15 / 400
 
 
-def test_without_a_robot_the_recorded_motion_is_drawn(comparison: Comparison, bare_run: Run) -> None:
-    tcp = comparison.runs[0].run.tcp
-    assert tcp is not None
-    log = replace(bare_run.log, tcp_rotation=tcp.euler_zyx, rotation_form="zyx")
-    recorded = replace(bare_run, log=log, tcp_recorded=tcp.position)
-    figure = by_title(gallery.run_figures(recorded), "Motion")
-    assert_drawn(trace(figure, "py"), bare_run.t, tcp.position[:, 1])
-    layout = figure.spec["layout"]
-    assert [layout[a]["title"]["text"] for a in ("yaxis", "yaxis2")] == ["p [m]", "orientation [rad]"]
-    assert len(figure.spec["data"]) == 6
+@pytest.mark.parametrize(("limit", "side"), [(0.0001, "bottom"), (1.0, "top")])
+def test_a_limit_is_told_on_the_side_of_its_line_that_has_room(limit: float, side: str) -> None:
+    found = drawn(figure(panel(abs(WAVE), small=True, limit=limit, signed=False)))
+    (told,) = [one["label"] for one in shapes(found, "y") if "label" in one]
+    assert (told["text"], told["yanchor"]) == (f"{1e3 * limit:g} mm", side)
 
 
-def test_before_repolarization_the_tool_swings_away_and_after_it_does_not(comparison: Comparison) -> None:
-    run = comparison.runs[0].run
-    played = play_back(run)
-    assert played is not None
-    figure = point_figure(run, played)
-    assert figure is not None
-    assert run.tcp is not None
-    for i, axis in enumerate("xyz"):
-        assert_drawn(trace(figure, f"p{axis} before"), played.t, played.position[:, i])
-        assert_drawn(trace(figure, f"p{axis} after"), run.t, run.tcp.position[:, i])
-    for symbol, before, after in (
-        ("v", played.velocity, run.tcp.velocity),
-        ("a", played.acceleration, run.tcp.acceleration),
-    ):
-        assert_drawn(trace(figure, f"‖{symbol}‖ before"), played.t, np.linalg.norm(before, axis=1))
-        assert_drawn(trace(figure, f"‖{symbol}‖ after"), run.t, np.linalg.norm(after, axis=1))
-    worst = played.worst
-    assert worst is not None
-    t = float(played.t[worst])
-    (item,) = [entry for entry in run.repolarizations if abs(entry.t - t) < run.tsp]
-    assert (
-        f"Before repolarization p7 goes wrong by up to {played.off[worst] * 1e3:.4f} mm, at t ="
-        f" {text.seconds(t)} s, where {item.joint} jumps (row {item.row});"
-    ) in figure.caption
-    scene = repolarized_path_figure(run, played)
-    assert scene is not None
-    for name, place in (
-        ("start", run.tcp.position[0]),
-        ("end", run.tcp.position[-1]),
-        ("furthest off", played.position[worst]),
-    ):
-        spot = [numbers(trace(scene, name)[axis])[0] for axis in "xyz"]
-        # drawn in single precision: 24 bits of mantissa of a coordinate below 2 m
-        np.testing.assert_allclose(spot, place, rtol=0, atol=2**-23)
+def test_what_was_asked_for_is_dashed_and_not_held_against_the_limit() -> None:
+    lines = (Line(10 * WAVE, ("wanted",), (RED,), dashed=True), Line(WAVE, ("real",), (BLUE,)))
+    found = drawn(figure(Panel("p", "m", lines, T_NS, limit=0.005, peaks=(314,))))
+    assert trace(found, "wanted")["line"]["dash"] == "dash"
+    assert trace(found, "real")["line"]["dash"] == "solid"
+    assert shapes(found, "y domain") == []
+    assert [one["name"] for one in found.spec["data"] if one["mode"] == "markers"] == ["largest real"]
 
 
-def test_all_logs_stand_in_one_figure_from_best_to_worst(comparison: Comparison) -> None:
-    figure = overview_figure(comparison)
-    assert figure is not None
-    best, worst = comparison.ranking
-    assert best.statistics["norm"].max < worst.statistics["norm"].max
-    assert [one["name"] for one in figure.spec["data"]] == [f"1. {best.name}", f"2. {worst.name}"]
-    for drawn, one in zip(figure.spec["data"], (best, worst), strict=True):
-        assert_drawn(drawn, one.t, one.delta[:, 3] * 1e3)
-        assert drawn["line"]["color"] == run_colour(comparison.runs.index(one))
-        most = text.millimetres(one.statistics["norm"].max)
-        assert f"{one.name}: at most {most} mm, {one.verdict}" in figure.alt
-    assert "type" not in figure.spec["layout"]["yaxis"]
-    far = replace(worst, statistics=worst.statistics | {"norm": replace(worst.statistics["norm"], max=9.0)})
-    wide = overview_figure(replace(comparison, runs=(best, far)))
-    assert wide is not None
-    assert wide.spec["layout"]["yaxis"]["type"] == "log"
+def test_rows_are_tinted_and_colours_that_repeat_have_other_dashes() -> None:
+    tinted = (T >= 2.0) & (T <= 3.0)
+    lines = Line(np.column_stack([WAVE, WAVE]), ("a", "b"), (RED, RED), steps=True)
+    found = drawn(figure(Panel("p", "m", (lines,), T_NS, tinted=tinted)))
+    (shape,) = shapes(found, "y domain")
+    assert (shape["x0"], shape["x1"]) == (2.0, 3.0)
+    assert [(one["line"]["dash"], one["line"]["shape"]) for one in found.spec["data"]] == [
+        ("solid", "hv"), ("dash", "hv"),
+    ]  # fmt: skip
 
 
-def test_every_repolarization_is_marked_where_it_is(comparison: Comparison) -> None:
-    run = comparison.runs[0].run
-    assert {item.joint for item in run.repolarizations} >= {"phi1", "phi4"}
-    figure = joints_figure(run)
-    assert figure is not None
-    marks = [trace for trace in figure.spec["data"] if trace["mode"] == "markers"]
-    above, below = ([trace for trace in marks if trace["yaxis"] == axis] for axis in ("y", "y2"))
-    for panel in (above, below):
-        times = np.sort(np.concatenate([numbers(trace["x"]) for trace in panel]))
-        np.testing.assert_array_equal(times, np.sort([item.t for item in run.repolarizations]))
-    notes = [note for trace in above for note in trace["text"]]
-    item = run.repolarizations[0]
-    assert (
-        f"repolarization of {item.joint}, row {item.row}: step {item.step:+.4f} rad,"
-        f" k {item.before} → {item.after}"
-    ) in notes
-    assert f"{len(notes)} repolarizations" in figure.caption
+def test_yes_and_no_have_an_axis_of_their_own() -> None:
+    line = Line((WAVE > 0.0).astype(float), ("out",), (RED,), steps=True)
+    found = drawn(figure(Panel("out", "", (line,), T_NS)))
+    assert found.spec["layout"]["yaxis"]["tickvals"] == [0, 1]
+    assert "tickvals" not in drawn(figure(panel(WAVE))).spec["layout"]["yaxis"]
 
 
-def test_axes_say_what_they_measure(comparison: Comparison) -> None:
-    for figure in all_figures(comparison):
-        layout = figure.spec["layout"]
+def test_peaks_marks_and_instants_are_where_they_are() -> None:
+    peak = int(np.argmax(WAVE))
+    marked = (
+        Mark(2_000_000_000, 0.001, "up", RED, "turn <added>", "Δx"),
+        Mark(3_000_000_000, 0.002, "down", RED, "turn taken", "Δx"),
+        Mark(4_000_000_000, 0.0, "cross", BLUE, "doubt"),
+    )
+    at = {int(T_NS[peak]): "decides at 1.570 s"}
+    found = drawn(figure(panel(WAVE, small=True, peaks=(peak,), marks=marked), instants=at))
+    largest = trace(found, "largest Δx")
+    assert (numbers(largest["x"])[0], numbers(largest["y"])[0]) == (T[peak], 1e3 * WAVE[peak])
+    turns, doubt = (one for one in found.spec["data"] if "text" in one)
+    assert turns["marker"]["symbol"] == ["triangle-up", "triangle-down"]
+    np.testing.assert_array_equal(numbers(turns["x"]), [2.0, 3.0])
+    np.testing.assert_array_equal(numbers(turns["y"]), [1.0, 2.0])
+    assert (turns["text"][0], doubt["marker"]["symbol"]) == ("turn &lt;added&gt;", ["x"])
+    (line,) = [one for one in found.spec["layout"]["shapes"] if one["yref"] == "paper"]
+    assert (line["x0"], line["label"]["text"]) == (T[peak], "decides at 1.570 s")
+
+
+def test_very_many_marks_are_counted() -> None:
+    marked = tuple(Mark(k, 0.0, "up", RED, "turn") for k in range(1200))
+    found = drawn(figure(panel(WAVE, marks=marked)))
+    assert len(trace(found, ", marked")["text"]) == 1000
+    assert found.caption == "Caption. The first 1000 of 1200 marks are drawn."
+
+
+def test_a_name_of_several_panels_is_one_entry_of_the_legend() -> None:
+    both = np.column_stack([WAVE, -WAVE])
+    panels = (panel(both, "p"), panel(both, "v", "m/s"), panel(WAVE, "‖v‖", "m/s"))
+    found = drawn(figure(*panels))
+    entries = [(one["name"], one["yaxis"]) for one in found.spec["data"] if one["showlegend"]]
+    assert entries == [("x", "y"), ("y", "y")]
+    groups = [one.get("legendgroup") for one in found.spec["data"]]
+    assert groups == ["x", "y", "x", "y", None]
+    assert found.spec["data"][2]["hovertemplate"] == "%{y:.4f} m/s<extra>v x</extra>"
+    through = drawn(figure(*panels, instants={0: "start"}))
+    above = (through.spec["layout"]["legend"]["y"] - 1.0) * (through.height - 64)  # px
+    assert above >= 7  # the words at the head of the line are 11 px high and half of them stand above it
+
+
+def test_lines_may_have_times_of_their_own() -> None:
+    lines = (Line(WAVE, ("a",), (RED,), t_ns=T_NS), Line(WAVE[:100], ("b",), (BLUE,), t_ns=2 * T_NS[:100]))
+    found = drawn(figure(Panel("Δ", "m", lines, limit=0.0001)))
+    assert numbers(trace(found, "b")["x"])[-1] == 2 * T[99]
+    assert found.spec["layout"]["xaxis"]["range"] == [0.0, T[-1]]
+    assert shapes(found, "y domain")
+
+
+def test_a_logarithmic_axis_reaches_the_limit() -> None:
+    both = np.column_stack([1e-6 * np.ones(COUNT), 0.01 * np.ones(COUNT)])
+    found = drawn(figure(panel(both, small=True, limit=2.0, signed=False, logarithmic=True)))
+    axis = found.spec["layout"]["yaxis"]
+    assert axis["type"] == "log"
+    assert levels(found) == [2000.0]
+    assert axis["range"][0] < np.log10(1e-3)
+    assert axis["range"][1] > np.log10(2000.0)
+    assert [one["type"] for one in found.spec["layout"]["shapes"]] == ["line"]
+
+
+def test_a_quantity_as_axis_has_points_and_the_largest_is_among_them() -> None:
+    speed = np.abs(np.cos(T))
+    speed[5] = np.nan
+    over = Over(speed, "‖v‖", "m/s")
+    found = drawn(figure(panel(abs(WAVE), "‖Δ‖", small=True, signed=False, over=over, peaks=(1234,))))
+    (cloud,) = found.spec["data"]
+    at = np.searchsorted(T, numbers(cloud["customdata"]))
+    assert 1234 in at
+    assert 5 not in at
+    assert len(at) in (1500, 1501)
+    np.testing.assert_allclose(numbers(cloud["x"]), speed[at], rtol=2**-24)
+    np.testing.assert_allclose(numbers(cloud["y"]), 1e3 * np.abs(WAVE[at]), rtol=2**-23)
+    assert found.over == "‖v‖"
+    assert found.spec["layout"]["xaxis"]["title"]["text"] == "‖v‖ [m/s]"
+    assert found.spec["layout"]["xaxis"]["rangemode"] == "tozero"
+
+
+def test_rows_without_times_are_points_that_nothing_joins() -> None:
+    found = drawn(figure(panel(WAVE[:5], t_ns=None), instants={3: "here"}))
+    (points,) = found.spec["data"]
+    assert points["mode"] == "markers"
+    np.testing.assert_array_equal(numbers(points["x"]), np.arange(5.0))
+    assert found.spec["layout"]["xaxis"]["title"]["text"] == "row, the first is 0"
+    assert found.over == "row"
+    assert found.spec["layout"]["shapes"][0]["x0"] == 3
+
+
+def test_panels_of_other_axes_become_figures_of_their_own() -> None:
+    both = figure(panel(WAVE), panel(WAVE, over=Over(T, "‖v‖", "m/s")))
+    first, second = drawn_figures(both, span_of([both]))
+    assert (first.title, first.over) == ("Title", "t")
+    assert (second.title, second.over) == ("Title over ‖v‖", "‖v‖")
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("count", [0, 1, 2])
+def test_few_rows_or_none_are_drawn(count: int) -> None:
+    values = np.full((count, 2), np.nan)
+    some: dict[str, Any] = {"t_ns": T_NS[:count], "limit": 1.0, "small": True}
+    for one in (panel(values, **some), panel(values, logarithmic=True, **some), panel(values, t_ns=None)):
+        drawn(figure(one))
+    drawn(figure(panel(values, over=Over(np.full(count, np.nan), "v", "m/s"))))
+    drawn_space(SpaceFigure("S", "C.", "A.", (Path("a", np.full((count, 3), np.nan), T_NS[:count], RED),)))
+
+
+def test_figures_of_a_part_have_one_axis_of_time() -> None:
+    late = panel(WAVE, t_ns=T_NS + 10**9)
+    page = page_of(figure(late), figure(panel(WAVE[:10], t_ns=T_NS[:10])))
+    ranges = [found.spec["layout"]["xaxis"]["range"] for _, found in page.figures]
+    assert ranges == [[0.0, T[-1] + 1.0]] * 2
+
+
+def test_parts_with_the_same_times_move_together() -> None:
+    same, other = (
+        Section(title, blocks=lambda t_ns=t_ns: [figure(panel(WAVE, t_ns=t_ns))])  # type: ignore[misc]
+        for title, t_ns in (("same", T_NS), ("other", T_NS.copy()))
+    )
+    (part,) = page_of(figure(panel(WAVE)), sections=(same, other)).parts
+    assert [part.link, *(one.link for one in part.parts)] == ["r1", "r1", "r1-2"]
+
+
+def test_small_figures_stand_side_by_side_and_others_do_not() -> None:
+    small, tall = figure(panel(WAVE)), figure(*[panel(WAVE)] * 4)
+    assert page_of(small, small, facts=(Fact("a", "b"),)).parts[0].pairs
+    assert not page_of(small, tall).parts[0].pairs
+    assert not page_of().parts[0].pairs
+
+
+PLACES = np.column_stack([np.cos(T), np.sin(T), 0.9 * T / T[-1]])
+
+
+def test_paths_keep_their_places_and_colours_tell_their_values() -> None:
+    asked = Path("reference", PLACES, T_NS, RED, asked=True)
+    actual = Path("actual", PLACES, T_NS, RED, values=np.abs(WAVE), kept=(1234,))
+    spots = (Spot((1.0, 0.0, 0.0), "start", RED, False), Spot((0.0, 1.0, 0.0), "end", RED, False),
+             Spot((0.5, 0.5, 0.5), "decides", BLUE))  # fmt: skip
+    found = drawn_space(SpaceFigure("Path", "Caption.", "Alt.", (asked, actual), spots))
+    go.Figure(found.spec)
+    assert found.space
+    assert found.spec["layout"]["scene"]["aspectmode"] == "data"
+    one = trace(found, "actual")
+    told = numbers(one["customdata"])
+    assert told[:, 1].max() == 1e3 * np.abs(WAVE).max()
+    assert T[1234] in told[:, 0]
+    assert one["line"]["colorbar"]["title"]["text"] == "actual [mm]"
+    at = np.searchsorted(T, told[:, 0])
+    for axis, values in zip("xyz", PLACES.T, strict=True):
+        # single precision: 24 bits of mantissa
+        np.testing.assert_allclose(numbers(one[axis]), values[at], rtol=2**-23, atol=2**-40)
+    symbols = [trace(found, spot.words)["marker"]["symbol"] for spot in spots]
+    assert symbols == ["circle", "square", "diamond"]
+    assert [numbers(trace(found, "decides")[axis])[0] for axis in "xyz"] == [0.5] * 3
+
+
+def test_a_path_is_broken_where_rows_are_missing() -> None:
+    sample = np.concatenate([np.arange(5), np.arange(50, 55)])
+    one = Path("a", PLACES[:10], T_NS[:10], RED, sample=sample)
+    x = numbers(trace(drawn_space(SpaceFigure("S", "C.", "A.", (one,))), "a")["x"])
+    assert np.flatnonzero(np.isnan(x)).tolist() == [5]
+    np.testing.assert_allclose(np.delete(x, 5), PLACES[:10, 0], rtol=2**-23)
+
+
+def test_a_slim_path_stands_in_a_box_of_equal_sides() -> None:
+    slim = PLACES * [1.0, 0.01, 0.01]
+    found = drawn_space(SpaceFigure("S", "C.", "A.", (Path("a", slim, T_NS, RED),)))
+    scene = found.spec["layout"]["scene"]
+    assert scene["aspectmode"] == "cube"
+    ranges = np.array([scene[f"{axis}axis"]["range"] for axis in "xyz"])
+    np.testing.assert_allclose(np.ptp(ranges, axis=1), 1.05 * np.ptp(slim, axis=0).max(), rtol=1e-9)
+    assert (ranges[:, 0] < slim.min(axis=0)).all()
+    assert (ranges[:, 1] > slim.max(axis=0)).all()
+
+
+def test_drawings_are_images_and_texts_stay_texts() -> None:
+    (part,) = page_of(Drawing("System", "Blocks.", "<svg/>"), Text("File", "a <b>", folded=False)).parts
+    image, listing = part.blocks
+    assert isinstance(image, Image)
+    assert base64.b64decode(image.source.removeprefix("data:image/svg+xml;base64,")) == b"<svg/>"
+    assert (image.title, image.alt) == ("System", "Blocks.")
+    assert listing == Listing("File", "a <b>", False)
+
+
+def test_plotly_accepts_every_figure_of_every_kind(
+    comparison: Comparison, hostile: Comparison, bare_run: Run, make_simulation: Any
+) -> None:
+    simulation: Simulation = make_simulation()
+    results = [comparison, hostile, bare_run, comparison.runs[0].run, simulation]
+    found = lay_out([present(one) for one in results]).figures
+    assert len(found) > 30
+    for _, one in found:
+        go.Figure(one.spec)  # raises on an unknown word or a wrong value
+        layout = one.spec["layout"]
         axes = layout.get("scene", layout)
         titles = [axis["title"]["text"] for name, axis in axes.items() if "axis" in name]
         assert len(titles) >= 2
         assert all(title.endswith("]") and "[" in title for title in titles)
-
-
-def test_the_scene_has_equal_scales_and_shows_the_place_that_decides(comparison: Comparison) -> None:
-    deviation = comparison.runs[1]
-    spec = path_figure(deviation).spec
-    assert spec["layout"]["scene"]["aspectmode"] == "data"
-    (decides,) = [trace for trace in spec["data"] if trace["name"] == "decides"]
-    place = [numbers(decides[axis])[0] for axis in "xyz"]
-    # drawn in single precision: 24 bits of mantissa of a coordinate below 2 m
-    np.testing.assert_allclose(place, deviation.place(deviation.decisive), rtol=0, atol=2**-23)
-    (actual,) = [trace for trace in spec["data"] if trace["name"] == "actual"]
-    assert numbers(actual["customdata"])[:, 1].max() == deviation.statistics["norm"].max * 1e3
-
-
-@pytest.mark.parametrize(("allowed", "side"), [(0.0001, "bottom"), (1.0, "top")])
-def test_a_tolerance_is_told_on_the_side_of_its_line_that_has_room(
-    comparison: Comparison, allowed: float, side: str
-) -> None:
-    reference, run = comparison.runs[0].run, comparison.runs[1].run
-    (deviation,) = compare_runs(reference, [run], CompareOptions({"angle": allowed})).runs
-    figure = pose_figure(deviation)
-    assert figure is not None
-    told = [shape["label"] for shape in figure.spec["layout"]["shapes"] if shape.get("label", {}).get("text")]
-    assert [(one["text"], one["yanchor"]) for one in told] == [
-        (f"{text.limit(allowed, 'rad')} deg", side),
-    ]
-
-
-def test_what_stands_at_the_head_of_a_line_is_not_under_the_legend(comparison: Comparison) -> None:
-    run = comparison.runs[0].run
-    played = play_back(run)
-    assert played is not None
-    figure = point_figure(run, played)
-    assert figure is not None
-    above = (figure.spec["layout"]["legend"]["y"] - 1.0) * (figure.height - 64)  # px
-    assert above >= 14  # a line of text of 11 px

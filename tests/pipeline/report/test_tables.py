@@ -1,202 +1,134 @@
-"""The tables: what stands in their rows and columns."""
+"""Tables and facts: digits, units in heads, verdicts, bars, links; long tables folded and cut."""
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import pytest
 
-from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.symbols import size_of
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
-from urmpipe_pipeline.report.log_tables import audit_table
-from urmpipe_pipeline.report.page import lay_out
-from urmpipe_pipeline.report.tables import Table
-from urmpipe_pipeline.report.verdict_tables import ranking_tables, statistics_tables
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.presentation.section import (
+    Cell,
+    Column,
+    Fact,
+    Judged,
+    Place,
+    Presentation,
+    Ref,
+    Section,
+    Table,
+    Value,
+)
+from urmpipe_pipeline.report.page import Page, lay_out
+from urmpipe_pipeline.report.tables import Grid, ShownCell, grid
 
 
-def row_of(table: Table, name: str) -> dict[str, str]:
-    """The texts of the row of that name, by the column's head."""
-    (row,) = [row for row in table.rows if row[0].text == name]
-    return {column.title: cell.text for column, cell in zip(table.columns, row, strict=True)}
+def nowhere(cell: Cell) -> str:
+    return ""
 
 
-def test_the_logs_are_ranked_from_best_to_worst(everything: Comparison) -> None:
-    far, where = ranking_tables(everything, ["#a", "#b"])
-    names = [run.name for run in everything.ranking]
-    assert names == ["joint-off", "shifted"]  # given the other way round
-    for table in (far, where):
-        assert [(row[0].text, row[0].href) for row in table.rows] == list(
-            zip(names, ("#a", "#b"), strict=True)
-        )
+def drawn(*columns: Column, folded: bool = False, folds: bool = True) -> Grid:
+    return grid(Table("T", columns, "A note.", folded=folded), nowhere, folds=folds)
 
 
-def test_the_ranking_holds_every_kind_of_deviation(everything: Comparison) -> None:
-    off = everything.ranking[0]
-    far, _ = ranking_tables(everything, ["#a", "#b"])
-    found = off.statistics
-    joint = max(off.joint_statistics.values(), key=lambda one: one.max)
-    assert row_of(far, "joint-off") == {
-        "Log": "joint-off",
-        "Verdict": "FAIL",
-        "Decided by": size_of(off.decisive),
-        "max |Δx| [mm]": text.millimetres(found["x"].max, 0.0035),
-        "max |Δy| [mm]": text.millimetres(found["y"].max, 0.0035),
-        "max |Δz| [mm]": text.millimetres(found["z"].max, 0.0035),
-        "max ‖Δ‖ [mm]": text.millimetres(found["norm"].max, 0.005),
-        "max path [mm]": text.millimetres(found["path"].max, 0.002),
-        "max angle [deg]": text.number(found["angle"].max, "rad", 0.01),
-        "max joint [deg]": text.number(joint.max, "rad", 0.002),
-        "Share out": text.percent(off.share_out),
-        "Covered": text.percent(everything.covered(off)),
-    }
-    failed = {cell.text for cell in far.rows[0] if cell.used == 1.0}
-    assert failed == {cell.text for cell in far.rows[0][3:] if cell.state == "fail"}
-    assert failed
+def of(*cells: Cell) -> Column:
+    return Column("key", "Head", cells)
 
 
-def test_the_ranking_says_when_where_and_how(everything: Comparison) -> None:
-    off = everything.ranking[0]
-    _, where = ranking_tables(everything, ["#a", "#b"])
-    longest = off.longest_out
-    assert longest is not None
-    assert row_of(where, "joint-off") == {
-        "Log": "joint-off",
-        "Decided at t [s]": text.seconds(off.decisive.t_max),
-        "Log there at x, y, z [m]": text.point(off.place(off.decisive)),
-        "Longest out [s]": text.seconds(longest.duration),
-        "Longest out from t [s]": text.seconds(longest.t),
-        "Sync offset [s]": "0.500",
-        "r(‖Δ‖, speed)": f"{off.speed_correlation:+.3f}",
-        "Left out": str(off.left_out),
-        "Warnings": str(len(everything.warnings_of(off))),
-        "Alignment": "none",
-    }
+def page_of(section: Section) -> Page:
+    return lay_out([Presentation("toy", "it is", section.verdict, (), section)])
 
 
-def test_what_a_comparison_says_of_a_log_counts_as_its_warning(everything: Comparison) -> None:
-    told = (
-        LogWarning("not-covered", "joint-off: it covers 1 s of the 4 s of path (25 %)"),
-        LogWarning("large-tolerance", "a tolerance of 500 mm (axis) lets anything pass"),
+@pytest.mark.parametrize(
+    ("column", "head", "texts"),
+    [
+        (of(Value(0.0025, "m"), Value(None, "m")), ("Head [mm]", True), ["2.5000", "–"]),
+        (of(Value(0.0035, "m", given=True), None), ("Head [mm]", True), ["3.5", "–"]),
+        (of(Value(0.5, "rad"), Value(1e-9, "rad")), ("Head [deg]", True), ["28.6479", "5.730e-08"]),
+        (of(Value(0.001, "m"), Value(1.0, "rad")), ("Head", True), ["1.0000 mm", "57.2958 deg"]),
+        (of(Value(0.258, "%"), Value(0.0, "%")), ("Head", True), ["25.8 %", "0 %"]),
+        (of(Value(1.25, "s"), Value(0.0, "s")), ("Head [s]", True), ["1.250", "0.000"]),
+        (of(Value(7, ""), Value(12, "")), ("Head", True), ["7", "12"]),
+        (of(Place((0.1, -0.2, 0.3)), None), ("Head [m]", True), ["(0.1000, -0.2000, 0.3000)", "–"]),
+        (of("word", ""), ("Head", False), ["word", "–"]),
+        (of(Judged("pass"), Judged(None)), ("Head", False), ["PASS", "–"]),
+    ],
+)  # fmt: skip
+def test_units_stand_in_heads_and_digits_follow_the_value(
+    column: Column, head: tuple[str, bool], texts: list[str]
+) -> None:
+    found = drawn(column)
+    assert found.heads == (head,)
+    assert [row[0].text for row in found.rows] == texts
+
+
+def test_columns_without_a_value_are_not_there() -> None:
+    found = drawn(
+        Column("a", "A", ["x", "y"]), Column("b", "B", [None, Value(None)]), Column("c", "C", ["", "z"])
     )
-    off = next(run for run in everything.runs if run.name == "joint-off")
-    gap = LogWarning("gap", "a gap", 7)
-    warned_off = replace(off, run=replace(off.run, warnings=(gap,)))
-    runs = tuple(warned_off if run is off else run for run in everything.runs)
-    warned = replace(everything, runs=runs, warnings=told)
-    assert warned.warnings_of(warned_off) == (gap, told[0])
-    links = [f"#{run.name}" for run in warned.ranking]
-    _, where = ranking_tables(warned, links)
-    assert row_of(where, "joint-off")["Warnings"] == "2"
-    (summary,) = lay_out([warned]).summaries
-    (facts,) = (one.facts for one in summary.cards if one.name == "joint-off")
-    assert [fact.value for fact in facts if fact.name == "Warnings"] == ["2"]
+    assert [head for head, _ in found.heads] == ["A", "C"]
+    assert [[cell.text for cell in row] for row in found.rows] == [["x", "–"], ["y", "z"]]
 
 
-def test_columns_without_a_value_are_not_there(comparison: Comparison) -> None:
-    shifted = replace(comparison.runs[0], joint_statistics={}, speed_correlation=None)
-    far, where = ranking_tables(replace(comparison, runs=(shifted,)), ["#a"])
-    titles = [column.title for column in (*far.columns, *where.columns)]
-    assert "max joint [mm]" not in titles
-    assert "max joint [deg]" not in titles
-    assert "Longest out [s]" not in titles
-    assert "r(‖Δ‖, speed)" not in titles
-    _, angles = statistics_tables(comparison.runs[0])
-    assert [column.title for column in angles.columns] == [
-        "Quantity",
-        "max |Δ| [deg]",
-        "at t [s]",
-        "rms [deg]",
-        "p95 |Δ| [deg]",
-        "mean [deg]",
-        "std [deg]",
-        "at start [deg]",
+def test_verdicts_bars_colours_and_what_stands_out() -> None:
+    cells: list[Cell] = [
+        Value(0.004, "m", 0.0035, "fail", 1.14), Value(0.001, "m", 0.0035, "pass", 0.286, most=True),
+        Value(None, "m", 0.0035, "fail"), Judged("fail"), Ref("log", "#fda201"),
+    ]  # fmt: skip
+    assert [row[0] for row in drawn(of(*cells)).rows] == [
+        ShownCell("4.0000", "fail", used=1.0),
+        ShownCell("1.0000", used=0.286, most=True),
+        ShownCell("–"),
+        ShownCell("FAIL", "fail"),
+        ShownCell("log", colour="#fda201"),
     ]
 
 
-def test_every_quantity_has_its_statistics_with_its_own_tolerance(everything: Comparison) -> None:
-    off = everything.ranking[0]
-    lengths, angles = statistics_tables(off)
-    assert (lengths.title, angles.title) == (
-        "Statistics of position and path",
-        "Statistics of orientation and joints",
-    )
-    assert [row[0].text for row in lengths.rows] == ["Δx", "Δy", "Δz", "‖Δ‖", "path"]
-    assert [row[0].text for row in angles.rows] == ["angle", *(f"phi{k}" for k in range(1, 7))]
-    assert row_of(lengths, "path")["tolerance [mm]"] == "2"
-    assert row_of(angles, "angle")["tolerance [deg]"] == "0.572958"
-    phi2 = row_of(angles, "phi2")
-    one = off.joint_statistics["phi2"]
-    assert phi2["samples out"] == str(one.out_of_tolerance)
-    assert phi2["share out"] == text.percent(one.share_out or 0.0)
-    assert off.joint_delta is not None
-    assert phi2["at start [deg]"] == text.number(float(off.joint_delta[0, 1]), "rad")
+@pytest.mark.parametrize(("rows", "folded"), [(12, False), (13, True)])
+def test_a_long_table_is_folded_unless_it_is_read_first(rows: int, folded: bool) -> None:
+    column = of(*(Value(k) for k in range(rows)))
+    assert drawn(column).folded is folded
+    assert drawn(column, folds=False).folded is False
+    assert drawn(column, folded=True, folds=False).folded is True
 
 
-def test_prismatic_joints_stand_among_the_lengths(everything: Comparison) -> None:
-    off = everything.ranking[0]
-    joints = dict(off.joint_statistics)
-    joints["phi6"] = replace(joints["phi6"], unit="m")
-    lengths, angles = statistics_tables(replace(off, joint_statistics=joints))
-    assert lengths.title == "Statistics of position, path and joints"
-    assert [row[0].text for row in lengths.rows][-1] == "phi6"
-    assert len(angles.rows) == 6
+def test_a_very_long_table_is_cut_and_counts_what_is_left_out() -> None:
+    found = drawn(of(*(Value(k) for k in range(700))))
+    assert (len(found.rows), found.rows[-1][0].text) == (500, "499")
+    assert found.note == "200 more; the JSON output lists them all. A note."
 
 
-def test_a_joint_may_be_called_like_a_quantity(everything: Comparison) -> None:
-    off = everything.ranking[0]
-    joints = {"norm": replace(off.joint_statistics["phi2"], quantity="norm")}
-    angles = statistics_tables(
-        replace(
-            off,
-            joint_statistics=joints,
-            joint_delta=(off.joint_delta if off.joint_delta is None else off.joint_delta[:, 1:2]),
-        )
-    )[1]
-    assert [row[0].text for row in angles.rows] == ["angle", "norm"]
+def test_facts_without_a_value_are_left_out_and_explained_ones_stand_apart() -> None:
+    facts = (
+        Fact("|Δx|", Value(0.0025, "m", 0.0035, "pass", 0.71), "71.4 % of the tolerance"),
+        Fact("Robot", "urm6"), Fact("Recording", ""), Fact("Offset", None), Fact("Mean", Value(None, "m")),
+        Fact("See", Ref("below"), brief=False), Fact("Nowhere", Ref("else")),
+    )  # fmt: skip
+    (part,) = page_of(Section("toy", facts=facts, sections=(Section("below"),))).parts
+    assert [(fact.name, fact.value, fact.help) for fact in part.explained] == [
+        ("|Δx|", "2.5000 mm of 3.5 mm allowed", "71.4 % of the tolerance")
+    ]
+    assert [(fact.name, fact.value, fact.href) for fact in part.facts] == [
+        ("Robot", "urm6", ""), ("See", "below", "#r1-1"), ("Nowhere", "else", ""),
+    ]  # fmt: skip
 
 
-def test_a_long_audit_is_folded_and_a_very_long_one_cut(bare_run: Run) -> None:
-    item = AuditEntry("phi1", 2, 0.0075, 0.0025, -6.28, 0, 1)
-    short = audit_table(replace(bare_run, audit=(item,) * 12))
-    folded = audit_table(replace(bare_run, audit=(item,) * 13))
-    cut = audit_table(replace(bare_run, audit=(item,) * 700))
-    assert (short.folded, folded.folded, cut.folded) == (False, True, True)
-    assert (cut.title, len(cut.rows)) == ("Audit of the repolarizer (700 wraps)", 500)
-    assert cut.note == "200 more; the JSON output lists them all."
+def test_warnings_are_a_table_before_everything_but_what_is_read_first() -> None:
+    first, last = (Table(title, (of("x"),)) for title in ("First", "Last"))
+    warned = (LogWarning("gap", "a gap", 7, column="q1"), LogWarning("gap", "another"))
+    section = Section("toy", tables=(first,), blocks=lambda: [last], warnings=warned)
+    (part,) = page_of(section).parts
+    assert [block.title for block in part.blocks] == ["First", "Warnings (2)", "Last"]
+    table = part.blocks[1]
+    assert isinstance(table, Grid)
+    assert [head for head, _ in table.heads] == ["Kind", "About", "Row", "What"]
+    assert [[cell.text for cell in row] for row in table.rows] == [
+        ["gap", "q1", "7", "a gap"], ["gap", "–", "–", "another"],
+    ]  # fmt: skip
+    assert page_of(Section("calm")).parts[0].blocks == ()
 
 
-def test_the_audit_says_what_its_kinds_mean(bare_run: Run) -> None:
-    wrap = AuditEntry("phi1", 2, 0.0075, 0.0025, -6.28, 0, 1)
-    table = audit_table(
-        replace(bare_run, audit=(wrap, replace(wrap, kind="repaired"), replace(wrap, kind="ambiguous")))
-    )
-    assert [row[0].text for row in table.rows] == ["wrap", "repaired", "ambiguous"]
-    assert table.title == "Audit of the repolarizer (1 wrap)"
-    assert table.note == (
-        "repaired: a sample that a linear resampling left on a wrap, put on the line of its neighbours, Step"
-        " deg away. ambiguous: a gap in which the joint can have turned more than half a period."
-    )
-    assert table.rows[0][5].text == f"{-6.28 * 180 / 3.141592653589793:+.4f}"
-
-
-@pytest.mark.parametrize("share", [0.2, 1.0])
-def test_a_bar_is_as_long_as_what_is_used_up(comparison: Comparison, share: float) -> None:
-    shifted = comparison.runs[0]
-    found = dict(shifted.statistics)
-    found["z"] = replace(found["z"], tolerance=found["z"].max / share)
-    lengths, _ = statistics_tables(replace(shifted, statistics=found))
-    (cell,) = [row[3] for row in lengths.rows if row[0].text == "Δz"]
-    assert cell.used == pytest.approx(share)
-
-
-def test_the_joint_that_is_furthest_off_stands_out(everything: Comparison) -> None:
-    off = everything.ranking[0]
-    (table,) = [one for one in statistics_tables(off) if "joints" in one.title]
-    marked = [row[0].text for row in table.rows if any(cell.most for cell in row)]
-    joint = off.furthest_joint("rad")
-    assert joint is not None
-    assert marked == [joint.quantity]
+def test_parts_stand_by_their_rank() -> None:
+    sections = (Section("second", rank=2), Section("first", rank=1), Section("also second", rank=2))
+    (part,) = page_of(Section("toy", sections=sections)).parts
+    assert [(one.title, one.ident) for one in part.parts] == [
+        ("first", "r1-2"), ("second", "r1-1"), ("also second", "r1-3"),
+    ]  # fmt: skip

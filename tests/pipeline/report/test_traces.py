@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from urmpipe_models.arrays import FloatArray
-from urmpipe_pipeline.report.spec import Panel, stacked, typed
-from urmpipe_pipeline.report.traces import line, precision, shaded, told
+from urmpipe_pipeline.report.spec import Panel, stacked, time_axis, typed
+from urmpipe_pipeline.report.traces import line, pointer_digits, precision, shaded, told
 
 
 def numbers(spec: dict[str, Any]) -> FloatArray:
@@ -50,7 +50,7 @@ def test_the_pointer_tells_the_extremes_as_the_tables_do(value: float, digits: i
 def test_panels_do_not_overlap_and_fill_the_height() -> None:
     t = np.arange(3.0)
     panels = [Panel("a [m]", [line(t, t, "a", "#000000", "m")], share=share) for share in (2.0, 1.0, 1.0)]
-    layout = stacked(panels, 2.0)["layout"]
+    layout = stacked(panels, time_axis(0.0, 2.0))["layout"]
     domains = [layout[f"yaxis{number}"]["domain"] for number in ("", "2", "3")]
     assert domains[0][1] == 1.0
     assert domains[2][0] == pytest.approx(0.0, abs=1e-3)  # rounded to four digits
@@ -62,7 +62,7 @@ def test_panels_do_not_overlap_and_fill_the_height() -> None:
 def test_a_line_without_any_value_is_drawn_as_nothing() -> None:
     drawn = line(np.arange(3.0), np.full(3, np.nan), "a", "#000000", "m")
     assert np.isnan(numbers(drawn["y"])).all()
-    assert drawn["hovertemplate"] == "%{y:.4f} m"
+    assert drawn["hovertemplate"] == "%{y:.6f} m"
 
 
 def test_a_single_sample_is_drawn_as_a_point() -> None:
@@ -77,3 +77,19 @@ def test_samples_crowded_in_time_take_no_points_from_the_others() -> None:
     late = numbers(drawn["x"])
     late = late[late >= 1.0]
     assert np.max(np.diff(late)) < 10.0 / 400  # a sample in each of 1000 buckets, two of them at its ends
+
+
+@pytest.mark.parametrize(
+    ("unit", "largest", "digits"),
+    [
+        ("mm", 1234.5, 4),
+        ("deg", 0.1, 4),
+        ("m", 1.5, 6),
+        ("m", 31.5, 5),
+        ("rad", 3.1, 4),
+        ("m/s²", 3.8e6, 0),
+        ("", 0.5, 6),
+    ],
+)
+def test_the_pointer_tells_no_more_digits_than_are_known(unit: str, largest: float, digits: int) -> None:
+    assert pointer_digits(unit, np.array([0.0, -largest, np.nan])) == digits

@@ -6,7 +6,14 @@ import numpy as np
 import pytest
 from scipy.signal import savgol_filter
 
-from urmpipe_pipeline.runs.derivatives import WINDOW, Method, derivatives, other_unit, recorded_agree
+from urmpipe_pipeline.runs.derivatives import (
+    WINDOW,
+    Method,
+    OtherUnit,
+    derivatives,
+    other_unit,
+    recorded_agree,
+)
 
 TSP = 0.005
 T = TSP * np.arange(400, dtype=np.float64)
@@ -90,18 +97,20 @@ def test_smoothing_leaves_a_gap_around_a_missing_sample_and_nothing_else(row: in
 @pytest.mark.parametrize(
     ("factor", "order", "said"),
     [
-        (1e3, 1, "with the time in ms"),
-        (1e6, 2, "with the time in ms"),
-        (1e6, 1, "with the time in us"),
-        (1e-3, 1, "with the time in s, not in ms"),
-        (180.0 / np.pi, 1, "in deg"),
-        (np.pi / 180.0, 2, "with the joints in deg"),
-        (1.5, 1, ""),
-        (0.0, 1, ""),
+        (1e3, 1, OtherUnit("with the time in ms", "ms")),
+        (1e6, 2, OtherUnit("with the time in ms", "ms")),
+        (1e6, 1, OtherUnit("with the time in us", "us")),
+        (1e-3, 1, OtherUnit("with the time in s, not in ms", "s")),
+        (180.0 / np.pi, 1, OtherUnit("in deg")),
+        (np.pi / 180.0, 2, OtherUnit("with the joints in deg")),
+        (1.5, 1, None),
+        (0.0, 1, None),
     ],
 )
-def test_the_unit_in_which_recorded_rates_agree_is_told(factor: float, order: int, said: str) -> None:
+def test_the_unit_in_which_recorded_rates_agree_is_told(
+    factor: float, order: int, said: OtherUnit | None
+) -> None:
     computed = np.column_stack((np.sin(np.arange(50.0)), np.cos(np.arange(50.0))))
     computed[7] = np.nan
     assert other_unit(factor * computed, computed, order) == said
-    assert other_unit(factor * computed[::-1], computed, order) == ""
+    assert other_unit(factor * computed[::-1], computed, order) is None

@@ -7,8 +7,9 @@ import pytest
 from numpy.typing import ArrayLike
 
 from urmpipe_models.errors import LogError
+from urmpipe_pipeline.gaps import inside_gaps
 from urmpipe_pipeline.joint_log import JointLog
-from urmpipe_pipeline.runs.grid import inside_gaps, interpolate, make_grid
+from urmpipe_pipeline.runs.grid import interpolate, make_grid
 
 MS = 1_000_000
 
@@ -122,8 +123,8 @@ def test_a_grid_that_would_fill_the_memory_is_refused() -> None:
     with pytest.raises(LogError) as caught:
         make_grid(log_at(t))
     assert str(caught.value) == (
-        "log: found 340000000001 samples every 5 ms for 11 rows, 1.7e+09 s pass before row 11, allowed:"
-        " 20000000 samples; a clock without such a gap, or --tsp SECONDS"
+        "log, row 11: found 340000000001 samples every 5 ms for 11 rows, 1.7e+09 s pass before row 11,"
+        " allowed: 20000000 samples; a clock without such a gap; tsp=SECONDS sets a longer period"
     )
     with pytest.raises(LogError, match="found 45000001 samples every 1e-06 ms for 10 rows"):
         make_grid(log_at(5 * MS * np.arange(10)), 1e-9)

@@ -16,6 +16,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import LogError, OptionError
 from urmpipe_models.kinematics.forward import positions_over_log
+from urmpipe_models.messages import Hint
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.runs.ingest import ingest_log
@@ -118,8 +119,9 @@ def test_rates_that_agree_in_another_unit_of_time_name_it(
     hint = "ms" if wanted == "ms" else "s, not in ms"
     assert warning.message == (
         "the recorded rates do not agree with the differences of the joint values, but would with the time in"
-        f" {hint} (--unit 't 1={wanted}'); the differences are used"
+        f" {hint}; the differences are used"
     )
+    assert warning.hints == (Hint("unit", {"t 1": wanted}, "reads the time so"),)
     assert ingest_log([path], read=ReadOptions(units={"t 1": wanted})).warnings == ()
 
 
@@ -173,13 +175,13 @@ def test_a_real_controller_log_agrees_with_the_catalogue() -> None:
 @pytest.mark.parametrize(
     ("options", "said"),
     [
-        ({"tsp": 0.0}, "--tsp: found 0 s, allowed: a positive time below 1e+09 s"),
-        ({"tsp": -0.005}, "--tsp: found -0.005 s, allowed: a positive time below 1e+09 s"),
-        ({"tsp": math.nan}, "--tsp: found nan s, allowed: a positive time below 1e+09 s"),
-        ({"derivative": "savgo"}, "--derivative: found savgo, allowed: central, savgol"),
+        ({"tsp": 0.0}, "tsp: found 0 s, allowed: a positive time below 1e+09 s"),
+        ({"tsp": -0.005}, "tsp: found -0.005 s, allowed: a positive time below 1e+09 s"),
+        ({"tsp": math.nan}, "tsp: found nan s, allowed: a positive time below 1e+09 s"),
+        ({"derivative": "savgo"}, "derivative: found savgo, allowed: central, savgol"),
         (
             {"read": ReadOptions(period=1e300)},
-            "--period: found 1e+300 s, allowed: less than 2.30584e+09 s for 2 rows",
+            "period: found 1e+300 s, allowed: less than 2.30584e+09 s for 2 rows",
         ),
     ],
 )  # fmt: skip

@@ -14,8 +14,7 @@ from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.errors import LogError
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform
-from urmpipe_pipeline.recording import read_recording, write_recording
-from urmpipe_pipeline.runs.ghosts import Ghost
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
@@ -90,13 +89,6 @@ def test_joints_that_turn_are_none_that_slide(log: Path) -> None:
     with pytest.raises(LogError) as caught:
         on_robot(ingest_log([log], robot=OTHER), replace(OTHER, joints=sliding))
     assert str(caught.value) == "log, joint q3: found rad, allowed: m, as robot urm6 has"
-
-
-def test_branches_are_those_of_the_arm_before(log: Path) -> None:
-    run = ingest_log([log], robot=OTHER)
-    run = replace(run, ghosts=(Ghost("left", run.t_ns, run.q),))
-    assert on_robot(run, OTHER).ghosts == run.ghosts
-    assert on_robot(run, ARM).ghosts == ()
 
 
 def test_a_path_has_no_joints_to_refuse(tmp_path: Path) -> None:

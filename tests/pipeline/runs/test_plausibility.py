@@ -11,6 +11,7 @@ import pytest
 from arm_motion import KINDS, arm, clock, found, log_of, swing
 from urmpipe_datasets import LOGS
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.messages import Hint
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import format_steps, largest_steps
@@ -134,7 +135,8 @@ def test_a_slow_controller_polled_fast_repeats_its_rows(ratio: float, said: str)
     q, t = swing()
     (warning,) = found(q[(np.arange(400) // ratio * ratio).astype(int)], t)
     assert (warning.kind, warning.row) == ("repeated-samples", 2)
-    assert warning.message.startswith(f"the joint values change only every {said} --tsp 0.0")
+    assert warning.message == f"the joint values change only every {said}"
+    assert warning.hints == (Hint("tsp", ratio * 0.005, "takes each value once"),)
 
 
 def test_a_rest_among_repeated_rows_changes_nothing() -> None:

@@ -8,13 +8,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from exported import export_result
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.orientation import NAMES, RotationForm, width
-from urmpipe_pipeline.export import ExportOptions, export_result
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
+from urmpipe_pipeline.tables import ExportOptions
 
 ROWS = 200
 TURN = np.linspace(2.0, 7.0, ROWS)

@@ -54,7 +54,7 @@ def test_a_tool_is_told_and_not_applied(tmp_path: Path) -> None:
     run = ingest(tmp_path / "log.csv", [*JOINTS[:6], *XYZ], np.hstack((q, recorded)))
     assert run.robot == robot
     (said,) = [i for i in run.log.inferences if i.what == "robot"]
-    assert "with --tool 0.0000,0.0100,0.1500, which is not applied" in said.evidence.replace(
+    assert "with the tool 0.0000,0.0100,0.1500, which is not applied" in said.evidence.replace(
         "-0.0000", "0.0000"
     )
 

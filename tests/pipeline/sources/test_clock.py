@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.joint_log import JointLog
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -94,8 +94,8 @@ def test_seconds_and_nanoseconds_apart(read: Read) -> None:
 def test_steps_that_may_be_two_units_are_asked_for(wrong: Wrong, read: Read) -> None:
     text = clocked("t", "0", "600", "1200")
     assert wrong(text) == [
-        "log.csv:2, column t: found steps of 600, which may be ms or us:"
-        " say which with --unit t=ms or --unit t=us"
+        'log.csv:2, column t: found steps of 600, which may be ms or us; unit={"t": "ms"} or'
+        ' unit={"t": "us"} says which'
     ]
     assert read(text, units={"t": "us"}).t_ns.tolist() == [0, 600_000, 1_200_000]
 
@@ -112,14 +112,14 @@ def test_without_a_time_the_period_is_given_or_that_of_the_paper(read: Read, wro
     assert log.t_ns.tolist() == [0, 5_000_000, 10_000_000]
     assert (log.warnings[0].kind, log.warnings[0].message) == (
         "assumed-period",
-        "no time column: the rows are taken as 5 ms apart; --period S says otherwise",
+        "no time column: the rows are taken as 5 ms apart",
     )
     log = read(text, period=1 / 3)
     assert log.t_ns.tolist() == [0, 333_333_333, 666_666_667]
     assert [warning.kind for warning in log.warnings] == ["assumed-unit"]
     for period in (0.0, -1.0, float("nan"), float("inf")):
         assert wrong(text, period=period) == [
-            f"--period: found {period:g} s, allowed: a positive time of 1e-9 s or more"
+            f"period: found {period:g} s, allowed: a positive time of 1e-9 s or more"
         ]
 
 
@@ -133,11 +133,7 @@ def test_without_a_time_the_period_is_given_or_that_of_the_paper(read: Read, wro
 def test_a_column_that_runs_like_a_clock_is_named_not_taken(read: Read, text: str) -> None:
     log = read(text)
     assert log.t_ns.tolist() == [0, 5_000_000, 10_000_000]
-    assert log.warnings[0] == LogWarning(
-        "assumed-period",
-        "no time column: the rows are taken as 5 ms apart; --period S says otherwise; takt always increases:"
-        " --time takt takes it as the time",
-    )
+    assert (log.warnings[0].kind, log.warnings[0].hints[1].value) == ("assumed-period", "takt")
     assert read(text, time="takt").t_ns.tolist() == [0, 750_000_000, 1_000_000_000]
 
 
@@ -145,17 +141,13 @@ def test_a_column_that_runs_like_a_clock_is_named_not_taken(read: Read, text: st
 def test_a_counter_and_what_stands_still_are_not_named_as_a_time(read: Read, column: str) -> None:
     cells = column.split(",")
     log = read("takt,q1,q2\n" + "".join(f"{cell},0.{k},1\n" for k, cell in enumerate(cells, 1)))
-    assert log.warnings[0].message == (
-        "no time column: the rows are taken as 5 ms apart; --period S says otherwise"
-    )
+    assert log.warnings[0].message == ("no time column: the rows are taken as 5 ms apart")
 
 
 @pytest.mark.parametrize("name", ["way [mm]", "pulses [counts]", "turn_deg"])
 def test_what_has_another_unit_is_not_named_as_a_time(read: Read, name: str) -> None:
     log = read(f"{name},q1 [rad],q2 [rad]\n0.5,0.1,1\n1.25,0.2,1\n1.5,0.3,1\n", joints=[2, 3])
-    assert [one.message for one in log.warnings] == [
-        "no time column: the rows are taken as 5 ms apart; --period S says otherwise"
-    ]
+    assert [one.message for one in log.warnings] == ["no time column: the rows are taken as 5 ms apart"]
 
 
 def test_the_time_as_the_user_says(read: Read, wrong: Wrong) -> None:
@@ -163,14 +155,14 @@ def test_the_time_as_the_user_says(read: Read, wrong: Wrong) -> None:
     assert read(text, time="b").t_ns.tolist() == [0, 100_000_000]
     assert read(text, time="2").t_ns.tolist() == [0, 100_000_000]
     assert read(clocked("t", "0", "0"), time="none").t_ns.tolist() == [0, 5_000_000]
-    assert wrong(text, time="c") == ["--time: found no column 'c', allowed: a, b, q1"]
+    assert wrong(text, time="c") == ["time: found no column 'c', allowed: a, b, q1"]
 
 
 def test_two_columns_of_one_name(wrong: Wrong, read: Read) -> None:
     text = "time,time,q1\n0,0.5,1\n1,0.6,2\n"
     assert wrong(text) == [
-        "log.csv:1, column time: found as columns 1, 2, allowed: once; give the number of the right one"
-        " with --time"
+        "log.csv:1, column time: found as columns 1, 2, allowed: once; time=COLUMN says which: give"
+        " its number"
     ]
     assert read(text, time="2").period == 0.1
 
@@ -211,8 +203,8 @@ def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:
     """Windows counts 100 ns since 1601: no unit that is known, and as s an age."""
     text = clocked("t [s]", "133500000000000000", "133500000000050000")
     assert wrong(text) == [
-        "log.csv:2, column t [s]: found 1.335e+17 s, allowed: times within 146 years of 0;"
-        " say the unit with --unit t=ns"
+        'log.csv:2, column t [s]: found 1.335e+17 s, allowed: times within 146 years of 0; unit={"t":'
+        ' "ns"} reads them so'
     ]
     assert read(text, units={"t": "ns"}).t_ns.tolist() == [0, 50_000]
     assert wrong(clocked("t [s]", "0", "1", "1e30")) == [
@@ -257,8 +249,9 @@ def test_a_coarse_time_of_day_goes_over_midnight(read: Read) -> None:
 def test_irregular_repeats_are_one_error(wrong: Wrong) -> None:
     rows = [0, 0, 0, 1, 1, 1, 1, 1, 1, 2, 3, 3, 3, 3]
     assert wrong(clocked("t [s]", *map(str, rows))) == [
-        "log.csv:3, column t [s]: found 0 s again, as 10 of 14 rows repeat a time: too coarse for a clock to"
-        " be rebuilt, allowed: times that increase from row to row, or --time none with --period SECONDS"
+        "log.csv:3, column t [s]: found 0 s again, as 10 of 14 rows repeat a time: too coarse for a"
+        ' clock to be rebuilt, allowed: times that increase from row to row; time="none" leaves the'
+        " time column out; period=SECONDS sets the time between rows then"
     ]
 
 
@@ -279,20 +272,21 @@ def test_a_counter_since_boot_is_not_taken_for_unix_time(
 ) -> None:
     text = clocked("time", *(str(start + k * step) for k in range(4)))
     found = f"found times of our years in steps of {step:g}, which may be {units[0]} or {units[1]}"
-    asked = f"say which with --unit time={units[0]} or --unit time={units[1]}"
-    assert wrong(text) == [f"log.csv:2, column time: {found}: {asked}"]
+    asked = " or ".join(f'unit={{"time": "{unit}"}}' for unit in units)
+    assert wrong(text) == [f"log.csv:2, column time: {found}; {asked} says which"]
     assert read(text, units={"time": units[1]}).period == 0.005
 
 
 def test_minutes_days_and_dates_in_numbers_are_not_taken_for_seconds(read: Read, wrong: Wrong) -> None:
     minutes = clocked("Time [min]", "0", "0.1", "0.2")
-    hint = "convert the times, or --time none with --period SECONDS"
+    hint = 'convert the times; time="none" leaves the time column out; period=SECONDS sets the time between'
+    hint += " rows then"
     said = f"found the unit 'min', allowed: s, ms, us, ns; {hint}"
     assert wrong(minutes) == [f"log.csv:2, column Time [min]: {said}"]
     assert read(minutes, time="none", period=6.0).period == 6.0
     excel = clocked("Time", *(f"{44297.5 + k * 0.005 / 86400:.12f}" for k in range(4)))
     said = "found steps of 5.79e-08, as of days or hours, allowed: times in s, ms, us, ns"
-    hint = "convert them, or say that it is so with --unit Time=s"
+    hint = 'convert them; unit={"Time": "s"} takes them as they are'
     assert wrong(excel) == [f"log.csv:2, column Time: {said}; {hint}"]
     assert read(excel, units={"Time": "s"}).units["Time"] == "s"
     date = clocked("Time", "20210411222721.0", "20210411222721.5")
@@ -316,7 +310,7 @@ def test_times_of_day_in_numbers_are_refused_where_they_leap(
 ) -> None:
     text = clocked("Time", *times)
     said = f"found {times[2]} after {times[1]}, as a time of day hhmmss goes on, allowed: a clock of one unit"
-    hint = "write it as hh:mm:ss, or say that it is no time of day with --unit Time=s"
+    hint = 'write it as hh:mm:ss; unit={"Time": "s"} takes it as no time of day'
     assert wrong(text) == [f"log.csv:4, column Time: {said}; {hint}"]
     assert read(text, units={"Time": "s"}).t[1:].tolist()[0] == 1.0
 

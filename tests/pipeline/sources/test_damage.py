@@ -8,13 +8,14 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import Phase, example, given, settings
+from hypothesis import Phase, assume, example, given, settings
 from hypothesis import strategies as st
 
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources.tables import blocks, table
 
 Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
@@ -106,6 +107,28 @@ def test_a_sound_log_or_an_error_of_ours(content: bytes, options: ReadOptions, r
     assert robot is None or len(log.joints) in (0, len(robot.coordinates))
 
 
+def outcome(path: Path, options: ReadOptions) -> tuple[object, ...]:
+    """What is read of a file, or what is wrong with it."""
+    try:
+        log = read_log([path], options)
+    except UrmpipeError as error:
+        return (str(error),)
+    return log.t_ns.tobytes(), log.q.tobytes(), log.q.shape, log.inferences, log.warnings
+
+
+@settings(max_examples=200, deadline=None)
+@given(damaged(), st.sampled_from(OPTIONS), st.sampled_from([8, 30, 200]))
+def test_a_file_reads_the_same_in_blocks_of_any_size(content: bytes, options: ReadOptions, size: int) -> None:
+    assume(b"\r" not in content)  # alone it ends a row for the parser, and no line of the file
+    with tempfile.TemporaryDirectory() as folder, pytest.MonkeyPatch.context() as patch:
+        path = Path(folder) / "log.csv"
+        path.write_bytes(content)
+        whole = outcome(path, options)
+        patch.setattr(blocks, "BLOCK_BYTES", size)
+        patch.setattr(table, "READ_BY_ROW", 8)
+        assert outcome(path, options) == whole
+
+
 INCREASE = "allowed: times that increase from row to row"
 
 
@@ -128,7 +151,7 @@ def test_a_merge_conflict_is_named_once(wrong: Wrong) -> None:
         " or an empty, Null or NaN cell where a sample is missing",
     ]
     text = joined(*rows(100), *both, *rows(30, 1.3), "1.7,x,0.5", *rows(9, 1.8))
-    assert wrong(text) == [*said, "log.csv: 1 of 203 rows cannot be read; --skip-bad leaves them out"]
+    assert wrong(text) == [*said, "log.csv: 1 of 203 rows cannot be read; skip_bad=True leaves them out"]
     assert wrong(text, skip_bad=True) == said[:1]
 
 
@@ -188,7 +211,7 @@ def test_rows_that_cannot_be_read_are_left_out_if_asked_for(read: Read, wrong: W
         "log.csv:503: found 1 cell ('(paused)'), allowed: 3",
     ]
     assert wrong(joined(*lines)) == [
-        *said, "log.csv: 3 of 1000 rows cannot be read; --skip-bad leaves them out"
+        *said, "log.csv: 3 of 1000 rows cannot be read; skip_bad=True leaves them out"
     ]  # fmt: skip
     log = read(joined(*lines), skip_bad=True)
     kept = np.delete(np.arange(1000), [100, 500, 501])
@@ -217,7 +240,7 @@ def test_no_more_than_one_row_in_a_hundred_is_left_out(read: Read, wrong: Wrong)
     assert read(joined(*lines), skip_bad=True).rows == 297
     lines[221] = "torn"
     assert wrong(joined(*lines), skip_bad=True)[-1] == (
-        "log.csv: 4 of 300 rows cannot be read, allowed with --skip-bad: 1% of them"
+        "log.csv: skip_bad: 4 of 300 rows cannot be read: allowed: 1% of them"
     )
 
 

@@ -57,15 +57,17 @@ def test_containers_by_suffix_and_by_their_first_bytes(wrong: Wrong, suffix: str
         assert wrong(content, name=name) == [f"{name}: found {CONTAINERS[suffix].format(name=name)}"]
 
 
+ALLOWED = "allowed: a text table; robot=NAME|FILE takes a robot"
+
+
 @pytest.mark.parametrize(
     ("name", "said"),
     [
-        ("arm.urdf", "the model of a robot, allowed: a text table; a robot is named with --robot arm.urdf"),
-        ("arm.csv", "the model of a robot, allowed: a text table; a robot is named with --robot arm.csv"),
+        ("arm.urdf", f"the model of a robot, {ALLOWED}"),
+        ("arm.csv", f"the model of a robot, {ALLOWED}"),
         (
             "arm.toml",
-            "a TOML file, allowed: a text table; a robot is named with --robot arm.toml, a map with --map"
-            " arm.toml",
+            f"a TOML file, {ALLOWED}; log_map=FILE.toml takes a map",
         ),
     ],
 )
@@ -115,9 +117,7 @@ def test_missing_folder_empty_binary(wrong: Wrong, tmp_path: Path) -> None:
 
 
 def test_unknown_source_and_no_file(tmp_path: Path) -> None:
-    with pytest.raises(
-        OptionError, match=r"^--source: found 'vendor', allowed: coppeliasim, .*, path, table$"
-    ):
+    with pytest.raises(OptionError, match=r"^source: found 'vendor', allowed: coppeliasim, .*, path, table$"):
         read_log([tmp_path / "log.csv"], ReadOptions(source="vendor"))
     with pytest.raises(OptionError, match=r"^found no log file, allowed: one, or several"):
         read_log([])
@@ -126,12 +126,12 @@ def test_unknown_source_and_no_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("options", "kind", "said"),
     [
-        ({"source": "coppeliasim"}, "source-not-used", "--source coppeliasim changes nothing: {none}"),
-        ({"source": "abb"}, "source-not-used", "--source abb changes nothing: {none}"),
+        ({"source": "coppeliasim"}, "source-not-used", "coppeliasim has no effect: {none}"),
+        ({"source": "abb"}, "source-not-used", "abb has no effect: {none}"),
         (
             {"rotation": "zyx"},
             "rotation-not-used",
-            "--rotation zyx changes nothing, since no orientation was found in the log",
+            "zyx has no effect: no orientation was found in the log",
         ),
     ],
 )
@@ -152,10 +152,10 @@ def test_a_source_that_tells_a_unit_or_nothing_else_is_not_doubted(read: Read, s
 
 def test_signs_that_are_none(wrong: Wrong) -> None:
     assert wrong("t,q1\n0,1\n", delimiter="x") == [
-        "--delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the sign itself"
+        "delimiter: found 'x', allowed: comma, semicolon, tab, spaces, bar, or the sign itself"
     ]
     assert wrong("t,q1\n0,1\n", decimal=";") == [
-        "--decimal: found ';', allowed: point, comma, or the sign itself"
+        "decimal: found ';', allowed: point, comma, or the sign itself"
     ]
 
 
@@ -163,9 +163,9 @@ def test_signs_that_the_file_does_not_have(wrong: Wrong) -> None:
     found = "log.csv:1: found 't,q1,q2' and no row of numbers below it"
     allowed = "a table with a row a sample"
     text = "t,q1,q2\n0,1,2\n1,1,2\n"
-    assert wrong(text, delimiter=";") == [f"{found} with --delimiter semicolon, allowed: {allowed}"]
+    assert wrong(text, delimiter=";") == [f"{found} with delimiter semicolon, allowed: {allowed}"]
     assert wrong(text, delimiter="Tab", decimal="comma") == [
-        f"{found} with --delimiter tab and --decimal comma, allowed: {allowed}"
+        f"{found} with delimiter tab and decimal sign comma, allowed: {allowed}"
     ]
 
 

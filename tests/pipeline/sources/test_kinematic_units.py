@@ -63,18 +63,13 @@ def test_a_header_that_says_degrees_over_radians(read: Read) -> None:
     (warning,) = log.warnings
     assert warning.kind == "unit-contradiction"
     miss = positions_over_log(UR5E, np.radians(Q)) - FLANGE
+    every = ", ".join(f'"q{k}": "deg"' for k in range(1, 7))
     off = 1e3 * np.sqrt((miss**2).sum(axis=1).mean())
-    assert warning.message == (
+    assert str(warning) == (
         "q1, q2, q3, q4, q5, q6: deg (its name) contradicts the kinematics: taken as rad: with it the arm"
-        f" comes within 0.00 mm (rms) of the recorded TCP, as deg within {off:.2f} mm; --unit q1=deg says"
-        " otherwise"
+        f" comes within 0.00 mm (rms) of the recorded TCP, as deg within {off:.2f} mm; unit={{{every}}}"
+        " reads them otherwise"
     )
-
-
-def test_kinematics_tell_degrees_from_gon(read: Read) -> None:
-    log = read(text([*joints(" [grad]"), "x [m]", "y [m]", "z [m]"], np.degrees(Q), FLANGE), UR5E)
-    np.testing.assert_allclose(log.q, Q, atol=PRINTED)
-    assert not log.warnings
 
 
 def test_the_user_has_the_last_word(read: Read) -> None:
@@ -97,8 +92,8 @@ def test_a_unit_that_the_data_contradict_is_asked_for(
     (said,) = wrong(table)
     assert re.fullmatch(
         rf"log\.csv: found q1, .*, q6 in {unit} by name or source, but \d+ steps? of about {turn} from one"
-        rf" row to the next; allowed: a unit that fits the data; say which with --unit {other} or"
-        rf" --unit {unit}",
+        rf" row to the next, allowed: a unit that fits the data; unit=\"{other}\" or"
+        rf" unit=\"{unit}\" says which",
         said,
     )
     assert set(read(table, units={"": other}).units.values()) == {"s", other}

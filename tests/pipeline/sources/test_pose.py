@@ -103,7 +103,7 @@ def test_the_kinematics_tell_of_a_rotation_vector_in_another_unit_than_its_names
         "rotvec_x, rotvec_y, rotvec_z: rad contradicts the kinematics: taken as deg: with it the arm's"
         " orientation agrees within 0.00 deg, as vector in rad within "
     )
-    assert warning.message.endswith(" deg; --unit rotvec_x=rad says otherwise")
+    assert warning.message.endswith(" deg")
     given = read(table, UR5E, units={"rotvec_x": "rad"})
     assert given.units["rotvec_z"] == "rad"
 
@@ -125,8 +125,7 @@ def test_rx_ry_rz_without_a_robot_are_not_guessed(read: Read) -> None:
     assert [(w.kind, w.message) for w in log.warnings] == [
         (
             "orientation",
-            "rx, ry, rz may be of several forms: the recorded orientation is not used; --rotation vector or"
-            " --rotation rpy or --rotation xyz says which",
+            "rx, ry, rz may be of several forms: the recorded orientation is not used",
         )
     ]
     assert "rx" not in log.units
@@ -292,11 +291,11 @@ def test_what_looks_like_a_recorded_tcp_and_is_none_is_said(read: Read, names: t
     log = read(f"t,q1 [rad],{','.join(names)}\n0,0.1,1,2,3\n0.1,0.2,1,2,3\n")
     assert log.tcp_position is None
     quoted = ", ".join(f'"{name}"' for name in names)
-    assert [(one.kind, one.message) for one in log.warnings] == [
+    assert [(one.kind, str(one)) for one in log.warnings] == [
         (
             "tcp-not-read",
             f"{', '.join(names)} look like a recorded TCP and are not read as one; name its columns tcp_x,"
-            f" tcp_y, tcp_z, or say which in a map (--map): [tcp] position = [{quoted}]",
+            f" tcp_y, tcp_z; log_map=FILE.toml says which they are: [tcp] position = [{quoted}]",
         )
     ]
 
@@ -304,9 +303,9 @@ def test_what_looks_like_a_recorded_tcp_and_is_none_is_said(read: Read, names: t
 def test_two_recorded_tcps_are_said(read: Read) -> None:
     names = ["tcp_x", "tcp_y", "tcp_z", "tool_x", "tool_y", "tool_z"]
     log = read(f"t,q1 [rad],{','.join(names)}\n0,0.1,1,2,3,4,5,6\n0.1,0.2,1,2,3,4,5,6\n")
-    assert [one.message for one in log.warnings] == [
+    assert list(map(str, log.warnings)) == [
         f"{', '.join(names)} look like a recorded TCP and are not read as one; name its columns tcp_x, tcp_y,"
-        ' tcp_z, or say which in a map (--map): [tcp] position = ["A", "B", "C"]'
+        ' tcp_z; log_map=FILE.toml says which they are: [tcp] position = ["A", "B", "C"]'
     ]
 
 

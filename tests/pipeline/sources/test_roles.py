@@ -16,8 +16,8 @@ Read = Callable[..., JointLog]
 Wrong = Callable[..., list[str]]
 Arm = Callable[..., Chain]
 
-OPTION = "name them in the robot's order with --joints A,B,C"
-RECORD = "record every joint, or give another --robot"
+OPTION = "joints=[A, B, C] names the joint columns, in the robot's order"
+RECORD = "record every joint; robot=NAME|FILE gives another arm"
 
 
 def table(names: Sequence[str]) -> str:
@@ -147,10 +147,10 @@ def test_joints_as_the_user_says(read: Read, wrong: Wrong) -> None:
     assert read(text, joints=("stick", "2")).joints == ("stick", "boom")
     assert read(text, joints=("stick [deg]", "BOOM")).joints == ("stick", "boom")
     assert wrong(text, joints=("stick", "arm")) == [
-        "--joints: found no column 'arm', allowed: boom [deg], stick [deg], other"
+        "joints: found no column 'arm', allowed: boom [deg], stick [deg], other"
     ]
     assert wrong(text, joints=("stick", "3")) == [
-        "log.csv: --joints: found stick [deg], stick [deg], allowed: each column once"
+        "log.csv: joints: found stick [deg], stick [deg], allowed: each column once"
     ]
 
 
@@ -180,7 +180,7 @@ def test_too_few_and_too_many_for_the_robot(wrong: Wrong, arm: Arm) -> None:
 
 
 def test_a_missing_number_is_named(wrong: Wrong, arm: Arm) -> None:
-    allowed = "allowed: numbers without a gap; record the missing one, or"
+    allowed = "allowed: numbers without a gap; record the missing one;"
     assert wrong(table(["t", "a", "J2", "J3"])) == [
         f"log.csv: found joint columns J2, J3 and none with number 1, {allowed} {OPTION}"
     ]
@@ -189,11 +189,11 @@ def test_a_missing_number_is_named(wrong: Wrong, arm: Arm) -> None:
     ]
     assert wrong(table(["t", "J1", "J2", "J4"]), arm(4)) == [
         "log.csv: found joint columns J1, J2, J4 and none with number 3, allowed: the 4 joints of the robot;"
-        " record the missing one, or give another --robot"
+        " record the missing one; robot=NAME|FILE gives another arm"
     ]
     assert wrong(table(["t", "J1", "J2", "Jthree", "J4"]), arm(4)) == [
         "log.csv: found joint columns J1, J2, J4 and none with number 3, allowed: the 4 joints of the robot;"
-        f" record the missing one, or {OPTION}"
+        f" record the missing one; {OPTION}"
     ]
 
 
@@ -201,18 +201,18 @@ def test_a_missing_name_is_named(wrong: Wrong, arm: Arm) -> None:
     names = ["shoulder_pan", "shoulder_lift", "wrist_1", "wrist_2", "wrist_3"]
     found = f"log.csv: found joint columns {', '.join(names)} and none for elbow, allowed:"
     assert wrong(table(["t", *names]), arm(6)) == [
-        f"{found} 6 for robot arm; record the missing one, or give another --robot"
+        f"{found} 6 for robot arm; record the missing one; robot=NAME|FILE gives another arm"
     ]
     assert wrong(table(["t", *names, "forearm", "other"]), arm(6)) == [
-        f"{found} 6 for robot arm; record the missing one, or {OPTION}"
+        f"{found} 6 for robot arm; record the missing one; {OPTION}"
     ]
     assert wrong(table(["t", *names])) == [
-        f"{found} such as q1, q2, ... or J1, J2, ...; record the missing one, or {OPTION}"
+        f"{found} such as q1, q2, ... or J1, J2, ...; record the missing one; {OPTION}"
     ]
     own = ["base_yaw", "lower_arm", "upper_arm", "hand"]
     assert wrong(table(["t", *own[:3]]), arm(4, names=tuple(own))) == [
         "log.csv: found joint columns base_yaw, lower_arm, upper_arm and none for hand, allowed: 4 for robot"
-        " arm; record the missing one, or give another --robot"
+        " arm; record the missing one; robot=NAME|FILE gives another arm"
     ]
 
 
@@ -225,12 +225,12 @@ def test_two_groups_are_ambiguous_unless_one_fits_the_robot(wrong: Wrong, read: 
 
 def test_names_that_stand_twice(wrong: Wrong) -> None:
     assert wrong(table(["t", "q1", "q2", "q2", "note", "note"])) == [
-        "log.csv:1, column q2: found as columns 3, 4, allowed: once; give the numbers of the right ones"
-        " with --joints"
+        "log.csv:1, column q2: found as columns 3, 4, allowed: once; joints=[A, B, C] says which: give"
+        " their numbers"
     ]
     assert wrong(table(["t", "q1 [deg]", "q1 [rad]"])) == [
-        "log.csv:1, column q1 [deg]: found as columns 2, 3, allowed: once; give the numbers of the right ones"
-        " with --joints"
+        "log.csv:1, column q1 [deg]: found as columns 2, 3, allowed: once; joints=[A, B, C] says"
+        " which: give their numbers"
     ]
 
 

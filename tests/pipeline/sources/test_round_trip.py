@@ -13,10 +13,11 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from urmpipe_pipeline.sources import ReadOptions, read_log
-from urmpipe_pipeline.sources.tables.diagnose import CarefulReader
+from urmpipe_pipeline.sources.tables.block_parser import clock_scales, parse_block
+from urmpipe_pipeline.sources.tables.blocks import byte_encoding, row_blocks, squeeze
+from urmpipe_pipeline.sources.tables.numbers import ClockColumn
+from urmpipe_pipeline.sources.tables.row_reader import RowReader
 from urmpipe_pipeline.sources.tables.sniff import sniff
-from urmpipe_pipeline.sources.tables.stream import byte_encoding, row_blocks, squeeze
-from urmpipe_pipeline.sources.tables.table import ClockColumn, read_fast
 from urmpipe_pipeline.sources.tables.text import open_text
 
 Floats = NDArray[np.float64]
@@ -112,20 +113,20 @@ def test_decimal_times_are_rounded_once(times: list[object]) -> None:
 
 @settings(max_examples=100, deadline=None)
 @given(tables())
-def test_the_careful_pass_reads_what_the_fast_one_reads(table: Written) -> None:
+def test_rows_are_read_alone_as_they_are_parsed_together(table: Written) -> None:
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.csv"
         path.write_bytes(table.text().encode(table.encoding))
         layout = sniff(open_text(path))
         clock = (ClockColumn(table.order.index(0), 0),)
         columns = [table.order.index(k + 1) for k in range(table.joints.shape[1])]
-        fast, reader = read_fast(layout, columns, clock), CarefulReader(layout, columns, clock)
-        rows = b"".join(row_blocks(layout)).decode(byte_encoding(layout))
-        careful = reader.read(rows.split("\n"))
-    assert fast is not None
+        block, reader = b"".join(row_blocks(layout)), RowReader(layout, columns, clock)
+    parsed = parse_block(layout, columns, clock, block, clock_scales(layout, clock))
+    by_row = reader.read(block.decode(byte_encoding(layout)).split("\n"))
+    assert parsed is not None
     assert not reader.verdict().findings
-    np.testing.assert_array_equal(fast.values, careful.values)
-    np.testing.assert_array_equal(fast.clock, careful.clock)
+    np.testing.assert_array_equal(parsed.values, by_row.values)
+    np.testing.assert_array_equal(parsed.clock, by_row.clock)
 
 
 NUMBERS = st.lists(st.sampled_from(["1", "-2.5", "3e4"]), min_size=1, max_size=4)

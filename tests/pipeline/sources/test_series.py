@@ -66,5 +66,8 @@ def test_all_columns_that_are_not_there_are_told_at_once(table: Path) -> None:
 def test_a_row_without_a_number_is_an_error_with_its_place(table: Path) -> None:
     with pytest.raises(LogError) as error:
         read_series(table, ["w"])
-    assert str(error.value) == f"{table}, column w: found 1 row without a number, allowed: one in every row"
+    assert (
+        str(error.value)
+        == f"{table}, row 3, column w: found 1 row without a number, allowed: one in every row"
+    )
     assert error.value.findings[0].row == 3

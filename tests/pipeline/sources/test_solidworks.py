@@ -50,8 +50,8 @@ def test_numbers_of_the_columns_come_before_those_of_the_files(write: Write) -> 
     assert [(warning.kind, warning.message) for warning in log.warnings] == [
         (
             "plot-order",
-            "the plots are joined by the numbers of their columns, which are not those of the files: Angular"
-            " Displacement1 of Plot2.csv, Angular Displacement2 of Plot1.csv; --joints says otherwise",
+            "the plots are joined by the numbers of their columns, which are not those of the files:"
+            " Angular Displacement1 of Plot2.csv, Angular Displacement2 of Plot1.csv",
         )
     ]
     given = read_log(files, ReadOptions(joints=("Angular Displacement2", "Angular Displacement1")))
@@ -65,7 +65,7 @@ def test_a_plot_that_is_missing_between_others_is_an_error(write: Write, arm: Ar
         read_log(files)
     assert str(caught.value) == (
         f"{tmp_path}: found plots with the numbers 1, 2, 4 and none with 3, allowed: a plot for each joint;"
-        " add the missing one, or name them in the robot's order with --joints A,B,C"
+        " add the missing one; joints=[A, B, C] names the joint columns, in the robot's order"
     )
     assert read_log(files, robot=arm(3)).q.shape == (3, 3)
 

@@ -183,7 +183,7 @@ WRONG = [
     Wrong("time_backwards", [r"^log:13, column t: found 0\.12 s after 0\.2 s, allowed: "]),
     Wrong("time_repeated", [r"^log:10, column t: found 0\.14 s again, allowed: "]),
     Wrong("time_missing", [r"^log:7, column t: found no time, allowed: a time in every row"]),
-    Wrong("time_of_one_second", [r"(?=.*rows repeat a time)(?=.*--period)"]),
+    Wrong("time_of_one_second", [r"(?=.*rows repeat a time)(?=.*period=)"]),
     Wrong("time_in_steps", [r"15\.6\d* ms|0\.0156\d* s"], stops=False),
     Wrong("gap_of_two_seconds", [r"row 16: 2\.02 s"], stops=False),
     Wrong("gap_with_a_possible_turn", [r"(?=.*q5)(?=.*\b16\b)(?=.*(ambiguous|turn))"], stops=False),
@@ -209,7 +209,7 @@ WRONG = [
     Wrong("header_with_all_names_twice", [r"^log:1, column q1: found as columns 2, 8, allowed: once"]),
     Wrong(
         "header_without_a_number",
-        [r"^log: found joint columns .* none with number 3, allowed: .*--joints"],
+        [r"^log: found joint columns .* none with number 3, allowed: .*joints="],
     ),
     Wrong("header_of_unknown_unit", [r"^log, column q1 \[gon\]: found the unit 'gon', allowed: rad, deg"]),
     Wrong("rows_too_short", [r"^log:8: found 6 cells, allowed: 7", r"^log:20: found 6 cells"]),
@@ -226,7 +226,7 @@ WRONG = [
     # the units
     Wrong(
         "angles_of_unknown_unit",
-        [r"values up to 4[23]\.?\d* in q1, .* no unit, allowed: rad or deg; .*--unit"],
+        [r"values up to 4[23]\.?\d* in q1, .* no unit, allowed: rad or deg; .*unit="],
     ),
     Wrong("header_says_rad", [r"(?=.*J1)(?=.*found)(?=.*rad)(?=.*(deg|360))"]),
     Wrong("header_says_deg_krc", [r"(?=.*AxisPos_Act1)(?=.*rad)(?=.*(deg|°))(?=.*\d mm)"], "ur5e", None),
@@ -314,7 +314,7 @@ def _ingested(name: str, robot: Chain | None) -> tuple[bool, list[str]]:
         assert {finding.file for finding in error.findings} <= files
         # Without the file's name, which tells what is wrong with it.
         return True, [str(replace(finding, file="log")) for finding in error.findings]
-    return False, [f"row {w.row}: {w.message}" for w in run.warnings]
+    return False, [f"row {w.row}: {w.sentence()}" for w in run.warnings]
 
 
 NO_PERIOD = [case for case in map(_case, GOOD) if case.options == NO_TIME]
@@ -323,13 +323,13 @@ NO_PERIOD = [case for case in map(_case, GOOD) if case.options == NO_TIME]
 @pytest.mark.parametrize("case", NO_PERIOD, ids=_name)
 def test_a_specimen_without_a_clock_loads_at_5_ms_and_the_option_is_named(case: Good) -> None:
     _, said = _ingested(case.name, load_robot(case.robot) if case.robot else None)
-    assert [line for line in said if "5 ms" in line and "--period" in line]
+    assert [line for line in said if "5 ms" in line and "period=" in line]
 
 
 def test_three_columns_without_names_may_be_a_path_and_the_option_is_named() -> None:
     stopped, said = _ingested("cad_path_no_header", None)
     assert stopped
-    assert [line for line in said if "--source path" in line]
+    assert [line for line in said if 'source="path"' in line]
 
 
 @pytest.mark.parametrize(

@@ -16,9 +16,11 @@ from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log
 from urmpipe_pipeline.sources.clocks.stamps import known_forms
 from urmpipe_pipeline.sources.clocks.text_times import timed
-from urmpipe_pipeline.sources.tables.diagnose import CarefulReader
+from urmpipe_pipeline.sources.tables.block_parser import clock_scales, parse_block
+from urmpipe_pipeline.sources.tables.blocks import row_blocks
+from urmpipe_pipeline.sources.tables.numbers import ClockColumn
+from urmpipe_pipeline.sources.tables.row_reader import RowReader
 from urmpipe_pipeline.sources.tables.sniff import sniff
-from urmpipe_pipeline.sources.tables.table import ClockColumn, read_fast
 from urmpipe_pipeline.sources.tables.text import open_text
 
 Read = Callable[..., JointLog]
@@ -133,13 +135,6 @@ def test_quoted_and_padded_cells(read: Read) -> None:
     assert log.t_ns.tolist() == [0, 168 * MS, 668 * MS]
 
 
-def test_evidence_is_told(read: Read) -> None:
-    log = read(clocked("2021-04-11 22:27:21.5", "2021-04-11 22:27:21.6"))
-    assert evidence(log) == "its cells, such as '2021-04-11 22:27:21.5'; without a time zone: taken as UTC"
-    log = read(clocked("2021-04-11T22:27:21Z", "2021-04-11T22:27:22Z"))
-    assert evidence(log) == "its cells, such as '2021-04-11T22:27:21Z'"
-
-
 def test_a_day_far_behind_the_head_decides(read: Read) -> None:
     """The sampled cells may be read in both ways; one at the end cannot be a month."""
     cells = [f"{1 + k // 200:02d}/04/2021 {k % 200 // 60 + 12:02d}:{k % 60:02d}:00" for k in range(200)]
@@ -173,15 +168,16 @@ def test_an_order_that_makes_no_difference_is_taken_and_told(read: Read) -> None
 def test_an_order_that_nothing_tells_is_asked_for(read: Read, wrong: Wrong) -> None:
     text = clocked("01/02/2021 23:59:59", "02/02/2021 00:00:01", "03/02/2021 00:00:02")
     assert wrong(text) == [
-        "log.csv:2, column timestamp: found '01/02/2021 23:59:59', which may be date and time, day first or"
-        " date and time, month first: say which with --unit timestamp=dmy or --unit timestamp=mdy"
+        "log.csv:2, column timestamp: found '01/02/2021 23:59:59', which may be date and time, day"
+        ' first or date and time, month first; unit={"timestamp": "dmy"} or unit={"timestamp": "mdy"}'
+        " says which"
     ]
     assert read(text, units={"timestamp": "dmy"}).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
     assert read(text, units={"timestamp": "mdy"}).clock_start_ns == unix(2021, 1, 2, 23, 59, 59)
     header = text.replace("timestamp", "Date (dd/mm/yyyy)")
     assert read(header).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
     assert wrong(text, units={"timestamp": "ms"}) == [
-        "--unit: found ms for the time 'timestamp', allowed: dmy, mdy"
+        "unit: found ms for the time 'timestamp', allowed: dmy, mdy"
     ]
 
 
@@ -211,9 +207,9 @@ def test_zero_padded_digits_behind_a_colon_are_decimals(read: Read) -> None:
 def test_digits_behind_a_colon_that_nothing_tells_are_asked_for(read: Read, wrong: Wrong) -> None:
     text = clocked("10:11:32:100", "10:11:32:105", "10:11:32:110", name="Time")
     assert wrong(text) == [
-        "log.csv:2, column Time: found '10:11:32:100', which may be time of day, decimals behind the last"
-        " colon or time of day, microseconds behind the last colon: say which with --unit Time=s or"
-        " --unit Time=us"
+        "log.csv:2, column Time: found '10:11:32:100', which may be time of day, decimals behind the"
+        ' last colon or time of day, microseconds behind the last colon; unit={"Time": "s"} or'
+        ' unit={"Time": "us"} says which'
     ]
     assert read(text, units={"Time": "us"}).t_ns.tolist() == [0, 5 * US, 10 * US]
     assert read(text, units={"Time": "ms"}).t_ns.tolist() == [0, 5 * MS, 10 * MS]
@@ -293,7 +289,7 @@ WRITERS: dict[str, Callable[[datetime], str]] = {
     st.lists(st.integers(1, 10**12), min_size=2, max_size=30),
     st.sampled_from(sorted(WRITERS)),
 )
-def test_dates_are_exact_and_both_readers_agree(start: datetime, steps: list[int], writer: str) -> None:
+def test_dates_are_exact_parsed_and_by_row(start: datetime, steps: list[int], writer: str) -> None:
     """Steps of 1 us to 11 days, written by Python's own clock."""
     exact = [start + timedelta(microseconds=int(us)) for us in np.cumsum([0, *steps])]
     if max(exact) > datetime(2110, 1, 1):
@@ -307,10 +303,10 @@ def test_dates_are_exact_and_both_readers_agree(start: datetime, steps: list[int
         key = {"us": "mdy", "german": "dmy", "counted": "us"}.get(writer, "")
         forms = known_forms(layout.cells(0))
         clock = (ClockColumn(0, forms=tuple(f for f in forms if key in f.keys) or forms),)
-        fast = read_fast(layout, [1], clock)
-        careful = CarefulReader(layout, [1], clock).read(text.splitlines()[1:])
-        assert fast is not None
-        read = [timed(layout, clock, numbers).clock for numbers in (fast, careful)]
+        parsed = parse_block(layout, [1], clock, b"".join(row_blocks(layout)), clock_scales(layout, clock))
+        by_row = RowReader(layout, [1], clock).read(text.splitlines()[1:])
+        assert parsed is not None
+        read = [timed(layout, clock, numbers).clock for numbers in (parsed, by_row)]
     wanted = [(time - datetime(1970, 1, 1)) // timedelta(microseconds=1) * 1000 for time in exact]
     assert [times.tolist() for times in read if times is not None] == [wanted, wanted]
 

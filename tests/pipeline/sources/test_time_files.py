@@ -90,7 +90,7 @@ def test_two_clocks_are_one_too_many(write: Write) -> None:
         read(joints, clock)
     assert str(caught.value) == (
         f"{joints}:1, column t: found a time here and in time.csv, allowed: one clock;"
-        " say which column with --time"
+        " time=COLUMN says which column"
     )
 
 

@@ -38,7 +38,7 @@ def evidence(log: JointLog, what: str) -> str:
     [
         ("q1 [deg]", "deg"), ("q1 (rad)", "rad"), ("q1 (°)", "deg"), ("q1[Grad]", "deg"), ("q1_deg", "deg"),
         ("q1_rad", "rad"), ("q1 [degrees]", "deg"), ("q1 (Radians)", "rad"), ("q1 [deg sign]", "deg"),
-        ("q1 (grd)", "deg"),
+        ("q1 (grd)", "deg"), ("q1 [Grad]", "deg"), ("achse_1_grad", "deg"),
     ],
 )  # fmt: skip
 def test_units_in_names(read: Read, name: str, unit: str) -> None:
@@ -48,50 +48,15 @@ def test_units_in_names(read: Read, name: str, unit: str) -> None:
     assert not log.warnings
 
 
-GON = "1 gon is 0.9 deg: multiply values in gon by 0.9"
-
-
-def test_a_unit_that_is_deg_or_gon_is_refused_as_an_option(wrong: Wrong) -> None:
+def test_a_unit_that_is_not_known_is_refused(wrong: Wrong) -> None:
     text = "t,q1,q2\n0,30,30\n0.1,31,30\n"
-    either = "which is deg in German and gon elsewhere, allowed: rad, deg"
-    assert wrong(text, units={"": "grad"}) == [f"--unit: found 'grad', {either}; {GON}"]
-    assert wrong(text, units={"q1": "Grad"}) == [
-        f"--unit: found 'Grad', {either}, m, mm, cm, s, ms, us, ns, dmy, mdy; {GON}"
+    assert wrong(text, units={"": "gon"}) == ["unit: found 'gon', allowed: rad, deg"]
+    assert wrong(text, units={"q1": "gon"}) == [
+        "unit: found 'gon', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
     ]
-    assert wrong(text, units={"": "gon"}) == [f"--unit: found 'gon', allowed: rad, deg; {GON}"]
     assert wrong("t,q1 [gon]\n0,30\n0.1,31\n") == [
-        f"log.csv, column q1 [gon]: found the unit 'gon', allowed: rad, deg, m, mm, cm; {GON}"
-    ]
-
-
-@pytest.mark.parametrize("name", ["q1 [grad]", "q1_grad", "q1 (GRAD)", "Q1_GRAD"])
-def test_a_unit_that_is_deg_or_gon_is_taken_as_deg_and_said(read: Read, name: str) -> None:
-    text = f"t,{name}\n0,30\n0.1,31\n"
-    log = read(text)
-    assert log.q[0, 0] == 30 * DEG
-    (warning,) = log.warnings
-    column, unit = (name, name[-4:]) if "_" in name else ("q1", name[4:8])
-    assert (warning.kind, warning.message) == (
-        "gon-or-deg",
-        f"{column}: {unit} is taken as deg, as in German; elsewhere it is gon, 0.9 deg: --unit deg says that"
-        " it is right, values in gon are to be multiplied by 0.9",
-    )
-    assert not read(text, units={"": "deg"}).warnings
-
-
-@pytest.mark.parametrize("name", ["q1 [Grad]", "Winkel1 [grad]", "achse_1_grad", "Gelenk 1 (grad)"])
-def test_german_names_tell_degrees(read: Read, name: str) -> None:
-    log = read(f"t,{name}\n0,30\n0.1,31\n")
-    assert log.q[0, 0] == 30 * DEG
-    assert not log.warnings
-
-
-def test_wraps_tell_degrees_from_gon(read: Read, wrong: Wrong) -> None:
-    angle = np.arange(0.0, 800.0, 7.0)[:, np.newaxis]
-    assert not read(csv_of(angle % 360.0, 0.1, ("q1 [grad]",))).warnings
-    assert wrong(csv_of(angle % 400.0, 0.1, ("q1 [grad]",))) == [
-        "log.csv: found q1 in grad and 1 step of about 400 from one row to the next, a full turn in gon,"
-        " allowed: rad, deg; multiply the values by 0.9, which are deg then"
+        "log.csv, column q1 [gon]: found the unit 'gon', allowed: rad, deg, m, mm, cm;"
+        ' unit={"q1": "deg"} says which'
     ]
 
 
@@ -108,8 +73,8 @@ def test_a_slide_without_unit_is_taken_as_m(read: Read, arm: Arm) -> None:
     log = read("t,q1,q2\n0,0.5,0.5\n0.1,0.6,0.6\n", arm(2, "prismatic", "revolute"))
     assert log.units == {"t": "s", "q1": "m", "q2": "rad"}
     assert [warning.message for warning in log.warnings] == [
-        "no unit is given for q1: the prismatic joints are taken as m; --unit says otherwise",
-        "no unit is given for q2: the joints are taken as rad; --unit says otherwise",
+        "no unit is given for q1: the prismatic joints are taken as m",
+        "no unit is given for q2: the joints are taken as rad",
     ]
 
 
@@ -134,15 +99,15 @@ def test_units_given_by_the_user(read: Read, wrong: Wrong, arm: Arm) -> None:
     assert log.q[0].tolist() == [30.0, 0.5 * DEG, 0.005]
     assert log.period == 0.6
     assert not log.warnings
-    assert wrong(text, units={"": "mm"}) == ["--unit: found 'mm', allowed: rad, deg"]
+    assert wrong(text, units={"": "mm"}) == ["unit: found 'mm', allowed: rad, deg"]
     assert wrong(text, units={"q1": "inch"}) == [
-        "--unit: found 'inch', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
+        "unit: found 'inch', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
     ]
-    assert wrong(text, units={"q9": "deg"}) == ["--unit: found no column 'q9', allowed: t, q1, q2, q3"]
+    assert wrong(text, units={"q9": "deg"}) == ["unit: found no column 'q9', allowed: t, q1, q2, q3"]
     assert wrong(text, units={"q1": "s", "t": "s"}) == [
-        "--unit q1: found the unit s (given as an option), allowed: rad, deg, m, mm, cm"
+        "column q1: unit: found the unit s (given as an option), allowed: rad, deg, m, mm, cm"
     ]
-    assert wrong(text, units={"t": "deg"}) == ["--unit: found deg for the time 't', allowed: s, ms, us, ns"]
+    assert wrong(text, units={"t": "deg"}) == ["unit: found deg for the time 't', allowed: s, ms, us, ns"]
 
 
 def test_a_unit_that_does_not_fit_the_robot(wrong: Wrong, arm: Arm) -> None:
@@ -154,15 +119,15 @@ def test_a_unit_that_does_not_fit_the_robot(wrong: Wrong, arm: Arm) -> None:
 def test_a_unit_that_is_not_known(wrong: Wrong, read: Read) -> None:
     text = "t,J1 [counts]\n0,30\n0.1,31\n"
     assert wrong(text) == [
-        "log.csv, column J1 [counts]: found the unit 'counts', allowed: rad, deg, m, mm, cm; say which with"
-        " --unit J1=deg"
+        "log.csv, column J1 [counts]: found the unit 'counts', allowed: rad, deg, m, mm, cm;"
+        ' unit={"J1": "deg"} says which'
     ]
     assert read(text, units={"J1": "deg"}).q[0, 0] == 30 * DEG
 
 
 def test_a_line_of_units_that_are_not_known(read: Read, wrong: Wrong) -> None:
     text = "t,J1,J2\n[s],[counts],[counts]\n0,30,1\n0.1,31,1\n"
-    said = "found the unit 'counts', allowed: rad, deg, m, mm, cm; say which with --unit J1=deg"
+    said = 'found the unit \'counts\', allowed: rad, deg, m, mm, cm; unit={"J1": "deg"} says which'
     assert wrong(text) == [f"log.csv, column J1: {said}"]
     assert read(text, units={"": "deg"}).units == {"t": "s", "J1": "deg", "J2": "deg"}
     powers = read("t,J1,tau1,M,n\n[s],[rad],[Nm],[kg m2/s2],(1/min)\n0,30,1,1,1\n0.1,31,1,1,1\n")
@@ -177,7 +142,7 @@ def test_radians_are_assumed_and_said(read: Read) -> None:
     log = read(csv_of(np.linspace(-3, 3, 50)[:, np.newaxis]))
     assert log.units["q1"] == "rad"
     assert [(w.kind, w.message) for w in log.warnings] == [
-        ("assumed-unit", "no unit is given for q1: the joints are taken as rad; --unit says otherwise")
+        ("assumed-unit", "no unit is given for q1: the joints are taken as rad")
     ]
 
 
@@ -211,7 +176,8 @@ def test_the_robots_limits_tell_degrees(read: Read, arm: Arm, wrong: Wrong) -> N
 
 def test_slow_large_values_may_be_either(wrong: Wrong) -> None:
     assert wrong(csv_of(np.linspace(0, 60, 1000)[:, np.newaxis])) == [
-        "log.csv: found values up to 60 in q1 and no unit, allowed: rad or deg; say which with --unit"
+        'log.csv: found values up to 60 in q1 and no unit, allowed: rad or deg; unit="rad" or'
+        ' unit="deg" says which'
     ]
 
 
@@ -246,9 +212,7 @@ def test_positions_in_mm(read: Read) -> None:
 
 def test_positions_without_unit_are_taken_as_m(read: Read) -> None:
     log = read("t,x,y,z\n0,0.1,0.2,0.3\n0.1,0.1,0.2,0.3\n")
-    assert [w.message for w in log.warnings] == [
-        "no unit is given for x, y, z: the positions are taken as m; --unit says otherwise"
-    ]
+    assert [w.message for w in log.warnings] == ["no unit is given for x, y, z: the positions are taken as m"]
 
 
 def test_digits_of_a_coarse_format(read: Read) -> None:
@@ -271,7 +235,7 @@ def test_a_position_without_unit_is_like_the_others(read: Read) -> None:
 
 
 def test_a_rate_in_an_unknown_unit_is_refused_as_a_joint_is(wrong: Wrong) -> None:
-    said = "found the unit 'rpm', allowed: rad, deg, m, mm, cm; say which with --unit qd1=deg"
+    said = 'found the unit \'rpm\', allowed: rad, deg, m, mm, cm; unit={"qd1": "deg"} says which'
     assert wrong("t,q1 [rad],qd1 [rpm]\n0,1,2\n1,2,3\n") == [f"log.csv, column qd1 [rpm]: {said}"]
 
 
@@ -293,7 +257,8 @@ def test_huge_numbers_are_read_without_a_warning_of_numpy(read: Read, wrong: Wro
     rows = "0,1e308\n1,-1e308\n2,0\n"
     assert read(f"t,q1 [rad]\n{rows}").q[0, 0] == 1e308
     assert wrong(f"t,q1\n{rows}") == [
-        "log.csv: found values up to 1e+308 in q1 and no unit, allowed: rad or deg; say which with --unit"
+        'log.csv: found values up to 1e+308 in q1 and no unit, allowed: rad or deg; unit="rad" or'
+        ' unit="deg" says which'
     ]
 
 

@@ -72,3 +72,8 @@ def exact_form(chain: Chain) -> ClosedForm | None:
         return None
     names = chain.coordinates
     return spherical_wrist(of_chain, names) or parallel_axes(of_chain, names)
+
+
+def method_words(method: str) -> str:
+    """Return what solves targets: "closed form: spherical wrist", or "iterative"."""
+    return method if method == "iterative" else f"closed form: {method}"

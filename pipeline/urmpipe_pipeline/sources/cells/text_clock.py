@@ -7,7 +7,7 @@ for their digits) have the same parts at the same places: one match tells how to
 from __future__ import annotations
 
 import re
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -188,15 +188,17 @@ def _length(parts: Parts) -> tuple[IntArray, Flags]:
     return parts.sign("sign") * (np.where(valid, whole, 0) * unit + low), valid
 
 
-def _forms() -> tuple[Form, ...]:
-    """Return all forms that are known."""
-    decimals = r"(?:[.,](?P<decimals>\d{1,9}))?"
-    minutes = r"(?P<minute>\d\d)"
-    clock = rf"(?P<hour>\d{{1,5}}):{minutes}(?::(?P<second>\d\d){decimals})?"
-    counted = rf"(?P<hour>\d{{1,5}}):{minutes}:(?P<second>\d\d):(?P<count>\d{{1,9}})"
-    unpadded = rf"(?P<hour>\d{{1,5}}):{minutes}:(?P<second>\d\d)[.,](?P<count>\d{{1,6}})"
-    dense = rf"(?P<hour>\d\d){minutes}(?P<second>\d\d){decimals}"
-    half = r"(?: ?(?P<half>[ap])\.?m\.?)?"
+_DECIMALS = r"(?:[.,](?P<decimals>\d{1,9}))?"
+_MINUTES = r"(?P<minute>\d\d)"
+_CLOCK = rf"(?P<hour>\d{{1,5}}):{_MINUTES}(?::(?P<second>\d\d){_DECIMALS})?"
+_COUNTED = rf"(?P<hour>\d{{1,5}}):{_MINUTES}:(?P<second>\d\d):(?P<count>\d{{1,9}})"
+_WITHOUT_ZEROS = rf"(?P<hour>\d{{1,5}}):{_MINUTES}:(?P<second>\d\d)[.,](?P<count>\d{{1,6}})"
+_HALF_DAY = r"(?: ?(?P<half>[ap])\.?m\.?)?"
+
+
+def _dates() -> Iterator[Form]:
+    """Yield the forms of dates, alone and with a time of day."""
+    dense = rf"(?P<hour>\d\d){_MINUTES}(?P<second>\d\d){_DECIMALS}"
     zone = r"(?P<zone> ?(?:z|utc|gmt|(?P<ahead>[+-])(?P<zone_hour>\d\d):?(?P<zone_minute>\d\d)?))?"
     dates = {
         "year first": (r"(?P<year>\d{4})(?P<gap>[-/.])(?P<month>\d{1,2})(?P=gap)(?P<day>\d{1,2})", "ymd"),
@@ -206,40 +208,42 @@ def _forms() -> tuple[Form, ...]:
         "without signs": (r"(?P<year>\d{4})(?P<month>\d\d)(?P<day>\d\d)", "ymd"),
     }
     between = r"(?:t|_|,? +)"
-    found = []
     for style, (date, key) in dates.items():
         keys = (key,) if key else ()
-        found.append(Form(f"date, {style}", DATE, _compiled(date), timed=False, keys=keys))
-        whole = _compiled(f"{date}{between}(?:{clock}){half}{zone}")
-        found.append(Form(f"date and time, {style}", DATE, whole, keys=keys))
-        name, loose = f"date and time, {style}, {_UNPADDED}", _compiled(date + between + unpadded)
-        found.append(Form(name, DATE, loose, True, keys, "us", last=True))
+        yield Form(f"date, {style}", DATE, _compiled(date), timed=False, keys=keys)
+        whole = _compiled(f"{date}{between}(?:{_CLOCK}){_HALF_DAY}{zone}")
+        yield Form(f"date and time, {style}", DATE, whole, keys=keys)
+        name, loose = f"date and time, {style}, {_UNPADDED}", _compiled(date + between + _WITHOUT_ZEROS)
+        yield Form(name, DATE, loose, True, keys, "us", last=True)
         for tail, what in _TAILS.items():
             name = f"date and time, {style}, {what} behind the last colon"
-            found.append(Form(name, DATE, _compiled(date + between + counted), True, (*keys, tail), tail))
+            yield Form(name, DATE, _compiled(date + between + _COUNTED), True, (*keys, tail), tail)
     iso = _compiled(f"{dates['without signs'][0]}{between}{dense}{zone}")
-    found.append(Form("date and time, without signs", DATE, iso))
-    found.append(Form("time of day", TIME_OF_DAY, _compiled(rf"(?P<sign>[+-]?){clock}{half}")))
-    loose = _compiled(unpadded)
-    found.append(Form(f"time of day, {_UNPADDED}", TIME_OF_DAY, loose, tail="us", last=True))
+    yield Form("date and time, without signs", DATE, iso)
+
+
+def _times() -> Iterator[Form]:
+    """Yield the forms of times of day and of lengths of time."""
+    yield Form("time of day", TIME_OF_DAY, _compiled(rf"(?P<sign>[+-]?){_CLOCK}{_HALF_DAY}"))
+    loose = _compiled(_WITHOUT_ZEROS)
+    yield Form(f"time of day, {_UNPADDED}", TIME_OF_DAY, loose, tail="us", last=True)
     for tail, what in _TAILS.items():
         name = f"time of day, {what} behind the last colon"
-        found.append(Form(name, TIME_OF_DAY, _compiled(counted), True, (tail,), tail))
-    days = rf"(?P<days_sign>[+-]?)(?P<days>\d{{1,6}}) days?(?: \+?{clock})?"
-    found.append(Form("days, hours, minutes and seconds", LENGTH, _compiled(days)))
-    short = rf"{minutes}:(?P<second>\d\d)[.,](?P<decimals>\d{{1,9}})"
-    found.append(Form("minutes and seconds", LENGTH, _compiled(short)))
+        yield Form(name, TIME_OF_DAY, _compiled(_COUNTED), True, (tail,), tail)
+    days = rf"(?P<days_sign>[+-]?)(?P<days>\d{{1,6}}) days?(?: \+?{_CLOCK})?"
+    yield Form("days, hours, minutes and seconds", LENGTH, _compiled(days))
+    short = rf"{_MINUTES}:(?P<second>\d\d)[.,](?P<decimals>\d{{1,9}})"
+    yield Form("minutes and seconds", LENGTH, _compiled(short))
     words = "|".join(_WORDS_NS)
-    number = rf"(?P<sign>[+-]?)(?P<whole>\d{{1,15}}){decimals} ?(?P<word>{words})"
-    found.append(Form("a number with its unit", LENGTH, _compiled(number)))
-    return tuple(found)
+    number = rf"(?P<sign>[+-]?)(?P<whole>\d{{1,15}}){_DECIMALS} ?(?P<word>{words})"
+    yield Form("a number with its unit", LENGTH, _compiled(number))
 
 
 def _compiled(pattern: str) -> re.Pattern[str]:
     return re.compile(rf" *{pattern} *\Z", re.IGNORECASE | re.ASCII)
 
 
-FORMS: Sequence[Form] = _forms()
+FORMS: Sequence[Form] = (*_dates(), *_times())
 """All forms, the usual ones first."""
 
 

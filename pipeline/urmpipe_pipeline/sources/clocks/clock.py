@@ -11,6 +11,7 @@ import numpy as np
 
 from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
 from urmpipe_pipeline.sources.cells.text_clock import DATE, SECOND_NS, TIME_OF_DAY
@@ -18,10 +19,10 @@ from urmpipe_pipeline.sources.clocks.clock_columns import time_columns, times_of
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS, unit_of
 from urmpipe_pipeline.sources.clocks.stamps import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column
-from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.options import ReadOptions
+from urmpipe_pipeline.sources.tables.numbers import ClockColumn
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import ClockColumn
+from urmpipe_pipeline.sources.units.unit_hints import called
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
 
 PAPER_PERIOD = 0.005
@@ -35,6 +36,10 @@ _DATES = (19_700_101_000_000, 21_000_101_000_000)
 """Dates written as numbers, YYYYMMDDhhmmss."""
 
 
+_OTHER_TIME = (Hint("time"), Hint("time", "none"))
+"""What to give for another time column."""
+
+
 @dataclass(frozen=True, slots=True)
 class Clock:
     """The clock of one table.
@@ -46,6 +51,7 @@ class Clock:
         told: Whether the user or the name of its column tells that unit.
         inferences: What was found out.
         warnings: What a person should know.
+        by_source: Whether the source told that unit.
     """
 
     columns: tuple[Column, ...] = ()
@@ -54,6 +60,7 @@ class Clock:
     told: bool = False
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
+    by_source: bool = False
 
     @property
     def units(self) -> dict[str, str]:
@@ -128,8 +135,9 @@ def clock_of(
         OptionError: If its unit is given as one that is no time.
     """
     if not chosen:
-        return Clock(inferences=(Inference("time column", "none", why),))
-    found = Inference("time column", " and ".join(column.name for column in chosen), why)
+        return Clock(inferences=(Inference("time column", "none", why, hints=_OTHER_TIME),))
+    names = tuple(column.name for column in chosen)
+    found = Inference("time column", " and ".join(names), why, columns=names, hints=_OTHER_TIME)
     if chosen[0].text:
         parts = tuple(_text_part(column, layout, units) for column in chosen)
         return Clock(chosen, parts, _unit_of(parts[0]), inferences=(found,))
@@ -140,9 +148,11 @@ def clock_of(
     unit, evidence, warnings = unit_of(time, layout, source, units)
     _refuse_ages(time, layout, unit)
     parts = (ClockColumn(time.index, EXPONENTS[unit]),)
-    said = (found, Inference("unit of the time", unit, evidence))
+    other = (Hint("unit", {called(time): "s" if unit != "s" else "ms"}),)
+    said = (found, Inference("unit of the time", unit, evidence, columns=names, hints=other))
     told = time.number in units or time.unit is not None
-    return Clock(chosen, parts, unit, told, said, warnings)
+    by_source = not told and source is not None and "time" in source.units
+    return Clock(chosen, parts, unit, told, said, warnings, by_source)
 
 
 def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> ClockColumn:
@@ -156,7 +166,8 @@ def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> Clo
     asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
     if given is not None and not asked:
         keys = ", ".join(dict.fromkeys(key for form in forms for key in form.keys)) or "none"
-        raise OptionError(f"--unit: found {given.name} for the time {shown(column.name)}, allowed: {keys}")
+        found = f"{given.name} for the time {shown(column.name)}"
+        raise OptionError(Finding(parameter="unit", found=found, allowed=keys))
     return ClockColumn(column.index, forms=asked or forms)
 
 
@@ -164,17 +175,22 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
     """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
     for value in times_of(layout.cells(time.index), layout)[:1]:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
-            message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
-            hint = f"say the unit with {option('--unit', f'{time.name}=ns')}"
+            place = (str(layout.segment.path), layout.first_line, 1, time.header)
+            hint = Hint("unit", {called(time): "ns"}, "reads them so")
             if unit == "s" and _DATES[0] <= value < _DATES[1]:
-                hint = "a date is read if it is written as 2021-04-11 22:27:21.5"
-            raise LogError(
-                Finding(f"{message}; {hint}", str(layout.segment.path), layout.first_line, 1, time.header)
-            )
+                hint = Hint("", does="a date is read if it is written as 2021-04-11 22:27:21.5")
+            message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
+            raise LogError(Finding(message, *place, hints=(hint,)))
+
+
+def unused_period(keyword: str) -> LogWarning:
+    """Return the warning that a period has no effect, since the file has a clock; by its keyword."""
+    hints = (Hint("time", "none", "leaves the clock out"),)
+    return LogWarning("period-not-used", "no effect: the log has a clock", parameter=keyword, hints=hints)
 
 
 def even_clock(
-    rows: int, period: float | None, given_by: str = "--period", column: str = ""
+    rows: int, period: float | None, given_by: str = "period", like: str = ""
 ) -> tuple[IntArray, tuple[Inference, ...], list[LogWarning]]:
     """Return the times in [ns], shape (rows,), of a log without a clock, what they rest on, and a warning.
 
@@ -183,22 +199,24 @@ def even_clock(
     Args:
         rows: Number of rows.
         period: Time between rows in [s], if the user gave it.
-        given_by: How it was given, for errors.
-        column: A column that may be the time, for the warning.
+        given_by: The keyword that gave it, for errors.
+        like: A column that may be the time, for the warning.
 
     Raises:
         OptionError: If the period is not a positive time of 1 ns or more.
     """
     if period is not None and not (math.isfinite(period) and period >= 1e-9):
-        raise OptionError(f"{given_by}: found {period:g} s, allowed: a positive time of 1e-9 s or more")
+        allowed = "a positive time of 1e-9 s or more"
+        raise OptionError(Finding(parameter=given_by, found=f"{period:g} s", allowed=allowed))
     step = PAPER_PERIOD if period is None else period
     if rows * step * 1e9 >= LONGEST_NS:
-        longest = LONGEST_NS / 1e9 / rows
-        raise OptionError(f"{given_by}: found {step:g} s, allowed: less than {longest:g} s for {rows} rows")
+        allowed = f"less than {LONGEST_NS / 1e9 / rows:g} s for {rows} rows"
+        raise OptionError(Finding(parameter=given_by, found=f"{step:g} s", allowed=allowed))
     times = np.rint(np.arange(rows) * (step * 1e9)).astype(np.int64)
     if period is not None:
-        return times, (Inference("period", f"{step:g} s", "given as an option"),), []
-    said = "no time column: the rows are taken as 5 ms apart; --period S says otherwise"
-    if column:
-        said += f"; {column} always increases: {option('--time', column)} takes it as the time"
-    return times, (Inference("period", "0.005 s", "assumed"),), [LogWarning("assumed-period", said)]
+        return times, (Inference("period", f"{step:g} s", "given as an option", hints=(Hint("period"),)),), []
+    hints = [Hint("period", None, "sets another time between rows")]
+    hints += [Hint("time", like, "takes this column as the time: it always increases")] if like else []
+    said = "no time column: the rows are taken as 5 ms apart"
+    warning = LogWarning("assumed-period", said, hints=tuple(hints))
+    return times, (Inference("period", "0.005 s", "assumed", hints=(Hint("period"),)),), [warning]

@@ -7,6 +7,7 @@ from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import width
 from urmpipe_pipeline.sources.cells.cell import count_up, is_missing, to_float
 from urmpipe_pipeline.sources.cells.text_clock import DATE, TIME_OF_DAY
@@ -38,7 +39,7 @@ def time_columns(
     if options.time is not None:
         if options.time.lower() == "none":
             return (), "given as an option"
-        column = find_column(columns, options.time, "--time")
+        column = find_column(columns, options.time, parameter="time")
         return _with_other_half(column, columns, layout), "given as an option"
     if layout.header is None:
         if options.source == PATH and (first := _before_pose(columns, layout, options)) is not None:
@@ -167,9 +168,11 @@ def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | Non
     if not one_more and (len(times) < 3 or times[0] != 0.0 or not _keeps_near_a_line(times)):
         return
     what = "the time or a counter" if path else "the time, a counter or a joint"
-    message = f"found a first column that increases from row to row, which may be {what}: say --time 1 or"
-    rest = "" if path else ", or name the joint columns with --joints 2,3,..."
-    raise LogError(Finding(f"{message} --time none{rest}", str(layout.segment.path), layout.first_line, 1))
+    message = f"found a first column that increases from row to row, which may be {what}"
+    hints = [Hint("time", "1", "says which"), Hint("time", "none", "says which")]
+    hints += [] if path else [Hint("joints", None, "names the joint columns")]
+    place = (str(layout.segment.path), layout.first_line, 1)
+    raise LogError(Finding(message, *place, hints=tuple(hints)))
 
 
 def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Column]) -> Column | None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock_columns import steps_of, times_of
 from urmpipe_pipeline.sources.columns.columns import Column
-from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.units.unit_hints import called, unit_hints
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
 
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
@@ -24,6 +25,12 @@ _UNUSUAL, _IMPOSSIBLE = 0.0002, 1e-5
 _EPOCH = (946_684_800.0, 4_102_444_800.0)  # 2000 to 2100 as Unix time in [s]
 
 _UNITS = ", ".join(EXPONENTS)
+
+EVEN = (
+    Hint("time", "none", "leaves the time column out"),
+    Hint("period", None, "sets the time between rows then"),
+)
+"""What to give where a time column is of no use."""
 
 Found = tuple[str, str, tuple[LogWarning, ...]]
 """A unit, why, and what a person should know."""
@@ -45,15 +52,14 @@ def unit_of(time: Column, layout: Layout, source: KnownSource | None, units: Map
     given = units.get(time.number)
     if given is not None:
         if given.name not in EXPONENTS:
-            raise OptionError(
-                f"--unit: found {given.name} for the time {shown(time.name)}, allowed: {_UNITS}"
-            )
+            found = f"{given.name} for the time {shown(time.name)}"
+            raise OptionError(Finding(parameter="unit", found=found, allowed=_UNITS))
         return given.name, "given as an option", ()
     if time.unit is not None and time.unit.name in EXPONENTS:
         return time.unit.name, "its name", ()
     if time.unit_text is not None and time.unit_text.lower() in vocabulary().long_times:
-        hint = "convert the times, or --time none with --period SECONDS"
-        raise _error(f"found the unit {shown(time.unit_text)}, allowed: {_UNITS}; {hint}", time, layout)
+        message = f"found the unit {shown(time.unit_text)}, allowed: {_UNITS}; convert the times"
+        raise _error(message, time, layout, *EVEN)
     if source is not None and "time" in source.units:
         return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()
     return _by_values(time, layout)
@@ -94,21 +100,23 @@ def _short(time: Column, layout: Layout, step: float) -> Found:
     """Return s for short steps, or for none; raise where they are too short for a log."""
     if 0 < step < _IMPOSSIBLE:
         said = f"found steps of {step:.3g}, as of days or hours, allowed: times in {_UNITS}"
-        hint = f"convert them, or say that it is so with {option('--unit', f'{time.name}=s')}"
-        raise _error(f"{said}; {hint}", time, layout)
+        hint = Hint("unit", {called(time): "s"}, "takes them as they are")
+        raise _error(f"{said}; convert them", time, layout, hint)
     return "s", "the usual unit", (_assumed(time, step),) if 0 < step < _UNUSUAL else ()
 
 
 def _assumed(time: Column, step: float) -> LogWarning:
-    return LogWarning("assumed-unit", f"the time {shown(time.name)} steps by {step:.6g}: taken as s")
+    said = f"the time {shown(time.name)} steps by {step:.6g}: taken as s"
+    return LogWarning("assumed-unit", said, hints=unit_hints([time], "s", "confirms it"))
 
 
 def _question(time: Column, layout: Layout, found: str, units: list[str]) -> LogError:
     """Ask which of some units is meant."""
-    options = " or ".join(option("--unit", f"{time.name}={unit}") for unit in units)
-    return _error(f"found {found}, which may be {' or '.join(units)}: say which with {options}", time, layout)
+    hints = (Hint("unit", {called(time): unit}, "says which") for unit in units)
+    return _error(f"found {found}, which may be {' or '.join(units)}", time, layout, *hints)
 
 
-def _error(message: str, time: Column, layout: Layout) -> LogError:
+def _error(message: str, time: Column, layout: Layout, *hints: Hint) -> LogError:
     """Return an error about a time column."""
-    return LogError(Finding(message, str(layout.segment.path), layout.first_line, 1, time.header))
+    place = (str(layout.segment.path), layout.first_line, 1, time.header)
+    return LogError(Finding(message, *place, hints=hints))

@@ -10,7 +10,7 @@ from urmpipe_models.arrays import IntArray
 from urmpipe_pipeline.sources.cells.cell import is_missing
 from urmpipe_pipeline.sources.cells.text_cells import Bytes, TextCells
 from urmpipe_pipeline.sources.cells.text_clock import FORMS, Form, Parts
-from urmpipe_pipeline.sources.tables.table import NO_TIME, UNREADABLE
+from urmpipe_pipeline.sources.tables.numbers import NO_TIME, UNREADABLE
 
 
 def read_cells(cells: TextCells, form: Form) -> IntArray:

@@ -10,18 +10,22 @@ import numpy as np
 
 from urmpipe_models.arrays import IntArray
 from urmpipe_models.errors import Finding, LogError, shown
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.cells.text_clock import DAY_NS, TIME_OF_DAY, Form
 from urmpipe_pipeline.sources.clocks.stamps import read_cells
-from urmpipe_pipeline.sources.option_text import option
+from urmpipe_pipeline.sources.tables.numbers import REPORTED, UNREADABLE, ClockColumn, Numbers
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import REPORTED, UNREADABLE, ClockColumn, Numbers
 
 MIDNIGHT_NS = DAY_NS - 3600 * 10**9
 """A time of day that falls back by this much or more has gone on over midnight."""
 
 Combination = tuple[Form, ...]
+
+
+ZONED = "form of the time with a zone"
+"""The kind of the inference about dates that say their time zone."""
 
 
 def timed(layout: Layout, parts: Sequence[ClockColumn], numbers: Numbers) -> Numbers:
@@ -143,9 +147,11 @@ def _said(reading: Reading, columns: Sequence[TextCells], evidence: Sequence[str
     """Return what was found out about a text clock."""
     text = " ".join(cells.text(0).strip() for cells in columns)
     reasons = [f"its cells, such as {shown(text)}", *evidence]
-    if any(form.dated for form in reading.forms) and not reading.forms[-1].has_zone(columns[-1].text(0)):
+    dated, zoned = any(form.dated for form in reading.forms), reading.forms[-1].has_zone(columns[-1].text(0))
+    if dated and not zoned:
         reasons.append("without a time zone: taken as UTC")
-    said = [Inference("form of the time", reading.name, "; ".join(reasons))]
+    kind = ZONED if dated and zoned else ""
+    said = [Inference("form of the time", reading.name, "; ".join(reasons), kind, hints=(Hint("unit"),))]
     if reading.nights:
         why = "there the time of day falls back by nearly 24 h: the next day begins"
         said.append(Inference("nights passed", str(reading.nights), why))
@@ -161,6 +167,6 @@ def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[R
     keys = dict.fromkeys(key for form in choices[place] for key in form.keys if key not in shared)
     column = layout.names[parts[place].column]
     cell = layout.cells(parts[place].column)[0]
-    options = " or ".join(option("--unit", f"{column}={key}") for key in keys)
-    message = f"found {shown(cell)}, which may be {names}: say which with {options}"
-    return Finding(message, str(layout.segment.path), layout.first_line, 1, column)
+    hints = tuple(Hint("unit", {column: key}, "says which") for key in keys)
+    message = f"found {shown(cell)}, which may be {names}"
+    return Finding(message, str(layout.segment.path), layout.first_line, 1, column, hints=hints)

@@ -3,16 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.sources.clocks.clock import Clock, clock_of
 from urmpipe_pipeline.sources.clocks.clock_columns import runs_evenly
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.tables.opening import Tables
 from urmpipe_pipeline.sources.vocabulary import Unit, key, vocabulary
 
-NOTHING_BUT = "holds nothing but"
-"""Stands in the evidence for a clock that is a file of its own."""
+TIME_FILE = "time file"
+"""The kind of the inference about a clock that is a file of its own."""
 
 
 def time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
@@ -55,11 +57,14 @@ def clock_of_file(tables: Tables, columns: Sequence[Column], index: int, units: 
     for column in columns:
         if column.table != index and _is_time(column.key):
             other = tables.layouts[column.table]
-            message = f"found a time here and in {title}, allowed: one clock; say which column with --time"
-            raise LogError(Finding(message, str(other.segment.path), other.header, column=column.header))
+            hints = (Hint("time", None, "says which column"),)
+            message, file = f"found a time here and in {title}, allowed: one clock", str(other.segment.path)
+            raise LogError(Finding(message, file, other.header, column=column.header, hints=hints))
     own = tuple(column for column in columns if column.table == index)
     form = "one row" if layout.across else "one column"
-    return clock_of(own, f"{title} {NOTHING_BUT} {form} of times", layout, tables.known, units)
+    found = clock_of(own, f"{title} holds nothing but {form} of times", layout, tables.known, units)
+    first, *others = found.inferences
+    return replace(found, inferences=(replace(first, kind=TIME_FILE), *others))
 
 
 def _is_named(tables: Tables, columns: Sequence[Column], index: int) -> bool:

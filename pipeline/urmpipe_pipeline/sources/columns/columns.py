@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.sources.cells.cell import is_missing, is_text
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
@@ -103,13 +104,13 @@ def _named_in_cells(columns: Sequence[Column], layouts: Sequence[Layout]) -> tup
     return tuple(result)
 
 
-def find_column(columns: Sequence[Column], text: str, option: str) -> Column:
+def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
     """Return the column that the user means.
 
     Args:
         columns: The log's columns.
         text: Its name, with or without unit, or its number from 1.
-        option: The option that it was given with.
+        place: Fields of the finding that says where the name is from, such as its parameter.
 
     Raises:
         LogError: If no column or more than one is meant.
@@ -119,11 +120,13 @@ def find_column(columns: Sequence[Column], text: str, option: str) -> Column:
         return found[0]
     if found:
         numbers = ", ".join(str(column.number) for column in found)
-        raise LogError(f"{option}: found {shown(text)} as columns {numbers}, allowed: one; give its number")
+        found_as = f"{shown(text)} as columns {numbers}"
+        raise LogError(Finding(found=found_as, allowed="one; give its number", **place))  # type: ignore[arg-type]
     for column in columns:
         if text == str(column.number):
             return column
-    raise LogError(f"{option}: found no column {shown(text)}, allowed: {listed(columns)}")
+    none = f"no column {shown(text)}"
+    raise LogError(Finding(found=none, allowed=listed(columns), **place))  # type: ignore[arg-type]
 
 
 def called(columns: Sequence[Column], text: str) -> list[Column]:
@@ -136,17 +139,17 @@ def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Un
     """Return the units that the user gave, by the column's number; by 0 that of all joints that turn.
 
     Raises:
-        OptionError: If a text is no unit or may be two, or that of all joints is none of angle.
+        OptionError: If a text is no unit, or that of all joints is none of angle.
         LogError: If there is no such column.
     """
     given = {}
     for text, unit_text in options.units.items():
-        unit, (either, remedy) = vocabulary().unit(unit_text), vocabulary().gon.about(unit_text)
+        unit = vocabulary().unit(unit_text)
         quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
-        if unit is None or unit.quantity not in quantities or remedy:
+        if unit is None or unit.quantity not in quantities:
             allowed = ", ".join(name for quantity in quantities for name in vocabulary().spelled(quantity))
-            raise OptionError(f"--unit: found {shown(unit_text)}{either}, allowed: {allowed}{remedy}")
-        given[find_column(columns, text, "--unit").number if text else 0] = unit
+            raise OptionError(Finding(parameter="unit", found=shown(unit_text), allowed=allowed))
+        given[find_column(columns, text, parameter="unit").number if text else 0] = unit
     return given
 
 
@@ -159,7 +162,7 @@ def listed(columns: Sequence[Column], most: int = 24) -> str:
 
 
 def refuse_twins(
-    used: Sequence[Column], columns: Sequence[Column], layouts: Sequence[Layout], remedy: str
+    used: Sequence[Column], columns: Sequence[Column], layouts: Sequence[Layout], remedy: Hint
 ) -> None:
     """Raise if a column that is to be used shares its name with another one.
 
@@ -187,9 +190,9 @@ def refuse_twins(
         ]
         if twins:
             numbers = ", ".join(str(n) for n in sorted(c.number for c in (column, *twins)))
-            message = f"found as columns {numbers}, allowed: once; {remedy}"
-            layout = layouts[column.table]
-            findings.append(Finding(message, str(layout.segment.path), layout.header, column=column.header))
+            message, layout = f"found as columns {numbers}, allowed: once", layouts[column.table]
+            place = (str(layout.segment.path), layout.header, None, column.header)
+            findings.append(Finding(message, *place, hints=(remedy,)))
     if findings:
         raise LogError(*findings)
 

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, shown
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import width
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
@@ -19,7 +20,15 @@ from urmpipe_pipeline.sources.columns.pose import (
     trailing_quaternion,
     with_form,
 )
-from urmpipe_pipeline.sources.columns.roles import OPTION, Roles, about_pose, check_count
+from urmpipe_pipeline.sources.columns.roles import (
+    NAME_JOINTS,
+    OTHER_ROBOT,
+    Roles,
+    about_pose,
+    check_count,
+    joint_inference,
+    path_inference,
+)
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import split_unit
@@ -50,14 +59,14 @@ def without_header(
     columns = [column for column in columns if column.header]
     pose = chosen_pose(columns, options)
     if options.joints:
-        joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
+        joints = tuple(find_column(columns, text, parameter="joints") for text in options.joints)
         check_count(joints, file, robot)
         return _by_place(joints, columns, robot, GIVEN, pose)
     for column in () if path else columns:  # of a path they are wrong rows
         if column.text:
             cell = layout.cells(column.index)[0]
-            message = f"found {shown(cell)} in a table without a header, allowed: numbers; {OPTION}"
-            raise LogError(Finding(message, file, layout.first_line, 1, column.name))
+            message = f"found {shown(cell)} in a table without a header, allowed: numbers"
+            raise LogError(Finding(message, file, layout.first_line, 1, column.name, hints=(NAME_JOINTS,)))
     if path:
         return _path_by_place(columns, layout, options, pose)
     if not columns:
@@ -87,7 +96,7 @@ def _path_by_place(
     behind = _trailing_pose(columns, layout, None, some=True) if pose is None else None
     pose = with_form(pose or behind or Pose(tuple(columns[:3]), evidence="there is no header"), form)
     rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
-    said = [Inference("path", listed(pose.position), pose.evidence), *about_pose(pose)[1:]]
+    said = [path_inference(listed(pose.position), pose.evidence), *about_pose(pose)[1:]]
     if rest:
         said.append(Inference("columns not used", listed(rest, most=8), "no header tells what they are"))
     return Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms, inferences=tuple(said))
@@ -137,7 +146,8 @@ def one_plot_a_file(
         return ordered, ()
     names = ", ".join(f"{column.name} of {paths[column.table].name}" for column in ordered)
     said = f"the plots are joined by the numbers of their columns, which are not those of the files: {names}"
-    return ordered, (LogWarning("plot-order", f"{said}; --joints says otherwise"),)
+    hints = (Hint("joints", None, "gives another order"),)
+    return ordered, (LogWarning("plot-order", said, hints=hints),)
 
 
 def _in_order(numbers: Sequence[int], columns: Sequence[Column]) -> tuple[Column, ...]:
@@ -151,8 +161,8 @@ def _refuse_missing_plot(numbers: Sequence[int], paths: Sequence[Path]) -> None:
     if missing and len(missing) < len(numbers):
         found = ", ".join(map(str, sorted(numbers)))
         said = f"found plots with the numbers {found} and none with {', '.join(map(str, missing))}"
-        hint = f"allowed: a plot for each joint; add the missing one, or {OPTION}"
-        raise LogError(Finding(f"{said}, {hint}", str(paths[0].parent)))
+        said = f"{said}, allowed: a plot for each joint; add the missing one"
+        raise LogError(Finding(said, str(paths[0].parent), hints=(NAME_JOINTS,)))
 
 
 def _only_numbers_differ(names: Sequence[str]) -> list[int] | None:
@@ -173,7 +183,7 @@ def _by_place(
 ) -> Roles:
     """Return joints that are named by the robot, or q1, q2, ..., and the pose beside them."""
     pose = pose or Pose()
-    said = [Inference("joint columns", ", ".join(column.name for column in joints), evidence)]
+    said = [joint_inference(joints, evidence)]
     said += about_pose(pose)
     rest = [column for column in columns if column not in (*joints, *pose.position, *pose.rotation)]
     if rest:
@@ -195,5 +205,5 @@ def _about_rest(robot: Chain, joints: Sequence[Column], rest: Sequence[Column]) 
     """Say that a table has more columns than the robot has joints, and no header that tells them apart."""
     count = f"{len(joints) + len(rest)} columns without names, and {robot.name} has {len(joints)} joints"
     which = f"column {listed(rest)} is" if len(rest) == 1 else f"columns {listed(rest, most=8)} are"
-    said = f"{count}: {which} left out; another --robot, or --joints A,B,C?"
-    return LogWarning("columns-not-used", said)
+    hints = (OTHER_ROBOT, NAME_JOINTS)
+    return LogWarning("columns-not-used", f"{count}: {which} left out", hints=hints)

@@ -90,8 +90,8 @@ def chosen_pose(columns: Sequence[Column], options: ReadOptions) -> Pose | None:
         if options.orientation:
             raise OptionError("orientation: found without a position, allowed: beside x, y, z")
         return None
-    position = tuple(find_column(columns, text, "position") for text in options.position)
-    rotation = tuple(find_column(columns, text, "orientation") for text in options.orientation)
+    position = tuple(find_column(columns, text, about="position") for text in options.position)
+    rotation = tuple(find_column(columns, text, about="orientation") for text in options.orientation)
     if len(position) != 3:
         raise OptionError(f"position: found {len(position)} columns, allowed: x, y, z")
     forms = tuple(form for form in FORMS if width(form) == len(rotation) and options.rotation in (None, form))
@@ -111,7 +111,8 @@ def with_form(pose: Pose, form: RotationForm | None) -> Pose:
         return pose
     if width(form) != len(pose.rotation):
         found = f"{form}, which has {width(form)} columns, for {listed(pose.rotation)}"
-        raise OptionError(f"--rotation: found {found}, allowed: a form of {len(pose.rotation)} columns")
+        allowed = f"a form of {len(pose.rotation)} columns"
+        raise OptionError(Finding(parameter="rotation", found=found, allowed=allowed))
     return replace(pose, forms=(form,))
 
 

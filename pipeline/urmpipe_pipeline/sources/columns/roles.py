@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import grouped_number
@@ -18,8 +19,9 @@ from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.vocabulary import key, vocabulary
 
-OPTION = "name them in the robot's order with --joints A,B,C"
-RECORD = "record the missing one"
+NAME_JOINTS = Hint("joints", None, "names the joint columns, in the robot's order")
+RECORD = Hint("", does="record the missing one")
+OTHER_ROBOT = Hint("robot", None, "gives another arm")
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +86,7 @@ def assign(
     file = str(layouts[0].segment.path)
     numeric = [column for column in columns if (path or not column.text) and not column.counts_rows]
     if options.joints:
-        joints = tuple(find_column(columns, text, "--joints") for text in options.joints)
+        joints = tuple(find_column(columns, text, parameter="joints") for text in options.joints)
         found = _Joints(joints, "given as an option", *_family_of(joints))
         pose = chosen_pose(columns, options) or find_pose([c for c in numeric if c not in joints], layouts)
     else:
@@ -102,7 +104,7 @@ def assign(
     rates = _derivative("rate", numeric, found)
     accelerations = _derivative("acceleration", numeric, found)
     roles = Roles(found.columns, rates, accelerations, pose.position, pose.rotation, pose.forms)
-    said = [Inference("joint columns", ", ".join(c.name for c in found.columns), found.evidence)]
+    said = [joint_inference(found.columns, found.evidence)]
     for what, group in (("rates", rates), ("accelerations", accelerations)):
         if group:
             said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
@@ -231,8 +233,8 @@ def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints |
     best = [family for family in fitting if family.rank == min(f.rank for f in fitting)]
     if len(best) > 1 and not all(len(family.columns) == 1 for family in best):
         groups = "; ".join(listed(family.ordered()) for family in best)
-        message = f"found several groups of joint columns: {groups}, allowed: one; {OPTION}"
-        raise LogError(Finding(message, file=file))
+        message = f"found several groups of joint columns: {groups}, allowed: one"
+        raise LogError(Finding(message, file=file, hints=(NAME_JOINTS,)))
     if len(best) > 1:  # one plot a joint, each with a number of its own
         columns = tuple(column for family in best for column in family.ordered())
         return _Joints(columns, "their names; the order is the file's")
@@ -245,17 +247,16 @@ def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints |
         said = f"found joint columns {listed(family.ordered())} and none with number {missing}"
         allowed = "numbers without a gap" if count is None else f"the {count} joints of the robot"
         spare = [c for c in still if c not in family.columns.values() and not c.words & words.other]
-        raise LogError(Finding(f"{said}, allowed: {allowed}; {_cure(len(gaps), spare, count)}", file=file))
+        hints = _cure(len(gaps), spare, count)
+        raise LogError(Finding(f"{said}, allowed: {allowed}", file=file, hints=hints))
     return _Joints(
         family.ordered(), "their names, in the order of their numbers", tuple(sorted(family.columns))
     )
 
 
-def _cure(missing: int, spare: Sequence[Column], count: int | None) -> str:
-    """Return what helps where joints are missing: --joints only where columns are left for a robot's."""
-    if count is not None and len(spare) < missing:
-        return f"{RECORD}, or give another --robot"
-    return f"{RECORD}, or {OPTION}"
+def _cure(missing: int, spare: Sequence[Column], count: int | None) -> tuple[Hint, Hint]:
+    """Return what helps where joints are missing: naming them only where columns are left for a robot's."""
+    return RECORD, OTHER_ROBOT if count is not None and len(spare) < missing else NAME_JOINTS
 
 
 def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> None:
@@ -265,7 +266,8 @@ def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> Non
         LogError: With what was found and what the robot needs.
     """
     if len(set(joints)) < len(joints):
-        raise LogError(Finding(f"--joints: found {listed(joints)}, allowed: each column once", file=file))
+        found, allowed = listed(joints), "each column once"
+        raise LogError(Finding(file=file, parameter="joints", found=found, allowed=allowed))
     if robot is None or len(joints) == len(robot.coordinates):
         return
     need = f"allowed: {len(robot.coordinates)}, as robot {robot.name} has"
@@ -275,8 +277,8 @@ def check_count(joints: Sequence[Column], file: str, robot: Chain | None) -> Non
     missing = [n for n in range(first, first + len(robot.coordinates)) if n not in numbers]
     none = f" and none with number {', '.join(map(str, missing))}" if numbers and not more else ""
     message = f"found {len(joints)} joint columns ({listed(joints)}){none}, {need}"
-    hint = OPTION if more else "record every joint, or give another --robot"
-    raise LogError(Finding(f"{message}; {hint}", file=file))
+    hints = (NAME_JOINTS,) if more else (Hint("", does="record every joint"), OTHER_ROBOT)
+    raise LogError(Finding(message, file=file, hints=hints))
 
 
 def _derivative(role: str, numeric: Sequence[Column], joints: _Joints) -> tuple[Column, ...]:
@@ -294,12 +296,33 @@ def _derivative(role: str, numeric: Sequence[Column], joints: _Joints) -> tuple[
     return tuple(best[0].columns[n] for n in joints.numbers) if len(best) == 1 else ()
 
 
+def joint_inference(joints: Sequence[Column], evidence: str) -> Inference:
+    """Return what is said of the joint columns, and why they are."""
+    names = tuple(column.name for column in joints)
+    hints = (Hint("joints", None, "in the robot's order"),)
+    return Inference("joint columns", ", ".join(names), evidence, columns=names, hints=hints)
+
+
+def path_inference(names: str, evidence: str) -> Inference:
+    """Return what is said of a log that is a path."""
+    return Inference("path", names, evidence, hints=(Hint("joints", None, "for a log of joints"),))
+
+
 def about_pose(pose: Pose) -> list[Inference]:
     """Say which columns hold the recorded tool centre point."""
-    groups = (("recorded TCP", pose.position), ("recorded orientation", pose.rotation))
+    groups = (
+        ("recorded TCP", pose.position, "position"),
+        ("recorded orientation", pose.rotation, "orientation"),
+    )
     return [
-        Inference(what, ", ".join(column.name for column in group), pose.evidence)
-        for what, group in groups
+        Inference(
+            what,
+            ", ".join(column.name for column in group),
+            pose.evidence,
+            columns=tuple(column.name for column in group),
+            hints=(Hint("log_map", None, f"with tcp.{key} in it"),),
+        )
+        for what, group, key in groups
         if group
     ]
 
@@ -318,24 +341,28 @@ def _path(
     pose = pose if pose.position else find_pose(numeric, layouts, file)
     if pose.position:
         names = ", ".join(column.name for column in pose.position)
-        said = [Inference("path", names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
+        said = [path_inference(names, "x, y, z and no joint columns"), *about_pose(pose)[1:]]
         roles = Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms)
         return _with_rest(roles, said, numeric)
     _refuse_thousands(layouts, file)
     if path:
-        need = 'x, y, z; name them so in the header, or in a map (--map): [tcp] position = ["A", "B", "C"]'
-        raise LogError(Finding(f"found no position in {listed(columns)}, allowed: {need}", file=file))
+        hints = (
+            Hint("", does="name them so in the header"),
+            Hint("log_map", None, 'says which they are: [tcp] position = ["A", "B", "C"]'),
+        )
+        message = f"found no position in {listed(columns)}, allowed: x, y, z"
+        raise LogError(Finding(message, file=file, hints=hints))
     need = (
         f"{len(robot.coordinates)} for robot {robot.name}" if robot else "such as q1, q2, ... or J1, J2, ..."
     )
     found, missing = _some_named(numeric, robot)
     if found:
         spare = [column for column in numeric if column not in found]
-        hint = _cure(len(missing), spare, len(robot.coordinates) if robot else None)
+        hints = _cure(len(missing), spare, len(robot.coordinates) if robot else None)
         lacking = f"found joint columns {listed(found)} and none for {', '.join(missing)}, allowed: {need}"
-        raise LogError(Finding(f"{lacking}; {hint}", file=file))
-    message = f"found no joint columns in {listed(columns)}, allowed: {need}; {OPTION}"
-    raise LogError(Finding(message, file=file))
+        raise LogError(Finding(lacking, file=file, hints=hints))
+    message = f"found no joint columns in {listed(columns)}, allowed: {need}"
+    raise LogError(Finding(message, file=file, hints=(NAME_JOINTS,)))
 
 
 def _some_named(numeric: Sequence[Column], robot: Chain | None) -> tuple[tuple[Column, ...], list[str]]:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
 from urmpipe_pipeline.sources.vocabulary import vocabulary
@@ -37,8 +38,11 @@ def about_tcp(rest: Sequence[Column]) -> list[LogWarning]:
     quoted = ", ".join(f'"{name}"' for name in named)
     table = f"[tcp] position = [{quoted}]"
     said = f"{listed(alike)} look like a recorded TCP and are not read as one"
-    hint = f"name its columns tcp_x, tcp_y, tcp_z, or say which in a map (--map): {table}"
-    return [LogWarning(TCP_NOT_READ, f"{said}; {hint}")]
+    hints = (
+        Hint("", does="name its columns tcp_x, tcp_y, tcp_z"),
+        Hint("log_map", None, f"says which they are: {table}"),
+    )
+    return [LogWarning(TCP_NOT_READ, said, hints=hints)]
 
 
 def _is_like(column: Column) -> bool:

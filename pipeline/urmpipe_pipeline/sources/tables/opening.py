@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TypeAlias
 
-from urmpipe_models.errors import OptionError, for_each, shown
+from urmpipe_models.errors import Finding, OptionError, for_each, shown
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables import coppeliasim
@@ -57,6 +58,10 @@ Sniff: TypeAlias = Callable[[Segment, str | None, str | None], Layout]
 """What finds out how a plain table is written, with delimiter and decimal sign as options give them."""
 
 
+_OTHER = (Hint("source"),)
+"""What to give for another source."""
+
+
 def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff = sniff) -> Tables:
     """Return the tables of a log's files.
 
@@ -72,7 +77,8 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
     if not files:
         raise OptionError("found no log file, allowed: one, or several if a source writes one a plot")
     if options.source is not None and options.source not in source_names():
-        raise OptionError(f"--source: found {shown(options.source)}, allowed: {', '.join(source_names())}")
+        found, allowed = shown(options.source), ", ".join(source_names())
+        raise OptionError(Finding(parameter="source", found=found, allowed=allowed))
     segments = for_each(lambda path: open_text(path, any_suffix=options.source is not None), files)
     titled = [(file.stem, segment) for file, segment in zip(files, segments, strict=True)]
     forced, graphs = options.source == COPPELIASIM, []
@@ -85,7 +91,10 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
     known, said = _known(layouts, options) if not forced else (None, _coppeliasim(titled, options))
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
     encoding = Inference(
-        "encoding", segments[0].encoding, "byte order mark" if segments[0].start else "its bytes"
+        "encoding",
+        segments[0].encoding,
+        "byte order mark" if segments[0].start else "its bytes",
+        hints=(Hint("", does="save the file as UTF-8"),),
     )
     return Tables(
         source=name,
@@ -107,12 +116,14 @@ def _layout(segment: Segment, options: ReadOptions, sniff_plain: Sniff) -> Layou
 def _known(layouts: Sequence[Layout], options: ReadOptions) -> tuple[KnownSource | None, Inference]:
     """Return the source that the columns give away."""
     if options.source is not None:
-        return vocabulary().source(options.source), Inference("source", options.source, "given as an option")
+        return vocabulary().source(options.source), Inference(
+            "source", options.source, "given as an option", hints=_OTHER
+        )
     names = _names(layouts)
     for source in vocabulary().sources:
         if source.wrote(names):
-            return source, Inference("source", source.name, "the names of its columns")
-    return None, Inference("source", TABLE, "no source is known by these columns")
+            return source, Inference("source", source.name, "the names of its columns", hints=_OTHER)
+    return None, Inference("source", TABLE, "no source is known by these columns", hints=_OTHER)
 
 
 def _is_foreign(given: str | None, graphs: bool, names: Sequence[str]) -> bool:
@@ -130,4 +141,4 @@ def _names(layouts: Sequence[Layout]) -> list[str]:
 def _coppeliasim(titled: Sequence[tuple[str, Segment]], options: ReadOptions) -> Inference:
     graphs = ", ".join(title for title, _ in titled)
     evidence = "given as an option" if options.source else f"each graph has its path and header: {graphs}"
-    return Inference("source", COPPELIASIM, evidence)
+    return Inference("source", COPPELIASIM, evidence, hints=_OTHER)

@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import (
     DECIMALS,
@@ -115,8 +116,8 @@ def sniff(
     """
     lines = head_lines(segment) if lines is None else lines
     told, lines = _told_delimiter(lines)
-    delimiters = _choices("--delimiter", delimiter or told, DELIMITERS)
-    decimals = _choices("--decimal", decimal, DECIMALS)
+    delimiters = _choices("delimiter", delimiter or told, DELIMITERS)
+    decimals = _choices("decimal", decimal, DECIMALS)
     body = [line for line in lines if not line.text.lstrip().startswith(COMMENTS)][:SAMPLED_LINES]
     style = _best_style([line.text for line in body[:SCORED_LINES]], delimiters, decimals)
     rows = [split_line(line.text, style.delimiter) for line in body]
@@ -124,7 +125,8 @@ def sniff(
     numeric = _numeric_columns(rows, width, style.decimal)
     first = next((i for i in range(len(rows)) if _is_data(rows, i, numeric, style.decimal)), None)
     if first is None:
-        raise LogError(_no_rows(segment, body, _options(delimiter, decimal)))
+        given = {"delimiter": delimiter, "decimal sign": decimal}
+        raise LogError(_no_rows(segment, body, {what: sign for what, sign in given.items() if sign}))
     _refuse_prose(segment, body[first:], [len(row) for row in rows[first:]], width)
     before = [line for line in lines if line.number < body[first].number]
     header, units = _header(before, style.delimiter, width)
@@ -166,14 +168,15 @@ def across(layout: Layout) -> Layout:
     return replace(layout, names=("1",), sample=column, across=True)
 
 
-def _choices(what: str, given: str | None, allowed: Sequence[str]) -> Sequence[str]:
+def _choices(parameter: str, given: str | None, allowed: Sequence[str]) -> Sequence[str]:
     """Return the signs to try: the one given by the user, or all."""
     if given is None:
         return allowed
     sign = _SIGNS.get(given.lower(), given)
     if sign not in allowed:
         names = ", ".join(_NAMES[sign] for sign in allowed)
-        raise OptionError(f"{what}: found {shown(given)}, allowed: {names}, or the sign itself")
+        allowed_signs = f"{names}, or the sign itself"
+        raise OptionError(Finding(parameter=parameter, found=shown(given), allowed=allowed_signs))
     return (sign,)
 
 
@@ -228,8 +231,12 @@ def _style_inferences(
     parts = "the first line says so" if told else parts
     given = "given as an option"
     return [
-        Inference("delimiter", _NAMES[style.delimiter], given if delimiter else parts),
-        Inference("decimal sign", _NAMES[style.decimal], given if decimal else reads),
+        Inference(
+            "delimiter", _NAMES[style.delimiter], given if delimiter else parts, hints=(Hint("delimiter"),)
+        ),
+        Inference(
+            "decimal sign", _NAMES[style.decimal], given if decimal else reads, hints=(Hint("decimal"),)
+        ),
     ]
 
 
@@ -340,14 +347,7 @@ def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[
         raise LogError(Finding(message, file=str(segment.path), line=lines[0].number))
 
 
-def _options(delimiter: str | None, decimal: str | None) -> str:
-    """Return the signs that were given, as options, behind " with"; empty without any."""
-    given = {"--delimiter": delimiter, "--decimal": decimal}
-    named = {name: _NAMES[_SIGNS.get(sign.lower(), sign)] for name, sign in given.items() if sign is not None}
-    return f" with {' and '.join(f'{name} {word}' for name, word in named.items())}" if named else ""
-
-
-def _no_rows(segment: Segment, body: Sequence[HeadLine], given: str) -> Finding:
+def _no_rows(segment: Segment, body: Sequence[HeadLine], given: Mapping[str, str]) -> Finding:
     """Say why no row of numbers was found with the signs that were given."""
     file = str(segment.path)
     if not body:
@@ -356,8 +356,10 @@ def _no_rows(segment: Segment, body: Sequence[HeadLine], given: str) -> Finding:
     if len(body) <= 2 and all(is_text(cell, ".") for cell in cells if cell):
         return Finding("found a header and no rows, allowed: a row a sample", file=file, line=body[0].number)
     text = body[0].text.strip()[:60]
+    named = [f"{what} {_NAMES[_SIGNS.get(sign.lower(), sign)]}" for what, sign in given.items()]
     return Finding(
-        f"found {text!r} and no row of numbers below it{given}, allowed: a table with a row a sample",
         file=file,
         line=body[0].number,
+        found=f"{text!r} and no row of numbers below it" + (f" with {' and '.join(named)}" if named else ""),
+        allowed="a table with a row a sample",
     )

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.files.missing import meant_by
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import SourceFile
 from urmpipe_pipeline.sources.vocabulary import Container, vocabulary
 
@@ -111,8 +112,10 @@ def open_text(path: Path, *, any_suffix: bool = False) -> Segment:
         raw = file.read(HEAD_BYTES)
     container = _container(path, raw, any_suffix)
     if container is not None:
-        advice = container.advice.format(file=path.name)
-        raise LogError(Finding(f"found {container.what}, allowed: a text table; {advice}", file=str(path)))
+        hints = (Hint(name, None, does) for name, does in container.parameters.items())
+        advice = Hint("", does=container.advice.format(file=path.name))
+        found = f"found {container.what}, allowed: a text table"
+        raise LogError(Finding(found, str(path), hints=(*([advice] if advice.does else []), *hints)))
     if size == 0:
         raise LogError(Finding("found an empty file, allowed: a table with a row a sample", file=str(path)))
     mark, encoding = _encoding(raw)

@@ -14,6 +14,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import split_line
 from urmpipe_pipeline.sources.checks import find_errors, rebuilt, unknown_times
@@ -21,10 +22,10 @@ from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD, Clock
 from urmpipe_pipeline.sources.clocks.text_times import timed
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.plan import Plan
-from urmpipe_pipeline.sources.tables.blockwise import read_blockwise
-from urmpipe_pipeline.sources.tables.diagnose import data_lines
+from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
+from urmpipe_pipeline.sources.tables.row_reader import data_lines
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.tables.table import UNREADABLE, Numbers, read_fast
+from urmpipe_pipeline.sources.tables.table import read_table
 
 ALLOWED = "a finite number"
 """What the cells of such a table may hold."""
@@ -68,7 +69,7 @@ def read_rows(plan: Plan) -> Rows:
     columns = plan.roles.columns
     layout, clock = plan.tables.layouts[plan.main], plan.clocks[plan.main]
     places = [column.index for column in columns]
-    read = read_fast(layout, places, clock.parts) or read_blockwise(layout, places, clock.parts, ALLOWED)
+    read = read_table(layout, places, clock.parts, ALLOWED)
     if read.lasting:
         raise LogError(*read.lasting)
     numbers = _without_blank_end(layout, timed(layout, clock.parts, read))
@@ -82,8 +83,8 @@ def read_rows(plan: Plan) -> Rows:
 def _faults(numbers: Numbers, columns: Sequence[Column], clock: Clock) -> dict[int, str]:
     """Return what is wrong with rows, in their order: all of it, each in one line."""
     faults: dict[int, list[str]] = {row + 1: [said] for row, said in numbers.unread.items()}
-    for row, name, said in unknown_times(numbers, clock):
-        faults.setdefault(row, []).append(f"column {name}: {said}")
+    for one in unknown_times(numbers, clock):
+        faults.setdefault(one.row or 0, []).append(f"column {one.column}: {one.message}")
     for row in np.flatnonzero(~np.isfinite(numbers.values).all(axis=1)).tolist():
         told = faults.setdefault(row + 1, [])
         if row in numbers.unread and not told[0].startswith("column "):
@@ -132,8 +133,9 @@ def _whole_clock(layout: Layout, numbers: Numbers, clock: Clock) -> tuple[IntArr
     known = np.flatnonzero(numbers.clock > UNREADABLE)
     if not len(known):
         said = f"found no time in any of {len(numbers.clock)} rows, allowed: at least one"
-        said = f"{said}; --time none leaves the column out"
-        raise LogError(Finding(said, str(layout.segment.path), column=clock.columns[0].header))
+        hints = (Hint("time", "none", "leaves the column out"),)
+        place = (str(layout.segment.path), None, None, clock.columns[0].header)
+        raise LogError(Finding(said, *place, hints=hints))
     told = replace(
         numbers,
         values=np.empty((len(known), 0)),

@@ -8,6 +8,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import Finding, LogError
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm, angles, matrices, quaternions
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, listed
@@ -15,6 +16,7 @@ from urmpipe_pipeline.sources.columns.pose import ORTHOGONAL
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.units.rotation import PURE
+from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
 UNIT_NORM = 1e-3
@@ -23,7 +25,7 @@ UNIT_NORM = 1e-3
 MOST_RAD = 2 * np.pi * 1.01
 """Angles of which none is told in a unit and most are beyond a turn in [rad] are hardly in rad."""
 
-MAP = 'a map (--map) says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."'
+MAP = Hint("log_map", None, 'says which: [tcp] position = ["X", "Y", "Z"], orientation = [...], form = "..."')
 """What helps where the names of columns do not tell an orientation."""
 
 _OURS = frozenset(("rx", "ry", "rz"))
@@ -54,20 +56,23 @@ def target_form(
     if not found:
         unused = [column for column in columns if column not in roles.columns]
         if options.rotation:
-            said = f"found {options.rotation} given for {listed(roles.position)} and no orientation"
-            raise LogError(Finding(f"--rotation: {said}, allowed: its columns beside them; {MAP}", file))
+            said = f"{options.rotation} given for {listed(roles.position)} and no orientation"
+            allowed = "its columns beside them"
+            raise LogError(
+                Finding(file=file, parameter="rotation", found=said, allowed=allowed, hints=(MAP,))
+            )
         return None, [] if options.position else _without_orientation(roles, unused, file)
     if len(roles.forms) == 1:
         return roles.forms[0], []
     if not all(column.words & _OURS for column in found):
-        hint = " or ".join(f"--rotation {form}" for form in roles.forms)
+        hints = tuple(Hint("rotation", form, "says which") for form in roles.forms)
         said = f"found {listed(found)}, which may be {' or '.join(roles.forms)}, allowed: one form"
-        raise LogError(Finding(f"{said}; {hint} says which", file))
+        raise LogError(Finding(said, file, hints=hints))
     if found[0].index > found[1].index > found[2].index:
         return "rpy", []
-    said = "are taken as angles about the moving axes Z, Y, X (rz, ry, rx)"
-    said = f"{listed(found)} {said}; --rotation vector if they are a rotation vector, as UR writes"
-    return "rpy", [LogWarning("assumed-rotation", said)]
+    said = f"{listed(found)} are taken as angles about the moving axes Z, Y, X (rz, ry, rx)"
+    hints = (Hint("rotation", "vector", "if they are a rotation vector, as UR writes"),)
+    return "rpy", [LogWarning("assumed-rotation", said, hints=hints)]
 
 
 def rotation_units(
@@ -95,8 +100,7 @@ def rotation_units(
         return units, []
     why = ", though most are beyond a turn" if beyond else ""
     said = f"no unit is given for {listed(columns)}: they are taken as rad{why}"
-    hint = f"--unit {columns[0].header}=deg says otherwise"
-    return units, [LogWarning("assumed-unit", f"{said}; {hint}")]
+    return units, [LogWarning("assumed-unit", said, hints=unit_hints(columns, "deg"))]
 
 
 def target_rotations(
@@ -143,15 +147,16 @@ def _without_orientation(roles: Roles, unused: Sequence[Column], file: str) -> l
     """
     half = [column for column in unused if _is_part(column)]
     if half:
-        allowed = f"all of rz, ry, rx or of qx, qy, qz, qw, or none; {MAP}"
-        raise LogError(Finding(f"found {listed(half)} as a part of an orientation, allowed: {allowed}", file))
+        said = f"found {listed(half)} as a part of an orientation"
+        allowed = "all of rz, ry, rx or of qx, qy, qz, qw, or none"
+        raise LogError(Finding(f"{said}, allowed: {allowed}", file, hints=(MAP,)))
     numbers = [column for column in unused if not column.text and not column.counts_rows]
     if len(numbers) < FEWEST:
         return []
     said = (
         f"{listed(roles.position)} are targets without an orientation: {listed(numbers, most=8)} are not used"
     )
-    return [LogWarning("columns-not-used", f"{said}; {MAP}")]
+    return [LogWarning("columns-not-used", said, hints=(MAP,))]
 
 
 def _is_part(column: Column) -> bool:

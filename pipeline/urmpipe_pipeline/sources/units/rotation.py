@@ -11,12 +11,13 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import poses_over_log
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm, angles, quaternions
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
-from urmpipe_pipeline.sources.option_text import option
 from urmpipe_pipeline.sources.units.evidence import spread, turned_apart
 from urmpipe_pipeline.sources.units.unit_evidence import peak
+from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT, unit_hints
 from urmpipe_pipeline.sources.vocabulary import Unit, vocabulary
 
 PURE = Unit("1", "ratio", 1.0)
@@ -83,25 +84,31 @@ def settle_rotation(
         said = f"{names} hold quaternions of length {length:.4g}, allowed: 1; they are not used"
         return Settled(warnings=(LogWarning("orientation", said),))
     choices = [(form, units) for form in sound for units in _possible_units(form, values, told)]
-    found = _settled_by_kinematics(names, choices, values, arm, given=given) if arm else None
+    found = _settled_by_kinematics(columns, choices, values, arm, given=given) if arm else None
     if found is not None:
         return found
     if len(choices) == 1:
-        return _settled(names, choices[0], "their names")
+        return _settled(columns, choices[0], "their names")
     if len(sound) == 1:
-        said = (
-            f"no unit is given for {names}: they are taken as {choices[0][1][0].name}; --unit says otherwise"
-        )
-        return _settled(names, choices[0], "their names", LogWarning("assumed-unit", said))
-    options = " or ".join(f"--rotation {form}" for form in sound)
-    said = f"{names} may be of several forms: the recorded orientation is not used; {options} says which"
-    return Settled(warnings=(LogWarning("orientation", said),))
+        taken = choices[0][1][0].name
+        said = f"no unit is given for {names}: they are taken as {taken}"
+        hints = unit_hints(columns, OTHER_UNIT[taken])
+        return _settled(columns, choices[0], "their names", LogWarning("assumed-unit", said, hints=hints))
+    said = f"{names} may be of several forms: the recorded orientation is not used"
+    hints = tuple(Hint("rotation", form, "says which") for form in sound)
+    return Settled(warnings=(LogWarning("orientation", said, hints=hints),))
 
 
-def _settled(names: str, choice: Choice, evidence: str, *warnings: LogWarning) -> Settled:
+def _settled(columns: Sequence[Column], choice: Choice, evidence: str, *warnings: LogWarning) -> Settled:
     form, units = choice
-    unit = "" if units[0] == PURE else f" in {units[0].name}"
-    return Settled(form, units, (Inference(f"form of {names}", f"{form}{unit}", evidence),), warnings)
+    said = form_inference([column.name for column in columns], form, units[0], evidence)
+    return Settled(form, units, (said,), warnings)
+
+
+def form_inference(names: Sequence[str], form: RotationForm, unit: Unit, evidence: str) -> Inference:
+    """Return what is said of the form of an orientation: of columns with some names, in a unit, and why."""
+    what, shown = f"form of {', '.join(names)}", f"{form}{'' if unit == PURE else f' in {unit.name}'}"
+    return Inference(what, shown, evidence, "form", tuple(names), (Hint("rotation"),))
 
 
 def _is_sound(values: FloatArray, form: RotationForm) -> bool:
@@ -127,7 +134,7 @@ def _possible_units(
 
 
 def _settled_by_kinematics(
-    names: str,
+    columns: Sequence[Column],
     choices: Sequence[Choice],
     values: FloatArray,
     arm: tuple[Chain, FloatArray],
@@ -140,19 +147,21 @@ def _settled_by_kinematics(
         return None
     best = _by_kinematics([*choices, *others], values, arm)
     if best is None or best[0] in choices:
-        return best and _settled(names, *best)
+        return best and _settled(columns, *best)
     told, better = choices[0][1][0].name, best[0][1][0].name
+    names = ", ".join(column.name for column in columns)
     said = f"{names}: {told} contradicts the kinematics: taken as {better}: {best[1]}"
-    hint = option("--unit", f"{names.split(', ', maxsplit=1)[0]}={told}")
-    return _settled(names, *best, LogWarning("unit-contradiction", f"{said}; {hint} says otherwise"))
+    hints = unit_hints(columns, told)
+    return _settled(columns, *best, LogWarning("unit-contradiction", said, hints=hints))
 
 
 def _in_other_units(choices: Sequence[Choice]) -> list[Choice]:
     """Return the same forms with their angles in the other of rad and deg."""
-    other = {"rad": "deg", "deg": "rad"}
     units = vocabulary().units
     return [
-        (form, (units[other[told[0].name]],) * len(told)) for form, told in choices if told[0].name in other
+        (form, (units[OTHER_UNIT[told[0].name]],) * len(told))
+        for form, told in choices
+        if told[0].name in OTHER_UNIT
     ]
 
 

@@ -11,8 +11,6 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
 
-FULL_TURN_DEG = 360.0
-FULL_TURN_GON = 400.0
 WRAP_SLACK_DEG = 20.0
 """A step this near to 360 is a wrap in degrees: in radians it would be 57 turns between two rows."""
 
@@ -46,19 +44,6 @@ class Bounds:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # huge numbers: their steps are infinite
-def steps_of(turn: float, values: FloatArray) -> str:
-    """Return that joint values step by about a full turn from one row to the next; empty if they do not.
-
-    Args:
-        turn: A full turn in a unit as fine as deg or finer, such as 360.
-        values: Joint values in that unit, shape (n, joints).
-    """
-    wraps = sum(int((np.abs(np.abs(np.diff(one)) - turn) <= WRAP_SLACK_DEG).sum()) for one in values.T)
-    several = "s" if wraps > 1 else ""
-    return f"{wraps} step{several} of about {turn:g} from one row to the next" if wraps else ""
-
-
-@np.errstate(over="ignore", invalid="ignore")
 def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds | None = None) -> str | None:
     """Return why joint values cannot be in rad, or None if they can.
 
@@ -74,8 +59,9 @@ def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds |
     if peak(values) <= math.tau:
         return None
     bounds = bounds or Bounds()
-    if wrapped := steps_of(FULL_TURN_DEG, values):
-        return wrapped
+    wraps = sum(int((np.abs(np.abs(np.diff(one)) - 360.0) <= WRAP_SLACK_DEG).sum()) for one in values.T)
+    if wraps:
+        return f"{wraps} step{'s' if wraps > 1 else ''} of about 360 from one row to the next"
     speed = 0.0 if t_ns is None else max(_usual_speed(np.abs(np.diff(one)), t_ns) for one in values.T)
     if np.radians(speed) <= bounds.speed < speed:
         return f"as rad it would turn at {speed:.3g} rad/s for a tenth of the time"

@@ -12,13 +12,13 @@ from dataclasses import dataclass, field
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain, JointKind
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
+from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import RotationForm, angles
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column
-from urmpipe_pipeline.sources.option_text import option
-from urmpipe_pipeline.sources.units.gon import GonDoubt
 from urmpipe_pipeline.sources.units.kinematic_units import KinematicUnits
 from urmpipe_pipeline.sources.units.unit_evidence import Bounds, degrees_evidence, peak, radians_evidence
+from urmpipe_pipeline.sources.units.unit_hints import OTHER_UNIT, unit_hints, unit_inference
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Quantity, Unit, vocabulary
 
 GIVEN = "given as an option"
@@ -39,7 +39,7 @@ class UnitFinder:
         source: The source, if it is known.
         file: The file, for errors.
         kinematic: The units that the kinematics single out, if they do.
-        gon: The columns in degrees that may be in gon.
+        by_source: Whether the source told a unit.
     """
 
     given: Mapping[int, Unit]
@@ -49,25 +49,18 @@ class UnitFinder:
     _assumed: list[LogWarning] = field(default_factory=list)
     _doubted: dict[tuple[Unit, Unit, str], list[Column]] = field(default_factory=dict)
     _overruled: dict[Unit, list[Column]] = field(default_factory=dict)
-    _noted: dict[tuple[str, str], list[str]] = field(default_factory=dict)
-    gon: GonDoubt = field(init=False)
-
-    def __post_init__(self) -> None:
-        """Begin without a doubt."""
-        self.gon = GonDoubt(self.given, self.file)
+    _noted: dict[tuple[str, str], list[Column]] = field(default_factory=dict)
+    by_source: bool = False
 
     @property
     def inferences(self) -> list[Inference]:
         """What was found out, columns of one unit and evidence together."""
-        return [
-            Inference(f"unit of {', '.join(names)}", unit, evidence)
-            for (unit, evidence), names in self._noted.items()
-        ]
+        return [unit_inference(columns, unit, evidence) for (unit, evidence), columns in self._noted.items()]
 
     @property
     def warnings(self) -> list[LogWarning]:
         """What was assumed, and what contradicts the kinematics or the names of the columns."""
-        return [*self._assumed, *self.gon.warnings, *self._contradictions(), *self._against_names()]
+        return [*self._assumed, *self._contradictions(), *self._against_names()]
 
     def joints(
         self, columns: Sequence[Column], values: FloatArray, t_ns: IntArray | None, robot: Chain | None
@@ -99,7 +92,6 @@ class UnitFinder:
             found = [unit if j in turns else other for j, other in enumerate(found)]
         if self.kinematic is None:
             self._refuse_contradictions(columns, told_units, values, t_ns, robot)
-            self.gon.note_unless_wrapped(columns, values)
         metre = vocabulary().units["m"]
         return [metre if unit is None else unit for unit in found]
 
@@ -150,7 +142,6 @@ class UnitFinder:
                 message = f"found the unit {own.name}, allowed: {names}"
                 raise LogError(Finding(message, self.file, column=column.header))
             units.append(own)
-        self.gon.note(columns)
         return units
 
     def _told(self, column: Column, kind: JointKind | None) -> Unit | None:
@@ -164,7 +155,7 @@ class UnitFinder:
             names = ", ".join(name for quantity in allowed for name in vocabulary().spelled(quantity))
             message = f"found the unit {unit.name} ({evidence}), allowed: {names}"
             if column.number in self.given:
-                raise OptionError(f"--unit {column.name}: {message}")
+                raise OptionError(Finding(message, column=column.name, parameter="unit"))
             raise LogError(Finding(message, self.file, column=column.header))
         return self._held_against_kinematics(column, unit, evidence)
 
@@ -183,16 +174,15 @@ class UnitFinder:
     def _contradictions(self) -> Iterator[LogWarning]:
         """Yield what the kinematics say against the units that were told."""
         for (unit, better, evidence), columns in self._doubted.items():
-            first = columns[0].header if columns[0].header.isdigit() else columns[0].name
             names = ", ".join(column.name for column in columns)
             told = f"{names}: {unit.name} ({evidence}) contradicts the kinematics: taken as"
             by_how_much = self.kinematic.evidence(unit.quantity, unit) if self.kinematic else ""
             if evidence == GIVEN:
                 said = f"{told} {unit.name}, though as {better.name} it would fit: {by_how_much}"
+                yield LogWarning("unit-contradiction", said)
             else:
-                hint = f"{option('--unit', f'{first}={unit.name}')} says otherwise"
-                said = f"{told} {better.name}: {by_how_much}; {hint}"
-            yield LogWarning("unit-contradiction", said)
+                hints = unit_hints(columns, unit.name)
+                yield LogWarning("unit-contradiction", f"{told} {better.name}: {by_how_much}", hints=hints)
 
     def _against_names(self) -> Iterator[LogWarning]:
         """Yield the columns whose names tell another unit than the one given for all joints."""
@@ -212,7 +202,10 @@ class UnitFinder:
         if own is not None and own.quantity != "time":
             return own, "its name"
         default = (self.source.units if self.source else {}).get("length" if kind == "prismatic" else "angle")
-        return default, f"{self.source.name} writes {default.name}" if self.source and default else ""
+        if self.source is None or default is None:
+            return None, ""
+        self.by_source = True
+        return default, f"{self.source.name} writes {default.name}"
 
     def _own(self, column: Column, likely: str = "deg") -> Unit | None:
         """Return the unit that the user or the name gives this very column; raise if it is not known."""
@@ -220,9 +213,8 @@ class UnitFinder:
             return self.given[column.number]
         if column.unit_text and column.unit is None:
             message = f"found the unit {shown(column.unit_text)}, allowed: rad, deg, m, mm, cm"
-            _, gon = vocabulary().gon.about(column.unit_text)
-            hint = gon or f"; say which with {option('--unit', f'{column.name}={likely}')}"
-            raise LogError(Finding(f"{message}{hint}", self.file, column=column.header))
+            hints = unit_hints([column], likely, "says which")
+            raise LogError(Finding(message, self.file, column=column.header, hints=hints))
         return column.unit
 
     def _settled(
@@ -272,8 +264,9 @@ class UnitFinder:
         if largest > MOST_TURNS * math.tau:
             message = f"found values up to {largest:.6g} in {names} and no unit, allowed: rad or deg"
             unnamed = len(columns) == 3 and all(column.header.isdigit() for column in columns)
-            path = ", or --source path if they are x, y, z" if unnamed else ""
-            raise LogError(Finding(f"{message}; say which with --unit{path}", self.file))
+            hints = [Hint("unit", {"": name}, "says which") for name in ("rad", "deg")]
+            hints += [Hint("source", "path", "reads them as x, y, z")] if unnamed else []
+            raise LogError(Finding(message, self.file, hints=tuple(hints)))
         self._assume("rad", "joints", columns)
         return vocabulary().units["rad"]
 
@@ -301,14 +294,15 @@ class UnitFinder:
             if evidence:
                 names = ", ".join(columns[j].name for j in which)
                 said = f"found {names} in {name} by name or source, but {evidence}"
-                hint = f"allowed: a unit that fits the data; say which with --unit {other} or --unit {name}"
-                raise LogError(Finding(f"{said}; {hint}", self.file))
+                hints = tuple(Hint("unit", {"": one}, "says which") for one in (other, name))
+                raise LogError(Finding(f"{said}, allowed: a unit that fits the data", self.file, hints=hints))
 
     def _note(self, columns: Sequence[Column], unit: str, evidence: str) -> None:
-        self._noted.setdefault((unit, evidence), []).extend(column.name for column in columns)
+        self._noted.setdefault((unit, evidence), []).extend(columns)
 
     def _assume(self, unit: str, what: str, columns: Sequence[Column]) -> None:
         names = ", ".join(column.name for column in columns)
         self._note(columns, unit, "assumed")
-        said = f"no unit is given for {names}: the {what} are taken as {unit}; --unit says otherwise"
-        self._assumed.append(LogWarning("assumed-unit", said))
+        said = f"no unit is given for {names}: the {what} are taken as {unit}"
+        hints = unit_hints(columns, OTHER_UNIT[unit])
+        self._assumed.append(LogWarning("assumed-unit", said, hints=hints))

@@ -1,1 +1,0 @@
-"""The mutation score of the models: a subject a module. mutmut makes the mutants and runs the tests."""

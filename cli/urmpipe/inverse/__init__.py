@@ -1,1 +1,0 @@
-"""What `urmpipe.ik` is made of: what is asked, its solutions, and their words."""

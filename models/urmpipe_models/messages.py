@@ -1,0 +1,164 @@
+"""Messages as data: what is wrong or worth knowing, apart from it what the reader may give, and three voices.
+
+A message keeps its sentence, written where the fault is seen. What that is about, and the parameters that
+would change it, are fields. Who prints chooses the voice, so that a stored message reads right for everybody:
+
+    warning = Finding("no unit is given", hints=(Hint("unit", {"q1": "deg"}, "reads it so"),))
+    warning.words("command line")   no unit is given; --unit q1=deg reads it so
+    warning.words("python")         no unit is given; unit={"q1": "deg"} reads it so
+    warning.words("system file")    no unit is given; units.q1 = "deg" in the map of the log reads it so
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
+from itertools import groupby
+from typing import Any
+
+from urmpipe_models.spelling import IN_MAP, IN_NO_FILE, Voice, spelled, subject
+
+Value = str | bool | float | list[str] | list[float] | Mapping[str, str | tuple[float, float] | None] | None
+"""What to give a parameter: by column or joint, "" for all; True for a flag; None for the reader's own."""
+
+
+@dataclass(frozen=True, slots=True)
+class Hint:
+    """A parameter that would change what a message says.
+
+    Attributes:
+        parameter: Its keyword, such as "skip_bad"; empty for advice that is no parameter.
+        value: What to give it; None where that is the reader's own.
+        does: What it does, as the end of a sentence that the parameter begins: "reads it so".
+        call: The command and public function that takes it, where it is another than the one that ran.
+    """
+
+    parameter: str
+    value: Value = None
+    does: str = ""
+    call: str = ""
+
+    def __hash__(self) -> int:
+        return hash((self.parameter, self.does))  # a mapping has no hash
+
+    def spelled(self, voice: Voice) -> str:
+        """Return the parameter with its value: `--unit q1=deg`, `unit={"q1": "deg"}`."""
+        if not self.parameter:
+            return ""
+        if not self.call:
+            return spelled(self.parameter, self.value, voice)
+        if voice == "python":
+            return f"{self.call}({spelled(self.parameter, self.value, voice)})"
+        return f"urmpipe {self.call} {spelled(self.parameter, self.value, 'command line')}"
+
+
+class Message:
+    """What all messages share: their words in each voice. Its classes are frozen dataclasses.
+
+    Attributes:
+        message: The sentence, without what the other fields say.
+        parameter: Keyword of the public function that it is about, such as "tsp".
+        found: What was found.
+        allowed: What is allowed.
+        hints: What the reader may give.
+    """
+
+    __slots__ = ()
+
+    message: str
+    parameter: str | None
+    found: str | None
+    allowed: str | None
+    hints: tuple[Hint, ...]
+
+    def __str__(self) -> str:
+        return self.words("python")
+
+    def place(self) -> str:
+        """Return where it was seen, as it stands before the sentence; empty where that is unknown."""
+        return ""
+
+    def sentence(self, voice: Voice = "python") -> str:
+        """Return what it says without its place: subject, sentence, found, allowed and hints."""
+        told = (
+            f"{name}{said}" for name, said in (("found ", self.found), ("allowed: ", self.allowed)) if said
+        )
+        said = ": ".join(filter(None, (self.message, ", ".join(told))))
+        if self.parameter:
+            said = f"{subject(self.parameter, voice)}: {said}"
+        return one_line("; ".join([said, *hint_words(self.hints, voice)]))
+
+    def words(self, voice: Voice) -> str:
+        """Return all of it in one line, as somebody reads it."""
+        place = one_line(self.place())
+        return f"{place}: {self.sentence(voice)}" if place else self.sentence(voice)
+
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+        """Return its fields for JSON, with the sentence as `message`."""
+        return asdict(self) | {"message": self.sentence(voice)}  # type: ignore[call-overload, no-any-return]
+
+
+@dataclass(frozen=True, slots=True)
+class Finding(Message):
+    """One thing that is wrong with an input.
+
+    Attributes:
+        message: What is wrong; empty where `found` and `allowed` say it.
+        file: The file it was found in, as the user named it.
+        line: Line of the file, counted from 1 (header lines count).
+        row: Data row of the file, counted from 1 (header lines do not count).
+        column: Name of the column or joint.
+        kind: A short word to filter by, such as "missing"; empty where none is known.
+        about: The log or block that it is about, where no file tells.
+        parameter: Keyword that it is about.
+        found: What was found.
+        allowed: What is allowed.
+        hints: What the reader may give.
+    """
+
+    message: str = ""
+    file: str | None = None
+    line: int | None = None
+    row: int | None = None
+    column: str | None = None
+    kind: str = ""
+    about: str | None = None
+    parameter: str | None = None
+    found: str | None = None
+    allowed: str | None = None
+    hints: tuple[Hint, ...] = ()
+
+    def place(self) -> str:
+        """Return file, line (or row) and column: "log.csv:12, column q1"."""
+        file = (self.file or "") + ("" if self.line is None else f":{self.line}")
+        row = None if self.row is None or self.line is not None else f"row {self.row}"
+        column = None if self.column is None else f"column {self.column}"
+        return ": ".join(filter(None, (self.about, ", ".join(filter(None, (file, row, column))))))
+
+
+def hint_words(hints: Sequence[Hint], voice: Voice) -> Iterator[str]:
+    """Yield what the reader may give, what does the same in one: "--repair or --skip-bad leaves them out".
+
+    Args:
+        hints: The hints; of those that belong to no file none is told to who writes a system file.
+        voice: Who reads it.
+    """
+    for does, alike in groupby(hints, key=lambda hint: hint.does):
+        own = [
+            hint for hint in alike if hint.call or voice != "system file" or hint.parameter not in IN_NO_FILE
+        ]
+        told = " or ".join(filter(None, (hint.spelled(voice) for hint in own)))
+        if voice == "system file" and any(hint.parameter in IN_MAP and not hint.call for hint in own):
+            told += " in the map of the log"
+        if own:
+            yield f"{told} {does}".strip() if does else f"use {told}"
+
+
+def one_line(text: str) -> str:
+    """Return a text with all that is not printable as the escapes of Python's strings.
+
+    Names come from files, and may hold what breaks a line or what a terminal acts on instead of showing it.
+    """
+    if text.isprintable():
+        return text
+    return "".join(one if one.isprintable() else one.encode("unicode_escape").decode() for one in text)

@@ -1,0 +1,95 @@
+"""What leaves of a comparison: the compared samples of all logs, and both trajectories of each."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.presentation.exports import (
+    ExportColumn,
+    Exports,
+    ExportTable,
+    Poses,
+    Rows,
+    Times,
+    columns_of,
+)
+from urmpipe_pipeline.runs.exports import provenance_of
+from urmpipe_pipeline.text import encodable
+
+NO_ORIENTATION = LogWarning(
+    "no-orientation",
+    "a comparison holds positions: every orientation is written as 0 0 0 1, compare translations only",
+)
+
+
+def exports(comparison: Comparison) -> Exports:
+    """Return what can leave of a comparison."""
+    about = provenance_of(comparison.name, comparison.provenance) | {
+        "reference": comparison.reference.name,
+        "tolerance": dict(comparison.tolerance),
+        "verdict": comparison.verdict,
+        "runs": [run.name for run in comparison.runs],
+    }
+    rows = Rows(lambda units_told: delta_table(comparison), lambda table: _fields(comparison))
+    poses = {"": lambda rows: _poses(comparison)}
+    return Exports("comparison", about, {"compared": rows}, poses, {}, (NO_ORIENTATION,))
+
+
+def delta_table(comparison: Comparison) -> ExportTable:
+    """Return the compared samples of all logs, one below the other: deviation, reference and actual in SI."""
+    runs = comparison.runs
+    names = np.repeat([encodable(run.name) for run in runs], [len(run.sample) for run in runs])
+    columns = [
+        ExportColumn("run", "", names),
+        ExportColumn("sample", "", np.concatenate([run.sample for run in runs])),
+        ExportColumn("t [s]", "s", Times(np.concatenate([run.t_ns for run in runs]), "s")),
+    ]
+    for what, axes in (("delta", AXES), ("reference", AXES[:3]), ("actual", AXES[:3])):
+        values = np.concatenate([getattr(run, what) for run in runs])
+        columns += columns_of([f"{what}_{axis}" for axis in axes], ["m"] * len(axes), values)
+    outside = np.concatenate([run.outside for run in runs]).astype(np.int64)
+    columns.append(ExportColumn("out_of_tolerance", "", outside))
+    clock = np.concatenate([run.run.log.clock_start_ns + run.t_ns for run in runs])
+    return ExportTable(tuple(columns), clock)
+
+
+def _fields(comparison: Comparison) -> dict[str, Any]:
+    """Return the fields of a comparison in SI, with a struct a log in the cell `runs`."""
+    return {
+        "name": encodable(comparison.name),
+        "reference": encodable(comparison.reference.name),
+        "verdict": comparison.verdict,
+        "tolerance": dict(comparison.tolerance),
+        "runs": [_deviation(run) for run in comparison.runs],
+    }
+
+
+def _deviation(run: Deviation) -> dict[str, Any]:
+    return {
+        "name": encodable(run.name),
+        "verdict": run.verdict,
+        "sample": run.sample,
+        "t": run.t,
+        "clock_ns": run.run.log.clock_start_ns + run.t_ns,
+        "delta": run.delta,
+        "reference": run.reference,
+        "actual": run.actual,
+        "out_of_tolerance": run.outside,
+    }
+
+
+def _poses(comparison: Comparison) -> list[Poses]:
+    """Return the reference and the log at the compared samples of each log, both on the log's clock."""
+    found = []
+    for one in comparison.runs:
+        clock = one.run.log.clock_start_ns + one.t_ns
+        upright = np.tile([0.0, 0.0, 0.0, 1.0], (len(clock), 1))
+        prefix = "" if len(comparison.runs) == 1 else f"{one.name}-"
+        found.append(Poses(f"{prefix}reference", clock, one.reference, upright))
+        found.append(Poses(f"{prefix}actual", clock, one.actual, upright))
+    return found

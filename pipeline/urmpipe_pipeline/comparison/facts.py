@@ -1,0 +1,152 @@
+"""The facts of a compared log: what decided, when and where; how it was put beside the reference."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.alignment import tool_with
+from urmpipe_pipeline.comparison.causes import causes
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import size_of, used_words
+from urmpipe_pipeline.comparison.trajectory import Sync
+from urmpipe_pipeline.comparison.wording import decided_words, out_words, stretch_words
+from urmpipe_pipeline.presentation.parts import spot_at
+from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
+from urmpipe_pipeline.runs.parts import log_facts
+
+
+def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
+    """Yield which log and quantity decided the verdict: how much, when and where.
+
+    Args:
+        one: The log that is furthest out of its tolerance, or closest to it.
+        colour: Its colour as #rrggbb.
+    """
+    held = one.decisive
+    yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
+    yield Fact("Decided by", decided_words(held))
+    if not held.missing:
+        yield Fact("Data row", Value(one.row(held)))
+    yield Fact("Position", Place(spot_at(one.place(held))))
+    yield from _furthest_joint(one)
+
+
+def largest(one: Statistics | None, *, most: bool = False) -> Value | None:
+    """Return the largest absolute value of a quantity, with what is allowed of it; None without one."""
+    if one is None:
+        return None
+    return Value(one.max, one.unit, one.tolerance, one.verdict, one.used, most=most)
+
+
+def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
+    """Yield what is to be known of a compared log, what decided first."""
+    held, covered = one.decisive, result.covered(one)
+    yield Fact(size_of(held), largest(held), used_words(held), brief=False)
+    yield Fact("Time", Value(held.t_max, "s"), brief=False)
+    yield Fact("Data row", Value(one.row(held)), brief=False)
+    yield Fact("Position", Place(spot_at(one.place(held))), brief=False)
+    yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
+    compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
+    yield Fact("Compared", compared)
+    yield Fact(
+        "Covered", Value(covered, "%"), "share of the reference within the log's time", covered < WHOLE
+    )
+    yield _left_out(one, len(result.reference.t_ns))
+    yield from _out_of_tolerance(one)
+    yield Fact("Clocks", *sync_words(one.sync))
+    yield Fact("Turns removed", _turns(one), "whole turns counted differently at the start")
+    yield from _alignment(one)
+    yield Fact("Joint tolerance", _sliding(one))
+    if (r := one.speed_correlation) is not None:
+        yield Fact("r(‖Δ‖, speed)", Value(r, "1", signed=True), "1: they grow together; 0: no correlation")
+    yield from (Fact("Looks like", cause) for cause in causes(one, result.reference))
+    yield from (replace(fact, brief=fact.name == "Robot") for fact in log_facts(one.run))
+
+
+def sync_words(sync: Sync) -> tuple[str, str]:
+    """Return how two clocks were put together, and how that was found."""
+    if sync.mode == "start":
+        return "aligned at the first sample", ""
+    sign = "-" if sync.offset < 0.0 else "+"
+    within = "" if sync.precision is None else f" ± {text.standard_error(sync.precision)}"
+    said = f"t_reference = t_log {sign} {abs(sync.offset):.6g} s{within}"
+    if sync.mode == "given":
+        return said, "as given"
+    alike = "" if sync.similarity is None else f", similarity {sync.similarity:.4f}"
+    return said, f"estimated from {sync.by or 'the motion'}{alike}"
+
+
+def alignment_words(one: Deviation) -> tuple[str, str]:
+    """Return how a log was moved in space, and by which rule."""
+    alignment = one.alignment
+    match alignment.mode:
+        case "none":
+            return "none", "both sides stand where they were recorded"
+        case "tool":
+            moved = text.quantity(float(np.linalg.norm(alignment.tool)), "m")
+            by = f"{_vector(alignment.tool)} mm in the tool's frame"
+            return f"tool centre point moved by {moved}", f"the constant offset that fits best: {by}"
+    turned = text.quantity(alignment.angle, "rad")
+    moved = text.quantity(float(alignment.moved(one.actual).max()), "m")
+    rule = (
+        "the first compared poses agree" if alignment.mode == "start" else "the rigid motion that fits best"
+    )
+    about = f"turned about the origin, then moved by {_vector(alignment.translation)} mm"
+    return f"{alignment.mode}: moved by up to {moved}, turned by {turned}", f"{rule}: {about}"
+
+
+def _vector(metres: tuple[float, ...]) -> str:
+    """Return a vector in [m] as (x, y, z) in [mm]."""
+    return f"({', '.join(text.millimetres(value) for value in metres)})"
+
+
+def _furthest_joint(one: Deviation) -> Iterator[Fact]:
+    """Yield the joint that deviates most, of a log that is decided by something else."""
+    joint = one.furthest_joint("rad") or one.furthest_joint("m")
+    if joint is not None and one.decisive.kind != "joint" and joint.max:
+        yield Fact("Joint furthest off", f"{joint.quantity}: {text.quantity(joint.max, joint.unit)}")
+
+
+def _left_out(one: Deviation, reference_samples: int) -> Fact:
+    said = (
+        f"{one.left_out} of {text.counted(one.left_out + len(one.sample), 'sample')},"
+        f" {one.reference_left_out} of {reference_samples} of the reference"
+    )
+    some = bool(one.left_out or one.reference_left_out)
+    return Fact("Left out", said, "no counterpart, or no value", some)
+
+
+def _out_of_tolerance(one: Deviation) -> Iterator[Fact]:
+    out = int(np.count_nonzero(one.outside))
+    yield Fact("Out of tolerance", out_words(out, len(one.sample)), brief=out > 0)
+    if longest := one.longest_out:
+        yield Fact("Longest stretch out", stretch_words(longest))
+
+
+def _turns(one: Deviation) -> str:
+    counts = zip(one.joint_statistics, one.joint_turns, strict=True)
+    return ", ".join(f"{name} {count:+d}" for name, count in counts if count)
+
+
+def _alignment(one: Deviation) -> Iterator[Fact]:
+    """Yield how a log was moved in space, and the option that does so permanently."""
+    moved = one.alignment.mode != "none"
+    yield Fact("Alignment", *alignment_words(one), brief=moved)
+    if one.alignment.mode == "tool" and one.run.robot is not None:
+        values = [round(value, 7) + 0.0 for value in tool_with(one.run.robot, one.alignment)]  # no -0.0
+        yield Fact("To apply this permanently", Advice(hints=(Hint("tool", values),)))
+
+
+def _sliding(one: Deviation) -> str:
+    """Say what a tolerance of joints is where they slide; nothing where none does."""
+    sliding = [held for held in one.joint_statistics.values() if held.unit == "m" and held.tolerance]
+    if not sliding:
+        return ""
+    names = ", ".join(held.quantity for held in sliding)
+    return f"in m for joints that slide: {names} {text.limit(sliding[0].tolerance, 'm')} mm"

@@ -1,0 +1,213 @@
+"""The plots of a comparison: how each log deviates over time, over its speed and in space."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
+from urmpipe_pipeline.comparison.symbols import SYMBOLS, symbol
+from urmpipe_pipeline.comparison.wording import amount_words, correlation
+from urmpipe_pipeline.palette import (
+    AXIS_COLOURS,
+    DEVIATION_COLOUR,
+    REFERENCE_COLOUR,
+    joint_colour,
+    run_colour,
+)
+from urmpipe_pipeline.presentation.figure import Figure, Line, Over, Panel, SpaceFigure, View
+from urmpipe_pipeline.presentation.parts import ends, spot_at
+from urmpipe_pipeline.presentation.scene import Path, Spot
+from urmpipe_pipeline.runs.figures import joints_figure, motion_figure, speed_figure
+
+APART = 30.0
+"""Largest values further apart than this factor need a logarithmic axis: else the small ones are flat."""
+
+STRENGTHS = ((0.7, "strongly"), (0.4, "moderately"), (0.2, "weakly"))
+"""From which |r| on two quantities go together, in words."""
+
+
+def overview_figure(comparison: Comparison) -> Iterator[Figure]:
+    """Yield the norm of every log over its own time, from best to worst; nothing of a single log."""
+    ranking = comparison.ranking
+    if len(ranking) < 2:
+        return
+    largest = [one.statistics["norm"].max for one in ranking]
+    logarithmic = min(largest) > 0.0 and max(largest) > APART * min(largest)
+    order = "; ".join(
+        f"{place}. {one.name}: at most {text.millimetres(one.statistics['norm'].max)} mm, {one.verdict}"
+        for place, one in enumerate(ranking, start=1)
+    )
+    lines = tuple(
+        Line(
+            column(one.delta, 3),
+            (f"{place}. {one.name}",),
+            (run_colour(comparison.runs.index(one)),),
+            t_ns=one.t_ns,
+        )
+        for place, one in enumerate(ranking, start=1)
+    )
+    panel = Panel(
+        "‖Δ‖", "m", lines, limit=comparison.tolerance.get("norm"), signed=False, logarithmic=logarithmic,
+        small=True, share=3.0,
+    )  # fmt: skip
+    scale = " The axis is logarithmic." if logarithmic else ""
+    yield Figure(
+        "Deviation of all logs",
+        f"The norm of each log's deviation over its own time, from best to worst.{scale}",
+        f"Norm of the deviation of {len(ranking)} logs over time, from best to worst. {order}.",
+        (View("‖Δ‖ of all logs", (panel,)),),
+    )
+
+
+def deviation_figures(one: Deviation) -> Iterator[Figure]:
+    """Yield the plots of a compared log: how it deviates, then how it moves."""
+    yield _deviation(one)
+    yield from _joints(one)
+    yield from joints_figure(one.run, 1 if one.joint_delta is not None else None)
+    if np.isfinite(one.speed).any():
+        yield speed_figure(one.name, one.t_ns, one.speed)
+    yield from motion_figure(one.run)
+
+
+def path_figure(one: Deviation) -> SpaceFigure:
+    """Return the reference and the actual path in space, the actual one coloured by its deviation."""
+    place = spot_at(one.place(one.decisive))
+    return SpaceFigure(
+        "Path in space",
+        "Equal scale on all axes. The colour is the distance from the reference at the same time.",
+        f"Paths of the reference and of {one.name} in three dimensions. The verdict was decided at"
+        f" x, y, z = {text.point(place)} m: {amount_words(one.decisive)}.",
+        (
+            Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
+            Path(
+                "actual: ‖Δ‖", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
+                sample=one.sample, kept=(one.decided_at,),
+            ),
+        ),
+        (*ends(one.actual), Spot(place, "decides", DEVIATION_COLOUR)),
+    )  # fmt: skip
+
+
+def speed_cloud(one: Deviation) -> Iterator[Figure]:
+    """Yield the norm over the speed of the tool centre point; nothing where the speed is not known."""
+    if not np.isfinite(one.speed).any():
+        return
+    said = correlation_words(one.speed_correlation)
+    line = Line(column(one.delta, 3), ("‖Δ‖",), (AXIS_COLOURS["norm"],), points=True)
+    over = Over(one.speed, "‖v‖", "m/s")
+    panel = Panel("‖Δ‖", "m", (line,), one.t_ns, signed=False, peaks=(one.worst,), over=over, small=True)
+    yield Figure(
+        "Deviation over speed",
+        f"Each point is a sample. {said}",
+        f"Norm of the deviation of {one.name} over the speed of its tool centre point. {said}",
+        (View("‖Δ‖ over ‖v‖", (panel,)),),
+    )
+
+
+def correlation_words(r: float | None) -> str:
+    """Say what the correlation of norm and speed means."""
+    if r is None:
+        return "The norm or the speed does not change, so there is no correlation."
+    strength = next((word for least, word in STRENGTHS if abs(r) >= least), "")
+    if not strength:
+        return f"r = {correlation(r)}: deviation does not correlate with speed."
+    if r > 0:
+        return f"r = {correlation(r)}: deviation grows {strength} with speed, as it does with a lag in time."
+    return f"r = {correlation(r)}: deviation shrinks {strength} with speed."
+
+
+def column(values: FloatArray, index: int) -> FloatArray:
+    """Return a column of an array in any unit of shape (n, k), shape (n,)."""
+    return np.asarray(np.asarray(values)[:, index])
+
+
+def _deviation(one: Deviation) -> Figure:
+    """Return delta, its norm, the distance from the path and the angle, with what is allowed of each."""
+    delta = tuple(
+        _panel(one, one.statistics[axis], Line(column(one.delta, i), (SYMBOLS[axis],), (AXIS_COLOURS[axis],)))
+        for i, axis in enumerate(AXES)
+    )
+    path = _panel(one, one.statistics["path"], Line(one.path, ("path",), (AXIS_COLOURS["norm"],)))
+    views = [View("delta", delta), View("Distance from the path", (path,))]
+    if one.angle is not None:
+        line = Line(one.angle, ("angle",), (AXIS_COLOURS["norm"],))
+        views.append(View("Angle between the orientations", (_panel(one, one.statistics["angle"], line),)))
+    largest = ", ".join(
+        f"{symbol(held)} {text.quantity(held.max, held.unit)} at {text.seconds(held.t_max)} s"
+        for held in one.statistics.values()
+    )
+    return Figure(
+        "Deviation over time",
+        "Δ is reference minus actual at the same time; path is the distance from the reference's path,"
+        " regardless of time; angle is that between the two orientations. Dashed: the tolerance; tinted: out"
+        " of it. Diamonds: the largest value of each. Dotted: the instant that decided the verdict.",
+        f"Deviation of {one.name} from the reference over time. Largest absolute values: {largest}."
+        f" {_out_words(one)}",
+        tuple(views),
+        _instant(one),
+        opened={"path": 1, "angle": 2}.get(one.decisive.kind, 0),
+        share=4.0,
+    )
+
+
+def _joints(one: Deviation) -> Iterator[Figure]:
+    """Yield reference minus log of the joints, a panel for those that turn and one for those that slide."""
+    if one.joint_delta is None or not one.joint_statistics:
+        return
+    held = list(one.joint_statistics.values())
+    units = [unit for unit in text.SHOWN if any(joint.unit == unit for joint in held)]
+    values = np.asarray(one.joint_delta)
+    panels = tuple(_joint_panel(one, values, held, unit) for unit in units)
+    largest = ", ".join(f"{joint.quantity} {text.quantity(joint.max, joint.unit)}" for joint in held)
+    yield Figure(
+        "Deviation of joints",
+        "Reference minus log of each joint, without whole turns counted differently at the start. Dashed: the"
+        " tolerance; tinted: out of it.",
+        f"Deviation of the joints of {one.name}. Largest absolute values: {largest}.",
+        tuple(View("Joints, reference - log", (panel,)) for panel in panels),
+        _instant(one),
+        opened=units.index(one.decisive.unit) if one.decisive.kind == "joint" else 0,
+        share=3.0,
+    )
+
+
+def _joint_panel(one: Deviation, delta: FloatArray, held: Sequence[Statistics], unit: str) -> Panel:
+    """Return the deviation of the joints of one unit, each in its colour."""
+    own = [j for j, joint in enumerate(held) if joint.unit == unit]
+    values = delta if len(own) == len(held) else delta[:, own]
+    names, colours = tuple(held[j].quantity for j in own), tuple(map(joint_colour, own))
+    first = held[own[0]]
+    return Panel(
+        "Δ joints", unit, (Line(values, names, colours),), one.t_ns, first.tolerance, small=True, share=1.9
+    )
+
+
+def _panel(one: Deviation, held: Statistics, line: Line) -> Panel:
+    """Return one quantity over time with its tolerance and its largest value."""
+    return Panel(
+        symbol(held),
+        held.unit,
+        (line,),
+        one.t_ns,
+        held.tolerance,
+        held.kind == "axis",
+        (one.peak(held),),
+        small=True,
+    )
+
+
+def _instant(one: Deviation) -> dict[int, str]:
+    """Return when the verdict was decided."""
+    return {int(one.t_ns[one.decided_at]): f"decides at {text.seconds(one.decisive.t_max)} s"}
+
+
+def _out_words(one: Deviation) -> str:
+    """Say how much of the log is out of tolerance."""
+    if all(held.tolerance is None for held in one.all_statistics):
+        return "There is no tolerance."
+    return f"Out of tolerance: {text.percent(one.share_out)} of the samples."

@@ -1,0 +1,139 @@
+"""How a comparison shows itself: the verdict, then a section a log, then the baseline."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.baseline_section import baseline_section
+from urmpipe_pipeline.comparison.checks import log_checks, log_properties
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.facts import (
+    alignment_words,
+    decisive_facts,
+    deviation_facts,
+    sync_words,
+)
+from urmpipe_pipeline.comparison.figures import (
+    deviation_figures,
+    overview_figure,
+    path_figure,
+    speed_cloud,
+)
+from urmpipe_pipeline.comparison.scene import comparison_scene
+from urmpipe_pipeline.comparison.tables import (
+    comparison_lines,
+    ranking_tables,
+    statistics_rows,
+    statistics_tables,
+)
+from urmpipe_pipeline.comparison.wording import amount_words, tolerance_words, verdict_words
+from urmpipe_pipeline.palette import run_colour
+from urmpipe_pipeline.presentation.parts import inputs_table, minute, provenance_table, recording_fact
+from urmpipe_pipeline.presentation.section import Block, Event, Fact, Level, Presentation, Section, Value
+from urmpipe_pipeline.runs.parts import log_events, log_tables
+from urmpipe_pipeline.runs.playback_figures import playback_figures
+
+
+def present(result: Comparison) -> Presentation:
+    """Return what a comparison shows."""
+    worst = result.worst
+    colour = run_colour(result.runs.index(worst))
+    return Presentation(
+        name=result.name,
+        headline=verdict_words([result]),
+        verdict=result.verdict,
+        facts=(*decisive_facts(worst, colour), *_against(result)),
+        body=_body(result),
+        opens_at_ns=int(worst.t_ns[worst.decided_at]),
+        scene=partial(comparison_scene, result),
+        lines=tuple(comparison_lines(result)),
+        rows=partial(statistics_rows, result),
+        created=result.provenance.created,
+    )
+
+
+def _against(result: Comparison) -> tuple[Fact, ...]:
+    """Return what was the reference and what is allowed."""
+    return (
+        Fact("Reference", result.reference.name, brief=False),
+        Fact("Tolerance", tolerance_words(result), brief=False),
+    )
+
+
+def _body(result: Comparison) -> Section:
+    sections = [_log(one, result) for one in result.runs]
+    if result.baseline is not None:
+        sections.append(baseline_section(result.baseline, len(sections)))
+    return Section(
+        f"Comparison {result.name}",
+        result.verdict,
+        (
+            *_against(result),
+            Fact("Reference samples", Value(len(result.reference.t_ns)), brief=False),
+            Fact("Made", minute(result.provenance), brief=False),
+            recording_fact(result.recording),
+        ),
+        ranking_tables(result),
+        blocks=partial(_overview, result),
+        warnings=result.own_warnings,
+        sections=tuple(sections),
+    )
+
+
+def _overview(result: Comparison) -> Iterator[Block]:
+    """Yield what a page shows of all logs together, and how the comparison was made."""
+    yield from overview_figure(result)
+    yield inputs_table("Reference files", result.reference.files)
+    yield provenance_table(result.provenance)
+
+
+def _log(one: Deviation, result: Comparison) -> Section:
+    """Return the section of a compared log."""
+    return Section(
+        one.name,
+        one.verdict,
+        tuple(deviation_facts(one, result)),
+        tuple(statistics_tables(one)),
+        partial(deviation_figures, one),
+        partial(_page, one),
+        tuple(log_checks(result, one)),
+        log_properties(result, one),
+        partial(_events, one),
+        result.warnings_of(one),
+        rank=result.ranking.index(one),
+        opened=one is result.worst,
+    )
+
+
+def _page(one: Deviation) -> Iterator[Block]:
+    """Yield what only a page shows of a compared log."""
+    yield path_figure(one)
+    yield from speed_cloud(one)
+    yield from playback_figures(one.run)
+    yield from log_tables(one.run)
+
+
+def _events(one: Deviation) -> Iterator[Event]:
+    """Yield how a log was put beside the reference, what was found in it, and where it deviates most."""
+    start = int(one.t_ns[0])
+    if one.sync.mode != "start":
+        yield Event(start, f"clocks: {', '.join(sync_words(one.sync))}")
+    if one.alignment.mode != "none":
+        yield Event(start, f"alignment: {'; '.join(alignment_words(one))}")
+    if one.left_out:
+        whole = one.left_out + len(one.sample)
+        yield Event(start, f"{one.left_out} of {whole} samples left out: no reference or no value", "warning")
+    yield from log_events(one.run)
+    level: Level = "info" if one.verdict == "pass" else "error"
+    if (longest := one.longest_out) is not None:
+        lasts = f"{longest.samples} samples, {text.seconds(longest.duration)} s"
+        yield Event(round(longest.t * 1e9), f"longest stretch out of tolerance begins: {lasts}", level)
+    held = one.decisive
+    if held.tolerance is not None:
+        yield Event(round(held.t_max * 1e9), f"decides: {amount_words(held)}", level)
+    x, y, z, norm = (text.quantity(float(value), "m") for value in one.delta[one.worst])
+    said = f"largest deviation: {norm} (x {x}, y {y}, z {z})"
+    yield Event(int(one.t_ns[one.worst]), said, level)

@@ -1,0 +1,134 @@
+"""What stands in space of a comparison: the worst log's arm, all paths, where it was decided."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from typing import cast
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.elementwise import Vector
+from urmpipe_models.kinematics.forward import points_over_log
+from urmpipe_models.transform import Transform, translation
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
+from urmpipe_pipeline.comparison.deviation import Deviation
+from urmpipe_pipeline.comparison.trajectory import Trajectory
+from urmpipe_pipeline.comparison.wording import amount_words
+from urmpipe_pipeline.palette import DEVIATION_COLOUR, REFERENCE_COLOUR, run_colour
+from urmpipe_pipeline.presentation.parts import spot_at
+from urmpipe_pipeline.presentation.scene import Arm, Path, Scene, Spot
+
+FACTORS = (50, 20, 10, 5, 2)
+"""How many times a deviation may be drawn, the usual one first."""
+
+LEAST_SEEN = 0.005
+"""An enlarged deviation below this share of the scene's radius lies within the width of the lines."""
+
+POSES = 1000
+"""Poses from which the extent of the scene is told."""
+
+
+def comparison_scene(result: Comparison) -> Scene:
+    """Return the arm of the worst log, the reference, all logs, and the worst log's deviation enlarged."""
+    shown = shown_log(result)
+    index, several = result.runs.index(shown), len(result.runs) > 1
+    arms = tuple(_arm(shown, run_colour(index)))
+    paths = [
+        *_reference(result.reference, shown),
+        *(_log(one, run_colour(i)) for i, one in enumerate(result.runs)),
+    ]
+    larger = _enlarged(shown, _radius(arms, paths))
+    whose = f"Arm of {shown.name}" if arms and several else "Arm"
+    said = f", in crimson the deviation x{larger[1]}" if larger else ""
+    return Scene(
+        f"{whose} and paths [m]{said}",
+        arms,
+        (*paths, *([larger[0]] if larger else [])),
+        (_decided(shown, several=several),),
+        enlarged=(len(paths), larger[1]) if larger else None,
+    )
+
+
+def shown_log(result: Comparison) -> Deviation:
+    """Return the compared log whose arm is drawn: the worst that has kinematics, else the worst."""
+    worst_first = sorted(result.runs, key=by_tolerance)[::-1]
+    return next((one for one in worst_first if one.run.tcp is not None), worst_first[0])
+
+
+def _arm(one: Deviation, colour: str) -> Iterator[Arm]:
+    """Yield the arm of a log where the alignment puts it; nothing without kinematics."""
+    run = one.run
+    if run.robot is None or run.tcp is None:
+        return
+    decided = int(one.t_ns[one.decided_at])
+    row = min(int(np.searchsorted(run.t_ns, decided)), len(run.t_ns) - 1)
+    yield Arm(_placed(run.robot, one), run.q, run.t_ns, colour, kept=(row,))
+
+
+def _placed(robot: Chain, one: Deviation) -> Chain:
+    """Return an arm where the alignment puts it."""
+    alignment = one.alignment
+    if alignment.mode == "none":
+        return robot
+    rotation = cast("tuple[Vector, Vector, Vector]", alignment.rotation)
+    base = Transform(rotation, alignment.translation) @ robot.base
+    return robot.placed(base, robot.tool @ translation(*alignment.tool))
+
+
+def _reference(reference: Trajectory, shown: Deviation) -> Iterator[Path]:
+    """Yield the whole reference as a line, and the point where it is at the samples of a log."""
+    if shown.run.timed:
+        yield Path(reference.name, reference.position, None, REFERENCE_COLOUR, asked=True)
+    yield Path(
+        reference.name, shown.reference, shown.t_ns, REFERENCE_COLOUR, asked=True, sample=shown.sample,
+        kept=(shown.decided_at,), line=False,
+    )  # fmt: skip
+
+
+def _log(one: Deviation, colour: str) -> Path:
+    """Return where a compared log was."""
+    return Path(
+        one.name, one.actual, one.t_ns, colour, sample=one.sample, kept=(one.decided_at,),
+        line=one.run.timed,
+    )  # fmt: skip
+
+
+def _decided(one: Deviation, *, several: bool) -> Spot:
+    """Return where the verdict on a log was decided: by what, how much and when."""
+    whose = f", {one.name}" if several else ""
+    said = f"{amount_words(one.decisive)} at t = {text.seconds(one.decisive.t_max)} s{whose}"
+    return Spot(spot_at(one.actual[one.decided_at]), said, DEVIATION_COLOUR)
+
+
+def _enlarged(one: Deviation, radius: float) -> tuple[Path, int] | None:
+    """Return reference + factor (actual - reference) of a log and the factor; None where it shows nothing.
+
+    Only that of the log whose arm is drawn: a line a log would hide all of them.
+    """
+    factor = _factor(one.statistics["norm"].max, radius)
+    if factor is None or not one.run.timed:
+        return None
+    position = one.reference + factor * (np.asarray(one.actual) - one.reference)
+    row = one.decided_at
+    name = f"deviation x{factor}"
+    return Path(name, position, one.t_ns, DEVIATION_COLOUR, sample=one.sample, kept=(row,)), factor
+
+
+def _factor(largest: float, radius: float) -> int | None:
+    """Return the largest factor that keeps a deviation inside the scene; None where none makes it seen."""
+    factor = next((factor for factor in FACTORS if factor * largest <= radius), None)
+    return None if factor is None or factor * largest < LEAST_SEEN * radius else factor
+
+
+def _radius(arms: Sequence[Arm], paths: Sequence[Path]) -> float:
+    """Return half of the diagonal around arms and paths in [m]; 1 around one point."""
+    points: list[FloatArray] = [np.asarray(path.position) for path in paths]
+    for arm in arms:
+        rows = np.unique(np.linspace(0, len(arm.q) - 1, min(POSES, len(arm.q))).astype(np.int64))
+        points.append(points_over_log(arm.chain, np.asarray(arm.q)[rows]).reshape(-1, 3))
+    low = np.min([np.nanmin(part, axis=0) for part in points if np.isfinite(part).any()], axis=0)
+    high = np.max([np.nanmax(part, axis=0) for part in points if np.isfinite(part).any()], axis=0)
+    return float(np.linalg.norm(high - low)) / 2 or 1.0

@@ -1,0 +1,162 @@
+"""The tables of a comparison: its logs from best to worst, the statistics of each, its line among others."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import fields, replace
+from typing import TypeAlias
+
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
+from urmpipe_pipeline.comparison.facts import alignment_words, largest
+from urmpipe_pipeline.comparison.symbols import size_of, symbol
+from urmpipe_pipeline.palette import run_colour
+from urmpipe_pipeline.presentation.parts import columns_of, minute, spot_at
+from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Place, Ref, Table, Value
+
+ABOUT = {"axis": "position", "norm": "position", "path": "path", "angle": "orientation", "joint": "joints"}
+"""What the kinds of deviation are about."""
+
+Heads: TypeAlias = Mapping[str, tuple[str, Callable[[Deviation], Cell]]]
+"""Title of each column, and its cell for a log, by its key."""
+
+
+def ranking_tables(result: Comparison) -> tuple[Table, ...]:
+    """Return the logs from best to worst: how far off, then when, where and how compared; none of one log."""
+    if len(result.runs) < 2:
+        return ()
+    names: Heads = {"run": ("Log", lambda one: reference_of(result, one))}
+    far: Heads = {
+        **names,
+        "verdict": ("Verdict", lambda one: Judged(one.verdict)),
+        "decided_by": ("Decided by", lambda one: size_of(one.decisive)),
+        **_sizes(result),
+    }
+    note = "The logs are ranked by the largest share of a tolerance that each uses. Covered: share of the"
+    note += " reference within the log's time."
+    left_out = "Left out: samples of the log without a counterpart or without a value."
+    whole = min(map(result.covered, result.runs)) >= WHOLE
+    columns = (
+        replace(one, brief=False) if one.key == "covered" and whole else one
+        for one in columns_of(result.ranking, far)
+    )
+    return (
+        Table("Largest deviations, from best to worst", tuple(columns), note),
+        Table("When, where and how compared", tuple(_conditions(result, names)), left_out),
+    )
+
+
+def reference_of(result: Comparison, one: Deviation) -> Ref:
+    """Return the name of a log, as a reference to its section, in its colour."""
+    return Ref(one.name, run_colour(result.runs.index(one)))
+
+
+def _sizes(result: Comparison) -> Heads:
+    """Return the columns of the largest deviations, and of how much was out and covered."""
+    return {
+        "max_x": ("max |Δx|", lambda one: largest(one.statistics["x"])),
+        "max_y": ("max |Δy|", lambda one: largest(one.statistics["y"])),
+        "max_z": ("max |Δz|", lambda one: largest(one.statistics["z"])),
+        "max_norm": ("max ‖Δ‖", lambda one: largest(one.statistics["norm"])),
+        "max_path": ("max path", lambda one: largest(one.statistics["path"])),
+        "max_angle": ("max angle", lambda one: largest(one.statistics.get("angle"))),
+        "max_joint": ("max joint", lambda one: largest(one.furthest_joint("rad"))),
+        "max_slide": ("max slide", lambda one: largest(one.furthest_joint("m"))),
+        "share_out": ("out", lambda one: Value(one.share_out, "%")),
+        "covered": ("covered", lambda one: Value(result.covered(one), "%")),
+    }
+
+
+def _conditions(result: Comparison, names: Heads) -> Iterator[Column]:
+    """Yield the columns of when and where each log is worst, and how it was compared."""
+    runs = result.ranking
+    heads: Heads = {
+        **names,
+        "t": ("decided at t", lambda one: Value(one.decisive.t_max, "s")),
+        "place": ("log there at x, y, z", lambda one: Place(spot_at(one.place(one.decisive)))),
+        "longest_out": ("longest out", lambda one: _stretch(one, "duration")),
+        "longest_out_t": ("longest out from t", lambda one: _stretch(one, "t")),
+        "sync_offset": ("offset", lambda one: Value(one.sync.offset, "s", signed=True)),
+        "speed_correlation": ("r(‖Δ‖, speed)", lambda one: Value(one.speed_correlation, "1", signed=True)),
+        "left_out": ("left out", lambda one: Value(one.left_out)),
+        "warnings": ("warnings", lambda one: Value(len(result.warnings_of(one)))),
+        "alignment": ("alignment", lambda one: alignment_words(one)[0]),
+    }
+    brief = {"run", "t", "longest_out", "longest_out_t", "speed_correlation"}
+    brief |= {"sync_offset"} if any(one.sync.offset for one in runs) else set()
+    brief |= {"left_out"} if any(one.left_out for one in runs) else set()
+    for column in columns_of(runs, heads):
+        yield replace(column, brief=column.key in brief)
+
+
+def _stretch(one: Deviation, name: str) -> Value | None:
+    longest = one.longest_out
+    return None if longest is None else Value(getattr(longest, name), "s")
+
+
+def comparison_lines(result: Comparison) -> Iterator[dict[str, Cell]]:
+    """Yield the lines of a comparison among several: one a log, from best to worst."""
+    lost: list[str] = []
+    if result.baseline:
+        lost = [*(one.run for one in result.baseline.worse), *(one.run for one in result.baseline.gone)]
+    for one in result.ranking:
+        worse = lost.count(one.name)
+        yield {
+            "Log": reference_of(result, one),
+            "Recording": str(result.recording or ""),
+            "Made": minute(result.provenance),
+            "Reference": result.reference.name,
+            "Verdict": Judged(one.verdict),
+            "Worse than its baseline": f"in {worse} {'quantity' if worse == 1 else 'quantities'}"
+            if worse
+            else "",
+            **{title: cell(one) for title, cell in _sizes(result).values()},
+        }
+
+
+def statistics_tables(one: Deviation) -> Iterator[Table]:
+    """Yield the statistics of every quantity of a log: those in m, then those in rad."""
+    starts = dict(zip(map(id, one.all_statistics), (float(values[0]) for values in one.values), strict=True))
+    for unit in text.SHOWN:
+        own = [held for held in one.all_statistics if held.unit == unit]
+        if own:
+            about = text.enumerated(list(dict.fromkeys(ABOUT[held.kind] for held in own)))
+            note = (
+                "max, rms and p95 are of absolute values, mean and std signed. At start: the difference of"
+                f" the start poses (mutual calibration) at t = {text.seconds(float(one.t_ns[0]) / 1e9)} s."
+            )
+            yield Table(f"Statistics of {about}", _statistics(one, own, starts), note)
+
+
+def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, float]) -> tuple[Column, ...]:
+    """Return the columns of the statistics of some quantities in one unit."""
+    joint = one.furthest_joint(own[0].unit)
+
+    def number(key: str) -> tuple[str, Callable[[Statistics], Cell]]:
+        return key, lambda held: Value(getattr(held, key), held.unit)
+
+    heads: dict[str, tuple[str, Callable[[Statistics], Cell]]] = {
+        "quantity": ("Quantity", symbol),
+        "verdict": ("Verdict", lambda held: Judged(held.verdict)),
+        "tolerance": ("tolerance", lambda held: Value(held.tolerance, held.unit, given=True)),
+        "max": ("max", lambda held: largest(held, most=held is joint and held.max > 0.0)),
+        "t_max": ("at t", lambda held: Value(held.t_max, "s")),
+        **{key: number(key) for key in ("rms", "p95", "mean", "std")},
+        "start": ("at start", lambda held: Value(starts[id(held)], held.unit)),
+        "out_of_tolerance": ("samples out", lambda held: Value(held.out_of_tolerance)),
+        "share_out": ("out", lambda held: Value(held.share_out, "%")),
+        "missing": ("no value", lambda held: Value(held.missing or None)),
+    }
+    return columns_of(own, heads)
+
+
+def statistics_rows(result: Comparison) -> Table:
+    """Return what --csv writes: a row a log and quantity; lengths in [m], angles in [rad], times in [s]."""
+    keys = ("run", "sync_offset", *(field.name for field in fields(Statistics)))
+    rows = list(result.rows())
+    return Table("Statistics", tuple(Column(key, key, [_plain(row[key]) for row in rows]) for key in keys))
+
+
+def _plain(value: str | float | None) -> Cell:
+    return value if value is None or isinstance(value, str) else Value(value)

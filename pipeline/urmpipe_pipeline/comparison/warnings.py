@@ -1,0 +1,132 @@
+"""What a person should know about a verdict: that it rests on little, or answers another question."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.deviation import AXES, Deviation
+from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.runs.results import Run
+
+EXCHANGED = "path-as-log"
+"""The kind of a doubt about the order of what was given: it says nothing against a log."""
+
+LARGE_NOISE = "large-noise"
+"""The kind of a doubt about the noise of a baseline: another baseline has its own."""
+
+AT_REST = 3e-4
+"""What moves by less in [m] or [rad] rests: three times what a UR5e at rest was logged to span in 25 s,
+0.10 mrad and 0.10 mm."""
+
+CALIBRATION = 5e-3
+"""A controller's own calibration moves the tool by up to this in [m] from where those of the data sheet have
+it: 1.6 mm and 3.7 mm in the logs of two UR5e."""
+
+LARGE_LENGTH = 0.1
+"""A larger tolerance in [m] was meant in mm: no arm misses by a tenth of a metre and is accepted."""
+
+LARGE_ANGLE = float(np.radians(10.0))
+"""A larger tolerance in [rad] was meant in deg."""
+
+
+def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
+    """Yield what a verdict on a log rests on, where that is little: missing values, or one pose.
+
+    Args:
+        one: The deviation of the log.
+    """
+    for found in one.all_statistics:
+        if found.tolerance is not None and found.missing:
+            said = f"{found.quantity}: judged at {found.samples} of {len(one.sample)} compared samples"
+            told = f"{said}; a sample without a value is out of tolerance"
+            yield LogWarning("partly-judged", told, about=one.name)
+    if one.run.timed and _rests(one):
+        said = f"{text.counted(len(one.sample), 'sample')} compared, all in one pose"
+        yield LogWarning("one-pose", f"{said}: the verdict is on that pose alone", about=one.name)
+
+
+def _rests(one: Deviation) -> bool:
+    """Tell whether a log stays where it is while it is compared: its tool centre point, and its joints."""
+    run = one.run
+    compared = (one.t_ns[0] <= run.t_ns) & (run.t_ns <= one.t_ns[-1])
+    return _extent(one.actual) < AT_REST and _extent(run.q[compared]) < AT_REST
+
+
+def _extent(values: FloatArray) -> float:
+    """Return the largest span of a column of shape (n, k), in its unit; 0 without a value."""
+    known = values[np.isfinite(values).all(axis=1)]
+    return float(np.ptp(known, axis=0).max()) if known.size else 0.0
+
+
+def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
+    """Yield a warning for each tolerance that hardly anybody means.
+
+    Args:
+        tolerance: In [m] or [rad], by kind or coordinate, of numbers that were given without a unit.
+    """
+    for kind, value in tolerance.items():
+        unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
+        if value > most:
+            shown, bare = text.limit(value, unit), f"{value:g}"
+            said = f"a tolerance of {shown} {other} ({kind}) lets anything pass: {bare} is in {unit}"
+            hints = (
+                Hint("tolerance", f"{kind}={bare}{other}", f"if {other} was meant"),
+                Hint("tolerance", f"{kind}={bare}{unit}", "if not"),
+            )
+            yield LogWarning("large-tolerance", said, hints=hints)
+
+
+def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
+    """Yield a warning for each noise that reaches its tolerance: nothing within that can then be worse.
+
+    Args:
+        noise: Changes in [m] or [rad] that mean nothing, of every kind, perhaps of a coordinate.
+        tolerance: In [m] or [rad], by kind or coordinate.
+    """
+    for kind, allowed in tolerance.items():
+        level = allowed_for(kind, "axis" if kind in AXES else kind, noise)
+        if level is not None and level >= allowed:
+            unit, other = ("rad", "deg") if "rad" in UNITS[kind] else ("m", "mm")
+            said = f"a noise of {text.limit(level, unit)} {other} ({kind}) reaches the tolerance of"
+            why = f"{text.limit(allowed, unit)} {other}: nothing within it can be worse than the baseline"
+            yield LogWarning(LARGE_NOISE, f"{said} {why}; a number without a unit is in {unit}")
+
+
+def exchanged(reference: Run, runs: Iterable[Run]) -> Iterator[LogWarning]:
+    """Yield a warning for each path that is held as a log against one with joints: perhaps the wrong way."""
+    for run in runs:
+        if reference.log.joints and not run.log.joints:
+            said = f"a path without joints, compared with {reference.name}, which has joints"
+            yield LogWarning(EXCHANGED, f"{said}: the reference comes first, then the logs", about=run.name)
+
+
+def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
+    """Yield a warning if a log that is compared by its joints recorded a tool centre point elsewhere.
+
+    Args:
+        run: The log.
+        allowed: Distance in [m] that is not told.
+    """
+    if run.tcp is None or run.tcp_recorded is None:
+        return
+    apart = np.linalg.norm(run.tcp.position - run.tcp_recorded, axis=1)
+    if (known := apart[np.isfinite(apart)]).size and (most := float(known.max())) > allowed:
+        said = f"by its joints it is up to {text.quantity(most, 'm')} from the tool centre point it recorded"
+        remedy = f"this verdict does not judge it, a comparison of {run.name} alone does"
+        yield LogWarning("recorded-tcp-apart", f"{said}, {_cause(most)}; {remedy}", about=run.name)
+
+
+def _cause(apart: float) -> str:
+    """Return what usually lies behind a distance in [m] between kinematics and recorded tool centre point."""
+    usual = f"{text.limit(CALIBRATION)} mm"
+    if apart <= CALIBRATION:
+        return (
+            f"usual up to {usual} where a controller knows its arm's calibration, which the robot here lacks"
+        )
+    return f"more than a calibration makes ({usual}): another robot, tool or base?"

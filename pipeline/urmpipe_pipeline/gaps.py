@@ -1,0 +1,44 @@
+"""Gaps: rows of a log that are further apart than its others."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from urmpipe_models.arrays import BoolArray, IntArray
+
+GAP = 3.0
+"""Two rows further apart than this many median periods have a gap between them, in which nothing is known."""
+
+MISSED_SAMPLE = 1.5
+"""Two values of a joint further apart than this many median periods lack one between them; a joint may turn
+unseen there."""
+
+
+def gaps_behind(t_ns: IntArray) -> BoolArray:
+    """Return which rows have a gap behind them.
+
+    Args:
+        t_ns: Times in integer [ns], shape (n,).
+
+    Returns:
+        One entry a step from row to row, shape (n - 1,).
+    """
+    step = np.diff(t_ns)
+    return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
+
+
+def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> BoolArray:
+    """Return which times lie strictly inside a gap between two known ones.
+
+    Args:
+        at_ns: Times in integer [ns], shape (n,).
+        known_ns: Rising times in integer [ns], shape (k,).
+
+    Returns:
+        Shape (n,).
+    """
+    if len(known_ns) < 2:
+        return np.zeros(len(at_ns), dtype=np.bool_)
+    after = np.clip(np.searchsorted(known_ns, at_ns, side="left"), 1, len(known_ns) - 1)
+    wide = gaps_behind(known_ns)[after - 1]
+    return np.asarray(wide & (at_ns > known_ns[after - 1]) & (at_ns < known_ns[after]))

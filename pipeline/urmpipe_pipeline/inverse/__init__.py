@@ -1,1 +1,0 @@
-"""Around inverse kinematics: targets from files, joint logs, and runs of solutions."""

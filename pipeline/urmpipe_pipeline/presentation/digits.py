@@ -1,0 +1,96 @@
+"""How a cell is written for people: here, and nowhere else, digits and units are chosen."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterable
+
+from urmpipe_models.messages import hint_words
+from urmpipe_models.spelling import Voice
+from urmpipe_pipeline import text
+from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Value
+
+FINEST = 15
+"""Digits of a share at most: more are not in it."""
+
+
+def written(cell: Cell, *, unit: bool = False, voice: Voice = "command line") -> str:
+    """Return a cell as people read it.
+
+    Args:
+        cell: What is shown.
+        unit: Whether its unit stands behind it; in a table it stands in the head.
+        voice: Who reads it: how parameters are spelled.
+    """
+    match cell:
+        case Value():
+            return _number(cell, unit=unit)
+        case Place():
+            return f"({text.point(cell.position)})" + (" m" if unit else "")
+        case Advice():
+            said = "; ".join(filter(None, (cell.words, *hint_words(cell.hints, voice))))
+        case Judged():
+            said = (cell.verdict or "").upper()
+        case Ref():
+            said = cell.title
+        case _:
+            said = cell or ""
+    return said or text.NOTHING
+
+
+def held(value: Value) -> str:
+    """Return a value with its unit and what is allowed of it: "2.5010 mm of 3.5 mm allowed"."""
+    allowed = allowed_words(value)
+    return f"{written(value, unit=True)} of {allowed} allowed" if allowed else written(value, unit=True)
+
+
+def allowed_words(value: Value) -> str:
+    """Return the limit of a value with its unit: "3.5 mm"; empty if there is none."""
+    return "" if value.limit is None else written(Value(value.limit, value.unit, given=True), unit=True)
+
+
+def unit_of(cells: Iterable[Cell]) -> str:
+    """Return the unit that all values of a column are shown in; empty where they differ or have none."""
+    units = {cell.unit for cell in cells if isinstance(cell, Value) and cell.number is not None}
+    places = any(isinstance(cell, Place) for cell in cells)
+    if places or len(units) != 1:
+        return "m" if places and not units else ""
+    return _shown_unit(units.pop())
+
+
+def _shown_unit(si: str) -> str:
+    """Return the unit that values in an SI unit are shown in; none of shares, ratios and counts."""
+    return "" if si in ("%", "1") else text.SHOWN.get(si, (si, 1.0))[0]
+
+
+def _number(value: Value, *, unit: bool) -> str:
+    if value.number is None:
+        return text.NOTHING
+    said = _digits(value, float(value.number))
+    sign = "+" if value.signed and value.number > 0 else ""
+    shown = _shown_unit(value.unit)
+    return f"{sign}{said} {shown}" if unit and shown and said != text.NOTHING else f"{sign}{said}"
+
+
+def _digits(value: Value, number: float) -> str:
+    if value.unit in text.SHOWN:
+        exact = value.given and math.isfinite(number)
+        return text.limit(number, value.unit) if exact else text.number(number, value.unit, value.limit)
+    if value.unit == "%":
+        return _percent(number, value.limit)
+    if value.unit == "1":
+        return f"{round(number, 3) + 0.0:.3f}"  # + 0.0: no -0.000
+    if value.unit == "s":
+        return text.seconds(number)
+    if isinstance(value.number, int):
+        return str(value.number)
+    return f"{number:.6g}"
+
+
+def _percent(share: float, against: float | None) -> str:
+    """Return a share in [%], with as many digits as tell it from what it is held against."""
+    shown = text.percent(share)
+    if against is None or against == share or float(shown[:-1]) != float(text.percent(against)[:-1]):
+        return shown
+    digits = next((n for n in range(3, FINEST) if f"{share:.{n}g}" != f"{against:.{n}g}"), FINEST)
+    return f"{100.0 * share:.{digits}g} %"

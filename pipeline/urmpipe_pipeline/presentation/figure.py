@@ -1,0 +1,174 @@
+"""What is plotted: arrays in SI over a time, a row or a quantity, with limits, marks and captions."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Literal, TypeAlias
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.presentation.scene import BoolArray, Path, Spot
+
+Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Line:
+    """An array as lines, a line a column. Whoever thins it out keeps every peak.
+
+    Attributes:
+        values: In the panel's unit, shape (n,) or (n, k); only `len` and slices are taken of it.
+        names: One a column; a name that several panels have is one entry of the legend.
+        colours: One a column, as #rrggbb.
+        dashed: True for what was asked for, beside what was measured.
+        steps: True for what changes only from one row to the next.
+        points: True for rows that nothing joins.
+        t_ns: Time of each row in [ns], shape (n,), where it is not the panel's.
+    """
+
+    values: FloatArray
+    names: tuple[str, ...]
+    colours: tuple[str, ...]
+    dashed: bool = False
+    steps: bool = False
+    points: bool = False
+    t_ns: IntArray | None = None
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Mark:
+    """A mark on a line.
+
+    Attributes:
+        t_ns: Its time in [ns] (its row where the panel has no times).
+        value: In the panel's unit.
+        shape: Turned up or down for turns added or taken, a cross for a doubt, a diamond for the largest.
+        colour: As #rrggbb.
+        words: What it is.
+        name: The line it stands on.
+    """
+
+    t_ns: int
+    value: float
+    shape: Shape
+    colour: str
+    words: str
+    name: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Over:
+    """A quantity as the horizontal axis.
+
+    Attributes:
+        values: In `unit`, shape (n,).
+        title: Its symbol or name.
+        unit: SI.
+    """
+
+    values: FloatArray
+    title: str
+    unit: str
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Panel:
+    """Lines of one unit.
+
+    Attributes:
+        title: The quantity, without its unit.
+        unit: SI unit of all lines ("m" and "rad" are shown in mm and deg if `small`).
+        lines: From the back to the front.
+        t_ns: Time of each row in [ns], shape (n,); None: the row number is the axis.
+        limit: Largest absolute value allowed, in `unit`.
+        signed: False for a size, which is never negative: its axis begins at 0 and has one limit.
+        peaks: Rows that are marked on each line as its largest, and kept by whoever thins out.
+        marks: Further marks.
+        over: A quantity as the horizontal axis instead of the time; rows are points then.
+        logarithmic: Whether the axis is logarithmic.
+        small: True for a deviation, shown in mm and deg; False for a place, shown in m and rad.
+        tinted: Rows to tint besides those out of the limit, shape (n,); None for none.
+        share: Height relative to other panels.
+        display_unit: A unit that people prefer to `unit`, such as deg; empty for none.
+    """
+
+    title: str
+    unit: str
+    lines: tuple[Line, ...]
+    t_ns: IntArray | None = None
+    limit: float | None = None
+    signed: bool = True
+    peaks: tuple[int, ...] = ()
+    marks: tuple[Mark, ...] = ()
+    over: Over | None = None
+    logarithmic: bool = False
+    small: bool = False
+    tinted: BoolArray | None = None
+    share: float = 1.0
+    display_unit: str = ""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class View:
+    """Panels that the viewer shows as one plot: they have one unit, or are few."""
+
+    name: str
+    panels: tuple[Panel, ...]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Figure:
+    """Plots that belong together: a page stacks all panels, the viewer shows each view as a tab of a row.
+
+    Attributes:
+        title: Its heading.
+        caption: What is drawn and what to look for, one or two sentences.
+        alt: What it shows, for who does not see it.
+        views: At least one.
+        instants: Times in [ns] at which a line goes through all panels, with a word each.
+        opened: Number of the view that the viewer opens; None: all of them, one below the other.
+        share: Height of its row in the viewer relative to others; of each row if all views are open.
+    """
+
+    title: str
+    caption: str
+    alt: str
+    views: tuple[View, ...]
+    instants: Mapping[int, str] = field(default_factory=dict)
+    opened: int | None = 0
+    share: float = 1.0
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class SpaceFigure:
+    """Paths in space on a page, with equal scale on all axes; the viewer has its scene instead."""
+
+    title: str
+    caption: str
+    alt: str
+    paths: tuple[Path, ...]
+    spots: tuple[Spot, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class Drawing:
+    """A drawing that is ready (SVG).
+
+    Attributes:
+        title: Its heading.
+        alt: What it shows, for who does not see it.
+        svg: The drawing.
+    """
+
+    title: str
+    alt: str
+    svg: str
+
+
+@dataclass(frozen=True, slots=True)
+class Text:
+    """A text that is shown letter by letter, such as a file."""
+
+    title: str
+    text: str
+    folded: bool = True

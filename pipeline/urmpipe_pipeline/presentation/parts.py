@@ -1,0 +1,131 @@
+"""Parts that several kinds of results share: tables of cells, input files, how a result was made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from pathlib import Path
+from typing import Any, Generic, TypeVar, overload
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.joint_log import SourceFile
+from urmpipe_pipeline.json_values import plain
+from urmpipe_pipeline.palette import INK_COLOUR
+from urmpipe_pipeline.presentation.scene import Spot
+from urmpipe_pipeline.presentation.section import Cell, Column, Fact, Table, Value
+from urmpipe_pipeline.provenance import Provenance
+
+Item = TypeVar("Item")
+
+
+class Cells(Sequence[Cell], Generic[Item]):
+    """The cells of a column that may be long, each made when it is shown.
+
+    Args:
+        items: What the rows are of.
+        cell: Returns the cell of one.
+    """
+
+    def __init__(self, items: Sequence[Item], cell: Callable[[Item], Cell]) -> None:
+        self._items, self._cell = items, cell
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    @overload
+    def __getitem__(self, index: int) -> Cell: ...
+
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Cell]: ...
+
+    def __getitem__(self, index: int | slice) -> Cell | Sequence[Cell]:
+        if isinstance(index, slice):
+            return Cells(self._items[index], self._cell)
+        return self._cell(self._items[index])
+
+
+def columns_of(
+    items: Sequence[Item], heads: Mapping[str, tuple[str, Callable[[Item], Cell]]]
+) -> tuple[Column, ...]:
+    """Return columns whose cells are made when they are shown.
+
+    Args:
+        items: What the rows are of.
+        heads: Title of each column, and what makes its cells, by its key.
+    """
+    return tuple(Column(key, title, Cells(items, cell)) for key, (title, cell) in heads.items())
+
+
+def table_of(
+    title: str,
+    heads: Mapping[str, str],
+    rows: Iterable[Sequence[Cell]],
+    *,
+    note: str = "",
+    brief: bool = False,
+    folded: bool = False,
+) -> Table:
+    """Return a table of rows.
+
+    Args:
+        title: Its heading.
+        heads: Title of each column by its key.
+        rows: One cell a column.
+        note: A line under it.
+        brief: Whether it is shown where there is little room.
+        folded: Whether a page opens it only on request.
+    """
+    cells = list(rows)
+    columns = (Column(key, head, [row[i] for row in cells]) for i, (key, head) in enumerate(heads.items()))
+    return Table(title, tuple(columns), note, brief, folded)
+
+
+def inputs_table(title: str, files: Iterable[SourceFile]) -> Table:
+    """Return input files by name, length and hash."""
+    heads = {"file": "File", "size": "Size [bytes]", "sha256": "SHA-256"}
+    rows = [(file.name, Value(file.size), file.sha256) for file in files]
+    return table_of(title, heads, rows, folded=True)
+
+
+def provenance_table(provenance: Provenance) -> Table:
+    """Return how to repeat a result: command, options, versions, when."""
+    rows = [("command", provenance.command), ("created", provenance.created)]
+    rows += _named("option", provenance.options) + _named("version of", provenance.versions)
+    return table_of("How it was made", {"what": "What", "value": "Value"}, rows, folded=True)
+
+
+def _named(word: str, values: Mapping[str, Any]) -> list[tuple[str, str]]:
+    return [(f"{word} {name}", plain(value)) for name, value in values.items()]
+
+
+def recording_fact(recording: Path | None) -> Fact:
+    """Return where a result is recorded; nothing is shown where it is not."""
+    return Fact("Recording", "" if recording is None else str(recording), brief=False)
+
+
+def minute(provenance: Provenance) -> str:
+    """Return when a result was made, to the minute: "2026-11-22 10:30 UTC"."""
+    created = provenance.created[:16].replace("T", " ")
+    return f"{created} UTC" if created else ""
+
+
+def ends(position: FloatArray) -> tuple[Spot, ...]:
+    """Return where a path starts and ends.
+
+    Args:
+        position: In [m], shape (n, 3).
+    """
+    known = np.flatnonzero(np.isfinite(position).all(axis=1))
+    if not len(known):
+        return ()
+    return tuple(
+        Spot(spot_at(position[row]), word, INK_COLOUR, always=False)
+        for word, row in (("start", known[0]), ("end", known[-1]))
+    )
+
+
+def spot_at(position: FloatArray) -> tuple[float, float, float]:
+    """Return a place in [m] of shape (3,) as x, y, z."""
+    x, y, z = (float(value) for value in position)
+    return x, y, z

@@ -1,0 +1,129 @@
+"""What stands in space: arms that move, paths, targets. Neither thinned out nor named as entities."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TypeAlias
+
+from numpy import bool_
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+
+BoolArray: TypeAlias = NDArray[bool_]
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Arm:
+    """An arm that moves.
+
+    Attributes:
+        chain: The arm.
+        q: Joint values in [rad] or [m], shape (n, joints); NaN where there is no pose.
+        t_ns: Time of each pose in [ns], shape (n,); None: its row number.
+        colour: Of its tip; of a ghost, of all of it.
+        label: What is written at it; one text, or one a pose.
+        ghost: True for another solution, drawn faintly beside the arm.
+        vanishes: True if nothing is drawn where there is no pose; else the last pose stays.
+        kept: Rows that are drawn in any case.
+    """
+
+    chain: Chain
+    q: FloatArray
+    t_ns: IntArray | None
+    colour: str
+    label: str | tuple[str, ...] = ""
+    ghost: bool = False
+    vanishes: bool = False
+    kept: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Path:
+    """Where a point goes.
+
+    Attributes:
+        name: What the legend calls it.
+        position: In [m], shape (n, 3); broken where it is NaN.
+        t_ns: Times in [ns], shape (n,); None: it does not move along it.
+        colour: As #rrggbb.
+        asked: True for what was asked for: drawn broad and dashed, so that what was done shows in the gaps.
+        label: What is written at the moving point.
+        values: What it is coloured by (small to large), in `unit`, shape (n,); None for its colour.
+        unit: SI unit of `values`.
+        sample: Row numbers, shape (n,): broken where one is missing; None: none is missing.
+        kept: Rows that are drawn in any case.
+        vanishes: True if there is no moving point where there is no position.
+        line: False if only the moving point is drawn: nothing joins its places, or another path is its line.
+    """
+
+    name: str
+    position: FloatArray
+    t_ns: IntArray | None
+    colour: str
+    asked: bool = False
+    label: str = ""
+    values: FloatArray | None = None
+    unit: str = "m"
+    sample: IntArray | None = None
+    kept: tuple[int, ...] = ()
+    vanishes: bool = False
+    line: bool = True
+
+
+@dataclass(frozen=True, slots=True)
+class Spot:
+    """A place with a word.
+
+    Attributes:
+        position: In [m].
+        words: What is written there.
+        colour: As #rrggbb.
+        always: True for what decides; False for ends and the like, which only a page marks.
+    """
+
+    position: tuple[float, float, float]
+    words: str
+    colour: str
+    always: bool = True
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Targets:
+    """Poses that were asked for.
+
+    Attributes:
+        position: In [m], shape (n, 3).
+        quat_xyzw: Orientations [-], shape (n, 4); None where none was asked for.
+        reached: Which of them are reached, shape (n,).
+        t_ns: Times in [ns], shape (n,); None without times.
+        reasons: Why they are not, one each; empty where nothing is known.
+    """
+
+    position: FloatArray
+    quat_xyzw: FloatArray | None
+    reached: BoolArray
+    t_ns: IntArray | None
+    reasons: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Scene:
+    """What the 3D view shows.
+
+    Attributes:
+        title: The name of the view: whose arm it is, and what else must be said of it.
+        arms: The moving arm first, ghosts behind it.
+        paths: From the back to the front.
+        spots: Places with a word.
+        targets: What was asked for, if it was poses.
+        enlarged: Index of the path that shows a deviation larger than it is, with its factor; None without.
+    """
+
+    title: str = ""
+    arms: tuple[Arm, ...] = ()
+    paths: tuple[Path, ...] = ()
+    spots: tuple[Spot, ...] = ()
+    targets: Targets | None = None
+    enlarged: tuple[int, int] | None = None

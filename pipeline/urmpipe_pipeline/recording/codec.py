@@ -1,0 +1,67 @@
+"""Any result as a JSON tree and named arrays, and back: by the types of its fields, knowing no kind."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from urmpipe_pipeline.recording.array_form import ArrayOf, Column, In, Out
+from urmpipe_pipeline.recording.forms import form_of, has_default, parts_of, stored
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Encoded:
+    """A result taken apart.
+
+    Attributes:
+        tree: All but its arrays, as JSON has it.
+        columns: Its arrays.
+        entities: The path of each array by its `id` and that of its times; see `entity_of`.
+    """
+
+    tree: Any
+    columns: tuple[Column, ...]
+    entities: Mapping[tuple[int, int], str]
+
+    def entity_of(self, array: Any, t_ns: Any = None) -> str:
+        """Return the path of an array on some times; empty for one that has no values, which is not kept."""
+        return self.entities.get((id(array), id(t_ns)), "")
+
+
+def encode(result: Any) -> Encoded:
+    """Return the tree of a dataclass and its arrays.
+
+    Raises:
+        CodecError: If a field holds what its type does not allow.
+    """
+    at = Out("", None, [], {})
+    cls: Any = type(result)
+    tree = form_of(cls).write(result, at)
+    return Encoded(tree, tuple(at.columns), at.paths)
+
+
+def decode(cls: Any, tree: Any, array: ArrayOf) -> Any:
+    """Return the object of a class that a tree tells.
+
+    Args:
+        cls: A dataclass.
+        tree: What `encode` made of one.
+        array: Returns the array of a path, given its shape and its dtype.
+
+    Raises:
+        CodecError: If the tree tells what the types of its fields do not allow.
+    """
+    return form_of(cls).read(tree, In("", array))
+
+
+def schema(classes: Sequence[type]) -> str:
+    """Return what is stored of some classes and all that stand in them: a line a field, "=" for a default."""
+    waiting, lines = list(classes), []
+    for one in waiting:
+        parts = parts_of(one)
+        lines.append(one.__name__)
+        for field in stored(one):
+            lines.append(f"    {field.name}: {parts[field.name].text}{' =' if has_default(field) else ''}")
+            waiting += [cls for cls in parts[field.name].classes if cls not in waiting]
+    return "\n".join(lines) + "\n"

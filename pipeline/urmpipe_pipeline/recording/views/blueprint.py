@@ -1,0 +1,182 @@
+"""What the viewer opens with: verdict, arm and paths at the left; the plots and the events at the right.
+
+No blueprint says at which time the viewer opens: a `time_selection` moves the cursor only while it plays, and
+keeps it there. So `urmpipe view` sets the time, and in the plots stands a line through the instant by which
+the verdict was decided. Opened otherwise the viewer stands at the first sample: the summary says where to go.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, TypeAlias
+
+from urmpipe_pipeline.presentation.figure import Figure, Text
+from urmpipe_pipeline.presentation.section import Event, Presentation, Section
+from urmpipe_pipeline.recording.sending import keys, shown_path
+from urmpipe_pipeline.recording.views.events import events_view
+from urmpipe_pipeline.recording.views.plots import EntityOf, Plots, most_rows, whole_time
+from urmpipe_pipeline.recording.views.scene_drawing import scene_view
+from urmpipe_pipeline.recording.views.summary import summary
+from urmpipe_pipeline.text import encodable
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+    from rerun.blueprint import Blueprint, Container, View
+
+    Row: TypeAlias = tuple[View | Container, float]
+
+EVENTS_SHARE = 2.2
+"""Share of the height that the row with the events has, relative to the rows of figures."""
+
+HEAD_SHARE, LINE_SHARE, MOST_TEXT = 0.12, 0.022, 0.45
+"""Shares of the height for the summary: its title, each line, and all of it at most."""
+
+LINE_LENGTH = 115
+"""Characters that fit in a line of the summary where it has half of a usual window's width."""
+
+SEEN_AT_ONCE, COLUMNS = 8, 2
+"""Plots of several sections that stand beside each other, and how many abreast; of more, each section is a
+tab."""
+
+
+def send_views(stream: RecordingStream, shown: Presentation, entity_of: EntityOf) -> Blueprint:
+    """Send what is there to be looked at of a presentation, and return the layout of its views.
+
+    Args:
+        stream: Where to.
+        shown: The presentation.
+        entity_of: Where arrays of the result stand as scalars in their own unit.
+    """
+    import rerun as rr
+
+    words = summary(shown)
+    stream.log(shown_path("summary"), rr.TextDocument(words, media_type="text/markdown"), static=True)
+    parts = _parts(shown.body)
+    figures = [figure for part in parts for figure in part.figures]
+    whole = whole_time(figures)
+    plots = Plots(stream, entity_of, whole, most_rows(figures))
+    scene = shown.scene() if shown.scene is not None else None
+    space = None if scene is None else scene_view(stream, scene, shown.opens_at_ns)
+    texts = [text for part in parts for text in part.texts]
+    return _blueprint(_words(stream, texts), words, space, _plots(plots, parts), timed=whole is not None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Part:
+    """A section with what the viewer shows of it, its views computed once."""
+
+    title: str
+    key: str
+    figures: tuple[Figure, ...]
+    texts: tuple[Text, ...]
+    events: tuple[Event, ...]
+    opened: bool
+
+
+def _parts(body: Section) -> list[_Part]:
+    """Return the sections that have anything to plot, the body first."""
+    sections = [body, *body.sections]
+    found = []
+    for section, key in zip(sections, keys([one.title for one in sections]), strict=True):
+        blocks = tuple(section.figures())
+        figures = tuple(one for one in blocks if isinstance(one, Figure))
+        texts = tuple(one for one in blocks if isinstance(one, Text))
+        title = f"{section.verdict.upper()} {section.title}" if section.verdict else section.title
+        found.append(_Part(encodable(title), key, figures, texts, tuple(section.events()), section.opened))
+    return found
+
+
+def _words(stream: RecordingStream, texts: Sequence[Text]) -> View | Container:
+    """Return the summary, with the texts behind it."""
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    views: list[View | Container] = [rrb.TextDocumentView(origin=shown_path("summary"), name="Summary")]
+    for key, text in zip(keys([one.title for one in texts]), texts, strict=True):
+        entity = shown_path("text", key)
+        stream.log(entity, rr.TextDocument(encodable(text.text)), static=True)
+        views.append(rrb.TextDocumentView(origin=entity, name=encodable(text.title)))
+    return _tabs(views)
+
+
+def _plots(plots: Plots, parts: Sequence[_Part]) -> View | Container | None:
+    """Return the plots: those of one section as rows, of several side by side if few, else as tabs."""
+    import rerun.blueprint as rrb
+
+    shown = [part for part in parts if part.figures]
+    if not shown:
+        rows = [row for part in parts for row in _rows(plots, part)]
+        return _stacked(rows) if rows else None
+    if len(shown) == 1:
+        return _stacked(_rows(plots, shown[0]))
+    if sum(len(figure.views) for part in shown for figure in part.figures) <= SEEN_AT_ONCE:
+        views = [view for part in shown for view, _ in _rows(plots, part)]
+        return rrb.Grid(*views, grid_columns=COLUMNS if len(views) > 2 * COLUMNS else 1)
+    tabs = [_stacked(_rows(plots, part), part.title) for part in shown]
+    return rrb.Tabs(*tabs, active_tab=next((i for i, part in enumerate(shown) if part.opened), 0))
+
+
+def _rows(plots: Plots, part: _Part) -> list[Row]:
+    """Return the figures of a section from top to bottom; the events share the row of the last."""
+    rows: list[Row] = []
+    last: list[View | Container] = []
+    if part.events:
+        first = None if plots.whole is None else plots.whole[0]
+        last.append(events_view(plots.stream, part.events, shown_path("events", part.key), first))
+    for number, figure in enumerate(part.figures):
+        root = shown_path("plots", part.key, str(number))
+        sent = [plots.views(figure, view, f"{root}/{i}") for i, view in enumerate(figure.views)]
+        views = [one for some in sent for one in some]
+        if last and figure is part.figures[-1] and number:
+            rows.append((_tabs([*last, *views]), EVENTS_SHARE))
+            last = []
+        elif figure.opened is None:
+            rows += [(_tabs(some), figure.share) for some in sent if some]
+        elif views:
+            opened = sum(len(some) for some in sent[: figure.opened])
+            rows.append((_tabs(views, opened), figure.share))
+    return rows + [(one, EVENTS_SHARE) for one in last]
+
+
+def _blueprint(
+    text: View | Container,
+    words: str,
+    space: View | None,
+    plots: View | Container | None,
+    *,
+    timed: bool,
+) -> Blueprint:
+    """Return the summary and the 3D view at the left, the plots at the right; without a 3D view stacked."""
+    import rerun.blueprint as rrb
+
+    length = LINE_LENGTH if space is not None else 2 * LINE_LENGTH
+    lines = sum(math.ceil(len(line) / length) for line in words.splitlines())
+    share = min(MOST_TEXT, HEAD_SHARE + LINE_SHARE * lines)
+    below = [one for one in (space, plots) if one is not None]
+    root: Container = rrb.Vertical(text, *below[:1], row_shares=[share, 1 - share][: 1 + len(below[:1])])
+    if len(below) == 2:
+        root = rrb.Horizontal(root, below[1], column_shares=[1, 1])
+    return rrb.Blueprint(
+        root,
+        rrb.TimePanel(state="collapsed", timeline="t" if timed else "row", play_state="paused"),
+        rrb.BlueprintPanel(state="collapsed"),
+        rrb.SelectionPanel(state="collapsed"),
+        auto_layout=False,
+        auto_views=False,
+    )
+
+
+def _stacked(rows: Sequence[Row], name: str | None = None) -> Container:
+    """Return views one below the other."""
+    import rerun.blueprint as rrb
+
+    return rrb.Vertical(*(view for view, _ in rows), row_shares=[share for _, share in rows], name=name)
+
+
+def _tabs(views: Sequence[View | Container], active: int = 0) -> View | Container:
+    """Return the views as tabs, one of them open, or the only one as itself."""
+    import rerun.blueprint as rrb
+
+    return rrb.Tabs(*views, active_tab=active) if len(views) > 1 else views[0]

@@ -1,0 +1,54 @@
+"""The list of events: what happened to a result, each at its time."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from urmpipe_pipeline import text
+from urmpipe_pipeline.presentation.section import Event
+from urmpipe_pipeline.recording.sending import times_at
+
+if TYPE_CHECKING:
+    from rerun import RecordingStream
+    from rerun.blueprint import TextLogView
+
+LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
+"""Rerun's words for the levels."""
+
+
+def events_view(
+    stream: RecordingStream, events: Sequence[Event], entity: str, first_ns: int | None
+) -> TextLogView:
+    """Send events and return their list, each beginning with its time: the list's own column is too narrow.
+
+    Args:
+        stream: Where to.
+        events: At least one.
+        entity: Where they stand.
+        first_ns: The first time in [ns], for what holds for all of it; None without times.
+    """
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    first = first_ns or 0
+    ordered = sorted(events, key=lambda one: first if one.t_ns is None else one.t_ns)
+    heads = ["" if one.t_ns is None else f"{one.t_ns / 1e9:.4f} s  " for one in ordered]
+    at = np.array([first if one.t_ns is None else one.t_ns for one in ordered], dtype=np.int64)
+    times = times_at(at, np.arange(len(at))) if first_ns is not None else times_at(None, np.zeros_like(at))
+    lines = [head + _words(one) for head, one in zip(heads, ordered, strict=True)]
+    columns = rr.TextLog.columns(text=lines, level=[LEVELS[one.level] for one in ordered])
+    stream.send_columns(entity, times, columns)
+    shown = rrb.TextLogColumns(
+        timeline_columns=[rrb.encodings.TimelineColumn(name, visible=False) for name in ("t", "row")],
+        text_log_columns=["LogLevel", "Body"],
+    )
+    name = "Events" if first_ns is None else "Events, at t [s]"
+    return rrb.TextLogView(origin="/", contents=entity, name=name, columns=shown)
+
+
+def _words(one: Event) -> str:
+    said = one.words if isinstance(one.words, str) else f"{one.words.kind}: {one.words.words('command line')}"
+    return text.encodable(said)

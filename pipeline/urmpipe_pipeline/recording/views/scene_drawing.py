@@ -1,0 +1,278 @@
+"""The 3D view: arms, paths, targets and places are sent, and seen from where all of them are in view."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.palette import AXIS_COLOURS, DEVIATION_COLOUR, NEUTRAL_COLOUR, REFERENCE_COLOUR, rgb
+from urmpipe_pipeline.presentation.scene import Scene, Spot
+from urmpipe_pipeline.recording.sending import ROOT, keys, shown_path, times_at
+from urmpipe_pipeline.recording.views.camera import EYE, eye_distance, seen
+from urmpipe_pipeline.recording.views.geometry import (
+    DrawnArm,
+    DrawnGhost,
+    DrawnLabel,
+    DrawnPath,
+    DrawnTargets,
+    Moving,
+    ball,
+    drawn_arm,
+    drawn_ghosts,
+    drawn_labels,
+    drawn_path,
+    drawn_targets,
+    extent,
+    opens_row,
+)
+from urmpipe_pipeline.recording.views.shapes import draw_body, hide_body, lacks_shapes
+from urmpipe_pipeline.text import encodable
+
+if TYPE_CHECKING:
+    from rerun import ComponentColumnList, LineStrips3D, Points3D, RecordingStream
+    from rerun.blueprint import Spatial3DView
+
+LINK, JOINT, POINT, SPOT, AXIS = 0.012, 0.022, 0.018, 0.024, 0.005
+ASKED, DONE = 0.0065, 0.0035
+FRAME_LENGTH, FRAME, TARGET, MISSED = 0.09, 0.004, 0.012, 0.02
+"""Sizes in the 3D view, as shares of the radius of everything in it."""
+
+THIN = 0.5
+"""Thickness of every second ghost beside the others."""
+
+OPACITY = 90
+"""Of the bones of a ghost, of 255: seven of them, one in front of the other, let the arm itself through."""
+
+STRIPS = 256
+"""Poses of the skeleton sent at a time: decoding a chunk of strips takes time by the square of its rows."""
+
+LABELLED = 8
+"""Reasons that are written beside the targets missed; of more each is told where its point is selected."""
+
+LABEL_COLOUR = "#ffffff"
+"""Labels: they stand on lines of any colour."""
+
+
+def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spatial3DView | None:
+    """Send a scene and return its view; None if there is nothing to see.
+
+    Args:
+        stream: Where to.
+        scene: What is drawn.
+        opens_at_ns: Where the viewer opens in [ns].
+    """
+    import rerun as rr
+    import rerun.blueprint as rrb
+
+    arm = next((drawn_arm(one) for one in scene.arms if not one.ghost), None)
+    ghosts = drawn_ghosts(scene.arms)
+    paths = [drawn_path(path) for path in scene.paths]
+    targets = None if scene.targets is None else drawn_targets(scene.targets)
+    if arm is None and not paths and not ghosts and targets is None:
+        return None
+    points = extent(arm, ghosts, paths, targets)
+    centre, size = ball(points)
+    stream.log(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
+    labelled = [one for one in scene.arms if one.label]
+    labels = drawn_labels(labelled, 2.0 * size, opens_row(scene, opens_at_ns))
+    for key, path in zip(keys([one.path.name for one in paths]), paths, strict=True):
+        _draw_path(stream, path, key, size)
+    for number, spot in enumerate(spot for spot in scene.spots if spot.always):
+        _draw_spot(stream, spot, f"spot {number}", size)
+    if targets is not None:
+        _draw_targets(stream, targets, size)
+    for number, ghost in enumerate(ghosts):
+        _draw_ghost(stream, ghost, shown_path("scene", "ghost", str(number)), size)
+    for number, label in enumerate(labels):
+        _draw_label(stream, label, shown_path("scene", "label", str(number)))
+    if arm is not None:
+        _draw_arm(stream, arm, size)
+    position = centre + max(size, eye_distance(seen(points - centre))) * EYE
+    eye = rrb.EyeControls3D(position=position, look_target=centre, eye_up=(0.0, 0.0, 1.0))
+    name = encodable(scene.title)
+    return rrb.Spatial3DView(origin=ROOT, contents=shown_path("scene") + "/**", name=name, eye_controls=eye)
+
+
+def _send(
+    stream: RecordingStream, entity: str, moving: Moving, columns: ComponentColumnList, each: int
+) -> None:
+    """Send so many values a row drawn."""
+    if len(moving.rows):
+        parts = columns.partition(np.full(len(moving.rows), each))
+        stream.send_columns(entity, times_at(moving.t_ns, moving.rows), parts)
+
+
+def _send_gone(stream: RecordingStream, entity: str, moving: Moving, columns: ComponentColumnList) -> None:
+    """Send rows without any value: from their times on the viewer shows nothing of what stood there."""
+    if len(moving.gone):
+        parts = columns.partition(np.zeros(len(moving.gone), dtype=np.int64))
+        stream.send_columns(entity, times_at(moving.t_ns, moving.gone), parts)
+
+
+def _draw_arm(stream: RecordingStream, arm: DrawnArm, size: float) -> None:
+    """Draw the links, as they look or as lines, and a ball at each joint in its colour."""
+    import rerun as rr
+
+    moving, entity = arm.moving, shown_path("scene", "robot", "joints")
+    for body in arm.bodies:
+        draw_body(stream, body, times_at(moving.t_ns, moving.rows))
+        if len(moving.gone):
+            hide_body(stream, body, times_at(moving.t_ns, moving.gone), len(moving.gone))
+    skeleton = arm.skeleton.astype(np.float32)
+    if lacks_shapes(arm.chain, arm.bodies):
+        _draw_links(stream, moving, skeleton, size)
+    colours = [rgb(colour) for colour in arm.colours]
+    stream.log(entity, rr.Points3D.from_fields(colors=colours, radii=[JOINT * size]), static=True)
+    columns = rr.Points3D.columns(positions=skeleton.reshape(-1, 3))
+    _send(stream, entity, moving, columns, skeleton.shape[1])
+    _send_gone(stream, entity, moving, rr.Points3D.columns(positions=[]))
+
+
+def _draw_links(stream: RecordingStream, moving: Moving, skeleton: NDArray[np.float32], size: float) -> None:
+    """Draw a line through the points of an arm in each pose, shape (m, n + 1, 3)."""
+    import rerun as rr
+
+    entity = shown_path("scene", "robot", "links")
+    links = rr.LineStrips3D.from_fields(colors=[rgb(NEUTRAL_COLOUR)], radii=[LINK * size])
+    stream.log(entity, links, static=True)
+    for start in range(0, len(skeleton), STRIPS):
+        rows = slice(start, start + STRIPS)
+        times = times_at(moving.t_ns, moving.rows[rows])
+        stream.send_columns(entity, times, rr.LineStrips3D.columns(strips=skeleton[rows]))
+    _send_gone(stream, entity, moving, rr.LineStrips3D.columns(strips=[]))
+
+
+def _draw_path(stream: RecordingStream, drawn: DrawnPath, key: str, size: float) -> None:
+    """Draw a path as lines, broad if it is what was asked for, and the point that moves on it."""
+    import rerun as rr
+
+    path, colour = drawn.path, rgb(drawn.path.colour)
+    if drawn.strips:
+        strips = [strip.astype(np.float32) for strip in drawn.strips]
+        lines = rr.LineStrips3D(strips, colors=[colour], radii=[(ASKED if path.asked else DONE) * size])
+        stream.log(shown_path("scene", "path", key), lines, static=True)
+    if not len(drawn.moving.rows):
+        return
+    entities = [shown_path("scene", "point", key)]
+    style = rr.Points3D.from_fields(colors=[colour], radii=[POINT * size])
+    stream.log(entities[0], style, static=True)
+    if path.label:
+        entities.append(shown_path("scene", "point", key, "label"))
+        stream.log(entities[1], _label(path.label), static=True)
+    for entity in entities:
+        columns = rr.Points3D.columns(positions=drawn.position.astype(np.float32))
+        _send(stream, entity, drawn.moving, columns, 1)
+        _send_gone(stream, entity, drawn.moving, rr.Points3D.columns(positions=[]))
+
+
+def _draw_spot(stream: RecordingStream, spot: Spot, key: str, size: float) -> None:
+    """Draw a place that is there at all times, with its label."""
+    import rerun as rr
+
+    point = rr.Points3D([spot.position], colors=[rgb(spot.colour)], radii=[SPOT * size])
+    stream.log(shown_path("scene", key), point, static=True)
+    entity = shown_path("scene", key, "label")
+    stream.log(entity, rr.Points3D.from_fields(positions=[spot.position]), static=True)
+    stream.log(entity, _label(spot.words), static=True)
+
+
+def _label(words: str, colour: str = LABEL_COLOUR) -> Points3D:
+    """Return the label of a point that stands elsewhere: in the point's colour it could hardly be read."""
+    import rerun as rr
+
+    labels = [encodable(words)] if words else None
+    return rr.Points3D.from_fields(colors=[rgb(colour)], radii=[0.0], labels=labels, show_labels=True)
+
+
+def _draw_label(stream: RecordingStream, label: DrawnLabel, entity: str) -> None:
+    """Write a word that moves with an arm."""
+    import rerun as rr
+
+    stream.log(entity, _label("", label.colour or LABEL_COLOUR), static=True)
+    texts = list(map(encodable, label.texts))
+    columns = rr.Points3D.columns(positions=label.position.astype(np.float32), labels=texts)
+    _send(stream, entity, label.moving, columns, 1)
+    _send_gone(stream, entity, label.moving, rr.Points3D.columns(positions=[], labels=[]))
+
+
+def _draw_ghost(stream: RecordingStream, ghost: DrawnGhost, entity: str, size: float) -> None:
+    """Draw another solution. Rerun draws lines always opaque: so its bones are capsules, seen through."""
+    import rerun as rr
+
+    bones = ghost.start.shape[1]
+    radii = np.where(np.arange(bones) < ghost.links, LINK, AXIS) * size * (THIN if ghost.thin else 1.0)
+    colours, solid = [(*rgb(ghost.colour), OPACITY)], rr.components.FillMode.Solid
+    stream.log(entity, rr.Capsules3D.from_fields(colors=colours, fill_mode=solid), static=True)
+    lengths, quaternions = capsules(ghost.end - ghost.start)
+    columns = rr.Capsules3D.columns(
+        lengths=lengths.reshape(-1),
+        radii=np.tile(radii, len(ghost.moving.rows)),  # where a row has a radius, it gets a length by default
+        translations=ghost.start.astype(np.float32).reshape(-1, 3),
+        quaternions=quaternions.reshape(-1, 4),
+    )
+    _send(stream, entity, ghost.moving, columns, bones)
+    nothing = rr.Capsules3D.columns(lengths=[], radii=[], translations=[], quaternions=[])
+    _send_gone(stream, entity, ghost.moving, nothing)
+
+
+def capsules(bones: FloatArray) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    """Return how long bones are and how they are turned: a capsule without a turn lies along z.
+
+    The least turn that takes z to the unit vector d is the quaternion (z x d, 1 + z.d), normalised; to -z it
+    is half a turn about x.
+
+    Args:
+        bones: From start to end in [m], shape (..., 3).
+
+    Returns:
+        Lengths in [m], shape (...), and quaternions x, y, z, w [-], shape (..., 4).
+    """
+    length = np.linalg.norm(bones, axis=-1)
+    x, y, z = np.moveaxis(bones / np.where(length > 0.0, length, 1.0)[..., None], -1, 0)
+    z = np.where(length > 0.0, z, 1.0)
+    quat = np.stack((-y, x, np.zeros_like(z), 1.0 + z), axis=-1)
+    norm = np.linalg.norm(quat, axis=-1, keepdims=True)
+    down = norm < 1e-9
+    quat = np.where(down, (1.0, 0.0, 0.0, 0.0), quat / np.where(down, 1.0, norm))
+    return length.astype(np.float32), quat.astype(np.float32)
+
+
+def _draw_targets(stream: RecordingStream, targets: DrawnTargets, size: float) -> None:
+    """Draw targets: they stand at all times."""
+    import rerun as rr
+
+    grey, root = rgb(REFERENCE_COLOUR), shown_path("scene", "targets")
+    if targets.strips:
+        strips = [strip.astype(np.float32) for strip in targets.strips]
+        stream.log(f"{root}/path", rr.LineStrips3D(strips, colors=[grey], radii=[ASKED * size]), static=True)
+    if len(targets.points):
+        points = rr.Points3D(targets.points, colors=[grey], radii=[TARGET * size])
+        stream.log(f"{root}/points", points, static=True)
+    if len(targets.origin):
+        stream.log(f"{root}/frames", _frames(targets, size), static=True)
+    if len(targets.missed):
+        stream.log(f"{root}/missed", _missed(targets, size), static=True)
+
+
+def _missed(targets: DrawnTargets, size: float) -> Points3D:
+    """Return the targets that are not reached: few with their reasons, many as a thin line."""
+    import rerun as rr
+
+    few = len(targets.missed) <= LABELLED
+    labels = list(map(encodable, targets.reasons))
+    radii, colours = [(MISSED if few else ASKED) * size], [rgb(DEVIATION_COLOUR)]
+    return rr.Points3D(targets.missed, colors=colours, radii=radii, labels=labels, show_labels=few)
+
+
+def _frames(targets: DrawnTargets, size: float) -> LineStrips3D:
+    """Return the axes of the targets, in the colours of the coordinates."""
+    import rerun as rr
+
+    ends = targets.origin[:, None] + FRAME_LENGTH * size * targets.axes.transpose(0, 2, 1)
+    starts = np.broadcast_to(targets.origin[:, None], ends.shape)
+    strips = np.stack((starts, ends), axis=2).reshape(-1, 2, 3).astype(np.float32)
+    colours = [rgb(AXIS_COLOURS[axis]) for axis in "xyz"] * len(targets.origin)
+    return rr.LineStrips3D(strips, colors=colours, radii=[FRAME * size])

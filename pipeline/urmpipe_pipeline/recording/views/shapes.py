@@ -1,0 +1,171 @@
+"""The links of an arm as they look: shapes that stand still below frames that move."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.visual import Box, Capsule, Colour, Cylinder, Mesh, Visual
+from urmpipe_models.kinematics.forward import frames_over_log
+from urmpipe_models.orientation import quaternions
+from urmpipe_pipeline.meshes import MEDIA_TYPES, drawable
+from urmpipe_pipeline.palette import NEUTRAL_COLOUR, rgb
+from urmpipe_pipeline.recording.sending import keys, shown_path
+
+if TYPE_CHECKING:
+    from rerun import AsComponents, RecordingStream, TimeColumn
+
+UNSEEN = 1e-9
+"""Scale of a shape that is hidden; zero would be none that the viewer can invert."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Body:
+    """What moves as one: a frame of the arm and the shapes on it.
+
+    Attributes:
+        joint: Name of the joint whose frame it is; None for the base.
+        position: Of the frame in the world in [m], shape (m, 3).
+        quat_xyzw: Its rotation as unit quaternions [-], shape (m, 4).
+        visuals: The shapes that can be drawn, at least one.
+    """
+
+    joint: str | None
+    position: FloatArray
+    quat_xyzw: FloatArray
+    visuals: tuple[Visual, ...]
+
+
+def bodies_over_log(robot: Chain, q: FloatArray) -> tuple[Body, ...]:
+    """Return the links of an arm that have shapes which can be drawn.
+
+    Args:
+        robot: The arm.
+        q: Joint values in [rad] or [m], shape (m, joints).
+    """
+    shown = [visual for visual in robot.visuals if drawable(visual)]
+    if not shown:
+        return ()
+    position, rotation = frames_over_log(robot, q)
+    carriers = [None, *(joint.name for joint in robot.joints)]
+    return tuple(
+        Body(
+            carrier,
+            position[:, k],
+            quaternions(rotation[:, k].reshape(-1, 9), "matrix"),
+            tuple(visual for visual in shown if visual.joint == carrier),
+        )
+        for k, carrier in enumerate(carriers)
+        if any(visual.joint == carrier for visual in shown)
+    )
+
+
+def lacks_shapes(robot: Chain, bodies: Sequence[Body]) -> bool:
+    """Tell whether a moving link shows nothing; frames fixed to it count as the link."""
+    moving = np.cumsum([joint.kind != "fixed" for joint in robot.joints])
+    link = dict(zip((joint.name for joint in robot.joints), moving.tolist(), strict=True))
+    shown = {link[body.joint] for body in bodies if body.joint is not None}
+    return not set(range(1, int(moving[-1]) + 1)) <= shown
+
+
+def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> None:
+    """Send a link: its frame at the times given, its shapes once.
+
+    Translation and quaternion both stand in every row: Rerun takes a row as the whole transform.
+    """
+    import rerun as rr
+
+    place = _carrier(body.joint)
+    position, rotation = body.position.astype(np.float32), body.quat_xyzw.astype(np.float32)
+    if body.joint is None:  # the base does not move
+        still = rr.Transform3D(translation=position[0], quaternion=rotation[0])
+        stream.log(shown_path(*place), still, static=True)
+    else:
+        columns = rr.Transform3D.columns(translation=position, quaternion=rotation)
+        stream.send_columns(shown_path(*place), times, columns)
+    for number, visual in enumerate(body.visuals, start=1):
+        if (shape := _shape(visual)) is not None:
+            entity = shown_path(*place, f"visual {number}")
+            stream.log(entity, _placed(visual), static=True)
+            stream.log(entity, shape, static=True)
+
+
+def hide_body(stream: RecordingStream, body: Body, times: list[TimeColumn], count: int) -> None:
+    """Hide the shapes of a link that moves from some times on, until it has a pose again.
+
+    They stand there once for all times, so they are made too small to be seen.
+
+    Args:
+        stream: Where to.
+        body: The link; nothing is done to the base.
+        times: The times.
+        count: How many.
+    """
+    import rerun as rr
+
+    if body.joint is not None:
+        columns = rr.Transform3D.columns(translation=np.zeros((count, 3)), scale=np.full((count, 3), UNSEEN))
+        stream.send_columns(shown_path(*_carrier(body.joint)), times, columns)
+
+
+def _carrier(joint: str | None) -> tuple[str, ...]:
+    """Return where the frame of a joint stands, or that of the base."""
+    return ("scene", "robot", "base") if joint is None else ("scene", "robot", "joint", *keys([joint]))
+
+
+def _placed(visual: Visual) -> AsComponents:
+    """Return where a shape stands in the frame that carries it, and the scale of a mesh."""
+    import rerun as rr
+
+    rotation: FloatArray = np.array(visual.origin.rotation, dtype=float).reshape(1, 9)
+    return rr.Transform3D(
+        translation=visual.origin.translation,
+        quaternion=quaternions(rotation, "matrix")[0],
+        scale=visual.shape.scale if isinstance(visual.shape, Mesh) else None,
+    )
+
+
+def _shape(visual: Visual) -> AsComponents | None:
+    """Return what is drawn; nothing for a mesh whose file went away meanwhile."""
+    import rerun as rr
+
+    shape = visual.shape
+    if isinstance(shape, Mesh):
+        return _mesh(Path(shape.file), visual.colour)
+    look: dict[str, Any] = {"colors": [_rgba(visual.colour)], "fill_mode": rr.components.FillMode.Solid}
+    if isinstance(shape, Box):
+        return rr.Boxes3D(sizes=[shape.size], **look)
+    if isinstance(shape, Cylinder):
+        return rr.Cylinders3D(lengths=[shape.length], radii=[shape.radius], **look)
+    if isinstance(shape, Capsule):  # Rerun's begins in the middle of its lower ball
+        begin = (0.0, 0.0, -shape.length / 2)
+        return rr.Capsules3D(lengths=[shape.length], radii=[shape.radius], translations=[begin], **look)
+    return rr.Ellipsoids3D(radii=[shape.radius], **look)
+
+
+def _mesh(path: Path, colour: Colour | None) -> AsComponents | None:
+    """Return a mesh with its file's contents, so that the recording shows it wherever it is opened."""
+    import rerun as rr
+
+    try:
+        contents = path.read_bytes()
+    except OSError:
+        return None
+    # Collada and glTF bring colours along; a triangle of the others has none.
+    coloured = path.suffix.lower() not in (".stl", ".obj")
+    factor = None if coloured and colour is None else _rgba(colour)
+    return rr.Asset3D(contents=contents, media_type=MEDIA_TYPES[path.suffix.lower()], albedo_factor=factor)
+
+
+def _rgba(colour: Colour | None) -> tuple[int, int, int, int]:
+    """Return a colour as four numbers 0..255."""
+    if colour is None:
+        return (*rgb(NEUTRAL_COLOUR), 255)
+    red, green, blue, opacity = (round(255 * share) for share in colour)
+    return red, green, blue, opacity

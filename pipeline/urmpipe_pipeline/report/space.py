@@ -1,0 +1,148 @@
+"""Paths in space as plotly.js draws them: equal scale on all axes, the z axis up."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline import text
+from urmpipe_pipeline.decimate import decimate
+from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.presentation.figure import SpaceFigure
+from urmpipe_pipeline.presentation.scene import Path, Spot
+from urmpipe_pipeline.report.spec import Figure, Spec, base_layout, space_axis, typed
+from urmpipe_pipeline.report.traces import label, points_for
+
+VALUE_SCALE = ((0.0, "#8fc1e3"), (0.35, "#e69f00"), (0.7, "#d55e00"), (1.0, "#6b0f00"))
+"""Small to large: darker all the way, blue to red, legible on white and to the colour-blind."""
+
+CAMERA = {"eye": {"x": 1.5, "y": -1.5, "z": 0.86}, "center": {"x": 0.0, "y": 0.0, "z": -0.2}}
+"""Looked at from the front right, a little from above; in lengths of the scene."""
+
+HANDLING = "Drag to turn; pinch to zoom, with a mouse by the bar at the top right."
+
+AROUND, CLOSEST = 0.05, 1e-3
+"""Space around a slim path as a share of its extent, and half of the shortest axis in [m]."""
+
+SLIM = 1.7
+"""Largest extent over the geometric mean of the three: from there on plotly.js, which keeps the volume of the
+scene, draws the longest axis out of view."""
+
+SCENE_PX = 540
+"""Height of a scene."""
+
+BACK_PX, FRONT_PX, VALUES_PX = 2, 5, 6
+"""Width of a path: of those in the back, of the one in front, and of one that its values colour."""
+
+
+def drawn_space(figure: SpaceFigure) -> Figure:
+    """Return paths and places in space."""
+    traces = [_path(path, FRONT_PX if path is figure.paths[-1] else BACK_PX) for path in figure.paths]
+    return Figure(
+        figure.title,
+        f"{figure.caption} {HANDLING}",
+        figure.alt,
+        _scene([*traces, *_spots(figure.spots)], [np.asarray(path.position[:]) for path in figure.paths]),
+        SCENE_PX,
+        space=True,
+    )
+
+
+def _path(path: Path, width: int) -> Spec:
+    """Return a path; the pointer tells its time or row, its place and its value."""
+    position = np.asarray(path.position[:])
+    timed = path.t_ns is not None
+    t = seconds(path.t_ns[:]) if path.t_ns is not None else np.arange(len(position), dtype=np.float64)
+    unit, factor = text.SHOWN.get(path.unit, (path.unit, 1.0))
+    values = np.full(len(position), np.nan) if path.values is None else factor * np.asarray(path.values[:])
+    columns = position if path.values is None else np.column_stack([position, values])
+    kept = np.union1d(decimate(columns, points_for(path.t_ns), t), np.asarray(path.kept, dtype=np.int64))
+    place, t, shown = (_picked(one, kept, path.sample) for one in (position, t, values))
+    said = "t %{customdata[0]:.3f} s" if timed else "row %{customdata[0]}"
+    said += "<br>x %{x:.4f} m<br>y %{y:.4f} m<br>z %{z:.4f} m"
+    if path.values is not None:
+        said += f"<br>%{{customdata[1]:.{text.DIGITS}f}} {label(unit)}"
+    style = {"color": path.colour, "width": width}
+    return _in_space(place) | {
+        "mode": "lines" if path.line else "markers",
+        "name": label(path.name),
+        "showlegend": path.values is None,  # a line of many colours is told by its colour scale
+        "customdata": typed(t if path.values is None else np.column_stack([t, shown]), "f8"),
+        "hovertemplate": f"{said}<extra>{label(path.name)}</extra>",
+        "line": style if path.values is None else _by_value(path.name, shown, unit),
+    }
+
+
+def _picked(values: FloatArray, kept: IntArray, sample: IntArray | None) -> FloatArray:
+    """Return the values that are drawn, and one that is missing wherever rows are missing between two."""
+    if sample is None or not len(kept):
+        return values[kept]
+    gaps = np.cumsum(np.diff(sample[:], prepend=sample[0]) > 1)[kept]
+    return np.insert(values[kept].astype(np.float64), np.flatnonzero(np.diff(gaps) > 0) + 1, np.nan, axis=0)
+
+
+def _by_value(name: str, values: FloatArray, unit: str) -> Spec:
+    """Return a line's style that colours it by its values, with their scale."""
+    return {
+        "color": typed(values),
+        "colorscale": [list(stop) for stop in VALUE_SCALE],
+        "cmin": 0.0,
+        "cmax": float(np.nanmax(values, initial=0.0)) or 1.0,
+        "width": VALUES_PX,
+        "showscale": True,
+        "colorbar": {
+            "title": {"text": f"{label(name)} [{label(unit) or '-'}]", "side": "top"},
+            "orientation": "h",
+            "thickness": 10,
+            "len": 0.6,
+            "y": 0,
+            "yanchor": "top",
+        },
+    }
+
+
+def _spots(spots: tuple[Spot, ...]) -> Iterator[Spec]:
+    """Yield what decides as diamonds, and the ends, the first of them round."""
+    ends = iter(("circle",))
+    for spot in spots:
+        symbol = "diamond" if spot.always else next(ends, "square")
+        name = label(spot.words)
+        yield _in_space(np.array([spot.position])) | {
+            "mode": "markers",
+            "name": name,
+            "marker": {"color": spot.colour, "size": 6, "symbol": symbol},
+            "hovertemplate": f"x %{{x:.4f}} m<br>y %{{y:.4f}} m<br>z %{{z:.4f}} m<extra>{name}</extra>",
+        }
+
+
+def _in_space(position: FloatArray) -> Spec:
+    x, y, z = (typed(column) for column in position.T)
+    return {"type": "scatter3d", "x": x, "y": y, "z": z}
+
+
+def _scene(traces: list[Spec], positions: list[FloatArray]) -> Spec:
+    """Return a scene with equal scale on all axes.
+
+    Args:
+        traces: What is in it.
+        positions: Where that is, in [m], shape (any, 3) each: around a slim path all axes are equally long.
+    """
+    axes = {f"{name}axis": space_axis(f"{name} [m]") for name in "xyz"}
+    scene = axes | {"aspectmode": "data", "camera": CAMERA}
+    every = np.concatenate([np.empty((0, 3)), *positions])
+    known = every[np.isfinite(every).all(axis=1)]
+    if len(known) and _slim(low := known.min(axis=0), high := known.max(axis=0)):
+        half = max(float((high - low).max()) / 2.0 * (1.0 + AROUND), CLOSEST)
+        for name, middle in zip("xyz", ((low + high) / 2.0).tolist(), strict=True):
+            axes[f"{name}axis"]["range"] = [middle - half, middle + half]
+        scene["aspectmode"] = "cube"
+    layout = base_layout() | {"scene": scene, "margin": {"l": 0, "r": 0, "t": 0, "b": 56}}
+    return {"data": traces, "layout": layout}
+
+
+def _slim(low: FloatArray, high: FloatArray) -> bool:
+    """Tell whether what lies between two corners is much longer than wide or high."""
+    extent = np.maximum(high - low, CLOSEST)
+    return bool(extent.max() > SLIM * np.prod(extent) ** (1.0 / 3.0))

@@ -1,0 +1,231 @@
+"""What a minute is enough for: the banner, a card for each judged part, results side by side."""
+
+from __future__ import annotations
+
+import math
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+from urmpipe_pipeline import text
+from urmpipe_pipeline.presentation.digits import allowed_words, written
+from urmpipe_pipeline.presentation.section import (
+    Cell,
+    Column,
+    Fact,
+    Presentation,
+    Ref,
+    Section,
+    Table,
+    Value,
+    Verdict,
+)
+from urmpipe_pipeline.report.tables import Anchors, Grid, ShownFact, grid, shown_facts
+
+STATES: tuple[Verdict, ...] = ("fail", "pass", None)
+"""What a verdict may be, the most important first."""
+
+PLAIN = "plain"
+"""How a banner, a card and a badge without a verdict look."""
+
+TOLD = 4
+"""Headlines of further results that stand in the banner; more of them are counted."""
+
+
+@dataclass(frozen=True, slots=True)
+class Banner:
+    """The verdict on all results.
+
+    Attributes:
+        state: pass, fail, or plain where nothing was judged.
+        word: The same in capitals, or what stands for it.
+        headline: Of the worst result, one sentence.
+        facts: What explains it.
+        others: What else was found, a sentence each.
+    """
+
+    state: str
+    word: str
+    headline: str
+    facts: tuple[ShownFact, ...]
+    others: tuple[str, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Card:
+    """A judged part, or a result without a verdict.
+
+    Attributes:
+        name: Its heading.
+        href: Where it is.
+        state: pass, fail or plain.
+        word: The same in capitals, or what stands for it.
+        size: What uses up most of its limit; empty where nothing has a limit.
+        amount: How much that is, with the unit.
+        allowed: What is allowed.
+        share: Share of the limit that is used up, 0 to 1 at most, drawn as a bar; None without one.
+        used: The same in words.
+        facts: What else there is to know.
+    """
+
+    name: str
+    href: str
+    state: str
+    word: str
+    size: str
+    amount: str
+    allowed: str
+    share: float | None
+    used: str
+    facts: tuple[ShownFact, ...]
+
+
+@dataclass(frozen=True, slots=True)
+class Summary:
+    """Cards and tables under a heading."""
+
+    title: str
+    cards: tuple[Card, ...]
+    tables: tuple[Grid, ...]
+
+
+def word_of(verdict: Verdict, instead: str = "") -> str:
+    """Return a verdict in capitals, or what stands for it."""
+    return (verdict or instead).upper()
+
+
+def banner_of(shown: Sequence[tuple[Presentation, Anchors]]) -> Banner:
+    """Return the verdict: the worst result leads, none of the others hides behind it.
+
+    Args:
+        shown: At least one result, each with where its sections are.
+    """
+    (worst, anchors), *others = worst_first(shown)
+    told = [_sentence(one) for one, _ in others[:TOLD]]
+    if left := Counter(word_of(one.verdict, one.word) for one, _ in others[TOLD:]):
+        told.append(f"And {', '.join(f'{count} more: {word}' for word, count in left.items())}.")
+    return Banner(
+        worst.verdict or PLAIN,
+        word_of(worst.verdict, worst.word),
+        worst.headline,
+        tuple(_short(worst.facts, anchors)),
+        tuple(told),
+    )
+
+
+def worst_first(shown: Sequence[tuple[Presentation, Anchors]]) -> list[tuple[Presentation, Anchors]]:
+    """Return results that fail, then those that pass, then others; of each the fullest of a limit first."""
+    return sorted(shown, key=lambda pair: _badness(pair[0].verdict, _most_used(pair[0])))
+
+
+def cards_of(shown: Sequence[tuple[Presentation, Anchors]], *, plain: bool) -> tuple[Card, ...]:
+    """Return a card for each judged part, the worst first.
+
+    Args:
+        shown: Results, each with where its sections are.
+        plain: Whether a result without a verdict has a card, too.
+    """
+    found = []
+    for one, anchors in shown:
+        sections = list(judged_sections(one.body)) or ([one.body] if plain or one.verdict else [])
+        for section in sections:
+            beside = len(shown) > 1 and section is not one.body
+            name = f"{section.title} ({one.name})" if beside else section.title
+            card = _card(section, name, one.word, anchors)
+            found.append((_badness(section.verdict, _used(section)), card))
+    return tuple(card for _, card in sorted(found, key=lambda pair: pair[0]))
+
+
+def judged_sections(section: Section) -> Iterator[Section]:
+    """Yield the innermost sections with a verdict and facts, and one that fails for a reason of its own."""
+    below = [found for child in section.sections for found in judged_sections(child)]
+    alone = section.verdict == "fail" and all(one.verdict != "fail" for one in below)
+    if section.verdict and (alone if below else section.facts):
+        yield section
+    yield from below
+
+
+def side_by_side(shown: Sequence[tuple[Presentation, Anchors]]) -> Iterator[Grid]:
+    """Yield a table for each kind of line that several results have; lines of one name stand together.
+
+    Lines are of one kind if their first two heads are the same. The first cell leads to its section, or to
+    its result.
+    """
+    kinds: dict[tuple[str, ...], list[tuple[Ref, Mapping[str, Cell]]]] = {}
+    results: Counter[tuple[str, ...]] = Counter()
+    leads: dict[int, str] = {}
+    for one, anchors in shown:
+        results.update({_kind(line) for line in one.lines})
+        for line in one.lines:
+            first = next(iter(line.values()))
+            name = first if isinstance(first, Ref) else Ref(written(first))
+            leads[id(name)] = anchors.href(name) or f"#{anchors.ident(one.body)}"
+            kinds.setdefault(_kind(line), []).append((name, line))
+    for kind, lines in kinds.items():
+        if results[kind] > 1:
+            order = list(dict.fromkeys(name.title for name, _ in lines))
+            lines.sort(key=lambda pair: order.index(pair[0].title))
+            heads = dict.fromkeys(head for _, line in lines for head in line)
+            columns = [Column(head, head, [line.get(head) for _, line in lines]) for head in heads]
+            columns[0] = replace(columns[0], cells=[name for name, _ in lines])
+            table = Table(f"{kind[0]}: {results[kind]} results", tuple(columns))
+            yield grid(table, lambda cell: leads.get(id(cell), ""), folds=False)
+
+
+def _kind(line: Mapping[str, Cell]) -> tuple[str, ...]:
+    return tuple(line)[:2]
+
+
+def _badness(verdict: Verdict, used: float) -> tuple[int, float]:
+    """Return what puts the worst first."""
+    return STATES.index(verdict), -used
+
+
+def _sentence(one: Presentation) -> str:
+    return f"{word_of(one.verdict, one.word)}: {one.headline.rstrip('.')}."
+
+
+def _most_used(one: Presentation) -> float:
+    """Return the largest share of a limit that a judged part of a result uses up; -1 without one."""
+    return max(map(_used, judged_sections(one.body)), default=-1.0)
+
+
+def _used(section: Section) -> float:
+    """Return the share of the limit that decided about a section; -1 without one."""
+    value = _decisive(section)
+    return -1.0 if value is None or value.used is None else value.used
+
+
+def _decisive(section: Section) -> Value | None:
+    """Return what decided about a section: its first fact, if it has a limit."""
+    value = section.facts[0].value if section.facts else None
+    return value if isinstance(value, Value) and value.limit is not None else None
+
+
+def _card(section: Section, name: str, word: str, anchors: Anchors) -> Card:
+    value, brief = _decisive(section), [fact for fact in section.facts if fact.brief]
+    used = None if value is None else value.used
+    if count := _warnings(section):
+        brief.append(Fact("Warnings", Value(count)))
+    return Card(
+        name=name,
+        href=f"#{anchors.ident(section)}",
+        state=section.verdict or PLAIN,
+        word=word_of(section.verdict, word),
+        size="" if value is None else section.facts[0].name,
+        amount="" if value is None else written(value, unit=True),
+        allowed="" if value is None else allowed_words(value),
+        share=None if used is None else min(used, 1.0),
+        used="" if used is None or math.isinf(used) else f"{text.portion(used)} the limit",
+        facts=tuple(_short([one for one in brief if one.value is not value], anchors)),
+    )
+
+
+def _short(facts: Sequence[Fact], anchors: Anchors) -> Iterator[ShownFact]:
+    """Yield facts without what they mean: that is said where there is room."""
+    return (replace(fact, help="") for fact in shown_facts(facts, anchors.href))
+
+
+def _warnings(section: Section) -> int:
+    """Return how many warnings there are in a section and below."""
+    return len(section.warnings) + sum(map(_warnings, section.sections))

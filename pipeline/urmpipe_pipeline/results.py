@@ -1,0 +1,118 @@
+"""The kinds of results: what each is called in a recording, its class, and how it presents itself.
+
+A new kind is a folder with its result and its presenter, and its line here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from urmpipe_models.errors import OptionError
+from urmpipe_pipeline.comparison import exports as comparison_exports
+from urmpipe_pipeline.comparison import presenter as comparison
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.presentation.exports import Exports
+from urmpipe_pipeline.presentation.section import Presentation
+from urmpipe_pipeline.recording.reader import read_result
+from urmpipe_pipeline.recording.writer import write_result
+from urmpipe_pipeline.runs import exports as run_exports
+from urmpipe_pipeline.runs import presenter as runs
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations import exports as simulation_exports
+from urmpipe_pipeline.simulations import presenter as simulations
+from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.solved_targets import presenter as solved_targets
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
+
+
+@dataclass(frozen=True, slots=True)
+class Kind:
+    """A kind of result.
+
+    Attributes:
+        name: What a recording calls it.
+        cls: Its dataclass.
+        present: Returns what a result of it shows.
+        exports: Returns what can leave of a result of it; None where nothing can.
+    """
+
+    name: str
+    cls: type
+    present: Callable[[Any], Presentation]
+    exports: Callable[[Any], Exports] | None = None
+
+
+KINDS: tuple[Kind, ...] = (
+    Kind("run", Run, runs.present, run_exports.exports),
+    Kind("comparison", Comparison, comparison.present, comparison_exports.exports),
+    Kind("simulation", Simulation, simulations.present, simulation_exports.exports),
+    Kind("solved targets", SolvedTargets, solved_targets.present, solved_targets.exports),
+)
+"""Every kind."""
+
+
+def is_result(value: Any) -> bool:
+    """Tell whether a value is a result of any kind."""
+    return any(kind.cls is type(value) for kind in KINDS)
+
+
+def kind_of(result: Any) -> Kind:
+    """Return the kind of a result."""
+    return next(kind for kind in KINDS if kind.cls is type(result))
+
+
+def write_recording(
+    result: Any,
+    path: Path,
+    inputs: Sequence[Path] = (),
+    progress: Callable[[float], None] | None = None,
+) -> Path:
+    """Write the recording of a result, read it back, and put it in its place.
+
+    Args:
+        result: What to record.
+        path: The file (.rrd); replaced if it is a recording of urmpipe's.
+        inputs: The files the result was made from: none of them is replaced.
+        progress: Told the share of the data that is written, 0..1.
+
+    Returns:
+        The path.
+
+    Raises:
+        OutputError: If the file may not be written there, or did not read back as it was written.
+    """
+    write_result(result, kind_of(result).name, present(result), path, inputs, progress)
+    return path
+
+
+def read_recording(path: Path, *, lazy: bool = False) -> Any:
+    """Return the result that a recording holds.
+
+    Args:
+        path: A recording (.rrd) that urmpipe wrote.
+        lazy: Whether arrays are read when they are used; the file must stand as long.
+
+    Raises:
+        RecordingError: If it is no recording, was cut off, is not of urmpipe, or of another layout.
+    """
+    return read_result(path, {kind.name: kind.cls for kind in KINDS}, lazy=lazy)
+
+
+def present(result: Any) -> Presentation:
+    """Return what a result shows."""
+    return kind_of(result).present(result)
+
+
+def exports(result: Any) -> Exports:
+    """Return what can leave of a result.
+
+    Raises:
+        OptionError: If nothing can.
+    """
+    kind = kind_of(result)
+    if kind.exports is None:
+        raise OptionError(f"a {kind.name} has no tables")
+    return kind.exports(result)

@@ -1,0 +1,141 @@
+"""What leaves of a run: its grid in SI, the columns of its file, and its poses."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import asdict
+from functools import partial
+from typing import Any
+
+import numpy as np
+
+from urmpipe_pipeline.presentation.exports import (
+    ExportColumn,
+    Exports,
+    ExportTable,
+    Poses,
+    Rows,
+    Times,
+    columns_of,
+)
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.runs.file_columns import file_table
+from urmpipe_pipeline.runs.poses import recorded_poses, run_poses
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.text import encodable
+
+XYZ = "xyz"
+
+
+def exports(run: Run) -> Exports:
+    """Return what can leave of a run."""
+    about = provenance_of(run.name, run.provenance) | {
+        "source": run.log.source,
+        "robot": run.robot.name if run.robot else None,
+        "joints": list(run.log.joints),
+        "tsp": run.tsp,
+        "clock_start_ns": run.log.clock_start_ns,
+        "repolarizations": len(run.repolarizations),
+    }
+    rows = {
+        "grid": Rows(lambda units_told: grid_table(run), lambda table: _grid_fields(run)),
+        "file": Rows(
+            lambda units_told: file_table(run.log, units_told=units_told), partial(_file_fields, run)
+        ),
+    }
+    poses: dict[str, Callable[[str], list[Poses]]] = {
+        "fk": partial(run_poses, run),
+        "recorded": lambda rows: [recorded_poses(run)],
+    }
+    return Exports("run", about, rows, poses, {"recorded": "file"})
+
+
+def provenance_of(name: str, made: Provenance) -> dict[str, Any]:
+    """Return what every export tells: the name of the result, and how it was made."""
+    return {
+        "name": name,
+        "inputs": [asdict(one) for one in made.inputs],
+        "command": made.command,
+        "options": dict(made.options),
+        "versions": dict(made.versions),
+        "created": made.created,
+    }
+
+
+def grid_table(run: Run) -> ExportTable:
+    """Return the run on its grid in SI, each name with its unit: t, q, q', q'', and the tool centre point.
+
+    Of single poses the row stands for t, and there is nothing per second: no motion joins them.
+    """
+    moves = run.timed
+    columns = [ExportColumn("t [s]", "s", Times(run.t_ns, "s"))]
+    if not moves:
+        columns = [ExportColumn("row", "", np.arange(1, len(run.t_ns) + 1))]
+    units = run.joint_units
+    joints = [encodable(name) for name in run.log.joints]
+    orders = (("", "", run.q), ("d_", "/s", run.qd), ("dd_", "/s2", run.qdd))
+    for prefix, order, values in orders[: 3 if moves else 1]:
+        names = [prefix + name for name in joints]
+        columns += columns_of(names, [unit + order for unit in units], values)
+    if run.tcp is not None:
+        points = (
+            ("p", "m", run.tcp.position), ("v", "m/s", run.tcp.velocity), ("a", "m/s2", run.tcp.acceleration),
+        )  # fmt: skip
+        for name, unit, values in points[: 3 if moves else 1]:
+            columns += columns_of([name + axis for axis in XYZ], [unit] * 3, values)
+        columns += columns_of(["rz", "ry", "rx"], ["rad"] * 3, run.tcp.euler_zyx)
+    if run.tcp_recorded is not None:
+        columns += columns_of([f"recorded_tcp_{axis}" for axis in XYZ], ["m"] * 3, run.tcp_recorded)
+    if run.rotation_recorded is not None:
+        unit = "rad" if len(run.rotation_names) == 3 else "1"
+        names = [f"recorded_{name}" for name in run.rotation_names]
+        columns += columns_of(names, [unit] * len(names), run.rotation_recorded)
+    return ExportTable(tuple(columns), run.log.clock_start_ns + run.t_ns if moves else None)
+
+
+def _grid_fields(run: Run) -> dict[str, Any]:
+    """Return the fields of a run on its grid, in SI: t, q, qd, qdd, p, v, a, euler_zyx, p_recorded.
+
+    What a run does not have is empty: the point without kinematics, times and derivatives of single poses.
+    """
+    units = run.joint_units
+    tcp = run.tcp
+    nothing = np.empty((0, 0))
+    moves = run.timed
+    return {
+        "name": encodable(run.name),
+        "rows": "grid",
+        "t": run.t if moves else nothing,
+        "clock_ns": run.log.clock_start_ns + run.t_ns if moves else nothing,
+        "q": run.q,
+        "qd": run.qd if moves else nothing,
+        "qdd": run.qdd if moves else nothing,
+        "p": nothing if tcp is None else tcp.position,
+        "v": tcp.velocity if tcp is not None and moves else nothing,
+        "a": tcp.acceleration if tcp is not None and moves else nothing,
+        "euler_zyx": nothing if tcp is None else tcp.euler_zyx,
+        "p_recorded": nothing if run.tcp_recorded is None else run.tcp_recorded,
+        "joints": [encodable(name) for name in run.log.joints],
+        "units": {
+            "t": "s", "clock_ns": "ns", "q": list(units), "qd": [f"{unit}/s" for unit in units],
+            "qdd": [f"{unit}/s2" for unit in units], "p": "m", "v": "m/s", "a": "m/s2",
+            "euler_zyx": "rad", "p_recorded": "m",
+        },
+    }  # fmt: skip
+
+
+def _file_fields(run: Run, table: ExportTable) -> dict[str, Any]:
+    """Return the fields of the file's own rows: values in its own units, their names, and the exact clock."""
+    columns = [column for column in table.columns if not isinstance(column.values, Times)]
+    clock = [column for column in table.columns if isinstance(column.values, Times)]
+    return {
+        "name": encodable(run.name),
+        "rows": "file",
+        "t": run.log.t,
+        "clock_ns": np.empty((0, 0)) if table.clock_ns is None else table.clock_ns,
+        "values": np.column_stack([np.asarray(column.values) for column in columns]),
+        "names": [column.name for column in columns],
+        "units": [column.unit for column in columns],
+        "clock_names": [column.name for column in clock],
+        "clock_units": [column.unit for column in clock],
+    }

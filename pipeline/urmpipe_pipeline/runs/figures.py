@@ -1,0 +1,270 @@
+"""The plots of a log over time: joints before and after repolarization, speed, motion."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.continuity import continuous_euler
+from urmpipe_models.kinematics.forward import PointLog
+from urmpipe_pipeline import text
+from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
+from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Panel, Shape, View
+from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.runs.results import Run
+
+COORDINATES = tuple(AXIS_COLOURS[axis] for axis in "xyz")
+"""The colours of x, y and z."""
+
+EULER = {"rz": AXIS_COLOURS["z"], "ry": AXIS_COLOURS["y"], "rx": AXIS_COLOURS["x"]}
+"""The Euler angles in the colours of their axes."""
+
+NORM = (AXIS_COLOURS["norm"],)
+"""The colour of what is never negative."""
+
+
+def run_figures(run: Run) -> Iterator[Figure]:
+    """Yield the plots of a log that stands alone: joints, speed, motion."""
+    yield from joints_figure(run)
+    if run.timed and run.tcp is not None:
+        velocity = np.asarray(run.tcp.velocity)
+        yield speed_figure(run.name, run.t_ns, np.sqrt(np.einsum("ij,ij->i", velocity, velocity)))
+    yield from motion_figure(run)
+
+
+def times_of(run: Run) -> IntArray | None:
+    """Return the times of a run's samples in [ns], shape (g,); None if the number of a row is its axis."""
+    return run.t_ns if run.timed else None
+
+
+def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
+    """Yield the joints as the file has them and repolarized, with every finding marked; nothing of a path.
+
+    Args:
+        run: The log.
+        opened: Number of the view that the viewer opens: 0 before, 1 after; None for both.
+    """
+    if not run.log.joints:
+        return
+    axis = "time" if run.timed else "the rows"
+    joints = f"Joint values of {run.name} over {axis}: {', '.join(run.log.joints)}."
+    after = joint_panels(run, "after" if run.audit else "joints", run.q, times_of(run), _marks(run))
+    if not run.timed:
+        yield Figure("Joints", "A pose a row: no motion joins them.", joints, (View("Joints", after),))
+        return
+    if not run.audit:
+        said = "No joint had to be repolarized: the values are those of the file."
+        yield Figure("Joints", said, f"{joints} {said}", (View("Joints, no repolarization needed", after),))
+        return
+    wraps, doubts = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
+    marked = f"{wraps} marked{f', {doubts} doubtful' if doubts else ''}"
+    before = joint_panels(run, "before", run.log.q, run.log.t_ns, _raw_marks(run))
+    views = View("Joints in the file", before), View(f"Joints repolarized ({marked})", after)
+    crosses = f" A cross marks each of {text.counted(doubts, 'other finding')}." if doubts else ""
+    yield Figure(
+        "Joints before and after repolarization",
+        f"First as in the file, then repolarized. {text.counted(wraps, 'repolarization')}: a triangle marks"
+        f" each, up where a turn was added, down where one was taken away.{crosses}",
+        f"{joints} First as in the file, then after {text.counted(wraps, 'repolarization')}.",
+        views,
+        opened=opened,
+        share=3.0,
+    )
+
+
+def joint_panels(
+    run: Run, title: str, values: FloatArray, t_ns: IntArray | None, marks: Sequence[Mark] = (), per: str = ""
+) -> tuple[Panel, ...]:
+    """Return joints over time, a panel for those that turn and one for those that slide.
+
+    Args:
+        run: Whose joints they are.
+        title: What is plotted of them.
+        values: In rad and m, divided by `per`, shape (n, joints).
+        t_ns: Times in [ns], shape (n,); None: the rows are points.
+        marks: Marks on them, by the names of the joints.
+        per: "", "/s" or "/s2".
+    """
+    names, units = run.log.joints, run.joint_units
+    panels = []
+    for unit in dict.fromkeys(units):
+        own = [j for j, other in enumerate(units) if other == unit]
+        line = Line(
+            values if len(own) == len(names) else np.asarray(values)[:, own],
+            tuple(names[j] for j in own),
+            tuple(map(joint_colour, own)),
+            points=t_ns is None,
+        )
+        marked = tuple(mark for mark in marks if mark.name in line.names)
+        panels.append(Panel(title, unit + per, (line,), t_ns, marks=marked, share=1.5))
+    return tuple(panels)
+
+
+def speed_figure(name: str, t_ns: IntArray, speed: FloatArray) -> Figure:
+    """Return the speed of a tool centre point over time.
+
+    Args:
+        name: Whose it is.
+        t_ns: Times in [ns], shape (n,).
+        speed: In [m/s], shape (n,).
+    """
+    title = "Speed of the tool centre point"
+    panel = Panel("‖v‖", "m/s", (Line(speed, ("speed",), NORM),), t_ns, signed=False)
+    alt = f"{title} of {name} over time: the norm of its velocity."
+    return Figure(title, "The norm of its velocity.", alt, (View(title, (panel,)),), share=2.0)
+
+
+def motion_figure(run: Run) -> Iterator[Figure]:
+    """Yield rates and accelerations of the joints, and how the tool centre point moves.
+
+    By kinematics; of a log without them the position and the orientation that it recorded, if any.
+    """
+    views = [*_derivatives(run), *(_recorded(run) if run.tcp is None else _point(run, run.tcp))]
+    if not views:
+        return
+    if run.tcp is None:
+        caption = "As the log recorded it: without a robot there are no kinematics."
+        yield Figure(
+            "Motion",
+            caption,
+            f"Motion over time, as the log {run.name} recorded it.",
+            tuple(views),
+            share=2.2,
+        )
+        return
+    point = point_name(run)
+    if not run.timed:
+        yield Figure(
+            "Poses of the tool centre point",
+            f"{point} and its Euler angles (moving Z-Y-X, in the colours of their axes), by forward"
+            " kinematics.",
+            f"Poses of {point} of {run.name} by forward kinematics.",
+            tuple(views),
+            share=2.2,
+        )
+        return
+    yield Figure(
+        "Motion",
+        f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a, and its Euler"
+        " angles (moving Z-Y-X, in the colours of their axes), by forward kinematics. The angles go on past"
+        f" ±π, so that none jumps.{_singular_words(run.tcp)}",
+        f"Motion of {point} of {run.name} over time by forward kinematics. {_extent_words(run.tcp)}",
+        tuple(views),
+        share=2.2,
+    )
+
+
+def point_name(run: Run) -> str:
+    """Return what the paper calls the tool centre point: p7 of an arm with seven segments."""
+    return f"p{len(run.robot.joints)}" if run.robot is not None else "p"
+
+
+def coordinates(values: FloatArray) -> Line:
+    """Return x, y and z of something in their colours, by these names in all panels.
+
+    Args:
+        values: Shape (n, 3).
+    """
+    return Line(values, tuple("xyz"), COORDINATES)
+
+
+def _derivatives(run: Run) -> Iterator[View]:
+    if run.timed and run.log.joints and len(run.t_ns) > 1:
+        yield View("Joint rates", joint_panels(run, "rates", run.qd, run.t_ns, per="/s"))
+        yield View("Joint accelerations", joint_panels(run, "accelerations", run.qdd, run.t_ns, per="/s2"))
+
+
+def _point(run: Run, tcp: PointLog) -> Iterator[View]:
+    """Yield the views of the tool centre point by kinematics."""
+    t_ns, points = times_of(run), not run.timed
+    position = replace(coordinates(tcp.position), points=points)
+    yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
+    if run.timed:
+        yield from _point_derivatives(run, tcp)
+    known = np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx)
+    angles = continuous_euler(known) if run.timed else known
+    euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
+    tinted = tcp.singular if np.any(tcp.singular) else None
+    yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
+
+
+def _point_derivatives(run: Run, tcp: PointLog) -> Iterator[View]:
+    """Yield the views of velocity and acceleration."""
+    yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), run.t_ns),))
+    size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
+    lines = (coordinates(tcp.acceleration), size)
+    yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
+
+
+def _recorded(run: Run) -> Iterator[View]:
+    """Yield position and orientation as a log without kinematics recorded them itself."""
+    if run.tcp_recorded is not None:
+        yield View("Recorded TCP", (Panel("p", "m", (coordinates(run.tcp_recorded),), run.t_ns),))
+    if (values := run.rotation_recorded) is not None:
+        names = run.rotation_names  # a quaternion has no unit
+        line = Line(values, names, tuple(map(joint_colour, range(len(names)))))
+        unit = "" if len(names) == 4 else "rad"
+        yield View("Recorded orientation", (Panel("orientation", unit, (line,), run.t_ns),))
+
+
+def _singular_words(tcp: PointLog) -> str:
+    count = int(np.count_nonzero(tcp.singular))
+    if not count:
+        return ""
+    said = "with ry at ±π/2, where rz and rx are not separately defined"
+    return f" Tinted: {text.counted(count, 'sample')} {said}."
+
+
+def _extent_words(tcp: PointLog) -> str:
+    """Say between which places a point moves and how fast."""
+    if not np.isfinite(tcp.position).any():
+        return "It has no value."
+    low, high = (text.point(end(tcp.position, axis=0)) for end in (np.nanmin, np.nanmax))
+    said = f"It stays within ({low}) m and ({high}) m"
+    for values, word, unit in ((tcp.velocity, "speed", "m/s"), (tcp.acceleration, "acceleration", "m/s²")):
+        norm = np.linalg.norm(values, axis=1)
+        if np.isfinite(norm).any():
+            said += f"; its {word} reaches {np.nanmax(norm):.4f} {unit}"
+    return f"{said}."
+
+
+def _raw_marks(run: Run) -> list[Mark]:
+    """Return a mark half way down each jump of the file, and on each other finding."""
+    q = np.asarray(run.log.q)
+    return [
+        _mark(run, one, float(q[one.sample, j] - (one.step / 2 if one.kind == "wrap" else 0.0)))
+        for one in run.audit
+        for j in (run.log.joints.index(one.joint),)
+    ]
+
+
+def _marks(run: Run) -> list[Mark]:
+    """Return a mark on the repolarized line at the instant of each finding."""
+    found = []
+    for name in dict.fromkeys(one.joint for one in run.audit):
+        own = [one for one in run.audit if one.joint == name]
+        t_ns = np.array([round(one.t * 1e9) for one in own], dtype=np.int64)
+        column = np.asarray(run.q)[:, run.log.joints.index(name)]
+        rows = _beside(run.t_ns, column, t_ns)
+        if len(rows):
+            values = np.interp(t_ns, run.t_ns[rows], column[rows])
+            found += [_mark(run, *pair) for pair in zip(own, values.tolist(), strict=True)]
+    return found
+
+
+def _beside(times_ns: IntArray, column: FloatArray, t_ns: IntArray) -> IntArray:
+    """Return the samples before and after each time; where a value is missing, all that there are."""
+    after = np.searchsorted(times_ns, t_ns)
+    rows: IntArray = np.unique(np.clip(np.concatenate((after - 1, after)), 0, len(times_ns) - 1))
+    return rows if np.isfinite(column[rows]).all() else np.flatnonzero(np.isfinite(column))
+
+
+def _mark(run: Run, one: AuditEntry, value: float) -> Mark:
+    shape: Shape = "cross" if one.kind != "wrap" else "up" if one.after > one.before else "down"
+    kind = "repolarization" if one.kind == "wrap" else one.kind
+    words = f"{kind} of {one.joint}, row {one.row}: step {one.step:+.4f} rad, k {one.before} → {one.after}"
+    colour = joint_colour(run.log.joints.index(one.joint))
+    return Mark(round(one.t * 1e9), value, shape, colour, words, one.joint)

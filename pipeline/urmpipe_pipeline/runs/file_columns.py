@@ -1,0 +1,140 @@
+"""The columns of a log as its file has them: its names, units, rows, numbers and clock."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.errors import Finding, RecordingError
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
+from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportColumn, ExportTable, Times
+from urmpipe_pipeline.runs.originals import originals
+from urmpipe_pipeline.sources.clocks.text_times import ZONED
+from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
+from urmpipe_pipeline.text import encodable
+
+ATTRIBUTES: dict[Role, str] = {
+    "joint": "q",
+    "rate": "qd",
+    "acceleration": "qdd",
+    "position": "tcp_position",
+    "rotation": "tcp_rotation",
+}
+"""Where a `JointLog` keeps the columns of a role."""
+
+
+def file_table(log: JointLog, *, units_told: bool = True) -> ExportTable:
+    """Return the columns of the file that were used: its names, its units, its rows, its numbers.
+
+    Nothing is repolarized or resampled; times are those of the file's clock.
+
+    Args:
+        log: The log.
+        units_told: Whether the format keeps the units beside the names; else those that the names do not
+            tell are warned of.
+
+    Raises:
+        RecordingError: If the log came from no file.
+    """
+    if not log.columns:
+        hint = Hint("rows", "grid", "writes what was made of it")
+        said = "the log was not read from a file"
+        raise RecordingError(Finding(said, about=log.name, hints=(hint,)))
+    kept = sorted((c for c in log.columns if _kept(log, c)), key=lambda column: column.number)
+    names = _names(kept)
+    clock_ns = log.clock_start_ns + log.t_ns
+    timed = [column.unit for column in kept if column.role == "time"]
+    clock = iter(shares(_as_told(log, clock_ns, timed), timed))
+    columns = [
+        ExportColumn(name, column.unit, next(clock) if column.role == "time" else _numbers(log, column))
+        for name, column in zip(names, kept, strict=True)
+    ]
+    warnings = [*_lost(log, kept), *([] if units_told else _unsaid_units(kept))]
+    return ExportTable(tuple(columns), clock_ns if timed else None, tuple(warnings))
+
+
+def _as_told(log: JointLog, clock_ns: IntArray, timed: Sequence[str]) -> IntArray:
+    """Return the clock as its columns tell it: a time of day that passed midnight began anew there."""
+    began_anew = any(inference.kind == "nights passed" for inference in log.inferences)
+    return clock_ns % DAY if began_anew and timed == [TIME_OF_DAY] else clock_ns
+
+
+def _kept(log: JointLog, column: LogColumn) -> bool:
+    """Tell whether the log holds the values of a column: a recorded group with an empty column is dropped."""
+    return column.role == "time" or getattr(log, ATTRIBUTES[column.role]) is not None
+
+
+def _numbers(log: JointLog, column: LogColumn) -> FloatArray:
+    values: FloatArray = getattr(log, ATTRIBUTES[column.role])
+    return originals(np.ascontiguousarray(values[:, column.index]), column)
+
+
+def _names(columns: Sequence[LogColumn]) -> list[str]:
+    """Return the headers as the file has them; where it has none, or several files share one, other names."""
+    count = Counter(column.header for column in columns)
+    return [
+        column.header if column.header and count[column.header] == 1 else _own_name(column)
+        for column in columns
+    ]
+
+
+def _own_name(column: LogColumn) -> str:
+    """Return our name of a column with its unit; without a header a clock has only its place for a name."""
+    name = "t" if column.role == "time" and not column.header else encodable(column.name)
+    return f"{name} [{column.unit}]"
+
+
+def _lost(log: JointLog, kept: Sequence[LogColumn]) -> Iterator[LogWarning]:
+    """Yield what of the file is not in the recording."""
+    empty = [column.name for column in log.columns if column not in kept]
+    if empty:
+        yield LogWarning(
+            "not-exported", f"{', '.join(empty)}: not ingested, since a column of them was empty"
+        )
+    for inference in log.inferences:
+        if inference.kind == "columns not used":
+            said = f"{inference.value}: not ingested ({inference.evidence}), so they cannot leave"
+            yield LogWarning("not-exported", said)
+    for warning in log.warnings:
+        if warning.kind == "clock-rebuilt":
+            said = f"the file's own times, which were not kept: {warning.message}"
+            yield LogWarning("not-exported", said, warning.row)
+        elif warning.kind in ("skipped-row", "other-lines"):
+            yield LogWarning("not-exported", warning.message, warning.row)
+    form = next((one for one in log.inferences if one.kind == ZONED), None)
+    if form and any(one.unit == DATE for one in kept):
+        yield LogWarning("clock-in-utc", f"{form.value} with a time zone: the dates leave in UTC")
+
+
+def _unsaid_units(columns: Sequence[LogColumn]) -> list[LogWarning]:
+    """Return a warning for each unit that is not of SI and that the names of its columns do not tell."""
+    unsaid: dict[str, list[str]] = {}
+    for column in columns:
+        told = not column.header or vocabulary().unit(split_unit(column.header)[1] or "")
+        if column.role != "time" and column.factor != 1.0 and not told:
+            unsaid.setdefault(column.unit, []).append(column.name)
+    return [
+        LogWarning("unit-not-in-name", f"{', '.join(names)}: in {unit}, which their names do not tell")
+        for unit, names in unsaid.items()
+    ]
+
+
+def shares(clock_ns: IntArray, units: Sequence[str]) -> list[Times]:
+    """Return what each column of a clock holds: all of it or, of two columns, its share.
+
+    Two columns are seconds and nanoseconds, or date and time of day.
+
+    Args:
+        clock_ns: The clock in integer [ns], shape (n,).
+        units: The unit of each of its columns.
+    """
+    steps = {"s": 10**9, DATE: DAY} if len(units) > 1 else {}
+    coarse = next((steps[unit] for unit in units if unit in steps), None)
+    if coarse is None:
+        return [Times(clock_ns, unit) for unit in units]
+    rest = clock_ns % coarse
+    return [Times(clock_ns - rest if unit in steps else rest, unit) for unit in units]

@@ -1,0 +1,92 @@
+"""How an ingested log shows itself: how it was read, what was repolarized, how it moves."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from functools import partial
+
+from urmpipe_pipeline import text
+from urmpipe_pipeline.outputs import AUDIT_COLUMNS
+from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table
+from urmpipe_pipeline.presentation.section import (
+    Block,
+    Column,
+    Judged,
+    Presentation,
+    Ref,
+    Section,
+    Table,
+    Value,
+)
+from urmpipe_pipeline.runs.figures import run_figures
+from urmpipe_pipeline.runs.parts import (
+    audit_table,
+    audit_words,
+    columns_table,
+    inference_table,
+    log_events,
+    log_facts,
+)
+from urmpipe_pipeline.runs.playback_figures import playback_figures
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.runs.scene import path_figure, run_scene
+
+
+def present(run: Run) -> Presentation:
+    """Return what an ingested log shows: nothing of it is judged."""
+    duration = Value(run.duration, "s") if run.timed else None
+    body = Section(
+        f"Log {run.name}",
+        None,
+        log_facts(run),
+        (inference_table(run, brief=True), *([audit_table(run, brief=True)] if run.audit else [])),
+        partial(run_figures, run),
+        partial(_page, run),
+        events=partial(log_events, run),
+        warnings=run.warnings,
+    )
+    return Presentation(
+        name=run.name,
+        headline=f"{run.name}: {text.counted(run.log.rows, 'row')}, {audit_words(run)}",
+        verdict=None,
+        facts=(),
+        body=body,
+        word="ingested",
+        opens_at_ns=int(run.t_ns[0]),
+        scene=partial(run_scene, run),
+        lines=(
+            {
+                "Log": Ref(body.title),
+                "Verdict": Judged(None),
+                "Robot": run.robot.name if run.robot else "none",
+                "Source": run.log.source,
+                "Rows": Value(run.log.rows),
+                "Duration": duration,
+                "Joints": Value(len(run.log.joints)),
+                "Repolarizations": Value(len(run.repolarizations)),
+                "Warnings": Value(len(run.warnings)),
+            },
+        ),
+        rows=partial(audit_rows, run),
+        created=run.provenance.created,
+    )
+
+
+def audit_rows(run: Run) -> Table:
+    """Return what --audit writes: a row a finding."""
+    rows = [one.to_dict() for one in run.audit]
+    columns = (Column(key, key, [_plain(row[key]) for row in rows]) for key in AUDIT_COLUMNS)
+    return Table("Audit of the repolarizer", tuple(columns))
+
+
+def _plain(value: str | float) -> str | Value:
+    return value if isinstance(value, str) else Value(value)
+
+
+def _page(run: Run) -> Iterator[Block]:
+    """Yield what only a page shows of a log."""
+    yield from playback_figures(run)
+    yield from path_figure(run)
+    yield columns_table(run)
+    yield inputs_table("Input files", run.log.files)
+    yield provenance_table(run.provenance)

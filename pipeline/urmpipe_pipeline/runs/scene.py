@@ -1,0 +1,55 @@
+"""What stands in space of an ingested log: its arm, and the path of its tool centre point."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from urmpipe_pipeline import text
+from urmpipe_pipeline.palette import AXIS_COLOURS, REFERENCE_COLOUR, run_colour
+from urmpipe_pipeline.presentation.figure import SpaceFigure
+from urmpipe_pipeline.presentation.parts import ends
+from urmpipe_pipeline.presentation.scene import Arm, Path, Scene
+from urmpipe_pipeline.runs.figures import times_of
+from urmpipe_pipeline.runs.results import Run
+
+
+def run_scene(run: Run) -> Scene | None:
+    """Return the arm of a log, where it was and where it recorded itself; None without a position."""
+    arms: tuple[Arm, ...] = ()
+    if run.robot is not None and run.tcp is not None:
+        arms = (Arm(run.robot, run.q, times_of(run), run_colour(0)),)
+    paths = tuple(_paths(run))
+    return Scene("Arm and paths [m]", arms, paths) if arms or paths else None
+
+
+def path_figure(run: Run) -> Iterator[SpaceFigure]:
+    """Yield the path of a tool centre point in space, by kinematics and as the log recorded it, if known."""
+    if not run.timed:
+        return
+    paths = []
+    if run.tcp_recorded is not None:
+        paths.append(Path("recorded by the log", run.tcp_recorded, run.t_ns, REFERENCE_COLOUR, asked=True))
+    if run.tcp is not None:
+        paths.append(Path("forward kinematics", run.tcp.position, run.t_ns, AXIS_COLOURS["norm"]))
+    if not paths or not np.isfinite(known := np.asarray(paths[-1].position)).any():
+        return
+    low, high = np.nanmin(known, axis=0), np.nanmax(known, axis=0)
+    yield SpaceFigure(
+        "Path in space",
+        "The tool centre point, equal scale on all axes.",
+        f"Path of {run.name} in three dimensions, within ({text.point(low)}) m and ({text.point(high)}) m.",
+        tuple(paths),
+        ends(known),
+    )
+
+
+def _paths(run: Run) -> Iterator[Path]:
+    """Yield where the log recorded itself, and where it was by its joints."""
+    if run.tcp_recorded is not None:
+        by_joints = run.tcp is not None
+        colour = REFERENCE_COLOUR if by_joints else run_colour(0)
+        yield Path("recorded by the log", run.tcp_recorded, run.t_ns, colour, asked=by_joints)
+    if run.tcp is not None and run.timed:
+        yield Path(run.name, run.tcp.position, run.t_ns, run_colour(0))

@@ -1,0 +1,205 @@
+"""How a simulation shows itself: how it ended, its verdicts, then what each block did."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import partial
+from itertools import groupby
+
+from urmpipe_pipeline import text
+from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
+from urmpipe_pipeline.comparison.wording import meter_size, meter_used, meter_words, out_words
+from urmpipe_pipeline.presentation.figure import Drawing, Text
+from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
+from urmpipe_pipeline.presentation.section import (
+    Block,
+    Cell,
+    Check,
+    Event,
+    Fact,
+    Judged,
+    Level,
+    Presentation,
+    Ref,
+    Section,
+    Value,
+)
+from urmpipe_pipeline.simulations.answers import answers_of
+from urmpipe_pipeline.simulations.figures import path_figure, signal_figures
+from urmpipe_pipeline.simulations.scene import simulation_scene
+from urmpipe_pipeline.simulations.signal_groups import Group, groups_of
+from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.simulations.tables import (
+    blocks_table,
+    connections_table,
+    first_signals_table,
+    meters_table,
+    settings_table,
+    signals_table,
+)
+from urmpipe_pipeline.simulations.wording import outcome_words
+
+
+def present(simulation: Simulation) -> Presentation:
+    """Return what a simulation shows."""
+    body = _body(simulation)
+    return Presentation(
+        name=simulation.name,
+        headline=outcome_words(simulation),
+        verdict=simulation.verdict,
+        facts=tuple(_decisive(simulation)),
+        body=body,
+        word="simulated",
+        opens_at_ns=_opening_time(simulation),
+        scene=partial(simulation_scene, simulation),
+        lines=({"System": Ref(body.title)} | _line(simulation),),
+        created=simulation.provenance.created,
+    )
+
+
+def _decisive(simulation: Simulation) -> Iterator[Fact]:
+    """Yield why it failed and when, or which delta meter decided."""
+    if simulation.failed is not None:
+        yield Fact("Why", simulation.failed)
+        yield Fact(
+            "Recorded until",
+            f"t = {text.seconds(float(simulation.t[-1]))} s" if len(simulation.t_ns) else "its start",
+        )
+    elif (worst := simulation.judged_worst) is not None:
+        yield Fact("Furthest out" if worst.verdict == "fail" else "Closest to the limit", Ref(worst.block))
+        yield Fact("Decided by", meter_words(worst))
+
+
+def _opening_time(simulation: Simulation) -> int:
+    """Return where the viewer opens in [ns]: at the worst sample; at the end of what failed."""
+    worst = simulation.judged_worst
+    shown = -1 if simulation.failed is not None else 0 if worst is None else worst.sample
+    return int(simulation.t_ns[shown]) if len(simulation.t_ns) else 0
+
+
+def _line(simulation: Simulation) -> dict[str, Cell]:
+    return {
+        "Verdict": Judged(simulation.verdict),
+        "Blocks": Value(len(simulation.blocks)),
+        "Signals": Value(sum(one.columns.shape[1] for one in simulation.signals)),
+        "Samples": Value(len(simulation.t_ns)),
+        "Duration": Value(simulation.duration, "s"),
+        "Communication step": Value(simulation.step, "s"),
+        "Warnings": Value(len(simulation.warnings)),
+    }
+
+
+def _body(simulation: Simulation) -> Section:
+    failed = simulation.failed
+    end = Check(
+        "reaches its end", "pass" if failed is None else "fail", failed or "", kind="simulation-failed"
+    )
+    return Section(
+        f"Simulation {simulation.name}",
+        simulation.verdict,
+        (*_outcome(simulation), *_facts(simulation)),
+        (*meters_table(simulation), *first_signals_table(simulation)),
+        partial(_system_file, simulation),
+        blocks=partial(_page, simulation),
+        checks=(end,),
+        events=partial(_events, simulation),
+        warnings=simulation.warnings,
+        notice="" if failed is None else f"Failed: {failed}",
+        sections=tuple(_sections(simulation)),
+    )
+
+
+def _outcome(simulation: Simulation) -> Iterator[Fact]:
+    """Yield what decided: when it failed, or what the worst delta meter found."""
+    if simulation.failed is not None:
+        yield Fact("Failed after", Value(simulation.duration, "s"), simulation.failed)
+    elif (worst := simulation.judged_worst) is not None:
+        yield from _meter_facts(worst)
+
+
+def _meter_facts(one: DeltaVerdict) -> Iterator[Fact]:
+    """Yield what a delta meter found: how much, when, how often it was too much."""
+    yield Fact(meter_size(one), Value(one.worst, "m", one.allowed, one.verdict, one.used), meter_used(one))
+    yield Fact("Time", Value(one.t, "s"))
+    yield Fact("Out of tolerance", out_words(one.out_of_tolerance, one.samples))
+
+
+def _facts(simulation: Simulation) -> Iterator[Fact]:
+    """Yield what a simulation is: its description, its samples, its step."""
+    count = len(simulation.t_ns)
+    yield Fact("Description", simulation.description)
+    yield Fact("Samples", Value(count))
+    yield Fact("Duration", Value(simulation.duration, "s"))
+    yield Fact("Communication step", Value(simulation.step, "s"))
+    if count > 1 and (period := simulation.duration / (count - 1)) > 1.5 * simulation.step:
+        yield Fact("Sample every", Value(period, "s"))
+    yield Fact("Blocks", Value(len(simulation.blocks)), brief=False)
+    yield recording_fact(simulation.recording)
+
+
+def _sections(simulation: Simulation) -> Iterator[Section]:
+    """Yield set points and answers, then what each block did; blocks that are judged rank first."""
+    answers = answers_of(simulation)
+    by_block = [
+        (block, list(some))
+        for block, some in groupby([*answers, *groups_of(simulation)], lambda one: one.block)
+    ]
+    worst = simulation.judged_worst
+    opened = by_block[0 if answers else -1][0] if by_block else ""
+    judged = {one.block: one for one in simulation.verdicts}
+    by_block += [(block, []) for block in judged if block not in dict(by_block)]
+    for block, groups in by_block:
+        yield _section(
+            simulation, block, groups, judged.get(block), opened=block == (worst.block if worst else opened)
+        )
+
+
+def _section(
+    simulation: Simulation, block: str, groups: Sequence[Group], meter: DeltaVerdict | None, *, opened: bool
+) -> Section:
+    """Return what a block, or several like ones, did."""
+    figures = partial(signal_figures, simulation, groups)
+    if meter is None:
+        return Section(block, figures=figures, rank=1, opened=opened)
+    fail = meter.verdict == "fail"
+    check = Check("within tolerance", meter.verdict, meter_words(meter) if fail else "", block)
+    return Section(
+        block, meter.verdict, tuple(_meter_facts(meter)), figures=figures, checks=(check,), opened=opened
+    )
+
+
+def _system_file(simulation: Simulation) -> Iterator[Text]:
+    if simulation.system_text:
+        yield Text("System file", simulation.system_text)
+
+
+def _page(simulation: Simulation) -> Iterator[Block]:
+    """Yield what only a page shows of a simulation: its system, its paths, its values."""
+    if simulation.system_svg:
+        yield Drawing("System", _system_words(simulation), simulation.system_svg)
+    yield blocks_table(simulation)
+    yield connections_table(simulation)
+    yield from path_figure(simulation)
+    yield signals_table(simulation)
+    yield settings_table(simulation)
+    yield inputs_table("Input files", simulation.provenance.inputs)
+    yield provenance_table(simulation.provenance)
+
+
+def _system_words(simulation: Simulation) -> str:
+    """Say what the drawing of a system shows."""
+    joined = "; ".join(f"{source} to {into}" for into, source in simulation.connections.items())
+    blocks = ", ".join(one.name for one in simulation.blocks)
+    return f"The blocks {blocks}" + (f", connected: {joined}." if joined else ".")
+
+
+def _events(simulation: Simulation) -> Iterator[Event]:
+    """Yield what decided each delta meter, what a person should know, and why it failed."""
+    for one in simulation.verdicts:
+        level: Level = "error" if one.verdict == "fail" else "info"
+        yield Event(int(simulation.t_ns[one.sample]), f"{one.block} decides: {meter_words(one)}", level)
+    for warning in simulation.warnings:
+        yield Event(None, warning, "warning")
+    if simulation.failed is not None:
+        at = int(simulation.t_ns[-1]) if len(simulation.t_ns) else None
+        yield Event(at, f"failed: {simulation.failed}", "error")

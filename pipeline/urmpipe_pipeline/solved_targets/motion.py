@@ -1,0 +1,75 @@
+"""Chosen solutions as a run: a motion where the targets have times, else poses that no motion joins.
+
+A motion goes the way of a log that was read: audit, grid, derivatives, kinematics. Between two poses without
+times there is no motion, so such a run has no rates, and no turns are resolved in it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_pipeline.joint_log import ROW_NS, JointLog, LogColumn, LogWarning
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.runs.ingest import kinematics, run_of
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.sources import ReadOptions
+
+SOURCE = "ik"
+"""What such a run says where another says which reader read it."""
+
+
+def run_of_solutions(
+    name: str,
+    chain: Chain,
+    q: FloatArray,
+    t_ns: IntArray | None,
+    clock_start_ns: int,
+    warnings: tuple[LogWarning, ...],
+    made: Provenance,
+) -> Run:
+    """Return joint values that inverse kinematics found as a run.
+
+    Args:
+        name: What to call it.
+        chain: The arm, with base and tool.
+        q: The chosen solutions in [rad] or [m], shape (n, joints); NaN where there is none: there the run has
+            no pose, and nothing is interpolated.
+        t_ns: Times from the first row in integer [ns], shape (n,); None without times.
+        clock_start_ns: The clock at the first row in integer [ns].
+        warnings: What a person should know.
+        made: How the solutions were made.
+
+    Raises:
+        LogError: If the times need a grid without end.
+    """
+    timed = t_ns is not None
+    log = JointLog(
+        name=name, source=SOURCE, files=made.inputs, joints=chain.coordinates, q=q,
+        t_ns=np.arange(len(q), dtype=np.int64) * ROW_NS if t_ns is None else t_ns,
+        clock_start_ns=clock_start_ns, columns=tuple(_columns(chain, timed=timed)), warnings=warnings,
+        timed=timed,
+    )  # fmt: skip
+    return run_of(log, chain, ReadOptions(), made=made) if timed else _poses(log, chain, made)
+
+
+def _columns(chain: Chain, *, timed: bool) -> Iterator[LogColumn]:
+    """Yield what the columns would be if the joint values stood in a file, so that they can be exported."""
+    if timed:
+        yield LogColumn("t", "t [s]", "time", 0, "s", number=1)
+    for j, joint in enumerate(chain.moving):
+        unit = "rad" if joint.kind == "revolute" else "m"
+        yield LogColumn(joint.name, f"{joint.name} [{unit}]", "joint", j, unit, number=j + 1 + timed)
+
+
+def _poses(log: JointLog, chain: Chain, made: Provenance) -> Run:
+    """Return the run of solutions without times: poses without rates."""
+    none = np.full_like(log.q, np.nan)
+    tcp, noticed = kinematics(chain, log.q, none, none)
+    return Run(
+        name=log.name, log=log, robot=chain, tsp=0.0, t_ns=log.t_ns, q=log.q, qd=none, qdd=none, tcp=tcp,
+        tcp_recorded=None, audit=(), warnings=(*log.warnings, *noticed), provenance=made,
+    )  # fmt: skip

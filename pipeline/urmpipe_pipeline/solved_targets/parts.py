@@ -1,0 +1,248 @@
+"""Facts, tables and events of solved targets: what was reached, how the path goes, and why not."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+from functools import partial
+from itertools import groupby
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.inverse.along_path.joint_path import JointPath
+from urmpipe_models.inverse.along_path.joint_speeds import TooFast
+from urmpipe_models.inverse.along_path.jumps import Jump
+from urmpipe_models.inverse.closed.closed_form import method_words
+from urmpipe_pipeline import text
+from urmpipe_pipeline.palette import ghost_colour_word, run_colour_word
+from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot_at, table_of
+from urmpipe_pipeline.presentation.section import Cell, Column, Event, Fact, Place, Table, Value
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
+from urmpipe_pipeline.solved_targets.scene import ghosts
+from urmpipe_pipeline.solved_targets.wording import in_words, rows_text
+
+MANY = 10
+"""Branches, jumps and stretches of joints too fast that are facts of each; the others are counted."""
+
+NUMBER = re.compile(r"(?<!\w)-?\d+(\.\d+)?(e[-+]?\d+)?")
+"""What may differ in reasons that are one."""
+
+
+def facts(one: SolvedTargets) -> Iterator[Fact]:
+    """Yield what was solved, how, and how much of it."""
+    yield Fact("Targets", f"{int(one.reached.sum())} of {len(one)} with a solution", brief=False)
+    yield Fact("Robot", one.robot.name, brief=False)
+    yield Fact("Method", method_words(one.method), brief=False)
+    if one.t_ns is None:
+        yield Fact("Rows", f"{len(one)}, without times", brief=False)
+    else:
+        yield Fact("Duration", Value(float(one.t_ns[-1]) / 1e9, "s"), brief=False)
+    yield recording_fact(one.recording)
+
+
+def path_facts(one: SolvedTargets, path: JointPath) -> Iterator[Fact]:
+    """Yield how the joints follow a path: a summary, not its samples; nothing where no target is reached."""
+    nearest = path.nearest_singularity
+    if nearest is None:
+        return
+    yield Fact("Branch", "; ".join(_capped(list(_branches(one)))))
+    yield from (Fact("Jump", words) for words in _capped([jump_words(one, jump) for jump in path.jumps]))
+    fast = [fast_words(one, stretch) for stretch in path.too_fast]
+    yield from (Fact("Too fast", words) for words in _capped(fast))
+    yield Fact(
+        "Nearest to a singularity",
+        f"{_at(one, nearest)}: smallest singular value {path.singularity.smallest[nearest]:.4g},"
+        f" manipulability {path.singularity.manipulability[nearest]:.4g}",
+    )
+    yield Fact("Off by", _furthest(one), "how far the tool is from its targets, by forward kinematics")
+
+
+def jump_words(one: SolvedTargets, jump: Jump) -> str:
+    """Return a jump with its time, its place and what moves."""
+    steps = ", ".join(f"{step.joint} by {in_words(step.step, step.unit)}" for step in jump.joints)
+    change = "" if jump.from_branch == jump.to_branch else f"{jump.from_branch} → {jump.to_branch}: "
+    since = f", since row {one.row[jump.last]}" if jump.last < jump.sample - 1 else ""
+    return f"{_at(one, jump.sample)}{since}, at ({text.point(jump.position)}) m: {change}{steps}"
+
+
+def fast_words(one: SolvedTargets, stretch: TooFast) -> str:
+    """Return how fast a joint would have to be, how fast it may be, and where."""
+    speed, allowed = (in_words(value, stretch.unit) for value in (stretch.speed, stretch.allowed))
+    rows = f"{_at(one, stretch.first)} to row {one.row[stretch.last]}"
+    return f"{stretch.joint} at {speed} of {allowed} allowed, {rows}"
+
+
+def _capped(lines: list[str]) -> list[str]:
+    """Return the first lines, and how many more there are."""
+    more = len(lines) - MANY
+    return [*lines[:MANY], f"and {more} more"] if more > 0 else lines
+
+
+def _branches(one: SolvedTargets) -> Iterator[str]:
+    """Yield the branches in the order of the path, with their rows if there are several."""
+    reached = np.flatnonzero(one.reached)
+    stretches = [list(some) for _, some in groupby(reached.tolist(), one.branch.__getitem__)]
+    for some in stretches:
+        rows = one.row[[some[0], some[-1]]].tolist()
+        stretch = f"row {rows[0]}" if rows[0] == rows[1] else f"rows {rows[0]}-{rows[1]}"
+        yield str(one.branch[some[0]]) + (f" ({stretch})" if len(stretches) > 1 else "")
+
+
+def _furthest(one: SolvedTargets) -> str:
+    """Return how far the tool is from its targets at most, and where."""
+    miss = one.miss[:, 0]
+    said = text.quantity(float(np.nanmax(miss)), "m")
+    if one.angle is not None:
+        said += f" and {text.quantity(float(np.nanmax(one.angle)), 'rad')}"
+    return f"{said} at most, {_at(one, int(np.nanargmax(miss)))}"
+
+
+def _at(one: SolvedTargets, sample: int) -> str:
+    """Return when a sample is."""
+    t = one.t
+    row = f"row {one.row[sample]}"
+    return f"at {row}" if t is None else f"at t = {text.seconds(t[sample])} s ({row})"
+
+
+def tables(one: SolvedTargets) -> Iterator[Table]:
+    """Yield the solutions or how the joints move along the path, and which ghost is which branch."""
+    if one.path is None:
+        yield solutions_table(one)
+    elif one.reached.any():
+        yield joints_table(one)
+    if found := ghosts(one):
+        yield table_of(
+            "Branches",
+            {"branch": "Branch", "drawn": "Drawn", "rows": "Rows"},
+            [
+                ("chosen", f"solid, its tip {run_colour_word(0)}", Value(int(one.reached.sum()))),
+                *(
+                    (ghost.name, ghost_colour_word(i), Value(int(np.isfinite(ghost.q).all(axis=1).sum())))
+                    for i, ghost in enumerate(found)
+                ),
+            ],
+        )
+
+
+def solutions_table(one: SolvedTargets) -> Table:
+    """Return the solutions nearest to the start, or every solution if all were requested: a row each."""
+    targets = np.flatnonzero(one.reached)
+    places = np.nonzero(one.solutions.reached) if one.every else (targets, one.chosen[targets])
+    q, labels, miss, angle = one.solutions.q, one.solutions.labels, one.miss, one.angle
+    heads: dict[str, tuple[str, Callable[[tuple[int, int]], Cell]]] = {
+        "row": ("Row", lambda at: Value(int(one.row[at[0]]))),
+        "branch": ("Branch", lambda at: str(labels[at])),
+    }
+    for j, (name, unit) in enumerate(zip(one.robot.coordinates, one.joint_units, strict=True)):
+        heads[name] = name, partial(_joint_value, q, j, unit)
+    heads["miss"] = "off by", lambda at: Value(float(miss[at]), "m")
+    if angle is not None:
+        heads["angle"] = "turned by", lambda at: Value(float(angle[at]), "rad")
+    title = "Every solution" if one.every else "The solutions nearest to the start"
+    rows, columns = (some.tolist() for some in places)
+    made = columns_of(list(zip(rows, columns, strict=True)), heads)
+    return Table(title, tuple(replace(one, brief=one.key != "angle") for one in made))
+
+
+def _joint_value(q: FloatArray, joint: int, unit: str, at: tuple[int, int]) -> Value:
+    """Return a joint value of a solution."""
+    return _shown(q[*at, joint], unit)
+
+
+def _shown(value: float, unit: str) -> Value:
+    """Return a joint value in [rad] or [m] as a cell: what is only rounding is 0."""
+    return Value(round(float(value), 9) + 0.0, unit)
+
+
+def joints_table(one: SolvedTargets) -> Table:
+    """Return how each joint moves along a path: where it starts and ends, and how fast it is at most."""
+    joints, q = one.robot.moving, one.q[one.reached]
+    units = one.joint_units
+    ends = {"start": q[0], "min": q.min(axis=0), "max": q.max(axis=0), "end": q[-1]}
+    columns = [Column("joint", "Joint", [joint.name for joint in joints])]
+    columns += [Column(key, key, list(map(_shown, values, units))) for key, values in ends.items()]
+    if one.t is not None and len(q) > 1:
+        speed = np.abs(np.diff(q, axis=0)) / np.diff(one.t[one.reached])[:, None]
+        for key, values in (
+            ("fastest", speed.max(axis=0)),
+            ("allowed", [joint.velocity for joint in joints]),
+        ):
+            cells = [
+                f"{text.quantity(round(value, 9), unit)}/s" if np.isfinite(value) else None
+                for value, unit in zip(values, units, strict=True)
+            ]
+            columns.append(Column(key, key, cells))
+    return Table("Joints along the path", tuple(columns))
+
+
+def unreached(one: SolvedTargets) -> Iterator[str]:
+    """Yield why rows have no solution; if all are requested also why branches of other rows have none."""
+    for rows, why in _stretches(one):
+        if why:
+            yield f"{rows_text(one.row[rows])}: {why}"
+        elif one.every and one.method != "iterative":
+            yield from _branches_unreached(one, rows)
+
+
+def unreached_facts(one: SolvedTargets) -> Iterator[Fact]:
+    """Yield what is not reached and why, as far as there is room."""
+    yield from (Fact("Not reached", words) for words in _capped(list(unreached(one))))
+
+
+def _stretches(one: SolvedTargets) -> Iterator[tuple[list[int], str]]:
+    """Yield stretches of rows, from 0, that have no solution for one reason but for its numbers, or have one.
+
+    The reason is the first of a row's, of the row in the middle where the numbers differ; empty of rows with a
+    solution.
+    """
+    reasons = [(reason or "").split("; ")[0] for reason in one.reasons]
+    for _, some in groupby(range(len(reasons)), lambda row: NUMBER.sub("#", reasons[row])):
+        rows = list(some)
+        middle = rows[len(rows) // 2]
+        alike = len({reasons[row] for row in rows}) == 1
+        yield rows, reasons[middle] if alike else f"row {one.row[middle]}: {reasons[middle]}"
+
+
+def _branches_unreached(one: SolvedTargets, rows: Sequence[int]) -> Iterator[str]:
+    """Yield why branches of targets that others reach have no solution."""
+    for index in rows:
+        found: dict[str, list[str]] = {}
+        for branch, reason in zip(one.solutions.branches, one.solutions.reasons[index], strict=True):
+            if reason:
+                found.setdefault(reason, []).append(branch)
+        for reason, branches in found.items():
+            yield f"row {one.row[index]} by {'; '.join(branches)}: {reason}"
+
+
+def missed_table(one: SolvedTargets) -> Table:
+    """Return every target without a solution, with its time, its place and all its reasons."""
+    missed, t = np.flatnonzero(~one.reached).tolist(), one.t
+    heads: dict[str, tuple[str, Callable[[int], Cell]]] = {
+        "row": ("Row", lambda k: Value(int(one.row[k]))),
+        "t": ("t", lambda k: None if t is None else Value(float(t[k]), "s")),
+        "position": ("x, y, z", lambda k: Place(spot_at(one.targets.position[k]))),
+        "reason": ("Why", one.solutions.reason),
+    }
+    return Table(f"Targets without a solution ({len(missed)})", columns_of(missed, heads), brief=False)
+
+
+def events(one: SolvedTargets) -> Iterator[Event]:
+    """Yield rows that are not reached, jumps, joints that are too fast, and warnings, each at its row."""
+    for rows, why in _stretches(one):
+        if why:
+            yield Event(_time(one, rows[0]), f"not reached: {rows_text(one.row[rows])}: {why}", "error")
+    if one.path is not None:
+        for jump in one.path.jumps:
+            yield Event(_time(one, jump.sample), f"jump {jump_words(one, jump)}", "error")
+        for stretch in one.path.too_fast:
+            yield Event(_time(one, stretch.first), f"too fast: {fast_words(one, stretch)}", "error")
+    for warning in one.warnings:
+        row = min(max((warning.row or 1) - 1, 0), len(one) - 1)
+        yield Event(_time(one, row), f"{warning.kind}: {warning.sentence()}", "warning")
+
+
+def _time(one: SolvedTargets, row: int) -> int | None:
+    """Return the time of a row in [ns]; None without times."""
+    return None if one.t_ns is None else int(one.t_ns[row])

@@ -1,0 +1,140 @@
+"""A request to inverse kinematics: the arm, the targets and the options, and which of them are refused."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
+from urmpipe_models.inverse.search import Search
+from urmpipe_models.inverse.solve import METHODS, Method
+from urmpipe_pipeline.solved_targets.given_targets import GivenTargets
+
+TYPED = 1e-3
+"""A start beyond a limit by this, in [rad] or [m], is on it: people type limits with few digits."""
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Request:
+    """What is to be solved, and how.
+
+    Attributes:
+        arm: The arm on its base and with its tool.
+        given: Where its tool shall be.
+        start: Joint values in [rad] or [m], shape (joints,), that solutions are to be near to; None for the
+            robot's own.
+        every: Whether all solutions are requested.
+        within_pi: Whether joints that turn without end are written within -pi to pi.
+        method: Which methods are allowed.
+        search: How far to search for what does not follow from the start.
+    """
+
+    arm: Chain
+    given: GivenTargets
+    start: FloatArray | None
+    every: bool
+    within_pi: bool
+    method: Method
+    search: Search
+
+    @property
+    def form(self) -> ClosedForm | None:
+        """The closed form by which the targets are solved, if they are."""
+        if self.given.targets.rotation is None or self.method == "iterative":
+            return None
+        return closed_form(self.arm) if self.given.t_ns is None else exact_form(self.arm)
+
+    @property
+    def begin(self) -> FloatArray:
+        """Joint values in [rad] and [m] that solutions are to be near to, shape (joints,)."""
+        return np.array(self.arm.start, dtype=float) if self.start is None else self.start
+
+    @property
+    def options(self) -> dict[str, Any]:
+        """The options as a recording keeps them."""
+        options = {name: getattr(self, name) for name in ("every", "within_pi", "method")}
+        options |= asdict(self.search)
+        return options | ({} if self.start is None else {"start": self.start.tolist()})
+
+
+def refuse_unsolvable(request: Request, *, recorded: bool) -> None:
+    """Raise an `OptionError` with every option that makes no sense, alone or with a path.
+
+    Args:
+        request: What is to be solved.
+        recorded: Whether a recording is to be written.
+    """
+    faults = [*_bad_values(request)]
+    if not faults and request.given.t_ns is not None:
+        faults += [*_not_for_paths(request, recorded)]
+    if faults:
+        raise OptionError(*faults)
+
+
+def _bad_values(request: Request) -> Iterator[str]:
+    """Yield which values make no sense."""
+    if request.method not in METHODS:
+        yield f"--method: found {shown(request.method)}, allowed: {', '.join(METHODS)}"
+    yield from (f"--{fault}" for fault in request.search.faults())
+
+
+def _not_for_paths(request: Request, recorded: bool) -> Iterator[str]:
+    """Yield the options that a path does not have."""
+    lacks = "positions only" if request.given.targets.rotation is None else "no closed form"
+    if request.method == "iterative":
+        yield (
+            "--method: found iterative with a path, allowed: auto; a path takes the closed form of the arm"
+            " if it has one"
+        )
+    if request.method == "closed" and request.form is None:
+        yield f"--method: found closed with a path of {request.arm.name} that has {lacks}, allowed: auto"
+    if request.every and request.form is None:
+        yield (
+            f"--all: found with a path of {request.arm.name} that has {lacks}, allowed: with poses and an arm"
+            " that has a closed form, whose branches run along the path; or with targets without times"
+        )
+    elif request.every and not recorded:
+        yield (
+            "--all: found with a path and no recording, allowed: with -o RUN.rrd, where every branch is a"
+            " ghost arm; or with targets without times"
+        )
+
+
+def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
+    """Return the start as an array in [rad] and [m], shape (joints,).
+
+    Raises:
+        OptionError: If it has not one finite value for each joint, within the joint's limits.
+    """
+    if start is None:
+        return None
+    allowed = f"allowed: {len(arm.coordinates)}, one for each of {', '.join(arm.coordinates)}"
+    try:
+        values = np.asarray(start, dtype=float)
+    except (TypeError, ValueError):
+        raise OptionError(f"--start: found {shown(start)}, {allowed}, in rad and m") from None
+    if values.shape != (len(arm.coordinates),):
+        raise OptionError(f"--start: found {values.size} values, {allowed}")
+    if not np.isfinite(values).all():
+        raise OptionError(f"--start: found a value that is not finite, {allowed}, in rad and m")
+    beyond = list(_beyond_limits(arm, values))
+    if beyond:
+        raise OptionError(*beyond)
+    return values
+
+
+def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[str]:
+    """Yield which values of a start the limits of their joints do not allow."""
+    for joint, value in zip(arm.moving, start.tolist(), strict=True):
+        if not joint.lower - TYPED <= value <= joint.upper + TYPED:
+            unit = "rad" if joint.kind == "revolute" else "m"
+            degrees = "; in deg?" if unit == "rad" and abs(value) > 2.0 * math.pi else ""
+            limits = f"{joint.lower:.6g} to {joint.upper:.6g} {unit}"
+            yield f"--start: found {joint.name} = {value:g}, allowed: {limits}{degrees}"

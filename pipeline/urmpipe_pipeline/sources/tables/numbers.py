@@ -1,0 +1,72 @@
+"""What is read of a table: numbers and times in the file's own units, and what is wrong with them."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.errors import Finding
+from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.sources.cells.text_cells import TextCells
+from urmpipe_pipeline.sources.cells.text_clock import Form
+
+NO_TIME = np.iinfo(np.int64).min
+"""Stands where a row has no time."""
+REPORTED = NO_TIME + 1
+"""Stands where a row has no time because of a finding that is reported already."""
+UNREADABLE = NO_TIME + 2
+"""Stands where the text of a row's time is none."""
+
+
+@dataclass(frozen=True, slots=True)
+class ClockColumn:
+    """A column of the clock.
+
+    Attributes:
+        column: Its place.
+        exponent: Power of ten from its unit to [ns]: 9 for s.
+        forms: What its cells may be if they are text: then exponent means nothing.
+    """
+
+    column: int
+    exponent: int = 0
+    forms: tuple[Form, ...] = ()
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Numbers:
+    """What was read of a table.
+
+    Attributes:
+        values: Numbers in the file's own units, shape (n, columns); NaN where a sample is missing.
+        clock: Time of each row in [ns] on the file's clock, shape (n,), or NO_TIME, REPORTED or UNREADABLE;
+            None without a clock; without meaning while the texts of the clock are not read.
+        findings: What is wrong with rows and cells, the first of them.
+        wrong: How many such findings there are.
+        lasting: Those of the findings that leaving out rows does not mend.
+        unread: Rows that could not be read, by their index, with what is wrong with each.
+        left_out: Lines among labelled rows that are none.
+        rows: Data row of the file of each row, from 1, shape (n,), where some were left out.
+        texts: The cells of the clock's columns, if they are text.
+        inferences: What the clock's rows told about it.
+        warnings: What a person should know about it.
+    """
+
+    values: FloatArray
+    clock: IntArray | None
+    findings: tuple[Finding, ...] = ()
+    wrong: int = 0
+    lasting: tuple[Finding, ...] = ()
+    unread: Mapping[int, str] = field(default_factory=dict)
+    left_out: int = 0
+    rows: IntArray | None = None
+    texts: tuple[TextCells, ...] = ()
+    inferences: tuple[Inference, ...] = ()
+    warnings: tuple[LogWarning, ...] = ()
+
+    def file_row(self, row: int) -> int:
+        """Return the data row of the file of a row that was read, both from 1."""
+        return row if self.rows is None else int(self.rows[row - 1])

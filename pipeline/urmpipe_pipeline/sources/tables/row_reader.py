@@ -1,0 +1,280 @@
+"""Rows that the parser refuses, cell by cell: read, or told with the line and column of what is wrong."""
+
+from __future__ import annotations
+
+import math
+from array import array
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.errors import Finding
+from urmpipe_pipeline.sources.cells.cell import (
+    is_missing,
+    is_number,
+    is_text,
+    split_line,
+    to_float,
+    to_nanoseconds,
+)
+from urmpipe_pipeline.sources.cells.text_cells import TextCells
+from urmpipe_pipeline.sources.tables.form import CONFLICT_MARK, RowError, Value
+from urmpipe_pipeline.sources.tables.numbers import NO_TIME, REPORTED, ClockColumn, Numbers
+from urmpipe_pipeline.sources.tables.sniff import COMMENTS, Layout
+
+SHOWN_FINDINGS = 20
+"""Findings that are told one by one; the others are counted."""
+
+_SHOWN_TEXT = 60
+
+MAY_BE_MISSING = "a number, or an empty, Null or NaN cell where a sample is missing"
+"""What a cell of a log may hold."""
+
+
+def lines_of_rows(layout: Layout, rows: Sequence[int]) -> dict[int, int]:
+    """Return the line of the file of some data rows, both counted from 1."""
+    wanted, found = set(rows), {}
+    for row, (line, _) in enumerate(data_lines(layout, layout.segment.lines()), start=1):
+        if row in wanted:
+            found[row] = line
+            if len(found) == len(wanted):
+                break
+    return found
+
+
+def data_lines(layout: Layout, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
+    """Yield number and text of each line with a data row, not of blank lines and comments.
+
+    Args:
+        layout: How the table is written.
+        lines: Lines of the file with their numbers.
+    """
+    lines = (line for line in lines if line[0] >= layout.first_line)
+    for number, line in lines if layout.form is None else layout.form.rows(lines):
+        text = line.strip()
+        if not text or text.startswith(COMMENTS):
+            continue
+        for row in split_line(text, layout.delimiter) if layout.across else (line,):
+            yield number, row
+
+
+@dataclass(slots=True)
+class _Fault:
+    """Something wrong with a row, and with how many rows after it in the same way."""
+
+    message: str
+    line: int
+    row: int
+    column: str | None
+    more: int = 0
+
+    def finding(self, file: str) -> Finding:
+        """Return it as a finding."""
+        more = f" (and so {self.more} more row{'s' if self.more > 1 else ''} below it)" if self.more else ""
+        return Finding(self.message + more, file, self.line, self.row, self.column)
+
+
+class RowReader:
+    """Goes through rows one by one and keeps the first findings.
+
+    Attributes:
+        layout: How the table is written.
+        columns: Which columns hold numbers.
+        clock: The columns of its clock.
+        allowed: What a cell may hold, for messages.
+    """
+
+    def __init__(
+        self,
+        layout: Layout,
+        columns: Sequence[int],
+        clock: Sequence[ClockColumn],
+        allowed: str = MAY_BE_MISSING,
+    ) -> None:
+        self.layout = layout
+        self.columns = columns
+        self.clock = clock
+        self.allowed = allowed
+        self._faults: list[_Fault] = []
+        self._lasting: list[_Fault] = []
+        self._wrong = 0
+        self._last: _Fault | None = None
+        self._unread: dict[int, str] = {}
+        self._left_out = 0
+        self._next_line = layout.first_line
+        self._line = 0
+        self._row = 0
+        self._text_parts = [part for part in clock if part.forms]
+        self._texts: list[list[str]] = []
+        self._in_conflict = False
+        self._other_side = False
+        self._ended = False
+        self._wanted = (*columns, *(part.column for part in clock))
+
+    @property
+    def waits(self) -> bool:
+        """Whether the next rows are not to be read: those of a second log, or of a conflict's other side."""
+        return self._ended or self._other_side
+
+    def pass_over(self, rows: int, lines: int) -> None:
+        """Count rows and lines that were read otherwise."""
+        self._row += rows
+        self._next_line += lines
+
+    def read(self, lines: Sequence[str]) -> Numbers:
+        """Return the numbers of the rows on the next lines: NaN and REPORTED where something is wrong."""
+        numbered = list(enumerate((line.rstrip("\r\n") for line in lines), start=self._next_line))
+        self._next_line += len(lines)
+        values, times, rows = array("d"), array("q"), 0
+        self._texts = [[] for _ in self._text_parts]
+        for time, row in self._rows(numbered):
+            times.append(time)
+            values.extend(row)
+            rows += 1
+        return Numbers(
+            np.array(values).reshape(rows, len(self.columns)),
+            np.array(times, dtype=np.int64) if self.clock else None,
+            left_out=self._others(numbered),
+            texts=tuple(TextCells.of(texts) for texts in self._texts),
+        )
+
+    def verdict(self) -> Numbers:
+        """Return what was found to be wrong, without numbers."""
+        file = str(self.layout.segment.path)
+        return Numbers(
+            np.empty((0, len(self.columns))),
+            None,
+            findings=tuple(fault.finding(file) for fault in self._faults),
+            wrong=self._wrong,
+            lasting=tuple(fault.finding(file) for fault in self._lasting),
+            unread=self._unread,
+        )
+
+    def _others(self, lines: Iterable[tuple[int, str]]) -> int:
+        """Return how many lines among labelled rows are none."""
+        form = self.layout.form
+        return sum(bool(line.strip()) and not form.is_row(line) for _, line in lines) if form else 0
+
+    def _rows(self, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, list[float]]]:
+        """Yield time in [ns] and values of each row."""
+        nothing = [math.nan] * len(self.columns)
+        for line, text in data_lines(self.layout, lines):
+            if self._ended:
+                return
+            self._line, self._row = line, self._row + 1
+            if CONFLICT_MARK.match(text):
+                self._mark(text)
+                cells = None
+            elif self._other_side:
+                cells = None
+            else:
+                cells = self._cells(text)
+            for texts, part in zip(self._texts, self._text_parts, strict=True):
+                texts.append("" if cells is None else cells[part.column])
+            yield (REPORTED, nothing) if cells is None else (self._time(cells), self._values(cells))
+
+    def _mark(self, text: str) -> None:
+        """Report a merge conflict once, at its first mark; what was merged in is not read."""
+        if text[0] == "<" or (text[0] == "=" and not self._in_conflict):
+            side = "the rows of one side, without the marks of git"
+            self._report(f"found {_shown(text)}, a merge conflict, allowed: {side}", lasting=True)
+        self._in_conflict = text[0] != ">"
+        self._other_side = text[0] in "|="
+
+    def _values(self, cells: Sequence[str]) -> list[float]:
+        wanted = [cells[j] for j in self.columns]
+        if self.layout.decimal == "." and not any("_" in cell for cell in wanted):  # float() takes 1_000
+            try:
+                return [float(cell) for cell in wanted]
+            except ValueError:
+                pass
+        return [self._value(cells, j) for j in self.columns]
+
+    def _cells(self, text: str) -> list[str] | None:
+        """Return the cells of a row; None if it is not written like the others, or has no numbers at all."""
+        form = self.layout.form
+        try:
+            values: list[Value] = (
+                [*split_line(text, self.layout.delimiter)] if form is None else form.values(text)
+            )
+            if not self._is_whole(text, values):
+                return None
+            cells = [str(value) for value in values] if form is None else form.spread(values)
+        except RowError as error:
+            self._report(error.message, error.name)
+            return None
+        if len(self._wanted) > 1 and all(is_text(cells[j], self.layout.decimal) for j in self._wanted):
+            self._report(f"found {_shown(text)}, allowed: a row of numbers")
+            return None
+        return cells
+
+    def _is_whole(self, text: str, values: list[Value]) -> bool:
+        """Return whether a row has as many values as the others, having reported what it is if not."""
+        names = self.layout.form.names if self.layout.form else self.layout.names
+        width = len(names)
+        if self.layout.header is not None and tuple(values[:width]) == names and any(names):
+            self._report(
+                "found the header again, allowed: one log a file; a second log begins here", lasting=True
+            )
+            self._ended = True
+            return False
+        if len(values) == width - 1 and not names[-1]:
+            values.append("")  # a row without the trailing delimiter that the others have
+        if len(values) != width and any([*values[width:], len(values) < width]):
+            numbers = any(not isinstance(v, str) or is_number(v, self.layout.decimal) for v in values)
+            shown = "" if numbers else f" ({_shown(text)})"
+            plural = "" if len(values) == 1 else "s"
+            self._report(f"found {len(values)} cell{plural}{shown}, allowed: {width}")
+            return False
+        del values[width:]
+        return True
+
+    def _time(self, cells: Sequence[str]) -> int:
+        total = 0
+        for part in () if self._text_parts else self.clock:
+            cell = cells[part.column]
+            time = to_nanoseconds(cell, self.layout.decimal, part.exponent)
+            if time is None and is_missing(cell):
+                return NO_TIME
+            if time is None:
+                name = self.layout.names[part.column]
+                self._report(f"found {_shown(cell)}, allowed: a number in every row", name)
+                return REPORTED
+            total += time
+        return total
+
+    def _value(self, cells: Sequence[str], column: int) -> float:
+        value = to_float(cells[column], self.layout.decimal)
+        if value is not None:
+            return value
+        self._report(f"found {_shown(cells[column])}, allowed: {self.allowed}", self.layout.names[column])
+        return math.nan
+
+    def _report(self, message: str, column: str | None = None, *, lasting: bool = False) -> None:
+        """Keep a finding about this row; the same in rows on end is one.
+
+        Args:
+            message: What was found, and what is allowed.
+            column: The column, if it is one.
+            lasting: Whether it stays wrong if the row is left out.
+        """
+        if not lasting:
+            earlier = self._unread.get(self._row - 1)
+            said = f"column {column}: {message}" if column else message
+            self._unread[self._row - 1] = f"{earlier}; {said}" if earlier else said
+        last = self._last
+        if last and (last.message, last.column, last.row + last.more + 1) == (message, column, self._row):
+            last.more += 1
+            return
+        self._last = _Fault(message, self._line, self._row, column)
+        self._wrong += 1
+        if len(self._faults) < SHOWN_FINDINGS:
+            self._faults.append(self._last)
+        if lasting:
+            self._lasting.append(self._last)
+
+
+def _shown(text: str) -> str:
+    text = text.strip()
+    return repr(text if len(text) <= _SHOWN_TEXT else text[: _SHOWN_TEXT - 3] + "...")

@@ -1,0 +1,43 @@
+"""A table as CSV: one line a row, numbers that read back bit for bit."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from urmpipe_pipeline.csv_rows import write_rows
+from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Table, Value
+from urmpipe_pipeline.text import exact
+
+
+def write_table(table: Table, part: Path, path: Path) -> None:
+    """Write a table and read it back.
+
+    The header holds the keys of the columns. Numbers stand in SI, in the shortest digits that are theirs; a
+    cell is empty where there is no value.
+
+    Args:
+        table: The table.
+        part: Where to write it, as `guarded_output` gives it.
+        path: The name it is to have, for messages.
+
+    Raises:
+        OutputError: If it did not read back as it was written.
+    """
+    rows = zip(*(map(_cell, column.cells) for column in table.columns), strict=True)
+    write_rows([[column.key for column in table.columns], *map(list, rows)], part, path)
+
+
+def _cell(cell: Cell) -> str:
+    match cell:
+        case Value():
+            return exact(cell.number)
+        case Judged():
+            return cell.verdict or ""
+        case Ref():
+            return cell.title
+        case Place():
+            return " ".join(map(exact, cell.position))
+        case Advice():
+            return cell.words
+        case _:
+            return cell or ""

@@ -1,0 +1,157 @@
+"""What is told of a verdict that rests on little, or answers another question."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+from hypothesis.extra import numpy as hnp
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_pipeline.comparison.baseline import complete_noise
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.comparison.statistics import Measured, describe
+from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
+from urmpipe_pipeline.comparison.warnings import large_noises, large_tolerances, recorded_apart, thin_evidence
+
+Compared = Callable[..., Comparison]
+
+
+def off(samples: int) -> FloatArray:
+    """No deviation at all."""
+    return np.zeros((samples, 3))
+
+
+def told(result: Comparison) -> list[tuple[str, str]]:
+    """Return the warnings of a comparison."""
+    return [(one.kind, one.message) for one in result.warnings]
+
+
+def test_a_noise_that_reaches_its_tolerance_is_told() -> None:
+    noise = complete_noise({"axis": 0.5, "angle": 0.01})
+    allowed = {"axis": 0.0035, "norm": 0.005, "angle": 0.01, "joint": 0.01}
+    assert [(one.kind, one.message) for one in large_noises(noise, allowed)] == [
+        (
+            "large-noise",
+            "a noise of 500 mm (axis) reaches the tolerance of 3.5 mm: nothing within it can be worse than"
+            " the baseline; a number without a unit is in m",
+        ),
+        (
+            "large-noise",
+            "a noise of 0.572958 deg (angle) reaches the tolerance of 0.572958 deg: nothing within it can be"
+            " worse than the baseline; a number without a unit is in rad",
+        ),
+    ]
+    assert [
+        one.message[:25] for one in large_noises({"axis": 1e-6, "x": 0.01}, {"x": 0.004, "y": 0.004})
+    ] == ["a noise of 10 mm (x) reac"]
+    assert list(large_noises(complete_noise(0.0034), {"axis": 0.0035})) == []
+
+
+@settings(max_examples=50, deadline=None)
+@given(
+    values=hnp.arrays(float, st.integers(1, 30), elements=st.floats(-2.0, 2.0)),
+    missing=st.sets(st.integers(0, 29)),
+)
+def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArray, missing: set[int]) -> None:
+    rows = [row for row in missing if row < len(values)][: len(values) - 1]
+    values[rows] = np.nan
+    count, t = np.arange(len(values)), np.linspace(0.0, 1.0, len(values))
+    measured = Measured("angle", "angle", "rad", values)
+    one = describe(measured, t, count, {"angle": 1.0})
+    assert (one.samples, one.missing) == (len(values) - len(rows), len(rows))
+    above = int(np.count_nonzero(np.abs(values) > 1.0))
+    assert (
+        one.out_of_tolerance == above + len(rows) == int(np.count_nonzero(measured.outside({"angle": 1.0})))
+    )
+    assert one.share_out is not None
+    assert round(one.share_out * len(values)) == one.out_of_tolerance
+    assert one.verdict == ("fail" if above or rows else "pass")
+    free = describe(measured, t, count, {"axis": 1.0})
+    assert (free.verdict, free.out_of_tolerance, free.missing) == (None, None, len(rows))
+
+
+def test_one_sample_is_one_pose(paths: Compared) -> None:
+    assert told(paths({"one": off(1)})) == [
+        ("one-pose", "1 sample compared, all in one pose: the verdict is on that pose alone")
+    ]
+
+
+def test_a_log_at_rest_is_told_and_one_that_turns_about_its_tool_is_not(arms: Compared) -> None:
+    moving = arms({"log": np.zeros((50, 6))}).runs[0]
+    still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)))
+    assert list(thin_evidence(moving)) == list(thin_evidence(still)) == []
+    at_rest = replace(moving.run, q=np.tile(moving.run.q[0], (50, 1)))
+    assert [one.kind for one in thin_evidence(replace(still, run=at_rest))] == ["one-pose"]
+
+
+def test_encoders_that_flicker_are_no_motion(arms: Compared) -> None:
+    moving = arms({"log": np.zeros((50, 6))}).runs[0]
+    flicker = np.where(np.arange(50) % 2, 1.05e-4, 0.0)[:, None]  # as a UR5e at rest was logged
+    for scale, expected in ((1.0, ["one-pose"]), (3.0, [])):
+        run = replace(moving.run, q=np.tile(moving.run.q[0], (50, 1)) + scale * flicker)
+        still = replace(moving, actual=np.tile(moving.actual[0], (50, 1)) + flicker, run=run)
+        assert [one.kind for one in thin_evidence(still)] == expected
+
+
+def test_a_log_that_moves_only_where_it_is_not_compared_is_told(arms: Compared) -> None:
+    moving = arms({"log": np.zeros((50, 6))}).runs[0]
+    q = moving.run.q.copy()
+    q[:20] = q[0]
+    for compared, expected in ((20, ["one-pose"]), (21, [])):
+        kept = {name: getattr(moving, name)[:compared] for name in ("sample", "t_ns")}
+        resting = replace(moving, **kept, actual=np.zeros((compared, 3)), run=replace(moving.run, q=q))
+        assert [one.kind for one in thin_evidence(resting)] == expected
+
+
+def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compared) -> None:
+    whole, early = np.full((1000, 3), 0.001), off(44)
+    result = paths({"early": early, "whole": whole, "nearly": off(990)})
+    assert [run.name for run in result.ranking] == ["nearly", "whole", "early"]
+    assert [result.covered(run) for run in result.runs] == pytest.approx([0.044, 1.0, 0.99], abs=1e-12)
+    assert told(result) == [
+        ("not-covered", "it covers 0.215 s of the 4.995 s of path (4.4 %): the rest was not judged")
+    ]
+
+
+def test_a_large_tolerance_without_a_unit_is_told(paths: Compared) -> None:
+    assert told(paths({"log": off(50)}, tolerance={"axis": 3.5, "norm": 0.1})) == [
+        (
+            "large-tolerance",
+            "a tolerance of 3500 mm (axis) lets anything pass: 3.5 is in m",
+        )
+    ]
+    assert [one.message for one in large_tolerances({"angle": 0.5, "joint": 0.17})] == [
+        "a tolerance of 28.6479 deg (angle) lets anything pass: 0.5 is in rad"
+    ]
+
+
+def test_a_large_tolerance_with_its_unit_is_meant(paths: Compared) -> None:
+    text = "axis=500mm,norm=0.5,path=1m"
+    tolerance = parse_tolerance(text)
+    found = told(paths({"log": off(50)}, tolerance=tolerance, with_unit=kinds_with_unit(text)))
+    assert [message.partition(" lets")[0] for _, message in found] == ["a tolerance of 500 mm (norm)"]
+    assert kinds_with_unit("0.5") == kinds_with_unit("axis=0.5, angle = 1.5") == frozenset()
+    assert kinds_with_unit("± 500 mm") == {"axis"}
+    assert kinds_with_unit("2um", ("axis", "norm")) == {"axis", "norm"}
+
+
+def test_a_tool_centre_point_that_two_logs_recorded_and_nobody_judges_is_told(arms: Compared) -> None:
+    run = arms({"bad": np.zeros((50, 6))}).runs[0].run
+    assert run.tcp is not None
+    for away, expected in ((0.0005, []), (0.005, ["recorded-tcp-apart"])):
+        beside = replace(run, tcp_recorded=run.tcp.position + np.array([0.0, 0.0, away]))
+        assert [one.kind for one in recorded_apart(beside, 1e-3)] == expected
+    usual = "usual up to 5 mm where a controller knows its arm's calibration, which the robot here lacks"
+    more = "more than a calibration makes (5 mm): another robot, tool or base?"
+    for away, shown, cause in ((0.00104, "1.0400", usual), (0.0051, "5.1000", more)):
+        beside = replace(run, tcp_recorded=run.tcp.position + np.array([0.0, 0.0, away]))
+        assert next(recorded_apart(beside, 1e-3)).message == (
+            f"by its joints it is up to {shown} mm from the tool centre point it recorded, {cause};"
+            " this verdict does not judge it, a comparison of bad alone does"
+        )
+    assert list(recorded_apart(run, 1e-3)) == []

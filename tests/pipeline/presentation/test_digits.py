@@ -1,0 +1,53 @@
+"""How a cell is written: digits that a judgement needs, units, advice in the voice of who reads it."""
+
+from __future__ import annotations
+
+import pytest
+
+from urmpipe_models.messages import Hint
+from urmpipe_pipeline.presentation.digits import unit_of, written
+from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Value
+from urmpipe_pipeline.text import NOTHING
+
+
+@pytest.mark.parametrize(
+    ("cell", "with_unit", "without"),
+    [
+        (Value(0.0025, "m"), "2.5000 mm", "2.5000"),
+        (Value(0.0035, "m", given=True), "3.5 mm", "3.5"),
+        (Value(0.00350000001, "m", 0.0035), "3.50000001 mm", "3.50000001"),  # it is out of its limit
+        (Value(-0.5, "rad", signed=True), "-28.6479 deg", "-28.6479"),
+        (Value(0.5, "rad", signed=True), "+28.6479 deg", "+28.6479"),
+        (Value(1.25, "s"), "1.250 s", "1.250"),
+        (Value(0.125, "%"), "12.5 %", "12.5 %"),
+        (Value(0.12501, "%", 0.12502), "12.501 %", "12.501 %"),  # it differs from what it is held against
+        (Value(-0.00004, "1", signed=True), "0.000", "0.000"),
+        (Value(3), "3", "3"),
+        (Value(1, signed=True), "+1", "+1"),
+        (Value(0.25, "N.m"), "0.25 N.m", "0.25"),
+        (Value(None, "m"), NOTHING, NOTHING),
+        (Value(float("nan"), "m", given=True), NOTHING, NOTHING),
+        (Place((0.1, -0.2, 0.30004)), "(0.1000, -0.2000, 0.3000) m", "(0.1000, -0.2000, 0.3000)"),
+        (Judged("fail"), "FAIL", "FAIL"),
+        (Judged(None), NOTHING, NOTHING),
+        (Ref("a log"), "a log", "a log"),
+        ("", NOTHING, NOTHING),
+        (None, NOTHING, NOTHING),
+    ],
+)
+def test_a_cell_is_written_with_its_unit_or_without(cell: Cell, with_unit: str, without: str) -> None:
+    assert (written(cell, unit=True), written(cell)) == (with_unit, without)
+
+
+def test_advice_is_spelled_for_who_reads_it() -> None:
+    advice = Advice("late", (Hint("sync", "auto", "finds an offset"),))
+    assert written(advice) == "late; --sync auto finds an offset"
+    assert written(advice, voice="python") == 'late; sync="auto" finds an offset'
+    assert written(Advice()) == NOTHING
+
+
+def test_a_column_has_a_unit_if_all_its_values_have_that() -> None:
+    assert unit_of([Value(1.0, "m"), None, Value(None, "rad")]) == "mm"
+    assert unit_of([Value(1.0, "m"), Value(1.0, "rad")]) == ""
+    assert unit_of([Place((0.0, 0.0, 0.0))]) == "m"
+    assert unit_of([Value(0.5, "%"), "words"]) == ""

@@ -1,0 +1,118 @@
+"""A kind of result that a test defines is recorded and read back; arrays are read when they are used."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, example, given, settings
+from hypothesis import strategies as st
+from numpy.typing import NDArray
+
+from recording_contents import times_of
+from same_results import assert_same
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
+from urmpipe_pipeline import results
+from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.recording.store import SLICE
+from urmpipe_pipeline.results import Kind
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
+
+ROWS = 2 * SLICE + 3
+
+
+@dataclass(frozen=True, eq=False)
+class Accuracy:
+    """A result of every type of array, some of more rows than are sent at a time."""
+
+    name: str
+    t_ns: IntArray
+    error: FloatArray
+    inside: BoolArray
+    count: NDArray[np.uint16]
+    poses: FloatArray
+    words: TextArray
+    lone: FloatArray
+    recording: Path | None = field(default=None, metadata={"stored": False})
+
+
+def accuracy() -> Accuracy:
+    rng = np.random.default_rng(3)
+    error = rng.normal(size=(ROWS, 2))
+    error[5] = np.nan, -0.0
+    payload = np.array([0x7FF8000000000123, 0x8000000000000000], np.uint64).view(np.float64)
+    error[-1] = payload  # every bit counts, also of what is no number
+    words = np.array(["", "ü \ud800", "out of reach"], np.object_)[rng.integers(0, 3, ROWS)]
+    t_ns = np.cumsum(rng.integers(1, 2**40, ROWS)) + 2**61  # beyond what a float tells apart
+    return Accuracy(
+        "toy", t_ns, error, rng.random(ROWS) < 0.1, rng.integers(0, 2**16, ROWS, np.uint16),
+        rng.normal(size=(ROWS, 3, 3)), words, np.array(0.25),
+    )  # fmt: skip
+
+
+@pytest.fixture
+def known(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Add the kind to those of results, which is all that recording asks for."""
+    monkeypatch.setattr(results, "KINDS", (*results.KINDS, Kind("accuracy", Accuracy)))
+
+
+@pytest.mark.usefixtures("known")
+def test_a_kind_of_ones_own_comes_back_as_it_was(tmp_path: Path) -> None:
+    wanted = accuracy()
+    path = write_recording(wanted, tmp_path / "toy.rrd")
+    assert_same(read_recording(path), wanted)
+    assert read_recording(path).recording == path
+    assert sorted(times_of(path, "/error")) == wanted.t_ns.tolist()
+
+
+def everything(rows: Any) -> list[Any]:
+    """Return what tells two arrays apart."""
+    array = np.asarray(rows)
+    return [array.dtype, array.shape, array.tobytes()]
+
+
+@pytest.mark.usefixtures("known")
+def test_arrays_are_read_when_they_are_used(tmp_path: Path) -> None:
+    wanted = accuracy()
+    back = read_recording(write_recording(wanted, tmp_path / "toy.rrd"), lazy=True)
+    for name in ("t_ns", "error", "inside", "count", "poses"):
+        rows, array = getattr(back, name), getattr(wanted, name)
+        assert (rows.shape, rows.dtype, rows.ndim, len(rows)) == (array.shape, array.dtype, array.ndim, ROWS)
+        for part in (slice(0, 2), slice(SLICE - 1, SLICE + 1), slice(-3, None), slice(None, None, -7), -1, 5):
+            assert everything(rows[part]) == everything(array[part])
+        columns = (slice(10, 20), *[slice(1, None)] * (array.ndim - 1))
+        assert everything(rows[columns]) == everything(array[columns])
+        assert rows._whole is None
+        assert everything(rows[array > 0]) == everything(array[array > 0])
+        assert everything(rows) == everything(array)
+    assert_same(np.diff(back.t_ns), np.diff(wanted.t_ns))
+    assert_same(-back.error * 2 + back.error, -wanted.error * 2 + wanted.error)
+    assert_same(back.error.T, wanted.error.T)
+    assert write_recording(back, tmp_path / "again.rrd")
+
+
+@settings(max_examples=40, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
+@given(first=st.integers(-60, 60), end=st.integers(-60, 60), step=st.sampled_from([1, 2, 7, -1, -3]))
+@example(first=3, end=3, step=1)
+def test_any_slice_is_that_of_the_array(
+    first: int, end: int, step: int, make_run: Callable[..., Run], tmp_path: Path
+) -> None:
+    path, run = tmp_path / "run.rrd", make_run(rows=50)
+    if not path.exists():
+        write_recording(run, path)
+    back = read_recording(path, lazy=True)
+    assert everything(back.q[first:end:step]) == everything(run.q[first:end:step])
+
+
+def test_a_simulation_is_opened_without_its_signals(
+    make_simulation: Callable[..., Simulation], tmp_path: Path
+) -> None:
+    wanted = make_simulation(50)
+    back = read_recording(write_recording(wanted, tmp_path / "a.rrd"), lazy=True)
+    assert all(one.values._whole is None for one in back.signals)
+    assert_same(back.to_dict() | {"recording": None}, wanted.to_dict())

@@ -1,0 +1,229 @@
+"""What cannot be exported is said in one line, and what is there stays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+import pytest
+from scipy.io import savemat
+
+from exported import export_result
+from urmpipe_models.errors import OptionError, OutputError, RecordingError, UrmpipeError
+from urmpipe_pipeline.comparison.comparison import Comparison
+from urmpipe_pipeline.presentation.exports import Times
+from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.tables import (
+    FORMATS,
+    ExportOptions,
+    Format,
+    format_of,
+    lines,
+    mat_file,
+    parquet_file,
+)
+from urmpipe_pipeline.tables.identity import is_export
+from urmpipe_pipeline.tables.lines import differences, texts, write_lines
+from urmpipe_pipeline.tables.write import write_all
+
+
+def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:
+    """What an error of this kind says of its only finding, on the command line."""
+    with pytest.raises(kind) as caught:
+        work()
+    assert len(caught.value.findings) == 1
+    return caught.value.findings[0].sentence("command line")
+
+
+def test_options_that_make_no_sense() -> None:
+    options: Any = ExportOptions
+    assert said(OptionError, lambda: options("xlsx")) == "--to: found xlsx, allowed: csv, parquet, mat, tum"
+    assert said(OptionError, lambda: options("csv", "own")) == "--rows: found own, allowed: grid, file"
+    assert said(OptionError, lambda: options("tum", None, "ik")) == "--tcp: found ik, allowed: fk, recorded"
+    assert said(OptionError, lambda: options("csv", tcp="fk")) == (
+        "--tcp: found fk with a table (csv), allowed: with trajectories; --to tum writes them"
+    )
+
+
+def test_recorded_poses_stand_at_the_rows_of_the_file(run: Run, tmp_path: Path) -> None:
+    work = lambda: export_result(run, tmp_path / "a.tum", ExportOptions("tum", "grid", "recorded"))  # noqa: E731
+    assert said(OptionError, work) == (
+        "--rows: found grid with recorded poses, which stand at other rows, allowed: file"
+    )
+
+
+def test_the_suffix_tells_the_format_unless_it_is_given() -> None:
+    assert [format_of(None, Path(f"a.{to.upper()}")) for to in FORMATS] == list(FORMATS)
+    assert format_of("csv", Path("a.txt")) == "csv"
+    assert said(OptionError, lambda: format_of(None, Path("a.txt"))) == (
+        "--to: found the output a.txt, allowed: csv, parquet, mat, tum, or an output that ends so"
+    )
+    assert format_of(None, None) == "csv"
+
+
+def test_a_comparison_has_the_samples_that_it_compared(comparison: Comparison, tmp_path: Path) -> None:
+    work = lambda: export_result(comparison, tmp_path / "a.csv", ExportOptions("csv", "file"))  # noqa: E731
+    assert said(OptionError, work) == "--rows: found file with a comparison, allowed: compared"
+
+
+def test_a_trajectory_needs_poses(run: Run, tmp_path: Path) -> None:
+    def of(changed: Run, **options: Any) -> str:
+        message = said(
+            RecordingError,
+            lambda: export_result(changed, tmp_path / "a.tum", ExportOptions("tum", **options)),
+        )
+        assert not list(tmp_path.iterdir())
+        return message
+
+    assert of(replace(run, robot=None)) == (
+        "no robot, so no pose; urmpipe ingest --robot NAME|FILE gives it; --tcp recorded takes what the log"
+        " recorded"
+    )
+    assert of(run, tcp="recorded") == (
+        "no recorded orientation, so no recorded pose; --tcp fk takes the poses of a robot"
+    )
+    assert of(replace(run, q=np.full_like(run.q, np.nan))) == "no row with a pose"
+
+
+def test_a_log_that_came_from_no_file_has_no_columns_of_one(run: Run, tmp_path: Path) -> None:
+    made = replace(run, log=replace(run.log, columns=()))
+    work = lambda: export_result(made, tmp_path / "a.csv", ExportOptions("csv", "file"))  # noqa: E731
+    assert (
+        said(RecordingError, work)
+        == "the log was not read from a file; --rows grid writes what was made of it"
+    )
+
+
+@pytest.mark.parametrize("to", ["parquet", "mat", "tum"])
+def test_an_export_of_ours_is_replaced_and_nothing_else(run: Run, tmp_path: Path, to: Format) -> None:
+    path = tmp_path / f"a.{to}"
+    export_result(run, path, ExportOptions(to))
+    assert is_export(path)
+    export_result(replace(run, name="other"), path, ExportOptions(to))
+    work = lambda: export_result(run, path, ExportOptions(to), [path])  # noqa: E731
+    assert said(OutputError, work) == "found an input of this command, allowed: any other name for the export"
+    for foreign in (b"", b"precious", b"# timestamp tx ty tz", b"PAR1", b"MATLAB 5.0 MAT-file Platform: nt"):
+        path.write_bytes(foreign)
+        work = lambda: export_result(run, path, ExportOptions(to))  # noqa: E731
+        assert said(OutputError, work) == (
+            "found a file that is no export of urmpipe's, allowed: a new name, or such an export to replace"
+        )
+        assert path.read_bytes() == foreign
+
+
+def test_a_csv_is_never_replaced_even_if_it_is_ours(run: Run, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    export_result(run, path, ExportOptions("csv"))
+    before = path.read_bytes()
+    assert said(OutputError, lambda: export_result(run, path, ExportOptions("csv", "file"))) == (
+        "found a file, allowed: a new name; nothing in a CSV tells whose it is, so none is replaced"
+    )
+    assert path.read_bytes() == before
+
+
+def test_what_a_mat_file_cannot_hold_is_said_before_it_is_written(
+    run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(mat_file, "LARGEST", 1000)
+    message = said(OutputError, lambda: export_result(run, tmp_path / "a.mat", ExportOptions("mat")))
+    size = 40 * 8 * (2 + 3 * 6 + 5 * 3)
+    assert message == (
+        f"found {size} bytes, allowed: 1000 in a MAT file of version 5; --to parquet takes all"
+    )
+    assert not list(tmp_path.iterdir())
+
+
+def test_of_several_trajectories_all_are_written_or_none(comparison: Comparison, tmp_path: Path) -> None:
+    (tmp_path / "c-b-actual.tum").write_text("precious")
+    with pytest.raises(OutputError):
+        export_result(comparison, tmp_path / "c.tum", ExportOptions("tum"))
+    assert [path.name for path in tmp_path.iterdir()] == ["c-b-actual.tum"]
+
+
+def test_a_file_that_reads_back_otherwise_does_not_get_its_name(tmp_path: Path) -> None:
+    def write(part: Path) -> list[str]:
+        """Write a file, and find the fault that a full disk would leave."""
+        part.write_text("half")
+        return ["the head", "row 2"]
+
+    message = said(OutputError, lambda: write_all([tmp_path / "a.csv"], [write], "csv", ()))
+    assert message == "reads back otherwise than written: the head, row 2"
+    assert not list(tmp_path.iterdir())
+
+
+def test_other_numbers_at_the_ends_of_a_parquet_file_are_seen(tmp_path: Path) -> None:
+    def table(*values: float) -> Any:
+        return pa.table({"q1": pa.array(values, pa.float64())})
+
+    pq.write_table(table(1.0, 2.0, 3.0), tmp_path / "a.parquet")
+    found = [
+        parquet_file.differences(one, tmp_path / "a.parquet")
+        for one in (
+            table(1, 9, 3),
+            table(0, 2, 3),
+            table(1, 2, 4),
+            table(1, 2),
+            table(1, 2, 3).rename_columns(["q2"]),
+        )
+    ]
+    assert found == [[], ["row 1"], ["row 3"], ["3 rows of 2"], ["the schema", "row 1", "row 3"]]
+
+
+def test_other_numbers_at_the_ends_of_a_mat_file_are_seen(tmp_path: Path) -> None:
+    def fields(*values: float, name: str = "a", units: tuple[str, ...] = ("rad",)) -> dict[str, Any]:
+        return {"name": name, "q": np.array(values), "units": {"q": mat_file.cells(units)}}
+
+    savemat(tmp_path / "a.mat", {"run": fields(1, 2, np.nan)}, oned_as="column")
+    others = [
+        fields(1, 9, np.nan),
+        fields(0, 2, np.nan),
+        fields(1, 2, 3),
+        fields(1, 2),
+        fields(1, 2, np.nan, name=""),
+        fields(1, 2, np.nan, units=("deg",)),
+        fields(1, 2, np.nan, units=("rad", "rad")),
+    ]
+    found = [mat_file.differences("run", one, tmp_path / "a.mat") for one in others]
+    expected = [[], ["run.q"], ["run.q"], ["run.q"], ["run.name"], ["run.units.q{1}"], ["run.units.q"]]
+    assert found == expected
+
+
+@pytest.mark.parametrize(
+    ("damage", "found"),
+    [
+        (lambda text: text, []),
+        (lambda text: text.replace("a,b", "a,c"), ["the head"]),
+        (lambda text: text[: text.rindex("0.002")], ["2 rows of 3", "row 3"]),
+        (lambda text: text.replace("0.000,1", "0.000,2"), ["row 1"]),
+        (lambda text: text.replace("0.002,\n", "0.002,0\n"), ["row 3"]),
+        (lambda text: text.replace("0.002", "0.003"), ["row 3"]),
+        (lambda text: text.replace("0.000", "0.001"), ["row 1"]),
+        (lambda text: text.replace("0.000,1", "0.000,one"), ["row 1"]),
+        (lambda text: "", ["the head", "0 rows of 3", "row 1", "row 3"]),
+    ],
+)
+def test_damage_at_head_count_or_ends_is_seen(
+    tmp_path: Path, damage: Callable[[str], str], found: list[str]
+) -> None:
+    columns = texts([Times(np.array([0, 1_000_000, 2_000_000]), "s"), np.array([1.0, 2.5, np.nan])])
+    path = tmp_path / "a.csv"
+    write_lines(path, "a,b\n", columns, ",")
+    assert path.read_text() == "a,b\n0.000,1\n0.001,2.5\n0.002,\n"
+    path.write_text(damage(path.read_text()))
+    assert differences(path, "a,b\n", columns, ",") == found
+
+
+def test_slices_do_not_show(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    columns = texts(
+        [Times(np.arange(10) * 10**6, "ms"), np.arange(10) / 4, np.array([f"r{k}" for k in range(10)])]
+    )
+    write_lines(tmp_path / "whole", "", columns, " ")
+    monkeypatch.setattr(lines, "SLICE", 3)
+    write_lines(tmp_path / "sliced", "", columns, " ")
+    assert (tmp_path / "sliced").read_bytes() == (tmp_path / "whole").read_bytes()
+    assert (tmp_path / "whole").read_text().splitlines()[7] == "7 1.75 r7"

@@ -1,0 +1,57 @@
+"""Solved targets made of joint values: their targets are where those bring the tool."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.inverse.solutions import Solutions
+from urmpipe_models.inverse.targets import Targets, targets_of
+from urmpipe_pipeline.joint_log import SourceFile
+from urmpipe_pipeline.provenance import provenance
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
+
+FILE = SourceFile("targets.csv", "0" * 64, 123)
+
+
+def solved(
+    name: str,
+    chain: Chain,
+    q: FloatArray,
+    t_ns: IntArray | None = None,
+    *,
+    others: dict[str, FloatArray] | None = None,
+    reasons: tuple[str, ...] = (),
+    targets: Targets | None = None,
+    **rest: Any,
+) -> SolvedTargets:
+    """Return targets with the solution chosen for each.
+
+    Args:
+        name: What they are called.
+        chain: The arm.
+        q: The solution chosen for each target, shape (n, joints); NaN where there is none.
+        t_ns: Their times, shape (n,), from any start; None without times.
+        others: Further branches by name, shape (n, joints) each: all are requested then.
+        reasons: Why a target has none, n of them.
+        targets: Where the tool shall be; by default where the joint values bring it.
+        rest: Other fields.
+    """
+    every = np.stack([q, *(others or {}).values()], axis=1)
+    n, k = every.shape[:2]
+    texts = np.full((n, k), "", dtype=np.object_)
+    texts[:, 0] = reasons or ""
+    start = 0 if t_ns is None or not len(t_ns) else int(t_ns[0])
+    made = SolvedTargets(
+        name=name, robot=chain, method="iterative", row=np.arange(1, n + 1),
+        t_ns=None if t_ns is None else t_ns - start, clock_start_ns=start,
+        targets=targets_of(chain, q) if targets is None else targets,
+        solutions=Solutions(every, ("chosen", *(others or {})), texts), chosen=np.zeros(n, dtype=np.intp),
+        miss=np.zeros((n, k)), angle=np.zeros((n, k)), every=others is not None, branches=None, path=None,
+        warnings=(), provenance=provenance("ik", {"robot": chain.name}, [FILE]),
+    )  # fmt: skip
+    return replace(made, **rest)
