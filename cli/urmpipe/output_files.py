@@ -63,7 +63,7 @@ def recorded(
     if output is None:
         return result
     written = write_recording(result, Path(output), inputs, progress)
-    return replace(result, recording=written)  # type: ignore[type-var] - every result is a dataclass
+    return replace(result, recording=written)  # type: ignore[type-var]
 
 
 def _refuse_shared(targets: Mapping[OutputKind, Path]) -> None:
