@@ -85,6 +85,8 @@ def continuous_rotations(rotation: FloatArray, form: RotationForm) -> FloatArray
 def _of_present(values: FloatArray, work: Callable[[FloatArray], FloatArray]) -> FloatArray:
     """Return a record worked on without its missing samples."""
     present = ~np.isnan(values).any(axis=1)
+    if present.all():
+        return work(values)
     result = np.full_like(values, np.nan)
     result[present] = work(values[present])
     return result
@@ -119,15 +121,25 @@ def _vectors(v: FloatArray) -> FloatArray:
 
 
 def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
-    """Return Euler angles in [rad], shape (n, 3), of both families the one nearest to the sample before."""
-    if not (np.abs(np.diff(angles, axis=0)) > SMALL_STEP).any():
-        return angles + 0.0  # the other family is further off at every step
-    other = angles * np.array([1.0, -1.0, 1.0]) + apart
-    own, across = (_distance(one[1:], angles[:-1]) for one in (angles, other))
-    switches = np.append(False, across < own)[: len(angles)]
-    swapped = np.cumsum(switches) % 2 == 1
-    family = np.where(swapped[:, np.newaxis], other, angles)
-    return family + FULL_TURN * _nearest_turns(family)
+    """Return Euler angles in [rad], shape (n, 3), of both families the one nearest to the sample before.
+
+    Between two samples that step little, neither the family nor the turns change.
+    """
+    steep = np.flatnonzero((np.abs(np.diff(angles, axis=0)) > SMALL_STEP).any(axis=1)) + 1
+    if not len(steep):
+        return angles + 0.0
+    before, after = angles[steep - 1], angles[steep]
+    own, across = (_distance(one, before) for one in (after, _other(after, apart)))
+    lengths = np.diff(steep, prepend=0, append=len(angles))
+    swapped = np.append(False, np.cumsum(across < own) % 2 == 1)
+    family = np.where(np.repeat(swapped, lengths)[:, np.newaxis], _other(angles, apart), angles)
+    turns = np.cumsum(np.rint((family[steep] - family[steep - 1]) / FULL_TURN), axis=0)
+    return family - FULL_TURN * np.repeat(np.vstack((np.zeros(3), turns)), lengths, axis=0)
+
+
+def _other(angles: FloatArray, apart: FloatArray) -> FloatArray:
+    """Return the other Euler angles in [rad] of the same rotations, shape (n, 3)."""
+    return np.asarray(angles * np.array([1.0, -1.0, 1.0]) + apart)
 
 
 def _distance(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -74,6 +74,12 @@ def rgb(colour: str) -> tuple[int, int, int]:
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
+def colour_word(colour: str) -> str:
+    """Return the word for a colour of lines in space; empty where it has none."""
+    words = {REFERENCE_COLOUR: "grey", DEVIATION_COLOUR: "crimson"}
+    return (words | {other: word for word, other in GHOST_COLOURS.items()}).get(colour, "")
+
+
 def ghost_colour(index: int) -> str:
     """Return the colour of a further branch of solved joint values as #rrggbb, counted from 0."""
     return list(GHOST_COLOURS.values())[index % len(GHOST_COLOURS)]

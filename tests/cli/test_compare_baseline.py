@@ -11,6 +11,7 @@ import pytest
 
 from four_logs import ALLOWED, Captured, compare, lay_logs, names, read_lines, recorded, said
 from urmpipe.main import run
+from urmpipe_pipeline.comparison.change_wording import since_words
 
 
 @pytest.fixture(autouse=True)
@@ -83,7 +84,9 @@ def test_the_report_of_a_recording_says_what_the_exit_code_said(folder: Path) ->
     page = Path("now.html").read_text(encoding="utf-8")
     assert "<title>FAIL: slack-against-wanted" in page
     assert ", by the joints on both sides, but worse than the baseline good-against-wanted" in page
-    assert "Against the baseline good-against-wanted: " in page
+    assert "Against the baseline good-against-wanted" in page
+    held = recorded("now.rrd").baseline
+    assert held is not None and since_words(held) in page
 
 
 def test_a_noise_in_mm_without_its_unit_is_told(capsys: Captured) -> None:

@@ -71,18 +71,6 @@ def test_what_is_given_replaces_the_default_tolerance_whole(capsys: Captured) ->
     assert told["runs"][0]["delta"]["x"]["verdict"] is None
 
 
-def test_the_help_says_what_a_tolerance_is(capsys: Captured) -> None:
-    assert run(["compare", "--help"]) == 0
-    text = " ".join(capsys.readouterr().out.split())
-    assert "[default: 0.0035]" in text
-    assert (
-        "as axis=3.5mm,norm=5mm,angle=0.5deg. It replaces the default whole: what is not named is not judged."
-        in text
-    )
-    assert "joint (rad, mrad, deg; m of joints that slide)" in text
-    assert "worse is exit code 1" in text
-
-
 def test_all_that_is_wrong_with_a_tolerance_is_told_at_once(capsys: Captured) -> None:
     assert compare("good.csv", "--tolerance", "axis=3 inch,roll=1deg,norm=5mm") == 2
     assert capsys.readouterr().err.splitlines() == [

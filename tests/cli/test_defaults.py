@@ -206,11 +206,6 @@ def test_a_map_is_never_replaced_by_the_map_that_it_led_to(lab: Path, capsys: Ca
     assert capsys.readouterr().err.startswith("error: m.toml: found an input of this command, allowed: ")
 
 
-def test_a_period_beside_a_clock_is_said_not_to_be_used(lab: Path, capsys: Captured) -> None:
-    assert run([*INGEST, "--period", "8ms", "--explain"]) == 0
-    assert "--period is not used, since the log has a clock; --time none" in capsys.readouterr().err
-
-
 def test_options_of_logs_are_refused_with_recordings_alone(lab: Path, capsys: Captured) -> None:
     assert run([*INGEST, "-q", "--robot", "ur5e"]) == 0
     both = ["compare", "log.rrd", "log.rrd", "--unit", "rad", "--repair"]

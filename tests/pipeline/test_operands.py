@@ -11,7 +11,7 @@ import pytest
 from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.errors import LogError, OptionError, UrmpipeError
 from urmpipe_pipeline.operands import load_runs
-from urmpipe_pipeline.recording import write_recording
+from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.section import Cell, Section, Table, Value
 
 
@@ -21,6 +22,11 @@ def plain(cell: Cell) -> Any:
 def facts(section: Section) -> dict[str, Any]:
     """The facts of a section by their names."""
     return {fact.name: plain(fact.value) for fact in section.facts}
+
+
+def figures(section: Section) -> list[Figure]:
+    """The plots of a section."""
+    return [one for one in section.figures() if isinstance(one, Figure)]
 
 
 def every_section(section: Section) -> Iterator[Section]:

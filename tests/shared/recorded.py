@@ -9,13 +9,13 @@ import numpy as np
 from rerun.chunk import RrdReader
 
 
-def rows_of(path: Path, entity: str, name: str) -> dict[int, list[Any]]:
-    """Return one component of an entity by its times in [ns]."""
+def rows_of(path: Path, entity: str, name: str, timeline: str = "t") -> dict[int, list[Any]]:
+    """Return one component of an entity by its times in [ns], or by another timeline."""
     found: dict[int, list[Any]] = {}
     for chunk in RrdReader(path).store().stream().filter(content=entity, components=name):
         batch = chunk.to_record_batch()
-        if "t" in batch.schema.names:
-            times = batch.column("t").to_numpy(zero_copy_only=False).astype(np.int64).tolist()
+        if timeline in batch.schema.names:
+            times = batch.column(timeline).to_numpy(zero_copy_only=False).astype(np.int64).tolist()
             found |= zip(times, batch.column(name).to_pylist(), strict=True)
     return dict(sorted(found.items()))
 

@@ -47,11 +47,11 @@ def largest(one: Statistics | None, *, most: bool = False) -> Value | None:
 def deviation_facts(one: Deviation, result: Comparison) -> Iterator[Fact]:
     """Yield what is to be known of a compared log, what decided first."""
     held, covered = one.decisive, result.covered(one)
-    yield Fact(size_of(held), largest(held), used_words(held))
-    yield Fact("Time", Value(held.t_max, "s"))
+    yield Fact(size_of(held), largest(held), used_words(held), brief=False)
+    yield Fact("Time", Value(held.t_max, "s"), brief=False)
     yield Fact("Data row", Value(one.row(held)), brief=False)
-    yield Fact("Position", Place(spot_at(one.place(held))))
-    yield from _furthest_joint(one)
+    yield Fact("Position", Place(spot_at(one.place(held))), brief=False)
+    yield from (replace(fact, brief=False) for fact in _furthest_joint(one))
     compared = f"{text.counted(len(one.sample), 'sample')} over {text.seconds(one.duration)} s"
     yield Fact("Compared", compared)
     yield Fact(

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import fields
+from dataclasses import fields, replace
 from typing import TypeAlias
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.deviation import Deviation, Statistics
+from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.facts import alignment_words, largest
 from urmpipe_pipeline.comparison.symbols import size_of, symbol
 from urmpipe_pipeline.palette import run_colour
@@ -36,8 +36,13 @@ def ranking_tables(result: Comparison) -> tuple[Table, ...]:
     note = "The logs are ranked by the largest share of a tolerance that each uses. Covered: share of the"
     note += " reference within the log's time."
     left_out = "Left out: samples of the log without a counterpart or without a value."
+    whole = min(map(result.covered, result.runs)) >= WHOLE
+    columns = (
+        replace(one, brief=False) if one.key == "covered" and whole else one
+        for one in columns_of(result.ranking, far)
+    )
     return (
-        Table("Largest deviations, from best to worst", columns_of(result.ranking, far), note),
+        Table("Largest deviations, from best to worst", tuple(columns), note),
         Table("When, where and how compared", tuple(_conditions(result, names)), left_out),
     )
 
@@ -82,7 +87,7 @@ def _conditions(result: Comparison, names: Heads) -> Iterator[Column]:
     brief |= {"sync_offset"} if any(one.sync.offset for one in runs) else set()
     brief |= {"left_out"} if any(one.left_out for one in runs) else set()
     for column in columns_of(runs, heads):
-        yield Column(column.key, column.title, column.cells, column.key in brief)
+        yield replace(column, brief=column.key in brief)
 
 
 def _stretch(one: Deviation, name: str) -> Value | None:

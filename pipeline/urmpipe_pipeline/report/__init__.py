@@ -1,8 +1,8 @@
 """The report: one HTML file that a person reads in a minute and can keep, send and print.
 
-Data goes one way: presentations -> `summary` (banner, cards, results side by side), `tables` (cells, facts),
-`figures` and `space` (for plotly.js as plain dicts, built on `spec` and `traces`) -> `page` (what stands
-where) -> `render` (assets/template.html.jinja) and `figure_files` (SVG, PNG, drawn by `headless`).
+Data goes one way: presentations -> `summary` (banner, cards, results side by side), `tables` (cells and
+facts), `figures` and `space` (for plotly.js as plain dicts, built on `spec` and `traces`) -> `page` (what
+stands where) -> `render` (assets/template.html.jinja) and `figure_files` (SVG, PNG, drawn by `headless`).
 """
 
 from urmpipe_pipeline.report.figure_files import FigureFile, FigureOptions

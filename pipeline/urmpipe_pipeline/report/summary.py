@@ -119,7 +119,7 @@ def worst_first(shown: Sequence[tuple[Presentation, Anchors]]) -> list[tuple[Pre
 
 
 def cards_of(shown: Sequence[tuple[Presentation, Anchors]], *, plain: bool) -> tuple[Card, ...]:
-    """Return a card for each judged part, the worst first.
+    """Return a card for each judged part that has something to tell, the worst first.
 
     Args:
         shown: Results, each with where its sections are.
@@ -127,20 +127,21 @@ def cards_of(shown: Sequence[tuple[Presentation, Anchors]], *, plain: bool) -> t
     """
     found = []
     for one, anchors in shown:
-        sections = list(judged_sections(one.body)) or ([one.body] if plain else [])
+        sections = list(judged_sections(one.body)) or ([one.body] if plain or one.verdict else [])
         for section in sections:
             beside = len(shown) > 1 and section is not one.body
             name = f"{section.title} ({one.name})" if beside else section.title
             card = _card(section, name, one.word, anchors)
-            found.append((_badness(section.verdict, _used(section)), card))
+            if card.size or card.facts:
+                found.append((_badness(section.verdict, _used(section)), card))
     return tuple(card for _, card in sorted(found, key=lambda pair: pair[0]))
 
 
 def judged_sections(section: Section) -> Iterator[Section]:
-    """Yield the innermost sections with a verdict, and one that fails for a reason of its own."""
+    """Yield the innermost sections with a verdict and facts, and one that fails for a reason of its own."""
     below = [found for child in section.sections for found in judged_sections(child)]
     alone = section.verdict == "fail" and all(one.verdict != "fail" for one in below)
-    if section.verdict and (alone or not below):
+    if section.verdict and (alone if below else section.facts):
         yield section
     yield from below
 

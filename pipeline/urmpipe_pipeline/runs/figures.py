@@ -51,7 +51,7 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
         return
     axis = "time" if run.timed else "the rows"
     joints = f"Joint values of {run.name} over {axis}: {', '.join(run.log.joints)}."
-    after = joint_panels(run, "joints", run.q, times_of(run), _marks(run))
+    after = joint_panels(run, "after" if run.audit else "joints", run.q, times_of(run), _marks(run))
     if not run.timed:
         yield Figure("Joints", "A pose a row: no motion joins them.", joints, (View("Joints", after),))
         return
@@ -71,7 +71,7 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
         f"{joints} First as in the file, then after {text.counted(wraps, 'repolarization')}.",
         views,
         opened=opened,
-        share=3.0,
+        share=3.4,
     )
 
 
@@ -113,9 +113,8 @@ def speed_figure(name: str, t_ns: IntArray, speed: FloatArray) -> Figure:
     """
     title = "Speed of the tool centre point"
     panel = Panel("‖v‖", "m/s", (Line(speed, ("speed",), NORM),), t_ns, signed=False)
-    return Figure(
-        title, "The norm of its velocity.", f"{title} of {name}.", (View(title, (panel,)),), share=2.0
-    )
+    alt = f"{title} of {name} over time: the norm of its velocity."
+    return Figure(title, "The norm of its velocity.", alt, (View(title, (panel,)),), share=2.0)
 
 
 def motion_figure(run: Run) -> Iterator[Figure]:
@@ -128,7 +127,13 @@ def motion_figure(run: Run) -> Iterator[Figure]:
         return
     if run.tcp is None:
         caption = "As the log recorded it: without a robot there are no kinematics."
-        yield Figure("Motion", caption, f"Motion of {run.name} over time.", tuple(views), share=2.2)
+        yield Figure(
+            "Motion",
+            caption,
+            f"Motion over time, as the log {run.name} recorded it.",
+            tuple(views),
+            share=2.2,
+        )
         return
     point = point_name(run)
     if not run.timed:
@@ -157,15 +162,13 @@ def point_name(run: Run) -> str:
     return f"p{len(run.robot.joints)}" if run.robot is not None else "p"
 
 
-def coordinates(values: FloatArray, symbol: str, words: str = "") -> Line:
-    """Return x, y and z of something in their colours.
+def coordinates(values: FloatArray) -> Line:
+    """Return x, y and z of something in their colours, by these names in all panels.
 
     Args:
-        values: In any unit, shape (n, 3).
-        symbol: Its letter.
-        words: What stands behind the names.
+        values: Shape (n, 3).
     """
-    return Line(values, tuple(f"{symbol}{axis}{words}" for axis in "xyz"), COORDINATES)
+    return Line(values, tuple("xyz"), COORDINATES)
 
 
 def _derivatives(run: Run) -> Iterator[View]:
@@ -177,7 +180,7 @@ def _derivatives(run: Run) -> Iterator[View]:
 def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     """Yield the views of the tool centre point by kinematics."""
     t_ns, points = times_of(run), not run.timed
-    position = replace(coordinates(tcp.position, "p"), points=points)
+    position = replace(coordinates(tcp.position), points=points)
     yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
     if run.timed:
         yield from _point_derivatives(run, tcp)
@@ -190,16 +193,16 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
 
 def _point_derivatives(run: Run, tcp: PointLog) -> Iterator[View]:
     """Yield the views of velocity and acceleration."""
-    yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity, "v"),), run.t_ns),))
+    yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), run.t_ns),))
     size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
-    lines = (coordinates(tcp.acceleration, "a"), size)
+    lines = (coordinates(tcp.acceleration), size)
     yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
 
 
 def _recorded(run: Run) -> Iterator[View]:
     """Yield position and orientation as a log without kinematics recorded them itself."""
     if run.tcp_recorded is not None:
-        yield View("Recorded TCP", (Panel("p", "m", (coordinates(run.tcp_recorded, "p"),), run.t_ns),))
+        yield View("Recorded TCP", (Panel("p", "m", (coordinates(run.tcp_recorded),), run.t_ns),))
     if (values := run.rotation_recorded) is not None:
         names = run.rotation_names  # a quaternion has no unit
         line = Line(values, names, tuple(map(joint_colour, range(len(names)))))

@@ -9,6 +9,7 @@ import numpy as np
 
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
+from urmpipe_pipeline.joint_log import LogColumn
 from urmpipe_pipeline.presentation.parts import (
     columns_of,
     inputs_table,
@@ -46,8 +47,12 @@ def _time_facts(run: Run) -> Iterator[Fact]:
     if not run.timed:
         yield Fact("Rows", f"{run.log.rows}, without times")
         return
-    yield Fact("Rows", f"{run.log.rows} every {text.seconds(run.log.period)} s")
-    yield Fact("Grid", f"{len(run.t_ns)} samples every {text.seconds(run.tsp)} s")
+    for name, count, noun, period in (
+        ("Rows", run.log.rows, "row", run.log.period),
+        ("Grid", len(run.t_ns), "sample", run.tsp),
+    ):
+        every = f" every {text.seconds(period)} s" if count > 1 else ""
+        yield Fact(name, f"{text.counted(count, noun)}{every}")
     yield Fact("Duration", Value(run.duration, "s"))
 
 
@@ -61,6 +66,7 @@ def log_tables(run: Run) -> Iterator[Table]:
     if run.log.joints:
         yield audit_table(run)
     yield inference_table(run)
+    yield columns_table(run)
     yield inputs_table("Input files", run.log.files)
     yield provenance_table(run.provenance)
 
@@ -96,14 +102,23 @@ def inference_table(run: Run, *, brief: bool = False) -> Table:
     rows: list[tuple[Cell, ...]]
     rows = [(one.what, one.value, one.evidence, Advice(hints=one.hints)) for one in run.log.inferences]
     known = {one.what for one in run.log.inferences}
-    units = ((f"unit of {column}", unit) for column, unit in run.log.units.items())
-    rows += [(what, unit, "as read", None) for what, unit in units if what not in known]
     if "robot" not in known and run.robot is not None:
         rows.append(("robot", run.robot.name, run.robot.description, Advice(hints=(Hint("robot"),))))
     heads = {"what": "Subject", "found": "Found", "evidence": "Why", "otherwise": "Otherwise"}
     table = table_of(f"What was inferred ({len(rows)})", heads, rows, brief=brief, folded=True)
     *others, last = table.columns
     return replace(table, columns=(*others, replace(last, brief=False)))
+
+
+def columns_table(run: Run) -> Table:
+    """Return the columns of the file that were used, and in which units they were read."""
+    heads: dict[str, tuple[str, Callable[[LogColumn], Cell]]] = {
+        "name": ("Column", lambda one: one.name),
+        "role": ("Holds", lambda one: one.role),
+        "unit": ("Unit", lambda one: one.unit),
+    }
+    columns = columns_of(run.log.columns, heads)
+    return Table(f"Columns ({len(run.log.columns)})", columns, brief=False, folded=True)
 
 
 def log_events(run: Run) -> Iterator[Event]:

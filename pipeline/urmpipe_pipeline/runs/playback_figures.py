@@ -32,10 +32,9 @@ def playback_figures(run: Run) -> Iterator[Figure | SpaceFigure]:
 def _point_figure(run: Run, after: PointLog, played: Playback) -> Figure:
     """Return position, speed and acceleration as the raw joints move the tool centre point, and after."""
     t_ns, name = _times(played), point_name(run)
-    before = coordinates(played.position, "p", " before"), coordinates(after.position, "p", " after")
     panels = [
-        Panel(f"{name} before", "m", before[:1], t_ns),
-        Panel(f"{name} after", "m", before[1:], run.t_ns),
+        Panel(f"{name} before", "m", (coordinates(played.position),), t_ns),
+        Panel(f"{name} after", "m", (coordinates(after.position),), run.t_ns),
     ]
     for symbol, unit, raw, right in (
         ("v", "m/s", played.velocity, after.velocity),

@@ -11,7 +11,6 @@ from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table
 from urmpipe_pipeline.presentation.section import (
     Block,
     Column,
-    Fact,
     Judged,
     Presentation,
     Ref,
@@ -23,10 +22,10 @@ from urmpipe_pipeline.runs.figures import run_figures
 from urmpipe_pipeline.runs.parts import (
     audit_table,
     audit_words,
+    columns_table,
     inference_table,
     log_events,
     log_facts,
-    robot_words,
 )
 from urmpipe_pipeline.runs.playback_figures import playback_figures
 from urmpipe_pipeline.runs.results import Run
@@ -50,7 +49,7 @@ def present(run: Run) -> Presentation:
         name=run.name,
         headline=f"{run.name}: {text.counted(run.log.rows, 'row')}, {audit_words(run)}",
         verdict=None,
-        facts=(Fact("Robot", robot_words(run)), Fact("Duration", duration)),
+        facts=(),
         body=body,
         word="ingested",
         opens_at_ns=int(run.t_ns[0]),
@@ -88,5 +87,6 @@ def _page(run: Run) -> Iterator[Block]:
     """Yield what only a page shows of a log."""
     yield from playback_figures(run)
     yield from path_figure(run)
+    yield columns_table(run)
     yield inputs_table("Input files", run.log.files)
     yield provenance_table(run.provenance)

@@ -194,9 +194,10 @@ def unreached_facts(one: SolvedTargets) -> Iterator[Fact]:
 def _stretches(one: SolvedTargets) -> Iterator[tuple[list[int], str]]:
     """Yield stretches of rows, from 0, that have no solution for one reason but for its numbers, or have one.
 
-    The reason is that of the row in the middle where the numbers differ; empty of rows with a solution.
+    The reason is the first of a row's, of the row in the middle where the numbers differ; empty of rows with a
+    solution.
     """
-    reasons = [reason or "" for reason in one.reasons]
+    reasons = [(reason or "").split("; ")[0] for reason in one.reasons]
     for _, some in groupby(range(len(reasons)), lambda row: NUMBER.sub("#", reasons[row])):
         rows = list(some)
         middle = rows[len(rows) // 2]

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from solved import solved
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.urm import urm_chain
@@ -22,7 +23,7 @@ from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarnin
 from urmpipe_pipeline.provenance import provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.solved_targets.drawn_run import Ghost, goals_of, row_times, solved_run
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 LENGTHS = (0.243215, 0.212430, 0.212430, 0.212430, 0.212430, 0.212430, 0.042215)
 TILT = math.radians(52.0)
@@ -30,7 +31,7 @@ PERIOD_NS = 5_000_000
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
-MakeSolved = Callable[..., Run]
+MakeSolved = Callable[..., SolvedTargets]
 
 
 def arm() -> Chain:
@@ -115,21 +116,20 @@ def slow_motion(rows: int) -> FloatArray:
 
 def build_solved(
     rows: int = 40, timed: bool = True, names: tuple[str, ...] = BRANCHES, robot: Chain | None = None
-) -> Run:
-    """Return a solved run: rows 5 to 8 unreachable, and ghost k there from row 2 k on, 20 to 29 apart."""
+) -> SolvedTargets:
+    """Return solved targets: rows 5 to 8 out of reach; ghost k is there from row 2 k on, but for 20 to 29."""
     chain, q = robot or load_robot("ur5e"), slow_motion(rows)
-    times = np.arange(rows) * STEP_NS if timed else row_times(rows)
     targets = targets_of(chain, q)
     q[5:9] = np.nan
-    reasons = [TOO_FAR if 5 <= k < 9 else "" for k in range(rows)]
-    ghosts = []
+    reasons = tuple(TOO_FAR if 5 <= k < 9 else "" for k in range(rows))
+    others = {}
     for k, name in enumerate(names):
         there = np.r_[2 * k : min(20, rows), 30:rows] if rows > 30 else np.arange(min(k, rows - 1), rows)
-        ghosts.append(Ghost(name, times[there], slow_motion(rows)[there] + 0.3 * (k + 1)))
-    return solved_run(
-        "targets", chain, times if timed else None, q, goals=goals_of(targets, times, reasons), ghosts=ghosts,
-        files=[SourceFile("targets.csv", "0" * 64, 123)], options={"robot": "ur5e", "all": True},
-    )  # fmt: skip
+        others[name] = np.full_like(q, np.nan)
+        others[name][there] = slow_motion(rows)[there] + 0.3 * (k + 1)
+        others[name][5:9] = np.nan
+    t_ns = np.arange(rows) * STEP_NS if timed else None
+    return solved("targets", chain, q, t_ns, others=others, reasons=reasons, targets=targets)
 
 
 def arm_of_shapes(folder: Path) -> Path:

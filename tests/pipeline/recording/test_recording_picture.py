@@ -15,6 +15,7 @@ import pytest
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray
+from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -34,10 +35,11 @@ from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
+from urmpipe_pipeline.solved_targets.result import SolvedTargets
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
-MakeSolved = Callable[..., Run]
+MakeSolved = Callable[..., SolvedTargets]
 Picture = NDArray[np.uint8]
 
 DRIVERS = sorted(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
@@ -186,12 +188,14 @@ def test_a_branch_in_the_viewer_is_there_only_where_there_is_such_a_solution(
     viewer: Any, make_solved: MakeSolved, tmp_path: Path
 ) -> None:
     """At 0.5 s neither the arm is there, whose joints have the same colours, nor a branch."""
-    run = make_solved(rows=60, names=("up", "down"))
-    assert run.goals is not None
-    q = run.q.copy()
+    one = make_solved(rows=60, names=("up", "down"))
+    q = np.array(one.solutions.q)
     q[20:30] = np.nan
-    run = replace(run, q=q, log=replace(run.log, q=q), goals=replace(run.goals, quat_xyzw=None))
-    path = write_recording(run, tmp_path / "solved.rrd")
+    reasons = np.array(one.solutions.reasons)
+    reasons[20:30] = "too far"
+    solutions = replace(one.solutions, q=q, reasons=reasons)
+    one = replace(one, solutions=solutions, targets=Targets(one.targets.position), angle=None)
+    path = write_recording(one, tmp_path / "solved.rrd")
     viewer.open(str(path))
     ghosts = [ghost_colour(0), ghost_colour(1)]
 

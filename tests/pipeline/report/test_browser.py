@@ -10,13 +10,14 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.presentation.section import Presentation
-from urmpipe_pipeline.report import render_report
+from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
+from urmpipe_pipeline.presentation.section import Presentation, Section
+from urmpipe_pipeline.report import render_report, spec
 from urmpipe_pipeline.report.page import lay_out
-from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.results import present
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
@@ -83,7 +84,7 @@ def report(shown: list[Presentation], tmp_path_factory: pytest.TempPathFactory) 
 
 
 @pytest.fixture(scope="module")
-def figures(shown: list[Presentation]) -> list[Figure]:
+def figures(shown: list[Presentation]) -> list[spec.Figure]:
     """Every figure of the page, from the top."""
     return [figure for _, figure in lay_out(shown).figures]
 
@@ -123,7 +124,7 @@ def sideways(page: Page) -> int:
     return int(page.evaluate("document.documentElement.scrollWidth - document.documentElement.clientWidth"))
 
 
-def test_a_simulation_is_drawn_and_its_drawing_runs_no_script(
+def test_a_drawing_is_seen_and_runs_no_script(
     browser: Browser, make_simulation: Callable[..., Simulation], tmp_path: Path
 ) -> None:
     script = "<script>alert(1)</script><rect onclick='alert(2)' width='9' height='9'/></svg>"
@@ -136,11 +137,28 @@ def test_a_simulation_is_drawn_and_its_drawing_runs_no_script(
         image = page.locator(".drawing img")
         assert image.evaluate("image => [image.complete, image.naturalWidth]") == [True, 640]
         image.click()
+    with opened(browser, path, width=390, phone=True) as page:
+        scroll_through(page)
+        assert sideways(page) == 0
+
+
+def test_small_figures_stand_side_by_side(browser: Browser, tmp_path: Path) -> None:
+    t_ns = np.arange(100, dtype=np.int64) * 10_000_000
+    line = Line(np.sin(t_ns / 1e8), ("wave",), ("#c25000",))
+    small = Figure(
+        "Wave", "A wave.", "A wave over time.", (View("wave", (Panel("wave", "m", (line,), t_ns),)),)
+    )
+    two, one = Section("two", figures=lambda: [small, small]), Section("one", figures=lambda: [small])
+    toy = Presentation("toy", "it is", None, (), Section("toy", sections=(two, one)))
+    path = tmp_path / "toy.html"
+    path.write_text(render_report([toy]), encoding="utf-8")
+    with opened(browser, path) as page:
+        scroll_through(page)
         plots = page.locator(".pairs .plot")
         first, second, alone = (box for box in (plots.nth(k).bounding_box() for k in range(3)) if box)
-        assert first["y"] == second["y"]  # the two plots of the meter, side by side
+        assert first["y"] == second["y"]
         assert first["x"] + first["width"] <= second["x"]
-        assert alone["width"] == second["x"] + second["width"] - first["x"]  # the only one of its block
+        assert alone["width"] == second["x"] + second["width"] - first["x"]  # the only one of its part
     with opened(browser, path, width=390, phone=True) as page:
         scroll_through(page)
         assert sideways(page) == 0
@@ -161,7 +179,7 @@ def test_the_verdict_is_seen_first(browser: Browser, report: Path) -> None:
 
 
 def test_figures_are_drawn_before_anybody_scrolls(
-    browser: Browser, report: Path, figures: list[Figure]
+    browser: Browser, report: Path, figures: list[spec.Figure]
 ) -> None:
     """So a picture of the whole page has no empty box."""
     spaces = sum(figure.space for figure in figures)
@@ -309,10 +327,11 @@ def test_a_keyboard_reaches_the_links_and_what_is_folded(browser: Browser, repor
 def test_a_card_leads_to_its_part(browser: Browser, report: Path, comparison: Comparison) -> None:
     with opened(browser, report) as page:
         names = [name.strip() for name in page.locator(".card h3 a").all_inner_texts()]
-        assert names == [run.name for run in comparison.ranking]
-        page.locator(".card h3 a").last.click()
+        worst, best = (run.name for run in reversed(comparison.ranking))
+        assert names == [worst, best, "Log bare"]
+        page.locator(".card h3 a").first.click()
         part = page.locator("#r1-2")
-        assert part.locator("h3").inner_text().startswith(names[-1])
+        assert part.locator("h3").inner_text().startswith(worst)
         box = part.bounding_box()
         assert box is not None
         assert 0 <= box["y"] < 200

@@ -115,6 +115,12 @@ def test_deviations_are_drawn_in_millimetres_and_degrees_and_places_in_si(
     assert most == pytest.approx(factor * WAVE.max(), rel=2**-23)
 
 
+def test_a_unit_that_people_prefer_is_taken_where_it_measures_the_same() -> None:
+    for wanted, factor in (("deg", 180 / np.pi), ("mm", 1.0), ("nonsense", 1.0)):
+        found = trace(drawn(figure(panel(WAVE, unit="rad", display_unit=wanted))), "Δx")
+        assert numbers(found["y"]).max() == pytest.approx(factor * WAVE.max(), rel=2**-23)
+
+
 def test_a_limit_is_a_band_and_what_is_out_of_it_is_tinted() -> None:
     signed, size = (
         panel(WAVE, small=True, limit=0.0035),
@@ -271,7 +277,7 @@ def test_panels_of_other_axes_become_figures_of_their_own() -> None:
 @pytest.mark.parametrize("count", [0, 1, 2])
 def test_few_rows_or_none_are_drawn(count: int) -> None:
     values = np.full((count, 2), np.nan)
-    some = {"t_ns": T_NS[:count], "limit": 1.0, "small": True}
+    some: dict[str, Any] = {"t_ns": T_NS[:count], "limit": 1.0, "small": True}
     for one in (panel(values, **some), panel(values, logarithmic=True, **some), panel(values, t_ns=None)):
         drawn(figure(one))
     drawn(figure(panel(values, over=Over(np.full(count, np.nan), "v", "m/s"))))
@@ -295,7 +301,7 @@ def test_parts_with_the_same_times_move_together() -> None:
 
 
 def test_small_figures_stand_side_by_side_and_others_do_not() -> None:
-    small, tall = figure(panel(WAVE)), figure(*[panel(WAVE)] * 3)
+    small, tall = figure(panel(WAVE)), figure(*[panel(WAVE)] * 4)
     assert page_of(small, small, facts=(Fact("a", "b"),)).parts[0].pairs
     assert not page_of(small, tall).parts[0].pairs
     assert not page_of().parts[0].pairs

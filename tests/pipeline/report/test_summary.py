@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from typing import Any
 
 import pytest
 
@@ -33,11 +34,21 @@ def judged(title: str, verdict: Verdict, used: float | None, *facts: Fact) -> Se
     return Section(title, verdict, (off(used, verdict), *facts))
 
 
-def toy(name: str, verdict: Verdict, *sections: Section, word: str = "", **more: object) -> Presentation:
-    body = Section(f"Toy {name}", verdict, tables=more.pop("tables", ()), sections=sections)  # type: ignore[arg-type]
-    return Presentation(
-        name, f"{name} came out", verdict, (Fact("Which", Ref(f"{name}-1")),), body, word, **more
-    )  # type: ignore[arg-type]
+ROWS = (Fact("Rows", Value(3)),)
+
+
+def toy(
+    name: str,
+    verdict: Verdict,
+    *sections: Section,
+    word: str = "",
+    tables: tuple[Table, ...] = (),
+    facts: tuple[Fact, ...] = ROWS,
+    **more: Any,
+) -> Presentation:
+    body = Section(f"Toy {name}", verdict, facts, tables, sections=sections)
+    which = (Fact("Which", Ref(f"{name}-1")),)
+    return Presentation(name, f"{name} came out", verdict, which, body, word, **more)
 
 
 def names(page: Page) -> list[str]:
@@ -114,6 +125,13 @@ def test_a_result_that_fails_for_a_reason_of_its_own_has_a_card_beside_its_parts
     meter = judged("meter", "pass", 0.5)
     assert names(lay_out([toy("broken", "fail", meter)])) == ["Toy broken", "meter"]
     assert names(lay_out([toy("sound", "pass", meter)])) == ["meter"]
+
+
+def test_a_judged_part_that_says_nothing_of_itself_has_no_card_of_its_own() -> None:
+    gone = judged("baseline", "fail", None), Section("gone", "fail")
+    outer = Section("baseline", "fail", (Fact("Since then", "1 gone"),), sections=gone[1:])
+    assert names(lay_out([toy("now", "fail", judged("log", "pass", 0.5), outer)])) == ["baseline", "log"]
+    assert names(lay_out([toy("bare", "pass", facts=())])) == []
 
 
 def test_tables_about_the_parts_stand_with_the_cards_and_others_in_the_part() -> None:

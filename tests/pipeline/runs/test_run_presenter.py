@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from presented import Untouched, cells, facts
+from presented import Untouched, cells, facts, figures
 from urmpipe_datasets import LOGS
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
@@ -33,7 +33,7 @@ def shown(run: Run) -> Presentation:
 
 
 def figure(shown: Presentation, title: str) -> Figure:
-    return next(one for one in shown.body.figures() if one.title == title)
+    return next(one for one in figures(shown.body) if one.title == title)
 
 
 def test_a_log_is_not_judged(run: Run, shown: Presentation) -> None:
@@ -56,9 +56,11 @@ def test_the_audit_is_a_table_and_what_audit_writes(run: Run, shown: Presentatio
 def test_what_was_inferred_is_a_table(run: Run, shown: Presentation) -> None:
     table = cells(shown.body.tables[0])
     found = [(one.what, one.value, one.evidence) for one in run.log.inferences]
-    rows = list(zip(table["what"], table["found"], table["evidence"], strict=True))
-    assert rows[: len(found)] == found
-    assert rows[-1] == ("robot", "urm6", run.robot.description if run.robot else "")
+    assert run.robot is not None
+    found.append(("robot", "urm6", run.robot.description))
+    assert list(zip(table["what"], table["found"], table["evidence"], strict=True)) == found
+    columns = cells(next(one for one in shown.body.blocks() if one.title.startswith("Columns")))  # type: ignore[arg-type]
+    assert columns["unit"] == [one.unit for one in run.log.columns]
 
 
 def test_the_joints_are_plotted_before_and_after(run: Run, shown: Presentation) -> None:
@@ -143,7 +145,7 @@ def test_a_path_has_no_joints_and_no_arm(tmp_path: Path) -> None:
     path = ingest_log([LOGS / "path.csv"])
     shown = present(path)
     assert path.tcp_recorded is not None
-    (motion,) = shown.body.figures()
+    (motion,) = figures(shown.body)
     assert motion.views[0].panels[0].lines[0].values is path.tcp_recorded
     assert len(shown.body.tables) == 1
     assert shown.scene is not None
@@ -156,7 +158,7 @@ def test_a_log_without_a_robot_has_joints_alone() -> None:
     run = ingest_log([LOGS / "coppeliasim.csv"])
     assert run.robot is None
     shown = present(run)
-    assert [one.title for one in shown.body.figures()] == ["Joints before and after repolarization", "Motion"]
+    assert [one.title for one in figures(shown.body)] == ["Joints before and after repolarization", "Motion"]
     assert not any(isinstance(one, (Figure, SpaceFigure)) for one in shown.body.blocks())
     assert shown.scene is not None
     assert shown.scene() is None
@@ -166,7 +168,7 @@ def test_a_log_of_one_row_is_shown(tmp_path: Path) -> None:
     file = tmp_path / "one.csv"
     file.write_text("t [s],q1 [rad],q2 [rad],q3 [rad],q4 [rad],q5 [rad],q6 [rad]\n0,0,0,0,0,0,0\n")
     shown = present(ingest_log([file], robot=load_robot("urm6")))
-    assert [len(figure.views) for figure in shown.body.figures()] == [1, 1, 4]
+    assert [len(figure.views) for figure in figures(shown.body)] == [1, 1, 4]
     list(shown.body.blocks())
     assert facts(shown.body)["Duration"] == 0.0
 

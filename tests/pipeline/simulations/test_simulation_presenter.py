@@ -9,7 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from presented import cells, facts
+from presented import cells, facts, figures
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure, Text
 from urmpipe_pipeline.presentation.section import Presentation, Section, Value
@@ -59,13 +59,13 @@ def test_without_a_meter_the_last_block_is_opened(make_simulation: MakeSimulatio
         signals=(*simulation.signals, Signal("chain", "d", simulation.signals[3].values, "m")),
     )
     (opened,) = [one for one in present(answered).body.sections if one.opened]
-    (figure,) = opened.figures()
+    (figure,) = figures(opened)
     assert [line.dashed for line in figure.views[0].panels[0].lines] == [True, False]
 
 
 def test_the_deviation_of_a_meter_is_plotted_with_its_tolerance(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation()
-    judged, tolerated = block(present(simulation), "meter").figures()
+    judged, tolerated = figures(block(present(simulation), "meter"))
     delta = simulation.signal("meter.delta").values
     *coordinates, norm = judged.views[0].panels
     for panel, values in zip(coordinates, delta.T, strict=True):
@@ -80,7 +80,7 @@ def test_the_deviation_of_a_meter_is_plotted_with_its_tolerance(make_simulation:
 
 def test_signals_keep_their_arrays_units_and_names(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation()
-    (figure,) = block(present(simulation), "log").figures()
+    (figure,) = figures(block(present(simulation), "log"))
     (panel,) = figure.views[0].panels
     assert panel.lines[0].values is simulation.signals[0].values
     assert (panel.unit, panel.display_unit) == ("rad", "deg")
@@ -109,7 +109,7 @@ def test_a_page_shows_the_system_and_the_path_of_the_tip(make_simulation: MakeSi
     simulation = make_simulation()
     blocks = list(present(simulation).body.blocks())
     assert next(one.svg for one in blocks if isinstance(one, Drawing)) == simulation.system_svg
-    assert next(one.text for one in blocks if isinstance(one, Text)) == simulation.system_text
+    assert list(present(simulation).body.figures()) == [Text("System file", simulation.system_text)]
     space = next(one for one in blocks if isinstance(one, SpaceFigure))
     arm = simulation.arms[0]
     np.testing.assert_array_equal(space.paths[0].position, positions_over_log(arm.chain, arm.q))
@@ -140,7 +140,7 @@ def test_a_failed_simulation_tells_why_and_opens_at_its_end(
     assert facts(shown.body)["Failed after"] == simulation.duration
     assert shown.opens_at_ns == (simulation.t_ns[-1] if samples else 0)
     assert list(shown.body.events())[-1].t_ns == (simulation.t_ns[-1] if samples else None)
-    assert [bool(list(section.figures())) for section in shown.body.sections] == [bool(samples)] * 3
+    assert [bool(figures(section)) for section in shown.body.sections] == [bool(samples)] * 3
     list(shown.body.blocks())
     assert shown.scene is not None
     assert (shown.scene() is None) == (not samples)

@@ -58,8 +58,7 @@ def test_rows_and_columns_of_findings(read: Read) -> None:
     assert [(f.line, f.row, f.column) for f in caught.value.findings] == [(7, 3, "q1"), (7, 3, "t")]
 
 
-def test_the_fast_way_finds_the_same_lines(wrong: Wrong) -> None:
-    """Times and infinities are found without the careful pass; blank lines still count."""
+def test_blank_lines_count_where_every_row_was_parsed(wrong: Wrong) -> None:
     assert wrong("t,q1\n\n0,1\n0.2,2\n\n0.1,3\n0.3,inf\n") == [
         f"log.csv:6, column t: found 0.1 s after 0.2 s, {INCREASE}",
         "log.csv:7, column q1: found inf, allowed: finite numbers",
@@ -127,7 +126,7 @@ def test_columns_that_lack_the_same_rows_are_one_warning(read: Read) -> None:
     ]
 
 
-def test_missing_samples_of_the_fast_way(read: Read) -> None:
+def test_missing_samples_of_many_rows(read: Read) -> None:
     rows = [f"{0.005 * k:.3f},{'' if k % 1000 == 7 else k % 3},{k % 2}" for k in range(20_000)]
     log = read("\n".join(["t,q1,q2", *rows]))
     np.testing.assert_array_equal(np.flatnonzero(np.isnan(log.q[:, 0])), np.arange(7, 20_000, 1000))

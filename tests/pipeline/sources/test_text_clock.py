@@ -135,13 +135,6 @@ def test_quoted_and_padded_cells(read: Read) -> None:
     assert log.t_ns.tolist() == [0, 168 * MS, 668 * MS]
 
 
-def test_evidence_is_told(read: Read) -> None:
-    log = read(clocked("2021-04-11 22:27:21.5", "2021-04-11 22:27:21.6"))
-    assert evidence(log) == "its cells, such as '2021-04-11 22:27:21.5'; without a time zone: taken as UTC"
-    log = read(clocked("2021-04-11T22:27:21Z", "2021-04-11T22:27:22Z"))
-    assert evidence(log) == "its cells, such as '2021-04-11T22:27:21Z'"
-
-
 def test_a_day_far_behind_the_head_decides(read: Read) -> None:
     """The sampled cells may be read in both ways; one at the end cannot be a month."""
     cells = [f"{1 + k // 200:02d}/04/2021 {k % 200 // 60 + 12:02d}:{k % 60:02d}:00" for k in range(200)]

@@ -10,6 +10,7 @@ import numpy as np
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.section import Event
 from urmpipe_pipeline.recording.sending import times_at
+from urmpipe_pipeline.recording.store import ROW, TIME
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -19,29 +20,34 @@ LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 """Rerun's words for the levels."""
 
 
-def events_view(stream: RecordingStream, events: Sequence[Event], entity: str, first_ns: int) -> TextLogView:
+def events_view(
+    stream: RecordingStream, events: Sequence[Event], entity: str, first_ns: int | None
+) -> TextLogView:
     """Send events and return their list, each beginning with its time: the list's own column is too narrow.
 
     Args:
         stream: Where to.
         events: At least one.
         entity: Where they stand.
-        first_ns: The first time in [ns], for what holds for all of it.
+        first_ns: The first time in [ns], for what holds for all of it; None without times: all is in row 1.
     """
     import rerun as rr
     import rerun.blueprint as rrb
 
-    ordered = sorted(events, key=lambda one: first_ns if one.t_ns is None else one.t_ns)
+    first = first_ns or 0
+    ordered = sorted(events, key=lambda one: first if one.t_ns is None else one.t_ns)
     heads = ["" if one.t_ns is None else f"{one.t_ns / 1e9:.4f} s  " for one in ordered]
-    at = np.array([first_ns if one.t_ns is None else one.t_ns for one in ordered], dtype=np.int64)
+    at = np.array([first if one.t_ns is None else one.t_ns for one in ordered], dtype=np.int64)
     lines = [head + _words(one) for head, one in zip(heads, ordered, strict=True)]
     columns = rr.TextLog.columns(text=lines, level=[LEVELS[one.level] for one in ordered])
-    stream.send_columns(entity, times_at(at, np.arange(len(at))), columns)
+    times = times_at(None, np.zeros_like(at)) if first_ns is None else times_at(at, np.arange(len(at)))
+    stream.send_columns(entity, times, columns)
     shown = rrb.TextLogColumns(
-        timeline_columns=[rrb.encodings.TimelineColumn("t", visible=False)],
+        timeline_columns=[rrb.encodings.TimelineColumn(one, visible=False) for one in (TIME, ROW)],
         text_log_columns=["LogLevel", "Body"],
     )
-    return rrb.TextLogView(origin="/", contents=entity, name="Events, at t [s]", columns=shown)
+    name = "Events" if first_ns is None else "Events, at t [s]"
+    return rrb.TextLogView(origin="/", contents=entity, name=name, columns=shown)
 
 
 def _words(one: Event) -> str:

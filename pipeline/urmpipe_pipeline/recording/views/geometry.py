@@ -305,8 +305,9 @@ def _moving(
         return Moving(t_ns, rows, np.empty(0, dtype=np.int64))
     begins, ends = beginnings(there), endings(there)
     begins = begins[:: math.ceil(len(begins) / POSES) or 1]
-    if t_ns is None and len(rows):
-        ends = ends[ends <= rows[-1] + 1]
+    if t_ns is None and len(rows):  # of many single poses the first are drawn, and nothing stays behind them
+        ends = np.union1d(ends[ends <= rows[-1]], [rows[-1] + 1])
+        ends = ends[ends < len(there)]
     return Moving(t_ns, np.union1d(rows, begins) if t_ns is not None else rows, ends)
 
 
