@@ -4,15 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.recording.store import ROW, TIME
 from urmpipe_pipeline.text import encodable, unique
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from rerun import ComponentColumn, TimeColumn
 
 ROOT = "/shown"
@@ -59,6 +62,19 @@ def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
     return [times_column(np.asarray(t_ns)[rows])]
 
 
+@dataclass(frozen=True)
+class Values:
+    """Values of any type as those of a component: Rerun's own batches would copy them once more."""
+
+    array: NDArray[Any]
+
+    def as_arrow_array(self) -> pa.Array:
+        """Return them as Rerun asks for them."""
+        import pyarrow as pa
+
+        return pa.array(self.array.reshape(-1))
+
+
 def scalar_column(values: FloatArray) -> ComponentColumn:
     """Return an array as a column of lists; `Scalars.columns` takes six times as long over it.
 
@@ -68,5 +84,4 @@ def scalar_column(values: FloatArray) -> ComponentColumn:
     import rerun as rr
 
     offsets = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.shape[1])
-    batch = rr.components.ScalarBatch(np.ascontiguousarray(values))
-    return rr.ComponentColumn(rr.Scalars.descriptor_scalars(), batch, offsets=offsets)
+    return rr.ComponentColumn(rr.Scalars.descriptor_scalars(), Values(np.asarray(values)), offsets=offsets)

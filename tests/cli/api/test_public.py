@@ -14,7 +14,7 @@ import pandas as pd
 import pytest
 
 import urmpipe
-from urmpipe.guards import frame_of
+from urmpipe.arm_placing import frame_of
 from urmpipe_models.transform import Transform, from_offset
 from urmpipe_pipeline.sources import ReadOptions
 
