@@ -140,6 +140,7 @@ KINDS = {
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
     "junit": PATH,
+    "lazy": FLAG,
     "map_robot": ROBOT_FILE,
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,
