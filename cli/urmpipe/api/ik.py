@@ -130,8 +130,8 @@ def _arm_of(robot: Robot | None, base: Frame | None, tool: Frame | None) -> Chai
     """
     arm = place_robot(robot, base, tool)
     if arm is None:
-        names = ", ".join(robot_names())
-        raise OptionError(f"found no robot; allowed: --robot NAME|FILE, a TOML, a URDF or one of {names}")
+        allowed = f"a TOML or URDF file, or one of {', '.join(robot_names())}"
+        raise OptionError(Finding(parameter="robot", found="none", allowed=allowed))
     return arm
 
 
@@ -146,7 +146,7 @@ def _kind_of(output: Path | None) -> OutputKind | None:
     kind = KINDS.get(output.suffix.lower())
     if kind is None:
         allowed = "a name that ends in .csv (a joint log) or .rrd (a recording)"
-        raise OptionError(f"-o: found {shown(str(output))}, allowed: {allowed}")
+        raise OptionError(Finding(parameter="output", found=shown(str(output)), allowed=allowed))
     return kind
 
 

@@ -41,6 +41,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 @click.argument("targets", metavar="TARGETS|PATH", type=click.Path(path_type=Path))
 @output_option("LOG.csv|RUN.rrd", "Write a joint log that ingest reads, or a recording.")
 @click.option(
+    "--every",
     "--all",
     "every",
     is_flag=True,
@@ -95,7 +96,7 @@ def ik(
     \b
     Examples:
       urmpipe ik targets.csv --robot arm6
-      urmpipe ik targets.csv --robot ur5e --all --json
+      urmpipe ik targets.csv --robot ur5e --every --json
       urmpipe ik targets.csv --robot ur5e --start 0,-1.6,1.6,0,1.6,0 -o ik.rrd
       urmpipe ik path.csv --robot urm6 -o joints.csv
       urmpipe ik path.csv --robot ur5e --tolerance 3.5mm -o run.rrd

@@ -83,7 +83,7 @@ def show(
     if len(q) != len(chain.coordinates):
         allowed = f"{len(chain.coordinates)}, one for each of {', '.join(chain.coordinates)}"
         raise OptionError(f"--q: found {len(q)} values, allowed: {allowed}")
-    terminal.warn(list(start_warnings(chain, np.array(q), "--q")))
+    terminal.warn(list(start_warnings(chain, np.array(q), "q")))
     posed = chain_at(chain, q)
     if picture is not None:
         write_export(picture, chain_svg(posed.skeleton, posed.title), Path(name))
