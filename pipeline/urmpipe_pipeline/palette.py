@@ -69,6 +69,11 @@ def run_colour_word(index: int) -> str:
     return list(RUN_COLOURS)[index % len(RUN_COLOURS)]
 
 
+def colour_word(colour: str) -> str:
+    """Return the word for the colour of a run; empty for another colour."""
+    return next((word for word, one in RUN_COLOURS.items() if one == colour), "")
+
+
 def rgb(colour: str) -> tuple[int, int, int]:
     """Return red, green and blue of #rrggbb, each 0..255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)

@@ -211,14 +211,23 @@ class Deviation(Shown):
         joints = [one for one in self.joint_statistics.values() if one.unit == unit]
         return max(joints, key=lambda one: one.max, default=None)
 
+    def peak(self, one: Statistics) -> int:
+        """Return the index into the compared samples at which one of its quantities is largest."""
+        return int(np.searchsorted(self.sample, one.sample_max))
+
+    @property
+    def decided_at(self) -> int:
+        """Index into the compared samples of what decides; the norm need not be largest there."""
+        return self.peak(self.decisive)
+
     def place(self, one: Statistics) -> FloatArray:
         """Return where the log was when one of its quantities was largest, in [m], shape (3,)."""
-        return np.asarray(self.actual[np.searchsorted(self.sample, one.sample_max)])
+        return np.asarray(self.actual[self.peak(one)])
 
     def row(self, one: Statistics) -> int:
         """Return the log's row of numbers, from 1, that is nearest to where a quantity was largest."""
         t_ns = self.run.log.t_ns
-        at = int(self.t_ns[np.searchsorted(self.sample, one.sample_max)])
+        at = int(self.t_ns[self.peak(one)])
         return int(np.argmin(np.abs(t_ns - at))) + 1
 
     @property

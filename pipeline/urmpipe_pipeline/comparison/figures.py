@@ -9,7 +9,6 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
 from urmpipe_pipeline.comparison.symbols import SYMBOLS, symbol
 from urmpipe_pipeline.comparison.wording import amount_words, correlation
@@ -87,7 +86,7 @@ def path_figure(one: Deviation) -> SpaceFigure:
             Path("reference", one.reference, one.t_ns, REFERENCE_COLOUR, asked=True, sample=one.sample),
             Path(
                 "actual: ‖Δ‖", one.actual, one.t_ns, AXIS_COLOURS["norm"], values=column(one.delta, 3),
-                sample=one.sample, kept=(decided_row(one),),
+                sample=one.sample, kept=(one.decided_at,),
             ),
         ),
         (*ends(one.actual), Spot(place, "decides", DEVIATION_COLOUR)),
@@ -190,15 +189,21 @@ def _joint_panel(one: Deviation, delta: FloatArray, held: Sequence[Statistics], 
 
 def _panel(one: Deviation, held: Statistics, line: Line) -> Panel:
     """Return one quantity over time with its tolerance and its largest value."""
-    peak = int(np.searchsorted(one.sample, held.sample_max))
     return Panel(
-        symbol(held), held.unit, (line,), one.t_ns, held.tolerance, held.kind == "axis", (peak,), small=True
+        symbol(held),
+        held.unit,
+        (line,),
+        one.t_ns,
+        held.tolerance,
+        held.kind == "axis",
+        (one.peak(held),),
+        small=True,
     )
 
 
 def _instant(one: Deviation) -> dict[int, str]:
     """Return when the verdict was decided."""
-    return {int(one.t_ns[decided_row(one)]): f"decides at {text.seconds(one.decisive.t_max)} s"}
+    return {int(one.t_ns[one.decided_at]): f"decides at {text.seconds(one.decisive.t_max)} s"}
 
 
 def _out_words(one: Deviation) -> str:

@@ -9,7 +9,6 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.baseline_section import baseline_section
 from urmpipe_pipeline.comparison.checks import log_checks, log_properties
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.facts import (
     alignment_words,
@@ -48,7 +47,7 @@ def present(result: Comparison) -> Presentation:
         verdict=result.verdict,
         facts=(*decisive_facts(worst, colour), *_against(result)),
         body=_body(result),
-        opens_at_ns=int(worst.t_ns[decided_row(worst)]),
+        opens_at_ns=int(worst.t_ns[worst.decided_at]),
         scene=partial(comparison_scene, result),
         lines=tuple(comparison_lines(result)),
         rows=partial(statistics_rows, result),

@@ -14,7 +14,6 @@ from urmpipe_models.kinematics.forward import points_over_log
 from urmpipe_models.transform import Transform, translation
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison, by_tolerance
-from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.comparison.wording import amount_words
@@ -64,7 +63,7 @@ def _arm(one: Deviation, colour: str) -> Iterator[Arm]:
     run = one.run
     if run.robot is None or run.tcp is None:
         return
-    decided = int(one.t_ns[decided_row(one)])
+    decided = int(one.t_ns[one.decided_at])
     row = min(int(np.searchsorted(run.t_ns, decided)), len(run.t_ns) - 1)
     yield Arm(_placed(run.robot, one), run.q, run.t_ns, colour, kept=(row,))
 
@@ -85,14 +84,14 @@ def _reference(reference: Trajectory, shown: Deviation) -> Iterator[Path]:
         yield Path(reference.name, reference.position, None, REFERENCE_COLOUR, asked=True)
     yield Path(
         reference.name, shown.reference, shown.t_ns, REFERENCE_COLOUR, asked=True, sample=shown.sample,
-        kept=(decided_row(shown),), line=False,
+        kept=(shown.decided_at,), line=False,
     )  # fmt: skip
 
 
 def _log(one: Deviation, colour: str) -> Path:
     """Return where a compared log was."""
     return Path(
-        one.name, one.actual, one.t_ns, colour, sample=one.sample, kept=(decided_row(one),),
+        one.name, one.actual, one.t_ns, colour, sample=one.sample, kept=(one.decided_at,),
         line=one.run.timed,
     )  # fmt: skip
 
@@ -101,7 +100,7 @@ def _decided(one: Deviation, *, several: bool) -> Spot:
     """Return where the verdict on a log was decided: by what, how much and when."""
     whose = f", {one.name}" if several else ""
     said = f"{amount_words(one.decisive)} at t = {text.seconds(one.decisive.t_max)} s{whose}"
-    return Spot(spot_at(one.actual[decided_row(one)]), said, DEVIATION_COLOUR)
+    return Spot(spot_at(one.actual[one.decided_at]), said, DEVIATION_COLOUR)
 
 
 def _enlarged(one: Deviation, radius: float) -> tuple[Path, int] | None:
@@ -113,7 +112,7 @@ def _enlarged(one: Deviation, radius: float) -> tuple[Path, int] | None:
     if factor is None or not one.run.timed:
         return None
     position = one.reference + factor * (np.asarray(one.actual) - one.reference)
-    row = decided_row(one)
+    row = one.decided_at
     name = f"deviation x{factor}"
     return Path(name, position, one.t_ns, DEVIATION_COLOUR, sample=one.sample, kept=(row,)), factor
 

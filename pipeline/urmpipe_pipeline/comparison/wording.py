@@ -10,7 +10,6 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics, Stretch
 from urmpipe_pipeline.comparison.symbols import SYMBOLS, allowed_words, portion_words, size_of, used_words
-from urmpipe_pipeline.comparison.trajectory import Alignment, Sync
 
 NAMED = 3
 """Logs out of tolerance that a verdict names; more are only counted."""
@@ -159,29 +158,3 @@ def meter_size(one: DeltaVerdict) -> str:
 def correlation(r: float | None) -> str:
     """Return a correlation with its sign; a dash where it is not known."""
     return text.NOTHING if r is None else f"{round(r, 3) + 0.0:+.3f}"  # + 0.0: no -0.000
-
-
-def sync_words(sync: Sync) -> str:
-    """Return how two clocks were put together; nothing if both simply start together."""
-    if sync.mode == "start":
-        return ""
-    how = "as given" if sync.mode == "given" else f"estimated from {sync.by}"
-    said = f"clocks: t_reference = t_log {'-' if sync.offset < 0.0 else '+'} {abs(sync.offset):.6g} s, {how}"
-    if sync.precision is not None:
-        said += f", ± {text.standard_error(sync.precision)}"
-    return said + ("" if sync.similarity is None else f", similarity {sync.similarity:.4f}")
-
-
-def alignment_words(alignment: Alignment) -> str:
-    """Return how a log was moved in space before it was compared; nothing if it was not."""
-    if alignment.mode == "none":
-        return ""
-    if alignment.mode == "tool":
-        return f"aligned (tool): tool centre point moved by {_vector(alignment.tool)} mm in the tool's frame"
-    turned, by = text.quantity(alignment.angle, "rad"), _vector(alignment.translation)
-    return f"aligned ({alignment.mode}): turned by {turned} about the origin, then moved by {by} mm"
-
-
-def _vector(metres: tuple[float, ...]) -> str:
-    """Return a vector in [m] as (x, y, z) in [mm]."""
-    return f"({', '.join(text.millimetres(value) for value in metres)})"

@@ -47,8 +47,12 @@ def _time_facts(run: Run) -> Iterator[Fact]:
     if not run.timed:
         yield Fact("Rows", f"{run.log.rows}, without times")
         return
-    yield Fact("Rows", f"{run.log.rows} every {text.seconds(run.log.period)} s")
-    yield Fact("Grid", f"{len(run.t_ns)} samples every {text.seconds(run.tsp)} s")
+    for name, count, noun, period in (
+        ("Rows", run.log.rows, "row", run.log.period),
+        ("Grid", len(run.t_ns), "sample", run.tsp),
+    ):
+        every = f" every {text.seconds(period)} s" if count > 1 else ""
+        yield Fact(name, f"{text.counted(count, noun)}{every}")
     yield Fact("Duration", Value(run.duration, "s"))
 
 

@@ -14,7 +14,6 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.deviation import AXES
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import run_colour
@@ -90,12 +89,12 @@ def test_the_first_fact_is_what_decided(arms: Compared) -> None:
         assert (value.used, value.verdict) == (held.used, held.verdict)
         found = facts(section)
         assert found["Time"] == held.t_max
-        assert found["Position"] == Place(tuple(one.actual[decided_row(one)].tolist()))
+        assert found["Position"] == Place(tuple(one.actual[one.decided_at].tolist()))
         assert found["r(‖Δ‖, speed)"] == one.speed_correlation
     shown = present(result)
     worst = result.worst
     assert shown.facts[0].value == Ref(worst.name, run_colour(result.runs.index(worst)))
-    assert shown.opens_at_ns == worst.t_ns[decided_row(worst)]
+    assert shown.opens_at_ns == worst.t_ns[worst.decided_at]
 
 
 def test_the_tables_hold_the_statistics_of_each_unit(arms: Compared) -> None:
@@ -177,7 +176,7 @@ def test_the_plots_are_the_deviation_with_what_is_allowed(arms: Compared) -> Non
     assert path.panels[0].lines[0].values is one.path
     assert angle.panels[0].lines[0].values is one.angle
     np.testing.assert_array_equal(joints.views[0].panels[0].lines[0].values, np.asarray(one.joint_delta))
-    assert list(deviation.instants) == [one.t_ns[decided_row(one)]]
+    assert list(deviation.instants) == [one.t_ns[one.decided_at]]
 
 
 @pytest.mark.parametrize(("kind", "view"), [("axis", 0), ("path", 1), ("angle", 2)])
@@ -212,7 +211,7 @@ def test_the_scene_is_the_worst_arm_all_paths_and_what_decided(arms: Compared) -
     assert (whole.t_ns, moving.line) == (None, False)
     assert moving.position is worst.reference
     assert [path.position for path in (a, b)] == [one.actual for one in result.runs]
-    assert scene.spots[0].position == tuple(worst.actual[decided_row(worst)].tolist())
+    assert scene.spots[0].position == tuple(worst.actual[worst.decided_at].tolist())
     assert scene.enlarged is not None
     index, factor = scene.enlarged
     assert scene.paths[index] is larger
@@ -263,7 +262,7 @@ def test_events_tell_when_what_happened(paths: Compared) -> None:
     assert longest is not None
     found = {event.t_ns: event.level for event in log_section(result, "a").events()}
     assert found[round(longest.t * 1e9)] == "error"
-    assert found[int(one.t_ns[decided_row(one)])] == "error"
+    assert found[int(one.t_ns[one.decided_at])] == "error"
 
 
 def test_no_array_of_a_motion_is_looked_into_before_it_is_shown(arms: Compared) -> None:

@@ -20,7 +20,6 @@ from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_models.transform import rotation_x, translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.decided import decided_row
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.wording import amount_words
 from urmpipe_pipeline.joint_log import LogWarning
@@ -216,7 +215,7 @@ def test_the_deviation_is_drawn_fifty_times_as_large(make_comparison: MakeCompar
     np.testing.assert_array_equal(way.strips[0], one.reference + 50 * (one.actual - one.reference))
     rows = np.searchsorted(one.sample, way.track.sample)
     np.testing.assert_array_equal(way.track.position, way.strips[0][rows])
-    assert decided_row(one) in rows
+    assert one.decided_at in rows
 
 
 def test_of_several_runs_only_the_deviation_of_the_one_whose_arm_stands_there_is_enlarged(
@@ -266,7 +265,7 @@ def test_the_place_that_decides_has_its_size_and_its_time(
 ) -> None:
     comparison = make_comparison(("one",))
     (one,) = comparison.runs
-    decisive, row = one.decisive, decided_row(one)
+    decisive, row = one.decisive, one.decided_at
     assert decisive.quantity == "x" and row != one.worst
     assert abs(one.delta[row, 0]) == decisive.max
     x, y, z = one.actual[row].tolist()

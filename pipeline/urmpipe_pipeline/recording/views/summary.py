@@ -7,9 +7,10 @@ from collections.abc import Iterable, Iterator, Sequence
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.palette import colour_word
 from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
 from urmpipe_pipeline.presentation.digits import written
-from urmpipe_pipeline.presentation.section import Fact, Presentation, Section, Table
+from urmpipe_pipeline.presentation.section import Cell, Fact, Presentation, Ref, Section, Table
 
 ROWS = 12
 """Rows of a table of verdicts that are shown; the others are counted. Of other tables only short ones are."""
@@ -54,7 +55,7 @@ def _section(section: Section, told: set[str]) -> Iterator[str]:
 def _facts(facts: Sequence[Fact], *, strong: bool = False) -> Iterator[str]:
     """Yield the brief facts in one paragraph."""
     mark = "**" if strong else ""
-    told = [(plain(one.name), plain(written(one.value, unit=True))) for one in brief_facts(facts)]
+    told = [(plain(one.name), plain(_coloured(one.value, unit=True))) for one in brief_facts(facts)]
     if told:
         yield ""
         yield "; ".join(f"{name}: {mark}{value}{mark}" for name, value in told)
@@ -66,10 +67,16 @@ def _table(table: Table) -> Iterator[str]:
     yield _row(map(head, columns))
     yield f"|{' --- |' * len(columns)}"
     for cells in zip(*(one.cells[rows] for one in columns), strict=True):
-        yield _row(map(written, cells))
+        yield _row(map(_coloured, cells))
     if (left := len(columns[0].cells) - ROWS) > 0:
         yield ""
         yield f"and {left} more, all in the report"
+
+
+def _coloured(cell: Cell, *, unit: bool = False) -> str:
+    """Return a cell, with the word for the colour in which its subject is drawn."""
+    word = colour_word(cell.colour) if isinstance(cell, Ref) else ""
+    return f"{written(cell, unit=unit)} ({word})" if word else written(cell, unit=unit)
 
 
 def _row(cells: Iterable[str]) -> str:
