@@ -131,8 +131,8 @@ def test_a_robot_that_is_no_arm(capsys: Captured, folder: Path, joints: str, sai
         ("x,y,z\n", "targets.csv:1: found a header and no rows, allowed: a row a sample"),
         (
             "t,q1,q2\n0,1,2\n1,2,3\n",
-            "targets.csv: found no position in q1, q2, allowed: x, y, z; name them so in the header; --log-map"
-            ' FILE.toml says which they are: [tcp] position = ["A", "B", "C"]',
+            "targets.csv: found no position in q1, q2, allowed: x, y, z; name them so in the header;"
+            ' --log-map FILE.toml says which they are: [tcp] position = ["A", "B", "C"]',
         ),
     ],
 )

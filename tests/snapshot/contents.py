@@ -35,6 +35,7 @@ ATTRIBUTES = {
     "Comparison": "verdict runs ranking baseline warnings",
     "Deviation": "name t delta angle joint_delta statistics sync alignment",
     "InverseResult": "q branch reasons verdict miss path",
+    "SolvedTargets": "q branch reasons verdict miss path",
     "Simulation": "t signals verdicts failed",
     "Report": "path figures",
     "Exported": "path files columns",

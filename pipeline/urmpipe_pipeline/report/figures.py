@@ -154,9 +154,9 @@ def _axis_of(panel: Panel) -> str:
 
 
 def _across(panel: Panel, one: Line) -> FloatArray:
-    """Return the times of a line in [s] or its row numbers, shape (n,)."""
+    """Return the times of a line in [s] or its row numbers from 1, shape (n,)."""
     t_ns = _times(panel, one)
-    return np.arange(len(one.values), dtype=np.float64) if t_ns is None else seconds(t_ns[:])
+    return np.arange(1.0, len(one.values) + 1.0) if t_ns is None else seconds(t_ns[:])
 
 
 def _times(panel: Panel, one: Line) -> IntArray | None:
@@ -197,7 +197,7 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
         return found
     timed = _axis_of(panels[0]) == "t"
     across = spec.time_axis if timed else spec.row_axis
-    places = ((at / 1e9 if timed else at, words) for at, words in figure.instants.items())
+    places = ((at / 1e9 if timed else at + 1, words) for at, words in figure.instants.items())
     through = [instant(at, words, span.start, span.end) for at, words in places]
     found = spec.stacked(drawn, across(span.start, span.end), through)
     if through and names.first:
@@ -301,7 +301,7 @@ def _marks(panel: Panel, factor: float, names: _Names, number: int) -> Iterator[
         some.setdefault((one.name, one.colour), []).append(one)
     for (name, colour), items in some.items():
         yield marks(
-            np.array([one.t_ns for one in items]) / (1e9 if panel.t_ns is not None else 1.0),
+            np.array([one.t_ns / 1e9 if panel.t_ns is not None else one.t_ns + 1 for one in items]),
             factor * np.array([one.value for one in items]),
             colour,
             [SYMBOLS[one.shape] for one in items],
