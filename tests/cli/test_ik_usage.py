@@ -60,7 +60,7 @@ def test_a_unit_that_is_given_twice_alike_is_one(folder: Path) -> None:
 def test_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv")
     assert said == (
-        "error: --robot: found none, allowed: a TOML or URDF file, or one of arm6, articulated6r,"
+        "error: --robot: found none, allowed: a TOML, a URDF or one of arm6, articulated6r,"
         " iiwa14, panda, ur3, ur5, ur10, ur3e, ur5e, ur10e, urm4, urm6, urm8"
     )
 
@@ -68,7 +68,7 @@ def test_without_a_robot(capsys: Captured) -> None:
 def test_a_tool_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv", "--tool", "0,0,0.1")
     assert said == (
-        "error: found --base, --tool, --base-link or --tip without a robot; allowed: with --robot NAME|FILE"
+        "error: --tool: found without a robot; --robot NAME|FILE gives one"
     )
 
 

@@ -32,8 +32,8 @@ class Search:
             allowed = "a number of m, more than 0"
             yield Finding(parameter="tolerance", found=shown(self.tolerance), allowed=allowed)
         elif self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
-            allowed = "more than 0, finite"
-            yield Finding(parameter="tolerance", found=f"{self.tolerance:g} m", allowed=allowed)
+            found = f"{self.tolerance:g} m"
+            yield Finding(parameter="tolerance", found=found, allowed="more than 0, finite")
         for name, value in (("restarts", self.restarts), ("seed", self.seed)):
             if not isinstance(value, Integral) or value < 0:
                 yield Finding(parameter=name, found=shown(value), allowed="a whole number, 0 or more")

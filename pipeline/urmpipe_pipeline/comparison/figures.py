@@ -133,7 +133,7 @@ def _deviation(one: Deviation) -> Figure:
         for i, axis in enumerate(AXES)
     )
     path = _panel(one, one.statistics["path"], Line(one.path, ("path",), (AXIS_COLOURS["norm"],)))
-    views = [View("delta", delta), View("Distance from the path", (path,))]
+    views = [View("delta = reference - log", delta), View("Distance from the path", (path,))]
     if one.angle is not None:
         line = Line(one.angle, ("angle",), (AXIS_COLOURS["norm"],))
         views.append(View("Angle between the orientations", (_panel(one, one.statistics["angle"], line),)))
@@ -151,7 +151,7 @@ def _deviation(one: Deviation) -> Figure:
         tuple(views),
         _instant(one),
         opened={"path": 1, "angle": 2}.get(one.decisive.kind, 0),
-        share=4.0,
+        share=3.6,
     )
 
 

@@ -4,9 +4,6 @@ The only part of urmpipe that knows Rerun. Data goes one way: result -> `codec` 
 of its fields) -> `writer` -> .rrd -> `reader` -> `codec` -> result; what is shown comes from `views`.
 """
 
-from urmpipe_pipeline.outputs import know_own
 from urmpipe_pipeline.recording.identity import is_ours, is_recording
-
-know_own("recording", is_ours)
 
 __all__ = ["is_ours", "is_recording"]

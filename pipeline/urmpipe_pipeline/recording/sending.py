@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import TYPE_CHECKING
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.recording.store import ROW, TIME
 from urmpipe_pipeline.text import encodable, unique
 
 if TYPE_CHECKING:
+    import pyarrow as pa
     from rerun import ComponentColumn, TimeColumn
 
 ROOT = "/shown"
@@ -41,7 +45,7 @@ def times_column(t_ns: IntArray) -> TimeColumn:
     """
     import rerun as rr
 
-    return rr.TimeColumn("t", duration=np.asarray(t_ns).astype("timedelta64[ns]"))
+    return rr.TimeColumn(TIME, duration=np.asarray(t_ns).astype("timedelta64[ns]"))
 
 
 def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
@@ -49,13 +53,26 @@ def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
 
     Args:
         t_ns: Times of all rows in integer [ns], shape (n,); None without times.
-        rows: The rows, shape (m,).
+        rows: The rows from 0, shape (m,).
     """
     import rerun as rr
 
     if t_ns is None:
-        return [rr.TimeColumn("row", sequence=np.asarray(rows) + 1)]
+        return [rr.TimeColumn(ROW, sequence=rows + 1)]
     return [times_column(np.asarray(t_ns)[rows])]
+
+
+@dataclass(frozen=True)
+class Values:
+    """Values of any type as those of a component: Rerun's own batches would copy them once more."""
+
+    array: NDArray[Any]
+
+    def as_arrow_array(self) -> pa.Array:
+        """Return them as Rerun asks for them."""
+        import pyarrow as pa
+
+        return pa.array(self.array.reshape(-1))
 
 
 def scalar_column(values: FloatArray) -> ComponentColumn:
@@ -67,5 +84,4 @@ def scalar_column(values: FloatArray) -> ComponentColumn:
     import rerun as rr
 
     offsets = np.arange(len(values) + 1, dtype=np.int32) * np.int32(values.shape[1])
-    batch = rr.components.ScalarBatch(np.ascontiguousarray(values))
-    return rr.ComponentColumn(rr.Scalars.descriptor_scalars(), batch, offsets=offsets)
+    return rr.ComponentColumn(rr.Scalars.descriptor_scalars(), Values(np.asarray(values)), offsets=offsets)

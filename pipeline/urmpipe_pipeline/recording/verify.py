@@ -47,13 +47,17 @@ def _differences(store: Store, every: Sequence[Column], metadata: str) -> Iterat
 
 
 def _wrong_row(store: Store, column: Column) -> int | None:
-    """Return the first of the verified rows of an array that does not stand in the recording as it should."""
+    """Return one of the verified rows of an array that does not stand in the recording as it should."""
     values = column.values if column.values.ndim else column.values.reshape(1)
-    for row in verified(column.rows):
-        found = store.read(column.at, row, row + 1, values.shape[1:], values.dtype)
-        if found.tobytes() != np.asarray(values[row]).tobytes():
-            return row
-    return None
+    missing = verified(column.rows)
+    for numbers, rows in store.parts(column.at, values.shape[1:], values.dtype):
+        for row in [row for row in missing if row in numbers]:
+            if rows[int(np.argmax(numbers == row))].tobytes() != np.asarray(values[row]).tobytes():
+                return row
+            missing.remove(row)
+        if not missing:
+            return None
+    return missing[0]
 
 
 def verified(rows: int) -> list[int]:

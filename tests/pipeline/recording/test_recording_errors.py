@@ -200,20 +200,22 @@ def test_a_full_disk_is_one_line_and_leaves_the_old_output(make_run: MakeRun, sm
 SWITCHED_OFF = """
 import sys
 from pathlib import Path
-sys.path.insert(0, sys.argv[1])
+sys.path[:0] = sys.argv[2:]
 import conftest
 from urmpipe_models.errors import OutputError
 from urmpipe_pipeline.results import write_recording
 try:
-    write_recording(conftest.build_run(rows=5), Path(sys.argv[2]))
+    write_recording(conftest.build_run(rows=5), Path(sys.argv[1]))
 except OutputError as error:
     print(error)
 """
 
 
 def test_rerun_switched_off_is_one_line(tmp_path: Path) -> None:
+    here = Path(__file__).parent
+    folders = [str(here), str(here.parents[1] / "shared")]
     done = subprocess.run(
-        [sys.executable, "-c", SWITCHED_OFF, str(Path(__file__).parent), str(tmp_path / "one.rrd")],
+        [sys.executable, "-c", SWITCHED_OFF, str(tmp_path / "one.rrd"), *folders],
         capture_output=True, text=True, check=False, timeout=100, env={**os.environ, "RERUN": "off"},
     )  # fmt: skip
     wanted = "Rerun is switched off by the environment variable RERUN; allowed: unset or on\n"
@@ -277,10 +279,12 @@ def test_what_cannot_be_read_back_is_named(make_run: MakeRun, tmp_path: Path) ->
 
 
 def test_what_could_not_be_read_back_is_not_written(make_run: MakeRun, tmp_path: Path) -> None:
-    run = replace(make_run(rows=5), tsp="5 ms")
+    run = make_run(rows=5)
+    run = replace(run, log=replace(run.log, digits="four"))  # type: ignore[arg-type]
     with pytest.raises(OutputError) as caught:
         write_recording(run, tmp_path / "one.rrd")
     assert (
-        str(caught.value) == f"{tmp_path / 'one.rrd'}: cannot be recorded: /tsp: found '5 ms', allowed: float"
+        str(caught.value)
+        == f"{tmp_path / 'one.rrd'}: cannot be recorded: /log/digits: found 'four', allowed: int or None"
     )
     assert list(tmp_path.iterdir()) == []

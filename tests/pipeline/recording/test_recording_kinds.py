@@ -17,9 +17,9 @@ from recording_contents import times_of
 from same_results import assert_same
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
 from urmpipe_pipeline import results
-from urmpipe_pipeline.recording import read_recording, write_recording
+from urmpipe_pipeline.presentation.section import Presentation, Section
 from urmpipe_pipeline.recording.store import SLICE
-from urmpipe_pipeline.results import Kind
+from urmpipe_pipeline.results import Kind, read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
@@ -55,10 +55,14 @@ def accuracy() -> Accuracy:
     )  # fmt: skip
 
 
+def shown(result: Accuracy) -> Presentation:
+    return Presentation(result.name, "measured", None, (), Section(result.name))
+
+
 @pytest.fixture
 def known(monkeypatch: pytest.MonkeyPatch) -> None:
     """Add the kind to those of results, which is all that recording asks for."""
-    monkeypatch.setattr(results, "KINDS", (*results.KINDS, Kind("accuracy", Accuracy)))
+    monkeypatch.setattr(results, "KINDS", (*results.KINDS, Kind("accuracy", Accuracy, shown)))
 
 
 @pytest.mark.usefixtures("known")
@@ -79,7 +83,7 @@ def everything(rows: Any) -> list[Any]:
 @pytest.mark.usefixtures("known")
 def test_arrays_are_read_when_they_are_used(tmp_path: Path) -> None:
     wanted = accuracy()
-    back = read_recording(write_recording(wanted, tmp_path / "toy.rrd"), lazy=True)
+    back: Any = read_recording(write_recording(wanted, tmp_path / "toy.rrd"), lazy=True)
     for name in ("t_ns", "error", "inside", "count", "poses"):
         rows, array = getattr(back, name), getattr(wanted, name)
         assert (rows.shape, rows.dtype, rows.ndim, len(rows)) == (array.shape, array.dtype, array.ndim, ROWS)
@@ -105,7 +109,7 @@ def test_any_slice_is_that_of_the_array(
     path, run = tmp_path / "run.rrd", make_run(rows=50)
     if not path.exists():
         write_recording(run, path)
-    back = read_recording(path, lazy=True)
+    back: Any = read_recording(path, lazy=True)
     assert everything(back.q[first:end:step]) == everything(run.q[first:end:step])
 
 
@@ -113,6 +117,6 @@ def test_a_simulation_is_opened_without_its_signals(
     make_simulation: Callable[..., Simulation], tmp_path: Path
 ) -> None:
     wanted = make_simulation(50)
-    back = read_recording(write_recording(wanted, tmp_path / "a.rrd"), lazy=True)
+    back: Any = read_recording(write_recording(wanted, tmp_path / "a.rrd"), lazy=True)
     assert all(one.values._whole is None for one in back.signals)
     assert_same(back.to_dict() | {"recording": None}, wanted.to_dict())
