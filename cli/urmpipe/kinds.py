@@ -141,6 +141,7 @@ KINDS = {
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
     "junit": PATH,
+    "lazy": FLAG,
     "log_map": Kind(_is_map, "a map (TOML), or what `read_map` returned"),
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,

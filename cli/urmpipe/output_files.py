@@ -11,8 +11,8 @@ from typing import TypeVar
 from urmpipe.keyword_checks import PathLike
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.simulations.simulation import Result
 
 Made = TypeVar("Made", bound=Result)
 
@@ -62,7 +62,8 @@ def recorded(
     """
     if output is None:
         return result
-    return replace(result, recording=write_recording(result, Path(output), inputs, progress))
+    written = write_recording(result, Path(output), inputs, progress)
+    return replace(result, recording=written)  # type: ignore[type-var]
 
 
 def _refuse_shared(targets: Mapping[OutputKind, Path]) -> None:

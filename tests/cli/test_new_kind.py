@@ -21,11 +21,11 @@ from same_results import assert_same
 from urmpipe.printing.presentation import print_presentation
 from urmpipe.printing.terminal import print_json
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.display import Shown
 from urmpipe_pipeline import results
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.presentation.exports import ExportColumn, Exports, ExportTable, Rows, Times
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.scene import Path as Way
 from urmpipe_pipeline.presentation.scene import Scene
 from urmpipe_pipeline.presentation.section import (
@@ -48,7 +48,7 @@ LIMIT = 0.25
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Swing(Shown):
+class Swing(Result):
     """How far a pendulum swings: the toy."""
 
     name: str

@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
 from urmpipe.keyword_checks import PathLike, paths, public, refuse_foreign, refuse_others
-from urmpipe_models.display import Shown
 from urmpipe_pipeline import results
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.results import read_recording
 
 if TYPE_CHECKING:
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 @public
 def export(
-    result: PathLike | Shown,
+    result: PathLike | Result,
     output: PathLike | None = None,
     *,
     to: Format | None = None,
@@ -46,10 +46,10 @@ def export(
     options = ExportOptions(format_of(to, target), rows, tcp)
     kept = paths(inputs)
     if results.is_result(result):
-        own: Path | None = result.recording  # type: ignore[union-attr]
+        own: Path | None = result.recording
     else:
         refuse_others("result", [result], (), "a recording, or a result such as a Run or a Comparison")
         own = Path(cast(PathLike, result))
         refuse_foreign([own])
-        result = read_recording(own)
+        result = read_recording(own, lazy=True)
     return export_result(results.exports(result), own, target, options, [*([own] if own else []), *kept])

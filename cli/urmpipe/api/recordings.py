@@ -6,28 +6,30 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from urmpipe.keyword_checks import PathLike, paths, public
-from urmpipe_models.display import Shown
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_pipeline import results
+from urmpipe_pipeline.presentation.result import Result
 
 
 @public
-def read_recording(path: PathLike) -> Shown:
+def read_recording(path: PathLike, *, lazy: bool = False) -> Result:
     """Return the result that a recording holds: a Run, a Comparison, a Simulation, ...
 
     Args:
         path: A recording (.rrd) that urmpipe wrote.
+        lazy: Whether arrays are read only when they are used, a slice of rows alone; the file must stand as
+            long. They are used as arrays are, and `np.asarray` makes one of them.
 
     Raises:
-        RecordingError: If it is no recording, was cut off, is not of urmpipe, or of a newer layout.
+        RecordingError: If it is no recording, was cut off, is not of urmpipe, or of another layout.
     """
-    found: Shown = results.read_recording(Path(path))
+    found: Result = results.read_recording(Path(path), lazy=lazy)
     return found
 
 
 @public
 def write_recording(
-    result: Shown,
+    result: Result,
     output: PathLike,
     *,
     inputs: Sequence[PathLike] = (),

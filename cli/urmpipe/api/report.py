@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from urmpipe.keyword_checks import PathLike, one_or_many, paths, public, refuse_foreign, refuse_others
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Cell, Value
 from urmpipe_pipeline.results import KINDS, present, read_recording
-from urmpipe_pipeline.simulations.simulation import Result
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -104,7 +104,7 @@ def report(
     def read(numbered: tuple[int, PathLike | Result]) -> Result:
         """Return a result, read if it is a recording, and tell how far it is."""
         number, one = numbered
-        found = read_recording(Path(one)) if isinstance(one, (str, Path)) else one
+        found = read_recording(Path(one), lazy=True) if isinstance(one, (str, Path)) else one
         reading(number / len(given))
         return found
 

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray, IntArray, TextArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.display import line_of, number_of
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.solutions import Solutions
@@ -20,6 +20,7 @@ from urmpipe_models.inverse.targets import Targets, misses
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.results import SCHEMA, Run
 from urmpipe_pipeline.solved_targets.motion import run_of_solutions
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SolvedTargets(Shown):
+class SolvedTargets(Result):
     """The joint values that bring the tool centre point of an arm to n targets.
 
     Attributes:
