@@ -10,7 +10,6 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline import text
-from urmpipe_pipeline.display_unit import display_unit
 from urmpipe_pipeline.joint_log import seconds
 from urmpipe_pipeline.presentation.figure import Line, Mark, Over, Panel, Shape
 from urmpipe_pipeline.report import spec
@@ -137,7 +136,7 @@ def _shown_unit(panel: Panel) -> tuple[str, float]:
     """Return the unit that a panel is drawn in, and how many of it one of its own is."""
     if panel.small and panel.unit in text.SHOWN:
         return text.SHOWN[panel.unit]
-    unit, factor = display_unit(panel.unit, panel.display_unit)
+    unit, factor = text.display_unit(panel.unit, panel.display_unit)
     return unit.replace("/s2", "/s²"), factor
 
 
