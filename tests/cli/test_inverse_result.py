@@ -228,7 +228,7 @@ def test_joints_without_limits_can_be_written_within_pi() -> None:
         ({"restarts": 1.5}, "restarts: found 1.5, allowed: a whole number, 0 or more"),
         ({"tolerance": np.nan, "tsp": 1.0}, "tolerance: found nan m, allowed: more than 0, finite"),
         ({"method": "magic", "tsp": 1.0}, "method: found 'magic', allowed: auto, closed, iterative"),
-        ({"robot": None}, "found no robot; allowed: robot=NAME|FILE, a TOML, a URDF or one of arm6, "),
+        ({"robot": None}, "robot: found none, allowed: a TOML, a URDF or one of arm6, "),
         (
             {"output": "log.txt"},
             "output: found 'log.txt', allowed: a name that ends in .csv (a joint log) or .rrd",

@@ -96,7 +96,7 @@ def test_the_nearest_point_tells_how_far_it_is_from_the_target() -> None:
     assert list(shortfall_warnings(found, np.array([1, 4, 5]))) == [
         LogWarning(
             "nearest-point",
-            "row 4: out of reach, the nearest point is taken (--tolerance): up to 2.1 mm away, in row 4",
+            "row 4: out of reach, the nearest point within tolerance is taken: up to 2.1 mm away, in row 4",
         )
     ]
     assert not list(shortfall_warnings(solutions(), np.array([1, 4, 5])))
@@ -109,8 +109,7 @@ def test_targets_in_mm_are_told_from_those_out_of_reach() -> None:
     (found,) = far_warnings(arm, Targets(position), np.arange(1, 5), reached)
     assert found.kind == "too-far"
     assert found.message == (
-        "row 1: up to 131.548 m from the base, while arm6 reaches no farther than 0.4001 m:"
-        " in mm? Allowed: m, or of a file --unit mm"
+        "row 1: up to 131.548 m from the base, while arm6 reaches no farther than 0.4001 m: in mm?"
     )
 
 
@@ -152,7 +151,8 @@ def test_a_start_in_degrees_is_told_of() -> None:
     assert list(start_warnings(arm, np.array([0.0, 45.0, -90.0, 3.0, 0.0, 0.0]))) == [
         LogWarning(
             "start-unit",
-            "--start: found phi2 = 45 rad (2578.31 deg), phi3 = -90 rad (-5156.62 deg): in deg? Allowed: rad",
+            "found phi2 = 45 rad (2578.31 deg), phi3 = -90 rad (-5156.62 deg): in deg? Allowed: rad",
+            parameter="start",
         )
     ]
 
@@ -166,8 +166,8 @@ def test_a_joint_with_limits_that_within_pi_leaves_beyond_pi_is_told_of() -> Non
     assert list(within_pi_warnings(limited, q)) == [
         LogWarning(
             "beyond-pi",
-            "--within-pi: wrist_3_joint goes to 200.535 deg: it is for joints without limits; a joint with"
-            " limits stays",
+            "wrist_3_joint goes to 200.535 deg: it is for joints without limits; a joint with limits stays",
+            parameter="within_pi",
         )
     ]
     assert not list(within_pi_warnings(limited, np.clip(q, -np.pi, np.pi)))
