@@ -25,9 +25,8 @@ from urmpipe_models.orientation import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
-from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.scene import Arm
-from urmpipe_pipeline.recording.store import ROW, TIME, Store
+from urmpipe_pipeline.recording.store import Store
 from urmpipe_pipeline.recording.views.geometry import (
     POSES,
     ball,
@@ -304,9 +303,9 @@ def test_a_name_keeps_its_place_in_a_motion_and_leaps_between_single_poses(make_
 def test_the_viewer_opens_where_most_branches_are(make_solved: MakeSolved, tmp_path: Path) -> None:
     store = Store(write_recording(make_solved(), tmp_path / "solved.rrd"))
     # At row 2 the arm and both ghosts are there for the first time.
-    assert store.opening == (TIME, 2 * STEP_NS)
+    assert store.opening == ("t", 2 * STEP_NS)
     store = Store(write_recording(make_solved(timed=False), tmp_path / "poses.rrd"))
-    assert store.opening == (ROW, 3)  # rows count from 1
+    assert store.opening == ("row", 3)  # rows count from 1
 
 
 # --- without times ---------------------------------------------------------------------------------
@@ -325,8 +324,7 @@ def test_single_poses_stand_on_rows_alone(make_solved: MakeSolved, tmp_path: Pat
 def test_what_is_shown_of_targets_without_times_has_no_line_and_no_speed(make_solved: MakeSolved) -> None:
     """A line from one pose to the next would look like a motion."""
     for timed, speeds in ((True, 5), (False, 0)):
-        figures = present(make_solved(timed=timed)).body.figures()
-        views = [view for one in figures if isinstance(one, Figure) for view in one.views]
+        views = [view for figure in present(make_solved(timed=timed)).body.figures() for view in figure.views]
         units = [panel.unit for view in views for panel in view.panels]
         assert sum("/s" in unit for unit in units) == speeds
         lines = [line for view in views for panel in view.panels for line in panel.lines]

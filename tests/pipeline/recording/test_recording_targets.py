@@ -59,7 +59,8 @@ def test_a_long_path_is_dashed_and_positions_are_points(make_solved: MakeSolved)
     assert len(long.strips) > 10
     few = make_solved(rows=20, timed=False)
     points = drawn_targets(shown_targets(replace(few, targets=Targets(few.targets.position), angle=None)))
-    np.testing.assert_array_equal(points.points, few.targets.position)
+    np.testing.assert_array_equal(points.points, few.targets.position[few.reached])
+    np.testing.assert_array_equal(points.missed, few.targets.position[~few.reached])
     assert (len(points.origin), points.strips) == (0, ())
 
 
