@@ -33,12 +33,12 @@ SETTLE = 12.0
 
 def of_recording(source: Path, target: Path, at: float | None, settle: float = SETTLE) -> list[str]:
     """Picture a recording without a window, at a time in [s] or where `view` opens it; return complaints."""
-    from urmpipe_pipeline.recording.viewer import open_window, opening_times
+    from urmpipe_pipeline.recording.store import TIME, Opening
+    from urmpipe_pipeline.recording.viewer import open_window, openings
 
     draw_in_software()
-    opens_at = opening_times([source])[source]
-    at_ns = opens_at if at is None else round(at * 1e9)
-    with open_window(source, at_ns, headless=True) as (_, viewer):
+    opening = openings([source])[source] if at is None else Opening(TIME, round(at * 1e9))
+    with open_window(source, opening, headless=True) as (_, viewer):
         time.sleep(settle)
         viewer.save_screenshot(str(target))
         return complaints_of(viewer)

@@ -33,7 +33,10 @@ if TYPE_CHECKING:
     from urmpipe.api.simulate import simulate as simulate
     from urmpipe.api.view import view as view
     from urmpipe.api.write_map import write_map as write_map
-    from urmpipe.edge import UrmpipeWarning as UrmpipeWarning
+    from urmpipe.keyword_checks import UrmpipeWarning as UrmpipeWarning
+    from urmpipe.reading import LogReading as LogReading
+    from urmpipe.reading import Reading as Reading
+    from urmpipe.reading import TableReading as TableReading
     from urmpipe_fmus.build import BuiltFmu as BuiltFmu
     from urmpipe_models.chains.chain import Chain as Chain
     from urmpipe_models.errors import CosimulationError as CosimulationError
@@ -72,20 +75,23 @@ _HOME = {
     "SolvedTargets": "urmpipe_pipeline.solved_targets.result",
     "JointLog": "urmpipe_pipeline.joint_log",
     "LogError": "urmpipe_models.errors",
+    "LogReading": "urmpipe.reading",
     "LogMap": "urmpipe_pipeline.sources",
     "OptionError": "urmpipe_models.errors",
     "OutputError": "urmpipe_models.errors",
+    "Reading": "urmpipe.reading",
     "ReadOptions": "urmpipe_pipeline.sources",
     "RecordingError": "urmpipe_models.errors",
     "Report": "urmpipe.api.report",
     "RobotError": "urmpipe_models.errors",
     "Run": "urmpipe_pipeline.runs.results",
     "Simulation": "urmpipe_pipeline.simulations.simulation",
+    "TableReading": "urmpipe.reading",
     "Targets": "urmpipe_models.inverse.targets",
     "Transform": "urmpipe_models.transform",
     "UnitError": "urmpipe_models.errors",
     "UrmpipeError": "urmpipe_models.errors",
-    "UrmpipeWarning": "urmpipe.edge",
+    "UrmpipeWarning": "urmpipe.keyword_checks",
     "ViewerError": "urmpipe_models.errors",
     "build_fmu": "urmpipe.api.build_fmu",
     "compare": "urmpipe.api.compare",

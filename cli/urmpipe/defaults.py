@@ -30,7 +30,7 @@ EACH_TIME = (
 )  # fmt: skip
 """Options of what one call is to give: no file says them for all."""
 
-FILES = ("robot", "map")
+FILES = ("robot", "map", "log-map")
 """Options whose value may be a file."""
 
 TABLES = ("tolerance", "noise")

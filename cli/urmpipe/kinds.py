@@ -60,10 +60,10 @@ def _is_robot(value: Any) -> bool:
     return isinstance(value, Chain) or _is_path(value)
 
 
-def _is_read(value: Any) -> bool:
-    from urmpipe_pipeline.sources import ReadOptions
+def _is_map(value: Any) -> bool:
+    from urmpipe_pipeline.sources import LogMap
 
-    return isinstance(value, ReadOptions)
+    return isinstance(value, LogMap) or _is_path(value)
 
 
 def _is_run(value: Any) -> bool:
@@ -85,7 +85,7 @@ def _is_unit(value: Any) -> bool:
 
 
 def _is_table(value: Any) -> bool:
-    from urmpipe.systems.log_tables import LogTable
+    from urmpipe.log_table import LogTable
 
     return isinstance(value, LogTable) or _is_path(value)
 
@@ -127,6 +127,7 @@ KINDS = {
     "audit": PATH,
     "backend": _one_of("native", "python"),
     "base_link": LINK,
+    "csv": PATH,
     "baseline": Kind(_is_baseline, "a recording, or what `compare` returned"),
     "build_fmu.log": Kind(_is_table, "a log: CSV, or a folder of plots"),
     "derivative": _one_of("central", "savgol"),
@@ -141,7 +142,7 @@ KINDS = {
     "inputs": PATHS,
     "junit": PATH,
     "lazy": FLAG,
-    "map_robot": ROBOT_FILE,
+    "log_map": Kind(_is_map, "a map (TOML), or what `read_map` returned"),
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,
     "noise": KIND_OF_LIMIT,
@@ -150,13 +151,11 @@ KINDS = {
     "path": PATH,
     "platforms": Kind(_one_or_many(_is_text), "linux64, win64 or a list of both"),
     "progress": TOLD,
-    "read": Kind(_is_read, "ReadOptions, such as the `read` of a map: urmpipe.read_map(FILE).read"),
     "restarts": COUNT,
     "robot": Kind(_is_robot, "a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)"),
     "rows": _one_of("grid", "file"),
     "run": Kind(_is_run, "a Run, such as urmpipe.ingest(LOG)"),
     "seed": COUNT,
-    "statistics": PATH,
     "step": SECONDS,
     "strict": FLAG,
     "sync": Kind(
@@ -171,7 +170,8 @@ KINDS = {
     "told": Kind(callable, "a function of a text, such as print"),
     "tolerance": KIND_OF_TOLERANCE,
     "tsp": SECONDS,
-    "unit": Kind(_is_unit, "the name of a unit, a Python file with one, or a Unit"),
+    "build_fmu.unit": Kind(_is_unit, "the name of a unit, a Python file with one, or a Unit"),
+    "voice": _one_of("python", "command line"),
     "within_pi": FLAG,
     "write_map": PATH,
     "write_map.robot": ROBOT_FILE,

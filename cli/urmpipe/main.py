@@ -8,15 +8,17 @@ from __future__ import annotations
 
 import gc
 import sys
+import warnings
 from collections.abc import Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import click
 
 from urmpipe import __version__
-from urmpipe.boundary import (
+from urmpipe.defaults import defaults_for, find_defaults
+from urmpipe.error_boundary import (
     close_streams,
     findings_of,
     leave_output,
@@ -24,11 +26,7 @@ from urmpipe.boundary import (
     print_findings,
     tell_junit_of,
 )
-from urmpipe.defaults import defaults_for, find_defaults
 from urmpipe.usage import Defaults, Group
-
-if TYPE_CHECKING:
-    from urmpipe_models.spelling import Voice
 
 COMMANDS = {
     "demo": "Run the whole way on bundled logs.",
@@ -47,10 +45,6 @@ COMMANDS = {
 COLLECT_AT = 100_000
 """Objects made before Python looks for cycles among them. Python's own 700 cost a command, which first of
 all imports thousands of them, a tenth of a second."""
-
-
-WITH_SYSTEM_FILES = ("simulate", "fmu")
-"""Commands whose logs are read as a system file, or the map of a log, says."""
 
 
 class LazyGroup(Group):
@@ -129,7 +123,11 @@ def run(arguments: Sequence[str]) -> int:
     """Run the command line and return the exit code."""
     as_json = "--json" in arguments
     try:
-        return int(cli.main(list(arguments), prog_name="urmpipe", standalone_mode=False) or 0)
+        with warnings.catch_warnings():
+            warnings.filterwarnings(
+                "ignore", module=r"urmpipe\.commands"
+            )  # a command prints those of results
+            return int(cli.main(list(arguments), prog_name="urmpipe", standalone_mode=False) or 0)
     except BrokenPipeError:  # the reader of a help text left, as head does; results are told to the end
         leave_output()
         return 0
@@ -141,8 +139,6 @@ def run(arguments: Sequence[str]) -> int:
 
             traceback.print_exception(error)
         findings = findings_of(error)
-        of_files = bool(arguments) and arguments[0] in WITH_SYSTEM_FILES
-        voice: Voice = "system file" if of_files else "command line"
-        print_findings(findings, as_json, voice)
-        tell_junit_of(arguments, findings, voice)
+        print_findings(findings, as_json)
+        tell_junit_of(arguments, findings)
     return 2

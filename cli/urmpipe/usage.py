@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -95,7 +95,7 @@ def usage_finding(error: click.UsageError) -> Finding:
         case click.MissingParameter(param=click.Parameter() as param):
             said = f"found no {_told(param)}, allowed: {_usage(ctx)}"
         case click.BadParameter(param=click.Parameter() as param):
-            return place_of(ctx, param, error.message)
+            return place_of(ctx, param, Finding(error.message))
         case click.UsageError() if ctx and "unexpected extra" in error.message:  # told by its words alone
             found = error.message.partition("(")[2].rstrip(")")
             robot = "; a robot is named with --robot" if _takes(ctx, "--robot") else ""
@@ -105,14 +105,15 @@ def usage_finding(error: click.UsageError) -> Finding:
     return Finding(said if ctx is None or "allowed: " in said else f"{said}; see {ctx.command_path} --help")
 
 
-def place_of(ctx: click.Context | None, param: click.Parameter, said: str) -> Finding:
+def place_of(ctx: click.Context | None, param: click.Parameter, found: Finding) -> Finding:
     """Return what is wrong with the value of a parameter: an option's, or a key's of urmpipe.toml."""
-    from urmpipe_models.errors import Finding
-
     by_file = ctx is not None and ctx.get_parameter_source(param.name or "") == ParameterSource.DEFAULT_MAP
     if ctx is not None and by_file and isinstance(ctx.obj, Defaults):
-        return Finding(f"key {_long(param)}: {said}", str(ctx.obj.path))
-    return Finding(f"{_told(param)}: {said}")
+        said = ": ".join(filter(None, (f"key {_long(param)}", found.message)))
+        return replace(found, message=said, file=str(ctx.obj.path), parameter=None)
+    if isinstance(param, click.Option):
+        return replace(found, parameter=param.name)
+    return replace(found, message=": ".join(filter(None, (_told(param), found.message))), parameter=None)
 
 
 def _long(param: click.Parameter) -> str:

@@ -17,7 +17,6 @@ from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.other_robot import on_robot
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
 from urmpipe_pipeline.sources import ReadOptions
 
@@ -96,11 +95,11 @@ def load_run(
             log_files(operand), robot=robot, read=read, tsp=tsp, derivative=derivative, name=name
         )
     result = read_recording(operand)
+    if isinstance(result, (Run, SolvedTargets)):
+        return on_robot(result.as_run(), robot)
     if isinstance(result, Comparison):
         raise RecordingError(Finding(COMPARISON, str(operand), hints=(WITH_BASELINE,)))
-    if isinstance(result, Simulation):
-        raise RecordingError(Finding(SIMULATION, file=str(operand)))
-    return on_robot(result.as_run(), robot)
+    raise RecordingError(Finding(SIMULATION, file=str(operand)))
 
 
 def load_comparison(operand: Path) -> Comparison | None:
@@ -111,6 +110,11 @@ def load_comparison(operand: Path) -> Comparison | None:
     """
     result = read_recording(operand) if _is_recording(operand) else None
     return result if isinstance(result, Comparison) else None
+
+
+def is_log(operand: Path) -> bool:
+    """Return whether an operand is a log that is yet to be read."""
+    return not _is_recording(operand)
 
 
 def _is_recording(operand: Path) -> bool:

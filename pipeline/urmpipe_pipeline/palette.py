@@ -64,26 +64,17 @@ def run_colour(index: int) -> str:
     return list(RUN_COLOURS.values())[index % len(RUN_COLOURS)]
 
 
-def run_colour_word(index: int) -> str:
-    """Return the word for the colour of a run, counted from 0."""
-    return list(RUN_COLOURS)[index % len(RUN_COLOURS)]
-
-
-def colour_word(colour: str) -> str:
-    """Return the word for the colour of a run; empty for another colour."""
-    return next((word for word, one in RUN_COLOURS.items() if one == colour), "")
-
-
 def rgb(colour: str) -> tuple[int, int, int]:
     """Return red, green and blue of #rrggbb, each 0..255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
 
 
+def colour_word(colour: str) -> str:
+    """Return the word for a colour of lines in space; empty where it has none."""
+    words = {REFERENCE_COLOUR: "grey", DEVIATION_COLOUR: "crimson"}
+    return (words | {other: word for word, other in GHOST_COLOURS.items()}).get(colour, "")
+
+
 def ghost_colour(index: int) -> str:
     """Return the colour of a further branch of solved joint values as #rrggbb, counted from 0."""
     return list(GHOST_COLOURS.values())[index % len(GHOST_COLOURS)]
-
-
-def ghost_colour_word(index: int) -> str:
-    """Return the word for the colour of a further branch, counted from 0."""
-    return list(GHOST_COLOURS)[index % len(GHOST_COLOURS)]

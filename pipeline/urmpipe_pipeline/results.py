@@ -8,13 +8,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.comparison import exports as comparison_exports
 from urmpipe_pipeline.comparison import presenter as comparison
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.exports import Exports
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation
 from urmpipe_pipeline.recording.reader import read_result
 from urmpipe_pipeline.recording.writer import write_result
@@ -40,7 +41,7 @@ class Kind:
     """
 
     name: str
-    cls: type
+    cls: type[Result]
     present: Callable[[Any], Presentation]
     exports: Callable[[Any], Exports] | None = None
 
@@ -54,18 +55,18 @@ KINDS: tuple[Kind, ...] = (
 """Every kind."""
 
 
-def is_result(value: Any) -> bool:
+def is_result(value: Any) -> TypeGuard[Result]:
     """Tell whether a value is a result of any kind."""
     return any(kind.cls is type(value) for kind in KINDS)
 
 
-def kind_of(result: Any) -> Kind:
+def kind_of(result: Result) -> Kind:
     """Return the kind of a result."""
     return next(kind for kind in KINDS if kind.cls is type(result))
 
 
 def write_recording(
-    result: Any,
+    result: Result,
     path: Path,
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
@@ -88,7 +89,7 @@ def write_recording(
     return path
 
 
-def read_recording(path: Path, *, lazy: bool = False) -> Any:
+def read_recording(path: Path, *, lazy: bool = False) -> Result:
     """Return the result that a recording holds.
 
     Args:
@@ -98,15 +99,16 @@ def read_recording(path: Path, *, lazy: bool = False) -> Any:
     Raises:
         RecordingError: If it is no recording, was cut off, is not of urmpipe, or of another layout.
     """
-    return read_result(path, {kind.name: kind.cls for kind in KINDS}, lazy=lazy)
+    found: Result = read_result(path, {kind.name: kind.cls for kind in KINDS}, lazy=lazy)
+    return found
 
 
-def present(result: Any) -> Presentation:
+def present(result: Result) -> Presentation:
     """Return what a result shows."""
     return kind_of(result).present(result)
 
 
-def exports(result: Any) -> Exports:
+def exports(result: Result) -> Exports:
     """Return what can leave of a result.
 
     Raises:

@@ -11,8 +11,7 @@ from typing import Any
 import pytest
 
 from urmpipe_datasets import LOGS
-from urmpipe_pipeline.operands import load_run
-from urmpipe_pipeline.recording.summary import summary
+from urmpipe_pipeline.results import present, read_recording
 
 RunCommand = Callable[..., Any]
 MATLAB = LOGS / "matlab.csv"
@@ -33,7 +32,7 @@ def recording(urmpipe: RunCommand, tmp_path: Path) -> Path:
 def test_a_format_without_a_folder_is_refused(urmpipe: RunCommand, recording: Path) -> None:
     ran = urmpipe("report", recording, "--format", "svg")
     assert (ran.code, ran.out) == (2, "")
-    assert "--format: found without --figures, allowed: with --figures DIR" in ran.err
+    assert "--formats: found without figures; --figures FIGURES names their folder" in ran.err
     assert not recording.with_suffix(".html").exists()
 
 
@@ -53,12 +52,13 @@ def test_ik_its_recording_and_the_report_of_it_say_one_verdict(
 ) -> None:
     (tmp_path / "poses.csv").write_text(f"x [m],y [m],z [m]\n0.4,0.2,0.3\n{x},0.2,0.4\n")
     ran = urmpipe("ik", "poses.csv", "--robot", "ur5e", "-o", "poses.rrd")
-    said = f"poses: ur5e reaches {reached}2 targets"
+    said = f"poses: ur5e reaches {reached}2 targets (iterative)"
     assert (ran.code, ran.out.splitlines()[0]) == (
         ("pass", "fail").index(verdict),
-        f"{verdict.upper()}  {said} (iterative)",
+        f"{verdict.upper()}  {said}",
     )
-    assert summary(load_run(tmp_path / "poses.rrd")).splitlines()[0] == f"### {verdict.upper()}: {said}"
+    recorded = present(read_recording(tmp_path / "poses.rrd"))
+    assert (recorded.verdict, recorded.headline) == (verdict, said)
     ran = urmpipe("report", "poses.rrd", "--json")
     assert json.loads(ran.out)["recordings"] == [{"name": "poses", "verdict": verdict}]
     page = (tmp_path / "poses.html").read_text(encoding="utf-8")

@@ -49,7 +49,7 @@ def load(tmp_path: Path) -> Load:
 
 @pytest.mark.parametrize("joints", [("b", "a"), ("b [rad]", "a"), ("3", "2")])
 def test_the_options_hold_for_every_log(joints: tuple[str, ...], load: Load) -> None:
-    for run in load(LOG, LOG, joints=joints, units={"a": "deg"}):
+    for run in load(LOG, LOG, joints=joints, unit={"a": "deg"}):
         np.testing.assert_allclose(run.log.q, np.column_stack((-TURN, np.radians(TURN))), rtol=1e-15)
         assert (run.log.joints, run.log.units) == (("b", "a"), {"t": "s", "b": "rad", "a": "deg"})
 
@@ -59,7 +59,7 @@ def test_a_run_and_its_recording_stand_as_they_were_read(load: Load, tmp_path: P
     (made,) = load(LOG, joints=("b", "a"))
     recording = write_recording(made, tmp_path / "made.rrd")
     (tmp_path / "log.csv").write_text(LOG.replace("a [rad]", "c").replace("b [rad]", "d"))
-    read = ReadOptions(joints=("c", "d"), units={"": "deg"})
+    read = ReadOptions(joints=("c", "d"), unit={"": "deg"})
     runs = load_runs([made, recording, tmp_path / "log.csv"], robot=ROBOT, read=read)
     assert [run.log.joints for run in runs] == [("b", "a"), ("b", "a"), ("c", "d")]
     for run in runs[:2]:

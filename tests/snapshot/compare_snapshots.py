@@ -15,11 +15,13 @@ import sys
 from base64 import b64encode
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterator
+from difflib import SequenceMatcher
 from fnmatch import fnmatch
 from pathlib import Path
 from typing import Any
 
-Case = dict[str, dict[str, Any]]
+Column = dict[str, Any]
+Case = dict[str, Column]
 Difference = tuple[str, str, str]
 """Its kind, what differs (alike in all cases), and how."""
 
@@ -29,7 +31,7 @@ KINDS = {
     "arrays": "ARRAYS of recordings, exports, attributes: changed or lost (must stay)",
     "times": "TIMES of arrays (must stay)",
     "scene": "WHAT IS DRAWN IN SPACE and lists of other components: changed or lost",
-    "traces": "TRACES of reports: changed or lost",
+    "traces": "TRACES of reports, in any order",
     "shown": "NUMBERS SHOWN in reports and texts, in any order",
     "keys": "KEYS renamed, lost, new",
     "entities": "ARRAYS RENAMED, regrouped, new",
@@ -52,47 +54,49 @@ def differences(before: Case, after: Case) -> Iterator[Difference]:
     """Yield what differs between a case and the same case later."""
     new = sorted(after.keys() - before.keys())
     for name, one in before.items():
-        other, shown = after.get(name), name
-        if other is None:
-            same = [
-                key
-                for key in new
-                if _file(key) == _file(name)
-                and after[key]["hash"] == one["hash"]
-                and after[key]["kind"] == one["kind"]
-            ]
-            if not same:
-                yield _gone(name, one, after)
-                continue
-            found = max(
-                same, key=lambda key: (after[key].get("t") == one.get("t"), _tail(key) == _tail(name))
-            )
+        found = name if name in after else _renamed(name, one, new, after)
+        if found is None:
+            yield _gone(name, one, after)
+            continue
+        other = after[found]
+        if found != name:
             new.remove(found)
-            other, shown = after[found], f"{name} -> {found}"
-            yield "entities" if "shape" in one else "keys", shown, "renamed"
+            yield _moved(name, one), f"{name} -> {found.partition('|')[2]}", "renamed"
         if (one["hash"], one["kind"]) != (other["hash"], other["kind"]):
             yield _kind(name, one), name, _how(one, other)
         elif one.get("t") != other.get("t"):
-            yield "times", shown, "its values stand at other times"
-    yield from (("entities" if "shape" in after[name] else "keys", name, "new") for name in new)
+            yield "times", name, "its values stand at other times"
+    yield from ((_moved(name, after[name]), name, "new") for name in new)
 
 
-def _gone(name: str, one: dict[str, Any], after: Case) -> Difference:
-    """Return what is said of a column that is not there later, under no name."""
-    if "shape" not in one:
-        return "keys", name, f"LOST, {one['n']} values: {' '.join(one.get('values', [])[:3])[:60]}"
+def _renamed(name: str, one: Column, new: list[str], after: Case) -> str | None:
+    """Return which new column of the same file holds the same: of several that with the most alike name."""
+    same = [key for key in new if _file(key) == _file(name) and after[key]["hash"] == one["hash"]]
+    alike = [(after[key].get("t") == one.get("t"), SequenceMatcher(None, name, key).ratio()) for key in same]
+    return same[alike.index(max(alike))] if same else None
+
+
+def _gone(name: str, one: Column, after: Case) -> Difference:
+    """Return what is said of a column that is there later under no name."""
     there = {
         each for key, other in after.items() if _file(key) == _file(name) for each in other.get("columns", ())
     }
-    if set(one["columns"]) <= there:
-        return "entities", name, "regrouped: its columns stand in other arrays"
-    return _kind(name, one), name, f"LOST, shape {one['shape']}"
+    if "shape" in one and set(one["columns"]) <= there:
+        return _moved(name, one), name, "regrouped: its columns stand in other arrays"
+    kind = _kind(name, one)
+    about = f"shape {one['shape']}" if "shape" in one else " ".join(one.get("values", [])[:3])[:60]
+    return "keys" if kind == "words" else kind, name, f"LOST, {about}"
 
 
-def _kind(name: str, one: dict[str, Any]) -> str:
+def _moved(name: str, one: Column) -> str:
+    """Return what it means that a column is new or has another name."""
+    if one["kind"] == "looks":
+        return "looks"
+    return "entities" if "shape" in one or _file(name).endswith(".rrd") else "keys"
+
+
+def _kind(name: str, one: Column) -> str:
     """Return what a change of a column means."""
-    if _file(name).endswith((".html", ".svg")) and one["kind"] in {"numbers", "arrays"}:
-        return "traces"
     return "verdicts" if JUDGED.search(name) and "shape" not in one else str(one["kind"])
 
 
@@ -100,17 +104,14 @@ def _file(name: str) -> str:
     return name.partition("|")[0]
 
 
-def _tail(name: str) -> str:
-    return re.split(r"[./| ]", name)[-1]
-
-
-def _how(one: dict[str, Any], other: dict[str, Any]) -> str:
-    """Return the first values that differ, or of numbers in any order those that are gone and new."""
+def _how(one: Column, other: Column) -> str:
+    """Return the first values that differ, or of those in any order which are gone and new."""
     if "values" not in one or "values" not in other:
         return f"hash differs; {one.get('shape', one['n'])} -> {other.get('shape', other['n'])}"
-    a, b = one["values"], other["values"]
-    if one["kind"] == "shown":
-        gone, new = ([*(Counter(x) - Counter(y)).elements()] for x, y in ((a, b), (b, a)))
+    a: list[str] = one["values"]
+    b: list[str] = other["values"]
+    if one["kind"] in {"shown", "traces"}:
+        gone, new = list((Counter(a) - Counter(b)).elements()), list((Counter(b) - Counter(a)).elements())
         return f"{len(gone)} gone: {' '.join(gone[:8])}; {len(new)} new: {' '.join(new[:8])}"
     was, now = next(
         ((x, y) for x, y in zip(a, b, strict=False) if x != y), (f"{len(a)} values", f"{len(b)} values")
@@ -126,8 +127,8 @@ def hashes(cases: dict[str, Case]) -> str:
         for name, one in columns.items():
             of = files[Path(_file(name)).suffix[1:] or name]
             of["keys"].append(name)
-            if "shape" not in one:
-                of[_kind(name, one)].append(one["hash"])
+            kind = _kind(name, one)
+            of["entities" if kind == "arrays" else kind].append(one["hash"])
         of_files = {
             f"{suffix} {kind}": _short(sorted(some))
             for suffix, kinds in files.items()
@@ -185,7 +186,8 @@ def main() -> int:
     for case in sorted(name for name in sides[0].keys() | sides[1].keys() if fnmatch(name, given.cases)):
         if case in sides[0] and case in sides[1]:
             for kind, name, how in compare(sides[0][case], sides[1][case]):
-                found[kind][name].append((case, how))
+                file, _, column = name.rpartition("|")
+                found[kind][column].append((f"{case}/{file}" if file else case, how))
         else:
             found["cases"]["only before" if case in sides[0] else "only after"].append((case, case))
     for kind, title in KINDS.items():

@@ -7,9 +7,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike, Robot, one_or_many
-from urmpipe.systems.log_tables import LogTable
+from urmpipe.arm_placing import Robot
+from urmpipe.keyword_checks import PathLike, one_or_many, public
+from urmpipe.log_table import LogTable
 from urmpipe.systems.units import Backend, unit_of
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.errors import Finding, OutputError
@@ -18,7 +18,7 @@ from urmpipe_pipeline.outputs import guarded_output
 
 if TYPE_CHECKING:
     from urmpipe_fmus.build import BuiltFmu
-    from urmpipe_pipeline.sources import ReadOptions
+    from urmpipe_pipeline.sources import LogMap
 
 
 @public
@@ -28,7 +28,7 @@ def build_fmu(
     *,
     log: PathLike | LogTable | None = None,
     options: Mapping[str, Any] | None = None,
-    read: ReadOptions | None = None,
+    log_map: PathLike | LogMap | None = None,
     backend: Backend | None = None,
     platforms: str | Sequence[str] = (),
     output: PathLike = ".",
@@ -41,7 +41,7 @@ def build_fmu(
         robot: Name, file (TOML, URDF) or chain of the arm, for a unit that has one.
         log: A log for a unit that plays one: CSV, a folder of plots, or what `read_table` made of them.
         options: Further options of the unit by name; see `urmpipe fmu list`.
-        read: How to read the log where it cannot tell by itself.
+        log_map: A map (TOML), or what `read_map` returned: how to read the log.
         backend: native (C) or python (needs Python with NumPy on the target); default: native if this
             machine can build it, else python, with a `note` why.
         platforms: linux64, win64; default: this one. Others than this one need the extra `cross`.
@@ -56,7 +56,7 @@ def build_fmu(
     """
     from urmpipe_fmus.build import build_fmu as build
 
-    made = unit_of(unit, robot=robot, log=log, options=options, read=read)
+    made = unit_of(unit, robot=robot, log=log, options=options, log_map=log_map)
     path = Path(output)
     if not path.is_dir() and path.suffix.lower() != ".fmu":
         allowed = "a folder that exists, or a name that ends in .fmu"

@@ -3,28 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
-from urmpipe.edge import public
-from urmpipe.guards import (
+from urmpipe.arm_placing import Frame, Robot
+from urmpipe.keyword_checks import (
     WRITTEN_FIRST,
-    Frame,
     PathLike,
-    Robot,
-    guarded_outputs,
     one_or_many,
     paths,
-    place_robot,
-    recorded,
+    public_reading,
     refuse_foreign,
     refuse_others,
     refuse_warnings,
 )
-from urmpipe.words import by_command_line
-from urmpipe_models.chains.chain import Chain
+from urmpipe.output_files import guarded_outputs, recorded
+from urmpipe.reading import Reading, map_files, resolved
 from urmpipe_models.errors import Finding, OptionError, RecordingError, for_each
+from urmpipe_models.messages import Hint
 from urmpipe_models.spelling import Voice
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
@@ -36,24 +34,24 @@ from urmpipe_pipeline.comparison.tables import statistics_rows
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
-from urmpipe_pipeline.operands import MadeRun, load_comparison, load_runs
+from urmpipe_pipeline.operands import MadeRun, is_log, load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
-from urmpipe_pipeline.recording import is_recording
 from urmpipe_pipeline.results import kind_of, present, read_recording
 from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.recorded_tcp import LACKING_TOOL
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
-from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 from urmpipe_pipeline.tables.table_csv import write_table
 
 Operand = PathLike | MadeRun
 
+EARLIER = Hint("baseline", None, "names one")
+
 OPERANDS = f"a log, a path, a recording, a Run or SolvedTargets; {WRITTEN_FIRST}"
 
 
-@public
+@public_reading(Reading)
 def compare(
     reference: Operand | Comparison,
     logs: Operand | Sequence[Operand] = (),
@@ -61,7 +59,8 @@ def compare(
     *,
     base: Frame | None = None,
     tool: Frame | None = None,
-    read: ReadOptions | None = None,
+    base_link: str | None = None,
+    tip_link: str | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
     tolerance: float | str | Mapping[str, float] = DEFAULT_TOLERANCE,
@@ -73,10 +72,11 @@ def compare(
     strict: bool = False,
     output: PathLike | None = None,
     junit: PathLike | None = None,
-    statistics: PathLike | None = None,
+    csv: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
     voice: Voice = "python",
     progress: Callable[[float], None] | None = None,
+    **reading: Unpack[Reading],
 ) -> Comparison:
     """Hold logs against a reference, and write what is named: all or none. docs/python.md has the keywords.
 
@@ -87,7 +87,8 @@ def compare(
         robot: The arm; a recording or a run that has another one is computed anew with it.
         base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
         tool: The tool centre point in the frame of the arm's tip, likewise.
-        read: How to read a log where it cannot tell by itself.
+        base_link: Link of a URDF where the arm begins; default: its root.
+        tip_link: Link of a URDF where the arm ends; default: its end.
         tsp: Period of a log's grid in [s].
         derivative: How a log is differentiated: central or savgol.
         tolerance: Largest deviation allowed of an axis in [m], or in [m] and [rad] by kind, or as a text with
@@ -101,10 +102,12 @@ def compare(
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write.
         junit: A JUnit file (XML) to write.
-        statistics: A table (CSV) to write, one row a log and quantity.
+        csv: A table to write, one row a log and quantity.
         inputs: Files besides the operands that are never replaced.
         voice: In whose words `junit` tells what to give: python or command line.
         progress: Told the share of the recording that is written, 0..1.
+        **reading: How to read the logs where they cannot tell by themselves: unit, time, joints, log_map and
+            the others of `urmpipe.Reading`; it holds for every log.
 
     Raises:
         UrmpipeError: With everything that is wrong with the input or the output.
@@ -112,27 +115,28 @@ def compare(
     Source: [UrmArm2021]_ eq. 19-23.
     """
     operands = _operands(reference, one_or_many(logs))
-    kept = [*_files([*operands, baseline]), *paths(inputs)]
+    kept = [*_files([*operands, baseline]), *map_files(reading), *paths(inputs)]
     outputs: dict[OutputKind, PathLike | None] = {
-        "recording": output, "junit": junit, "statistics": statistics,
+        "recording": output, "junit": junit, "statistics": csv,
     }  # fmt: skip
     told = None if junit is None else Path(junit)
     with errors_in_junit(told, kept, voice), guarded_outputs(outputs, kept) as parts:
         options = CompareOptions(_allowed(tolerance), tcp, sync, align, _with_unit(tolerance))
         level = _noise_level(noise, baseline)
-        given = _Given(place_robot(robot, base, tool), read, tsp, derivative)
-        given.refuse_unused(operands)
+        given = resolved(reading, robot, base, tool, base_link, tip_link)
+        _refuse_unused(operands, {**reading, "tsp": tsp, "derivative": derivative})
         earlier = None if baseline is None else _earlier(baseline)
+        load = partial(load_runs, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative)
         made = None if operands[1:] or earlier is None else _made_before(reference, output)
-        made = made or _compared(operands, given, options)
+        made = made or _compared(operands, load, options)
         if earlier is not None:
             made = _with_noise(made, level)
         _refuse_doubts(strict, made)
         result = made if earlier is None else replace(made, baseline=against_baseline(made, earlier, level))
         if told is not None:
             write_junit(present(result), parts["junit"], told, voice)
-        if statistics is not None:
-            write_table(statistics_rows(result), parts["statistics"], Path(statistics))
+        if csv is not None:
+            write_table(statistics_rows(result), parts["statistics"], Path(csv))
         return recorded(result, output, kept, progress)
 
 
@@ -155,41 +159,13 @@ def _with_unit(tolerance: float | str | Mapping[str, float]) -> frozenset[str]:
     return kinds_with_unit(tolerance) if isinstance(tolerance, str) else frozenset()
 
 
-@dataclass(frozen=True)
-class _Given:
-    """What is said of the operands: the arm of all of them, and how the logs among them are read."""
-
-    robot: Chain | None
-    read: ReadOptions | None
-    tsp: float | None
-    derivative: Method | None
-
-    def runs(self, operands: Sequence[Operand]) -> list[Run]:
-        """Return the runs that operands are, or are read as."""
-        return load_runs(
-            [Path(one) if isinstance(one, (str, Path)) else one for one in operands],
-            robot=self.robot, read=self.read, tsp=self.tsp, derivative=self.derivative,
-        )  # fmt: skip
-
-    def refuse_unused(self, operands: Sequence[Operand | Comparison]) -> None:
-        """Raise an `OptionError` if it is said how logs are read, and every operand was ingested before.
-
-        The command line tells so itself, since there a file of defaults may say how logs are read.
-        """
-        said = {"read": self.read, "--tsp": self.tsp, "--derivative": self.derivative}
-        names = [name for name, value in said.items() if value is not None]
-        if not names or by_command_line() or any(_is_log(one) for one in operands):
-            return
-        found = f"{', '.join(names)}: found with what was ingested before"
-        raise OptionError(f"{found}, allowed: with a log; a run or a recording stands as `ingest` made it")
-
-
-def _is_log(operand: Operand | Comparison) -> bool:
-    """Return whether an operand is a log that is yet to be read."""
-    if not isinstance(operand, (str, Path)):
-        return False
-    path = Path(operand)
-    return not (path.suffix == ".rrd" or (path.is_file() and is_recording(path)))
+def _refuse_unused(operands: Sequence[Operand | Comparison], given: Mapping[str, Any]) -> None:
+    """Raise an `OptionError` with all that says how logs are read, if every operand was ingested before."""
+    unused = [name for name, value in given.items() if value not in (None, False)]
+    if unused and not any(isinstance(one, (str, Path)) and is_log(Path(one)) for one in operands):
+        found = "found with what was ingested before"
+        allowed = "with a log; a run or a recording stands as `ingest` made it"
+        raise OptionError(*(Finding(found, parameter=name, allowed=allowed) for name in unused))
 
 
 def _noise_level(
@@ -201,15 +177,21 @@ def _noise_level(
         OptionError: If it is no such mapping, or there is no baseline.
     """
     if noise is not None and baseline is None:
-        raise OptionError("--noise: found without --baseline, allowed: with an earlier comparison")
+        allowed = "with an earlier comparison"
+        raise OptionError(Finding(parameter="noise", found="no baseline", allowed=allowed, hints=(EARLIER,)))
     return complete_noise(noise)
 
 
-def _compared(operands: Sequence[Operand | Comparison], given: _Given, options: CompareOptions) -> Comparison:
+def _compared(
+    operands: Sequence[Operand | Comparison],
+    load: Callable[[Sequence[Path | MadeRun]], list[Run]],
+    options: CompareOptions,
+) -> Comparison:
     """Return the comparison of some logs with a reference, or of one log with what it recorded itself."""
     if any(isinstance(one, Comparison) for one in operands):
         raise OptionError("found a comparison as the reference, allowed: with a baseline, and without logs")
-    first, *others = given.runs([one for one in operands if not isinstance(one, Comparison)])
+    given = (Path(one) if isinstance(one, (str, Path)) else one for one in operands)
+    first, *others = load([one for one in given if not isinstance(one, Comparison)])
     return compare_runs(first, others, options) if others else compare_recorded(first, options)
 
 
@@ -223,7 +205,8 @@ def _made_before(reference: Operand | Comparison, output: PathLike | None) -> Co
         return None
     made = reference if isinstance(reference, Comparison) else load_comparison(Path(reference))
     if made is not None and output is not None:
-        raise OptionError(f"-o: found {output} with a comparison that stands already, allowed: without")
+        found = f"{output} with a comparison that stands already"
+        raise OptionError(Finding(parameter="output", found=found, allowed="without"))
     return made
 
 
@@ -234,12 +217,14 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
     path = Path(baseline)
     if not path.exists():
         said = "found no such file, allowed: the recording of an earlier comparison"
-        raise RecordingError(Finding(f"{said}; before there is one: without --baseline", str(path)))
+        raise RecordingError(Finding(f"{said}; before there is one, none", str(path), parameter="baseline"))
     refuse_foreign([path])
     result = read_recording(path)
     if not isinstance(result, Comparison):
         found = f"found a recording ({kind_of(result).name})"
-        raise RecordingError(Finding(f"{found}, allowed: that of a comparison (--baseline)", str(path)))
+        raise RecordingError(
+            Finding(f"{found}, allowed: that of a comparison", str(path), parameter="baseline")
+        )
     return result
 
 

@@ -6,10 +6,9 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike, paths, refuse_foreign, refuse_others
-from urmpipe_models.display import Shown
+from urmpipe.keyword_checks import PathLike, paths, public, refuse_foreign, refuse_others
 from urmpipe_pipeline import results
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.results import read_recording
 
 if TYPE_CHECKING:
@@ -18,7 +17,7 @@ if TYPE_CHECKING:
 
 @public
 def export(
-    result: PathLike | Shown,
+    result: PathLike | Result,
     output: PathLike | None = None,
     *,
     to: Format | None = None,
@@ -47,7 +46,7 @@ def export(
     options = ExportOptions(format_of(to, target), rows, tcp)
     kept = paths(inputs)
     if results.is_result(result):
-        own: Path | None = result.recording  # type: ignore[union-attr]
+        own: Path | None = result.recording
     else:
         refuse_others("result", [result], (), "a recording, or a result such as a Run or a Comparison")
         own = Path(cast(PathLike, result))

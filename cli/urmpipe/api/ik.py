@@ -5,12 +5,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from numpy.typing import ArrayLike
 
-from urmpipe.edge import public
-from urmpipe.guards import Frame, PathLike, Robot, paths, place_robot, refuse_warnings
+from urmpipe.arm_placing import Frame, Robot
+from urmpipe.keyword_checks import PathLike, paths, public_reading, refuse_warnings
+from urmpipe.reading import Resolved, TableReading, map_files, resolved
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError, for_each, shown
@@ -38,14 +39,15 @@ RESTARTS = USUAL_SEARCH.restarts
 """Random starts of the iterative solver for a target that it does not reach from the start."""
 
 
-@public
+@public_reading(TableReading)
 def ik(
     targets: TargetsLike,
     robot: Robot | None = None,
     *,
     base: Frame | None = None,
     tool: Frame | None = None,
-    read: ReadOptions | None = None,
+    base_link: str | None = None,
+    tip_link: str | None = None,
     t: ArrayLike | None = None,
     tsp: float | None = None,
     start: Sequence[float] | FloatArray | None = None,
@@ -59,6 +61,7 @@ def ik(
     output: PathLike | None = None,
     inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
+    **reading: Unpack[TableReading],
 ) -> SolvedTargets:
     """Find the joint values that bring an arm's tool to targets, limits kept. docs/ik.md tells how.
 
@@ -70,7 +73,8 @@ def ik(
         robot: The arm.
         base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
         tool: The tool centre point in the frame of the arm's tip, likewise.
-        read: How to read the file where it cannot tell by itself.
+        base_link: Link of a URDF where the arm begins; default: its root.
+        tip_link: Link of a URDF where the arm ends; default: its end.
         t: Times of arrays in [s], shape (n,).
         tsp: Time from target to target in [s] where none is told.
         start: Joint values in [rad] or [m] to be near to, shape (joints,); default: the robot's own.
@@ -84,6 +88,8 @@ def ik(
         output: A joint log (.csv) or a recording (.rrd) to write.
         inputs: Files besides the targets that are never replaced.
         progress: Told the share that is done, 0..1.
+        **reading: How to read the file where it cannot tell by itself: unit, time, rotation, log_map and the
+            others of `urmpipe.TableReading`.
 
     Raises:
         UrmpipeError: With everything that is wrong with the input or the output. A target that is out of
@@ -92,10 +98,11 @@ def ik(
     Source: [Serial6dof2019]_ section 4, [UrmArm2021]_ section 5.
     """
     path = None if output is None else Path(output)
+    said = resolved(reading, robot, base, tool, base_link, tip_link)
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: _arm_of(robot, base, tool),
+        lambda: _arm_of(said),
         lambda: _kind_of(path),
-        lambda: _given(targets, t, tsp, read),
+        lambda: _given(targets, t, tsp, said.options),
     )
     arm, kind, given = for_each(lambda make: make(), parts)
     solving, writing = _parts(progress, path is not None)
@@ -103,7 +110,11 @@ def ik(
     request = Request(arm, given, start_of(arm, start), every, within_pi, method, search)
     refuse_unsolvable(request, recorded=kind == "recording")
 
-    kept = [*(paths(targets) if isinstance(targets, (str, Path)) else []), *paths(inputs)]
+    kept = [
+        *(paths(targets) if isinstance(targets, (str, Path)) else []),
+        *map_files(reading),
+        *paths(inputs),
+    ]
     if path is not None and kind is not None:
         refuse_output(path, kept, kind)
     result = solve_targets(request, solving)
@@ -121,18 +132,12 @@ def ik(
     return replace(result, recording=path)
 
 
-def _arm_of(robot: Robot | None, base: Frame | None, tool: Frame | None) -> Chain:
-    """Return the arm on its base and with its tool, frames in [m] and [rad] as 6 numbers or of shape (4, 4).
-
-    Raises:
-        OptionError: If there is none.
-        RobotError: If it is unknown, or with everything that is wrong with its file.
-    """
-    arm = place_robot(robot, base, tool)
-    if arm is None:
-        names = ", ".join(robot_names())
-        raise OptionError(f"found no robot; allowed: --robot NAME|FILE, a TOML, a URDF or one of {names}")
-    return arm
+def _arm_of(said: Resolved) -> Chain:
+    """Return the arm; raise an `OptionError` if there is none."""
+    if said.arm is None:
+        allowed = f"a TOML, a URDF or one of {', '.join(robot_names())}"
+        raise OptionError(Finding(parameter="robot", found="none", allowed=allowed))
+    return said.arm
 
 
 def _kind_of(output: Path | None) -> OutputKind | None:
@@ -146,7 +151,7 @@ def _kind_of(output: Path | None) -> OutputKind | None:
     kind = KINDS.get(output.suffix.lower())
     if kind is None:
         allowed = "a name that ends in .csv (a joint log) or .rrd (a recording)"
-        raise OptionError(f"-o: found {shown(str(output))}, allowed: {allowed}")
+        raise OptionError(Finding(parameter="output", found=shown(str(output)), allowed=allowed))
     return kind
 
 

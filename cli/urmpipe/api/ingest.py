@@ -4,23 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from urmpipe.api.write_map import write_map_part
-from urmpipe.edge import public
-from urmpipe.guards import (
+from urmpipe.arm_placing import Frame, Robot
+from urmpipe.keyword_checks import (
     WRITTEN_FIRST,
-    Frame,
     PathLike,
-    Robot,
-    guarded_outputs,
     one_or_many,
     paths,
-    place_robot,
-    recorded,
+    public_reading,
     refuse_others,
     refuse_warnings,
 )
+from urmpipe.output_files import guarded_outputs, recorded
+from urmpipe.reading import Reading, map_files, resolved
+from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, for_each
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.outputs import OutputKind
@@ -29,29 +28,29 @@ from urmpipe_pipeline.runs.derivatives import Method
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.presenter import audit_rows
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables.table_csv import write_table
 
 LOG_ALLOWED = f"a file, several of one log, or a folder of them; {WRITTEN_FIRST}"
 
 
-@public
+@public_reading(Reading)
 def ingest(
     log: PathLike | Sequence[PathLike],
     robot: Robot | None = None,
     *,
     base: Frame | None = None,
     tool: Frame | None = None,
-    read: ReadOptions | None = None,
+    base_link: str | None = None,
+    tip_link: str | None = None,
     tsp: float | None = None,
     derivative: Method | None = None,
     strict: bool = False,
     output: PathLike | None = None,
     audit: PathLike | None = None,
     write_map: PathLike | None = None,
-    map_robot: str | None = None,
     inputs: Sequence[PathLike] = (),
     progress: Callable[[float], None] | None = None,
+    **reading: Unpack[Reading],
 ) -> Run:
     """Turn one log into a run, and write what is named: all or none. docs/python.md has the keywords.
 
@@ -60,34 +59,39 @@ def ingest(
         robot: The arm; without it there are no kinematics.
         base: Where the arm stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
         tool: The tool centre point in the frame of the arm's tip, likewise.
-        read: How to read the log where it cannot tell by itself.
+        base_link: Link of a URDF where the arm begins; default: its root.
+        tip_link: Link of a URDF where the arm ends; default: its end.
         tsp: Period of the grid in [s]; default: the log's own.
         derivative: central or savgol; default: savgol for quantised logs, else central.
         strict: Whether a warning is an error.
         output: The recording (.rrd) to write.
         audit: A CSV file to write the repolarizer's audit to.
         write_map: A TOML file to write the map to, by which further logs read as this one was read.
-        map_robot: Name or file of the arm in that map; default: its name, if it is one of the catalogue.
         inputs: Files besides the log that are never replaced, such as the map it was read by.
         progress: Told the share of the recording that is written, 0..1.
+        **reading: How to read the log where it cannot tell by itself: unit, time, joints, log_map and the
+            others of `urmpipe.Reading`.
 
     Raises:
         UrmpipeError: With everything that is wrong with the input or the output.
     """
     parts: tuple[Callable[[], Any], ...] = (
-        lambda: place_robot(robot, base, tool),
+        lambda: resolved(reading, robot, base, tool, base_link, tip_link),
         lambda: _files_and_name(log),
     )
-    arm, (files, name) = for_each(lambda make: make(), parts)
+    given, (files, name) = for_each(lambda make: make(), parts)
     outputs: dict[OutputKind, PathLike | None] = {"recording": output, "audit": audit, "map": write_map}
-    kept = [*files, *paths(inputs)]
+    kept = [*files, *map_files(reading), *paths(inputs)]
     with guarded_outputs(outputs, kept) as written:
-        run = ingest_log(files, robot=arm, read=read, tsp=tsp, derivative=derivative, name=name)
+        run = ingest_log(
+            files, robot=given.arm, read=given.options, tsp=tsp, derivative=derivative, name=name
+        )
         refuse_warnings(strict, run.warnings)
         if audit is not None:
             write_table(audit_rows(run), written["audit"], Path(audit))
         if write_map is not None:
-            write_map_part(run, written["map"], Path(write_map), map_robot)
+            named = None if given.robot is None or isinstance(given.robot, Chain) else str(given.robot)
+            write_map_part(run, written["map"], Path(write_map), named)
         return recorded(run, output, kept, progress)
 
 

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike
+from urmpipe.keyword_checks import PathLike, public
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.robots import catalogue
 

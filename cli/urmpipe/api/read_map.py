@@ -4,8 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike
+from urmpipe.keyword_checks import PathLike, public
 from urmpipe_pipeline import sources
 from urmpipe_pipeline.sources import LogMap
 

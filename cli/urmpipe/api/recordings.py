@@ -5,15 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike, paths
-from urmpipe_models.display import Shown
+from urmpipe.keyword_checks import PathLike, paths, public
 from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_pipeline import results
+from urmpipe_pipeline.presentation.result import Result
 
 
 @public
-def read_recording(path: PathLike, *, lazy: bool = False) -> Shown:
+def read_recording(path: PathLike, *, lazy: bool = False) -> Result:
     """Return the result that a recording holds: a Run, a Comparison, a Simulation, ...
 
     Args:
@@ -24,13 +23,13 @@ def read_recording(path: PathLike, *, lazy: bool = False) -> Shown:
     Raises:
         RecordingError: If it is no recording, was cut off, is not of urmpipe, or of another layout.
     """
-    found: Shown = results.read_recording(Path(path), lazy=lazy)
+    found: Result = results.read_recording(Path(path), lazy=lazy)
     return found
 
 
 @public
 def write_recording(
-    result: Shown,
+    result: Result,
     output: PathLike,
     *,
     inputs: Sequence[PathLike] = (),

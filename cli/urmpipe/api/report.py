@@ -7,13 +7,12 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike, one_or_many, paths, refuse_foreign, refuse_others
+from urmpipe.keyword_checks import PathLike, one_or_many, paths, public, refuse_foreign, refuse_others
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Cell, Value
 from urmpipe_pipeline.results import KINDS, present, read_recording
-from urmpipe_pipeline.simulations.simulation import Result
 
 if TYPE_CHECKING:
     import pandas as pd

@@ -6,11 +6,12 @@ import math
 from collections.abc import Callable, Mapping
 from dataclasses import replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Unpack
 
 from urmpipe import __version__
-from urmpipe.edge import public
-from urmpipe.guards import PathLike, guarded_outputs, recorded
+from urmpipe.keyword_checks import PathLike, public_reading
+from urmpipe.output_files import guarded_outputs, recorded
+from urmpipe.reading import LogReading, map_files
 from urmpipe.systems.blocks import Blocks
 from urmpipe.systems.result import check_meters, simulation_of
 from urmpipe.systems.units import Backend
@@ -18,16 +19,15 @@ from urmpipe_datasets import LOGS
 from urmpipe_fmus.cosim import load_system, prepare, read_system, system_name, system_names, system_svg
 from urmpipe_fmus.cosim import simulate as run_plan
 from urmpipe_fmus.cosim.process import Worker
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import Finding, OptionError
 from urmpipe_pipeline.outputs import DRAWING_HEADER, OutputKind
 from urmpipe_pipeline.simulations.simulation import Simulation
 
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import System
-    from urmpipe_pipeline.sources import ReadOptions
 
 
-@public
+@public_reading(LogReading)
 def simulate(
     system: PathLike,
     *,
@@ -35,11 +35,11 @@ def simulate(
     step: float | None = None,
     duration: float | None = None,
     backend: Backend | None = None,
-    read: ReadOptions | None = None,
     output: PathLike | None = None,
     draw: PathLike | None = None,
     told: Callable[[str], None] | None = None,
     progress: Callable[[float], None] | None = None,
+    **reading: Unpack[LogReading],
 ) -> Simulation:
     """Run a system of blocks, and write its recording and its drawing if they are named.
 
@@ -49,11 +49,12 @@ def simulate(
         step: Communication step in [s]; default: that of the system, else of the joint log that it plays.
         duration: In [s]; default: that of the system, else of the longest log that it reads.
         backend: native or python, for the FMUs of units; default: native if it can be built here.
-        read: How to read the logs where they cannot tell by themselves.
         output: The recording (.rrd) to write.
         draw: An SVG file to draw the system to.
         told: Told what takes its time before the first step, a line each.
         progress: Told the share that is done, 0..1.
+        **reading: How to read the logs where they cannot tell by themselves: unit, time, joints, log_map and
+            the others of `urmpipe.LogReading`; it comes before the map that a block names.
 
     Returns:
         The simulation: `signals`, `verdicts`, `to_frame()`, `to_dict()`. Where an FMU failed, `failed` tells
@@ -65,11 +66,11 @@ def simulate(
     texts = {name: str(value) for name, value in (arguments or {}).items()}
     loaded = _changed(read_system(system, texts), step, duration)
     bundled = _bundled(system, texts)
-    kept = [loaded.path, *_files(loaded)]
+    kept = [loaded.path, *_files(loaded), *map_files(reading)]
     named: dict[OutputKind, PathLike | None] = {"recording": output, "drawing": draw}
     running, writing = _halves(progress)
     with guarded_outputs(named, kept) as parts, Worker() as worker:  # it loads what it needs meanwhile
-        blocks = Blocks(loaded, bundled=bundled, backend=backend, read=read, told=told)
+        blocks = Blocks(loaded, bundled=bundled, backend=backend, reading=reading, told=told)
         plan = prepare(loaded, blocks.make, column=blocks.column, duration=blocks.end, period=blocks.period)
         check_meters(plan)
         svg = system_svg(plan)
@@ -122,7 +123,10 @@ def _changed(system: System, step: float | None, duration: float | None) -> Syst
     given = {"step": step, "duration": duration}
     wrong = {name: value for name, value in given.items() if value is not None and not 0.0 < value < math.inf}
     if wrong:
-        raise OptionError(*(f"{name}: found {value:g} s, allowed: above 0" for name, value in wrong.items()))
+        faults = (
+            Finding(parameter=name, found=f"{value:g} s", allowed="above 0") for name, value in wrong.items()
+        )
+        raise OptionError(*faults)
     return replace(system, step=step or system.step, duration=duration or system.duration)
 
 

@@ -5,8 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike, one_or_many, refuse_others
+from urmpipe.keyword_checks import PathLike, one_or_many, public, refuse_others
 
 
 @public

@@ -6,8 +6,8 @@ import os
 from collections.abc import Sequence
 from pathlib import Path
 
-from urmpipe.edge import public
-from urmpipe.guards import PathLike, offset_of, paths
+from urmpipe.arm_placing import offset_of
+from urmpipe.keyword_checks import PathLike, paths, public
 from urmpipe_models.robots.catalogue import robot_names
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.runs.results import Run

@@ -10,17 +10,17 @@ from typing import TYPE_CHECKING, Any
 import click
 
 import urmpipe
-from urmpipe.options.given import about_recordings, options_given
+from urmpipe.options.given import for_logs, options_given
 from urmpipe.options.grouped import Command
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.reading import LogOptions, log_options
+from urmpipe.options.reading import log_options
 from urmpipe.options.types import TIMES, OneOf, ParsedType, parsed, quantity
 from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.comparison.comparison import Comparison
 
-OF_RESULTS = {"baseline", "noise", "junit", "statistics", "strict", "as_json", "quiet", "debug"}
+OF_RESULTS = {"baseline", "noise", "junit", "csv", "strict", "as_json", "quiet", "debug"}
 """Parameters that a comparison takes that was made before; the others say how one is made."""
 
 
@@ -104,7 +104,6 @@ def _file(name: str, *names: str, metavar: str, help: str) -> Callable[[Command]
 @_file("--junit", metavar="FILE.xml", help="Write the verdicts as JUnit XML, for GitLab, Jenkins and GitHub.")
 @_file(
     "--csv",
-    "statistics",
     metavar="FILE.csv",
     help="Write the statistics as a table, one line a log and quantity.",
 )
@@ -127,7 +126,6 @@ def compare(
     reference: Path,
     logs: tuple[Path, ...],
     output: Path | None,
-    log: LogOptions,
     terminal: Terminal,
     **options: Any,
 ) -> int:
@@ -148,21 +146,18 @@ def compare(
 
     Exit codes: 0 within tolerance and not worse than the baseline, 1 not so, 2 bad input or usage.
     """
-    said = about_recordings(ctx, (reference, *logs))
-    if said:
-        terminal.note(said)
+    options, note = for_logs(ctx, (reference, *logs), options)
+    if note:
+        terminal.note(note)
     made = None if logs or not options["baseline"] else _made_before(ctx, reference)
     if not options["baseline"] and not options_given(ctx, "noise".__eq__):
         options["noise"] = None  # what a lab says for the calls that have a baseline
-    reading = log.reading()
     target = None if made else output or Path(default_name(reference, logs))
     replaces = target is not None and target.exists()
     with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
         result = urmpipe.compare(
             made or reference,
             logs,
-            robot=reading.arm,
-            read=reading.options,
             output=target,
             voice="command line",
             progress=progress,
@@ -171,7 +166,7 @@ def compare(
     for one in result.runs:
         terminal.warn(one.run.warnings, one.name)
     terminal.warn(result.warnings)
-    written = {"JUnit": options["junit"], "Statistics": options["statistics"]}
+    written = {"JUnit": options["junit"], "Statistics": options["csv"]}
     terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, replaces, written))
     if terminal.quiet and result.verdict == "fail":
         _tell_failure(result)

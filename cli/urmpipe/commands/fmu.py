@@ -13,6 +13,8 @@ from urmpipe.options.output import Terminal, output_options
 from urmpipe.options.reading import MAP_OPTION
 from urmpipe.options.types import ROBOT, UNIT, NamesType, OneOf
 from urmpipe.usage import Group
+from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.messages import Hint
 
 PLATFORMS = ("linux64", "win64")
 
@@ -70,8 +72,8 @@ def list_(unit: str | None, terminal: Terminal) -> int:
 @MAP_OPTION
 @click.option(
     "-s",
+    "--options",
     "--option",
-    "given",
     type=NamedType(option_names),
     multiple=True,
     callback=named_values,
@@ -106,7 +108,7 @@ def build(
     robot: str | None,
     log: Path | None,
     log_map: Path | None,
-    given: dict[str, str],
+    options: dict[str, str],
     backend: Literal["native", "python"] | None,
     platforms: tuple[str, ...],
     output: Path,
@@ -124,29 +126,29 @@ def build(
       urmpipe fmu build log_source --log log.csv -o log.fmu
       urmpipe fmu build my_unit.py
     """
-    from urmpipe.guards import place_robot
+    from urmpipe.arm_placing import place_robot
     from urmpipe.printing.fmu import print_built
     from urmpipe.printing.terminal import prints_apart
-    from urmpipe.systems.log_tables import read_table
+    from urmpipe.systems.log_tables import read_mapped_table
     from urmpipe.systems.units import column_names, refuse_operands
-    from urmpipe_pipeline.sources import read_map
 
     if log_map and not log:
-        raise click.UsageError("--map: found without a log, allowed: with --log LOG")
-    options = {name: option_value(text) for name, text in given.items()}
+        hint = Hint("log", None, "names one")
+        raise OptionError(Finding("found without a log", parameter="log_map", hints=(hint,)))
+    given = {name: option_value(text) for name, text in options.items()}
     if Path(unit).suffix != ".py":
         refuse_operands(unit, robot, log)
     arm = place_robot(robot)
-    read = read_map(log_map).read if log_map else None
-    table = log and read_table(log, column_names(options.pop("columns", None)), robot=arm, read=read)
+    columns = column_names(given.pop("columns", None))
+    table = log and read_mapped_table(log, columns, robot=arm, log_map=log_map)
     if table:
-        terminal.warn(table.warnings, voice="system file")
+        terminal.warn(table.warnings)
     with prints_apart(), terminal.working(f"Building {unit}"):
         made = urmpipe.build_fmu(
             unit,
             robot=robot,
             log=table,
-            options=options,
+            options=given,
             backend=backend,
             platforms=platforms,
             output=output,

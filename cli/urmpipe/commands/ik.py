@@ -10,7 +10,7 @@ from click.core import ParameterSource
 
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.reading import TableOptions, table_options
+from urmpipe.options.reading import table_options
 from urmpipe.options.types import DURATION, JointValuesType, OneOf, WholeType
 
 if TYPE_CHECKING:
@@ -41,8 +41,8 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 @click.argument("targets", metavar="TARGETS|PATH", type=click.Path(path_type=Path))
 @output_option("LOG.csv|RUN.rrd", "Write a joint log that ingest reads, or a recording.")
 @click.option(
+    "--every",
     "--all",
-    "every",
     is_flag=True,
     help="Print all solutions, and record every branch as a ghost arm; without a closed form by restarts.",
 )
@@ -80,9 +80,7 @@ def _on_axes(ctx: click.Context, param: click.Parameter, value: str | None) -> f
 @output_options
 def ik(
     targets: Path,
-    every: bool,
     output: Path | None,
-    table: TableOptions,
     terminal: Terminal,
     **options: Any,
 ) -> int:
@@ -95,7 +93,7 @@ def ik(
     \b
     Examples:
       urmpipe ik targets.csv --robot arm6
-      urmpipe ik targets.csv --robot ur5e --all --json
+      urmpipe ik targets.csv --robot ur5e --every --json
       urmpipe ik targets.csv --robot ur5e --start 0,-1.6,1.6,0,1.6,0 -o ik.rrd
       urmpipe ik path.csv --robot urm6 -o joints.csv
       urmpipe ik path.csv --robot ur5e --tolerance 3.5mm -o run.rrd
@@ -103,21 +101,13 @@ def ik(
     Exit codes: 0 every target reached, 1 not so (rows that hold no target count, and along a path jumps and
     joints that are too fast), 2 bad input or usage.
     """
-    reading = table.reading()
     replaces = output is not None and output.exists()
     with terminal.progress(f"Solving {targets}") as progress:
-        result = urmpipe.ik(
-            targets,
-            reading.arm,
-            read=reading.options,
-            every=every,
-            output=output,
-            inputs=reading.files,
-            progress=progress,
-            **options,
-        )
+        result = urmpipe.ik(targets, output=output, progress=progress, **options)
     terminal.warn(result.warnings)
-    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, reading.robot, replaces))
+    terminal.answer(
+        lambda: result.to_dict("command line"), lambda: _print(result, options["robot"], replaces)
+    )
     return 0 if result.verdict == "pass" else 1
 
 

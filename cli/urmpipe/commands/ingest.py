@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -9,7 +10,8 @@ import click
 
 import urmpipe
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.reading import LogOptions, log_options
+from urmpipe.options.reading import log_options
+from urmpipe_models.errors import Finding, OptionError
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.runs.results import Run
@@ -25,7 +27,6 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--write-map",
-    "map_output",
     metavar="FILE.toml",
     type=click.Path(path_type=Path),
     help="Save what was inferred as a map for --map.",
@@ -42,9 +43,6 @@ def ingest(
     logs: tuple[Path, ...],
     output: Path | None,
     explain: bool,
-    map_output: Path | None,
-    audit: Path | None,
-    log: LogOptions,
     terminal: Terminal,
     **options: Any,
 ) -> int:
@@ -63,33 +61,18 @@ def ingest(
       urmpipe ingest next.csv --map lab.toml
     """
     if explain and output:
-        raise click.UsageError(
-            f"-o: found {output} with --explain, which writes no recording, allowed: one of both"
-        )
+        found = f"{output} with explain, which writes no recording"
+        raise OptionError(Finding(parameter="output", found=found, allowed="one of both"))
     target = None if explain else output or Path(default_name(logs))
     replaces = target is not None and target.exists()
-    reading = log.reading()
     with terminal.progress(f"Writing {target}", shown=target is not None) as progress:
-        run = urmpipe.ingest(
-            logs,
-            robot=reading.arm,
-            read=reading.options,
-            output=target,
-            audit=audit,
-            write_map=map_output,
-            map_robot=reading.robot,
-            inputs=reading.files,
-            progress=progress,
-            **options,
-        )
+        run = urmpipe.ingest(logs, output=target, progress=progress, **options)
     terminal.warn(run.warnings)
-    terminal.answer(
-        lambda: run.to_dict("command line"), lambda: _print(run, explain, replaces, audit, map_output)
-    )
+    terminal.answer(lambda: run.to_dict("command line"), lambda: _print(run, explain, replaces, options))
     return 0
 
 
-def _print(run: Run, explain: bool, replaces: bool, audit: Path | None, map_output: Path | None) -> None:
+def _print(run: Run, explain: bool, replaces: bool, options: Mapping[str, Any]) -> None:
     """Print what was found in a log, and what was written."""
     from urmpipe.printing.presentation import print_presentation
     from urmpipe.printing.terminal import print_recording, say
@@ -99,10 +82,10 @@ def _print(run: Run, explain: bool, replaces: bool, audit: Path | None, map_outp
     print_presentation(present(run), every=explain)
     if run.recording:
         print_recording(run.recording, replaced=replaces)
-    if audit:
+    if audit := options["audit"]:
         say(f"Audit: {audit}  ({counted(len(run.audit), 'line')})")
-    if map_output:
-        say(f"Map: {map_output}  (use it: urmpipe ingest LOG --map {map_output})")
+    if written := options["write_map"]:
+        say(f"Map: {written}  (use it: urmpipe ingest LOG --map {written})")
 
 
 def default_name(logs: tuple[Path, ...]) -> str:

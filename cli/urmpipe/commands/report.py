@@ -11,6 +11,8 @@ import urmpipe
 from urmpipe.options.given import options_given
 from urmpipe.options.output import Terminal, output_option, output_options
 from urmpipe.options.types import OneOf
+from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.messages import Hint
 
 if TYPE_CHECKING:
     from urmpipe.api.report import Report
@@ -33,8 +35,8 @@ FORMATS: dict[str, tuple[FigureFormat, ...]] = {
     help="Write every figure as a file into this folder, too.",
 )
 @click.option(
+    "--formats",
     "--format",
-    "figure_format",
     type=OneOf(list(FORMATS)),
     default="both",
     show_default=True,
@@ -48,7 +50,7 @@ def report(
     recordings: tuple[Path, ...],
     output: Path | None,
     figures: Path | None,
-    figure_format: str,
+    formats: str,
     terminal: Terminal,
 ) -> int:
     """Write one self-contained HTML file about recordings that ingest, compare or simulate wrote.
@@ -63,13 +65,14 @@ def report(
       urmpipe report monday.rrd tuesday.rrd -o week.html
       urmpipe report log-against-path.rrd --figures figures --format svg
     """
-    if figures is None and options_given(ctx, "figure_format".__eq__):
-        raise click.UsageError("--format: found without --figures, allowed: with --figures DIR")
+    if figures is None and options_given(ctx, "formats".__eq__):
+        hint = Hint("figures", None, "names their folder")
+        raise OptionError(Finding("found without figures", parameter="formats", hints=(hint,)))
     target = output or Path(f"{recordings[0].stem}.html")
     replaces = target.is_file()
     with terminal.progress(f"Writing {target}") as progress:
         result = urmpipe.report(
-            recordings, target, figures=figures, formats=FORMATS[figure_format], progress=progress
+            recordings, target, figures=figures, formats=FORMATS[formats], progress=progress
         )
     terminal.answer(result.to_dict, lambda: _print(result, figures, replaces))
     return 0

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from urmpipe.options.output import Terminal, output_option, output_options
-from urmpipe.options.reading import PlacingOptions, placing_options
+from urmpipe.options.reading import placing_options
 from urmpipe.options.types import ROBOT, JointValuesType
 from urmpipe.usage import Group
 
@@ -57,8 +58,8 @@ def show(
     name: str,
     q: tuple[float, ...] | None,
     picture: Path | None,
-    placing: PlacingOptions,
     terminal: Terminal,
+    **placing: Any,
 ) -> int:
     """Print the parameters of a robot and where its points are; --picture draws it from two sides.
 
@@ -74,7 +75,7 @@ def show(
 
     from urmpipe.printing.chain_drawing import chain_svg
     from urmpipe.printing.robot import chain_at, print_chain
-    from urmpipe_models.errors import OptionError
+    from urmpipe_models.errors import Finding, OptionError
     from urmpipe_models.robots.written import write_export
     from urmpipe_pipeline.solved_targets.solution_warnings import start_warnings
 
@@ -82,8 +83,8 @@ def show(
     q = chain.start if q is None else q
     if len(q) != len(chain.coordinates):
         allowed = f"{len(chain.coordinates)}, one for each of {', '.join(chain.coordinates)}"
-        raise OptionError(f"--q: found {len(q)} values, allowed: {allowed}")
-    terminal.warn(list(start_warnings(chain, np.array(q), "--q")))
+        raise OptionError(Finding(parameter="q", found=f"{len(q)} values", allowed=allowed))
+    terminal.warn(list(start_warnings(chain, np.array(q), "q")))
     posed = chain_at(chain, q)
     if picture is not None:
         write_export(picture, chain_svg(posed.skeleton, posed.title), Path(name))
@@ -96,7 +97,7 @@ def show(
 @output_option("FILE", "A .urdf or .toml file [default: NAME.urdf here].")
 @placing_options
 @output_options
-def export(name: str, output: Path | None, placing: PlacingOptions, terminal: Terminal) -> int:
+def export(name: str, output: Path | None, terminal: Terminal, **placing: Any) -> int:
     """Write a robot as URDF (its visuals, else cylinders for its links) or as a TOML robot file.
 
     Read back, the file is the same arm: of a TOML bit by bit, of a URDF to rounding. It replaces only
@@ -109,7 +110,7 @@ def export(name: str, output: Path | None, placing: PlacingOptions, terminal: Te
       urmpipe robot export urm8 -o urm8.toml
     """
     from urmpipe.printing.terminal import say
-    from urmpipe_models.errors import OptionError, shown
+    from urmpipe_models.errors import Finding, OptionError, shown
     from urmpipe_models.robots.robot_file import robot_toml
     from urmpipe_models.robots.urdf_writer import urdf_text
     from urmpipe_models.robots.written import write_export
@@ -117,9 +118,8 @@ def export(name: str, output: Path | None, placing: PlacingOptions, terminal: Te
     target = output or Path(f"{Path(name).stem}.urdf")
     writers = {".urdf": urdf_text, ".toml": robot_toml}
     if target.suffix.lower() not in writers:
-        raise OptionError(
-            f"--output: found {shown(str(target))}, allowed: a name that ends in .urdf or .toml"
-        )
+        allowed = "a name that ends in .urdf or .toml"
+        raise OptionError(Finding(parameter="output", found=shown(str(target)), allowed=allowed))
     chain = _placed(name, placing)
     write_export(target, writers[target.suffix.lower()](chain), Path(name))
     made = {"schema": 1, "robot": chain.name, "file": target}
@@ -127,10 +127,9 @@ def export(name: str, output: Path | None, placing: PlacingOptions, terminal: Te
     return 0
 
 
-def _placed(name: str, placing: PlacingOptions) -> Chain:
+def _placed(name: str, placing: Mapping[str, Any]) -> Chain:
     """Return a robot on its base, with its tool, and cut."""
     from urmpipe_models.robots.catalogue import load_robot
 
-    return load_robot(name, base_link=placing.base_link, tip_link=placing.tip).placed(
-        placing.base, placing.tool
-    )
+    robot = load_robot(name, base_link=placing["base_link"], tip_link=placing["tip_link"])
+    return robot.placed(placing["base"], placing["tool"])

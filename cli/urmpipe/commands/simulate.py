@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any
 
 import click
 
 import urmpipe
 from urmpipe.options.named import NamedType, argument_names, named_values
 from urmpipe.options.output import Terminal, output_option, output_options
+from urmpipe.options.reading import row_options
 from urmpipe.options.types import DURATION, SYSTEM, OneOf
+from urmpipe_models.errors import Finding, OptionError
 
 if TYPE_CHECKING:
     from urmpipe_pipeline.simulations.simulation import Simulation
@@ -21,8 +23,8 @@ if TYPE_CHECKING:
 @click.option("--list", "listed", is_flag=True, help="List the systems that urmpipe brings along.")
 @output_option("RUN.rrd", "The recording [default: SYSTEM.rrd, of a file FILE.rrd, here].")
 @click.option(
+    "--arguments",
     "--set",
-    "arguments",
     type=NamedType(argument_names),
     multiple=True,
     callback=named_values,
@@ -37,7 +39,6 @@ if TYPE_CHECKING:
 )
 @click.option(
     "--write-system",
-    "copy",
     metavar="FILE.toml",
     type=click.Path(path_type=Path),
     help="Write the file of a system that came along, to be changed, and do not run it.",
@@ -50,6 +51,7 @@ if TYPE_CHECKING:
     type=OneOf(["native", "python"]),
     help="What the units run as [default: native if it can be built here].",
 )
+@row_options
 @output_options
 def simulate(
     system: str | None,
@@ -58,10 +60,10 @@ def simulate(
     arguments: dict[str, str],
     step: float | None,
     duration: float | None,
-    copy: Path | None,
+    write_system: Path | None,
     draw: Path | None,
-    backend: Literal["native", "python"] | None,
     terminal: Terminal,
+    **options: Any,
 ) -> int:
     """Run a system of blocks: units of urmpipe, your own, and FMUs of any tool, connected to each other.
 
@@ -84,10 +86,10 @@ def simulate(
         raise click.UsageError(f"found {found}, allowed: one of both")
     if listed or system is None:
         return _list(terminal)
-    asked = {"arguments": arguments, "step": step, "duration": duration, "backend": backend}
-    if copy is not None:
+    asked = {"arguments": arguments, "step": step, "duration": duration, **options}
+    if write_system is not None:
         _refuse_run_options({"output": output, "draw": draw, **asked})
-        return _write(system, copy, terminal)
+        return _write(system, write_system, terminal)
     target = output or Path(default_name(system))
     return _run(system, target, draw, terminal, asked)
 
@@ -106,10 +108,8 @@ def _run(system: str, target: Path, draw: Path | None, terminal: Terminal, asked
             system, output=target, draw=draw, told=terminal.note, progress=progress, **asked
         )
     wall = perf_counter() - started
-    terminal.warn(
-        [one for one in result.warnings if one.kind != ON_PYTHON], voice="system file"
-    )  # that is told already
-    terminal.answer(lambda: result.to_dict("system file"), lambda: _print(result, wall, replaces, draw))
+    terminal.warn([one for one in result.warnings if one.kind != ON_PYTHON])  # that is told already
+    terminal.answer(lambda: result.to_dict("command line"), lambda: _print(result, wall, replaces, draw))
     if result.failed is not None:
         say(f"error: {result.failed}; what was recorded until then is in {result.recording}", err=True)
     return 2 if result.failed is not None else 1 if result.verdict == "fail" else 0
@@ -144,11 +144,11 @@ def _list(terminal: Terminal) -> int:
 
 def _refuse_run_options(given: dict[str, Any]) -> None:
     """Raise a usage error if a file is to be written with options that only a run follows."""
-    flags = {"arguments": "set"}
-    found = [f"--{flags.get(name, name)}" for name, value in given.items() if value]
+    allowed = "with a system that is run; change the file"
+    found = [name for name, value in given.items() if value]
     if found:
-        allowed = "alone, as nothing is run; change the file"
-        raise click.UsageError(f"--write-system: found with {', '.join(found)}, allowed: {allowed}")
+        with_file = "found beside a system that is written"
+        raise OptionError(*(Finding(with_file, parameter=name, allowed=allowed) for name in found))
 
 
 def _write(system: str, path: Path, terminal: Terminal) -> int:

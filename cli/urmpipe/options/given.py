@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import click
 from click.core import ParameterSource
@@ -27,24 +28,29 @@ def options_given(ctx: click.Context, asked: Callable[[str], bool]) -> list[str]
     ]
 
 
-def about_recordings(ctx: click.Context, operands: Sequence[Path]) -> str | None:
-    """Return what is to be said of options that say how a log is read, and of recordings among the operands.
+def for_logs(
+    ctx: click.Context, operands: Sequence[Path], options: Mapping[str, Any]
+) -> tuple[dict[str, Any], str | None]:
+    """Return options without those of logs where none is among the operands, and what is to be said of them.
 
     Args:
         ctx: The command's context.
         operands: Recordings, logs and folders of them.
+        options: The options by their keywords.
 
     Raises:
-        UsageError: If no operand is a log.
+        UsageError: If such an option stands on the command line, and no operand is a log.
     """
-    from urmpipe_pipeline.recording import is_recording
+    from urmpipe_pipeline.operands import is_log
 
     given = options_given(ctx, OF_LOGS.__contains__)
-    recordings = [str(path) for path in operands if path.is_file() and is_recording(path)]
-    if not given or not recordings:
-        return None
-    options, files = ", ".join(given), ", ".join(recordings)
+    recordings = [str(path) for path in operands if not is_log(path)]
+    files = ", ".join(recordings)
     if len(recordings) == len(operands):
-        allowed = "with a log among them; a recording stands as it was ingested"
-        raise click.UsageError(f"{options}: found with recordings alone ({files}), allowed: {allowed}")
-    return f"{options} of the logs alone: {files} as ingested"
+        if given:
+            found = f"{', '.join(given)}: found with recordings alone ({files})"
+            allowed = "with a log among them; a recording stands as it was ingested"
+            raise click.UsageError(f"{found}, allowed: {allowed}")
+        return {name: value for name, value in options.items() if name not in OF_LOGS}, None
+    note = f"{', '.join(given)} of the logs alone: {files} as ingested" if given and recordings else None
+    return dict(options), note

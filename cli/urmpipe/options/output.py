@@ -14,7 +14,6 @@ from urmpipe import __version__
 from urmpipe.options.grouped import Command, grouped, with_options
 
 if TYPE_CHECKING:
-    from urmpipe_models.spelling import Voice
     from urmpipe_pipeline.joint_log import LogWarning
 
 
@@ -37,7 +36,7 @@ class Terminal:
             result: Makes the object for --json.
             text: Prints the result for people.
         """
-        from urmpipe.boundary import leave_output
+        from urmpipe.error_boundary import leave_output
         from urmpipe.printing.terminal import print_json
 
         try:
@@ -48,12 +47,12 @@ class Terminal:
         except BrokenPipeError:  # the reader left, as head does: the exit code is what it is all the same
             leave_output()
 
-    def warn(self, warnings: Sequence[LogWarning], log: str = "", voice: Voice = "command line") -> None:
+    def warn(self, warnings: Sequence[LogWarning], log: str = "") -> None:
         """Print warnings on standard error, behind the name of their log if given."""
         if not self.quiet:
             from urmpipe.printing.terminal import print_warnings
 
-            print_warnings(warnings, log, voice)
+            print_warnings(warnings, log)
 
     def note(self, line: str) -> None:
         """Print what is no warning and yet good to know, on standard error."""

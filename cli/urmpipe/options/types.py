@@ -95,9 +95,7 @@ def parsed(
     except UrmpipeError as error:
         if param is None:
             raise
-        own = f"{max(param.opts, key=len)}: "
-        found = [one.message.removeprefix(own) for one in error.findings]
-        raise OptionError(*(place_of(ctx, param, said) for said in found)) from None
+        raise OptionError(*(place_of(ctx, param, one) for one in error.findings)) from None
 
 
 class ParsedType(click.ParamType[Any]):

@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from rich.table import Table
     from rich.text import Text
 
-    from urmpipe_models.spelling import Voice
     from urmpipe_pipeline.joint_log import LogWarning
 
 LISTED = 30
@@ -63,11 +62,11 @@ def print_recording(recording: Path | None, *, replaced: bool = False) -> None:
     say(f"Recording: {recording}  (open it: {pasted(command)} view {pasted(recording)}{earlier})")
 
 
-def print_warnings(warnings: Sequence[LogWarning], log: str = "", voice: Voice = "command line") -> None:
+def print_warnings(warnings: Sequence[LogWarning], log: str = "") -> None:
     """Print warnings on standard error, one unwrapped line each, behind the name of their log if given."""
     named = f"{log}: " if log else ""
     for warning in warnings[:LISTED]:
-        say(f"warning: {named}{warning.words(voice)}", err=True)
+        say(f"warning: {named}{warning.words('command line')}", err=True)
     if len(warnings) > LISTED:
         say(f"warning: {named}and {len(warnings) - LISTED} more", err=True)
 

@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Iterator
+from collections.abc import Callable, Collection, Iterator, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe.guards import place_robot
+from urmpipe.arm_placing import place_robot
+from urmpipe.log_table import LogTable
+from urmpipe.reading import resolved
 from urmpipe.systems.held_logs import between_samples, clock_of, on_points
-from urmpipe.systems.log_tables import LogTable, read_table
+from urmpipe.systems.log_tables import read_table
 from urmpipe.systems.units import Backend, column_names, unit_of
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.build import chosen_backend
@@ -18,9 +20,8 @@ from urmpipe_fmus.cache import cached_fmu
 from urmpipe_fmus.cosim.plan import LogColumn
 from urmpipe_fmus.cosim.system import STEP
 from urmpipe_fmus.table import Table
-from urmpipe_models.errors import OptionError, UrmpipeError, shown
+from urmpipe_models.errors import Finding, OptionError, UrmpipeError, shown
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.sources import ReadOptions, read_map
 
 if TYPE_CHECKING:
     from urmpipe_fmus.cosim.system import Block, LogInput, Port, System
@@ -44,7 +45,7 @@ class Blocks:
         system: The system.
         bundled: Names of logs that came with urmpipe, and are those whatever else is called so.
         backend: What the FMUs of units are built with.
-        read: How to read a log where it cannot tell by itself.
+        reading: How to read a log where it cannot tell by itself: keywords that come before its own map.
         told: Told what takes its time: an FMU that is built, and Python where native is not to be had.
 
     Attributes:
@@ -62,10 +63,10 @@ class Blocks:
         *,
         bundled: Collection[str] = (),
         backend: Backend | None = None,
-        read: ReadOptions | None = None,
+        reading: Mapping[str, Any] | None = None,
         told: Callable[[str], None] | None = None,
     ) -> None:
-        self._bundled, self._read = bundled, read
+        self._bundled, self._reading = bundled, reading or {}
         self._told = told or (lambda line: None)
         self._backend, self._slow = chosen_backend(backend)
         self.units: dict[str, Unit] = {}
@@ -139,7 +140,8 @@ class Blocks:
         if robot is not None and Path(robot).is_file():
             self.files.append(Path(robot))
         if log is None and log_map is not None:
-            raise OptionError(f"map: found {log_map} without a log, allowed: with log = ...")
+            found = f"{log_map} without a log"
+            raise OptionError(Finding(about="map", found=found, allowed="with log = ..."))
         if log is None:
             return unit_of(block.unit, robot=arm, options=options)
         names = column_names(options.pop("columns", None))
@@ -190,8 +192,8 @@ class Blocks:
     ) -> LogTable:
         """Return a log by the name that the system gives it, and remember what there is to know of it."""
         path = LOGS / name if name in self._bundled else Path(name)
-        read = self._read if log_map is None else read_map(Path(log_map)).read
-        found = read_table(path, columns, robot=robot, read=read)
+        reading = self._reading if log_map is None else {**self._reading, "log_map": log_map}
+        found = read_table(path, columns, robot=robot, read=resolved(reading).options)
         self.files += found.files
         self.warnings += [one for one in found.warnings if one not in self.warnings]
         self.end = max(self.end or 0.0, float(found.table.t_ns[-1]) / 1e9)

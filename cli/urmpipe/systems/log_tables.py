@@ -2,63 +2,25 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
-from urmpipe.guards import PathLike
+from urmpipe.keyword_checks import PathLike
+from urmpipe.log_table import LogTable, Quantity
+from urmpipe.reading import resolved
 from urmpipe_fmus.table import Table
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_models.messages import Hint
+from urmpipe_models.spelling import IN_MAP, IN_NO_FILE
+from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.operands import log_files
-from urmpipe_pipeline.sources import ReadOptions, read_log
+from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
 from urmpipe_pipeline.text import counted
-
-OPTION = re.compile(
-    r"--(unit|time|period|joints|decimal|delimiter|rotation|interval|repair|skip-bad|source)\b"
-)
-"""Options of `urmpipe ingest`: what is said of a log offers them."""
-
-BY_MAP = (
-    'an option of urmpipe ingest, kept by its --write-map FILE for --map FILE, in a system for map = "FILE"'
-)
-"""How such an option reaches a unit."""
-
-
-class Quantity(NamedTuple):
-    """Columns of a table that are one variable.
-
-    Attributes:
-        name: The variable.
-        unit: Its unit; SI, spelled as FMI does.
-        size: How many columns it has; None for a variable that is no array.
-    """
-
-    name: str
-    unit: str
-    size: int | None = None
-
-
-class LogTable(NamedTuple):
-    """A log as a unit takes it.
-
-    Attributes:
-        table: Its rows.
-        columns: What the columns of the table are, from the left.
-        files: Its files.
-        warnings: What a person should know of it.
-    """
-
-    table: Table
-    columns: tuple[Quantity, ...]
-    files: tuple[Path, ...]
-    warnings: tuple[LogWarning, ...]
 
 
 def read_table(
@@ -83,18 +45,37 @@ def read_table(
     Raises:
         LogError: With everything that is wrong with the files, or if a row lacks a value.
     """
+    return _motion(Path(log), robot, read) if names is None else _columns(Path(log), names, read)
+
+
+def read_mapped_table(
+    log: PathLike,
+    names: Sequence[str] | None = None,
+    *,
+    robot: Chain | None = None,
+    log_map: PathLike | LogMap | None = None,
+) -> LogTable:
+    """Return a log as a table, as `read_table` does, where a map alone says how to read it.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the map or the files; hints say what a map tells.
+    """
     try:
-        found = _motion(Path(log), robot, read) if names is None else _columns(Path(log), names, read)
+        found = read_table(log, names, robot=robot, read=resolved({"log_map": log_map}).options)
     except LogError as error:
-        findings = [replace(one, message=_by_map(one.message)) for one in error.findings]
-        raise LogError(*findings) from error
-    warnings = (replace(one, message=_by_map(one.message)) for one in found.warnings)
-    return found._replace(warnings=tuple(warnings))
+        raise LogError(*(replace(one, hints=_in_map(one.hints)) for one in error.findings)) from error
+    return found._replace(warnings=tuple(replace(one, hints=_in_map(one.hints)) for one in found.warnings))
 
 
-def _by_map(message: str) -> str:
-    """Return what is said of a log with how the options that it offers reach a unit."""
-    return f"{message} ({BY_MAP})" if OPTION.search(message) else message
+def _in_map(hints: Sequence[Hint]) -> tuple[Hint, ...]:
+    """Return hints with those of reading options as what a map says; what it cannot say is left out."""
+    said = (
+        Hint("log_map", None, f"with {hint.spelled('system file')} {hint.does}".strip())
+        if hint.parameter in IN_MAP and not hint.call
+        else hint
+        for hint in hints
+    )
+    return tuple(hint for hint in said if hint.parameter not in IN_NO_FILE)
 
 
 def _motion(path: Path, robot: Chain | None, read: ReadOptions | None) -> LogTable:

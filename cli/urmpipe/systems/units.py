@@ -6,16 +6,19 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from urmpipe.guards import PathLike, Robot, place_robot
-from urmpipe.systems.log_tables import LogTable, read_table
+from urmpipe.arm_placing import Robot, place_robot
+from urmpipe.keyword_checks import PathLike
+from urmpipe.log_table import LogTable
+from urmpipe.systems.log_tables import read_mapped_table
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_name, unit_options
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import Finding, OptionError
+from urmpipe_models.messages import Hint
 
 if TYPE_CHECKING:
-    from urmpipe_pipeline.sources import ReadOptions
+    from urmpipe_pipeline.sources import LogMap
 
 Backend = Literal["native", "python"]
 
@@ -36,7 +39,7 @@ def unit_of(
     robot: Robot | None = None,
     log: PathLike | LogTable | None = None,
     options: Mapping[str, Any] | None = None,
-    read: ReadOptions | None = None,
+    log_map: PathLike | LogMap | None = None,
 ) -> Unit:
     """Return a unit by name or from a file, made with its options.
 
@@ -46,7 +49,7 @@ def unit_of(
         log: A log for a unit that plays one, or what `read_table` made of it.
         options: Further options of the unit. Of a log, `columns` names columns of any table; without it
             they are the joints, or the x, y, z of a path.
-        read: How to read the log where it cannot tell by itself.
+        log_map: How to read the log where it cannot tell by itself.
 
     Raises:
         UrmpipeError: With everything that is wrong with the unit or its options.
@@ -60,7 +63,9 @@ def unit_of(
     arm = place_robot(robot)
     if log is not None:
         names = column_names(given.pop("columns", None))
-        found = log if isinstance(log, LogTable) else read_table(log, names, robot=arm, read=read)
+        found = (
+            log if isinstance(log, LogTable) else read_mapped_table(log, names, robot=arm, log_map=log_map)
+        )
         given |= {"table": found.table, "columns": found.columns}
     elif arm is not None:
         given["robot"] = arm
@@ -101,13 +106,13 @@ def refuse_operands(name: str, robot: Robot | None, log: Any) -> None:
     known = unit_options(name)
     takes = {"robot": "robot" in known, "log": FROM_LOG[0] in known}
     faults = []
-    for option, value, metavar in (("robot", robot, "NAME|FILE"), ("log", log, "LOG")):
+    for option, value in (("robot", robot), ("log", log)):
         if takes[option] and value is None:
-            allowed = f"--{option} {metavar}, in a system file {option} = ..."
-            faults.append(f"unit {name}: found no {option}, allowed: {allowed}")
+            hint = Hint(option, None, f"gives one, in a system file {option} = ...")
+            faults.append(Finding(f"found no {option}", about=f"unit {name}", hints=(hint,)))
         elif not takes[option] and value is not None and not (option == "robot" and takes["log"]):
             said = f"found a {option} ({_shown(value)}), allowed: none, it has no such option"
-            faults.append(f"unit {name}: {said}")
+            faults.append(Finding(said, about=f"unit {name}"))
     if faults:
         raise OptionError(*faults)
 

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from numbers import Integral, Real
 
-from urmpipe_models.errors import shown
+from urmpipe_models.errors import Finding, shown
 
 
 @dataclass(frozen=True, slots=True)
@@ -26,15 +26,17 @@ class Search:
     restarts: int = 20
     seed: int = 0
 
-    def faults(self) -> Iterator[str]:
+    def faults(self) -> Iterator[Finding]:
         """Yield which of the values make no sense."""
         if self.tolerance is not None and not isinstance(self.tolerance, Real):
-            yield f"tolerance: found {shown(self.tolerance)}, allowed: a number of m, more than 0"
+            allowed = "a number of m, more than 0"
+            yield Finding(parameter="tolerance", found=shown(self.tolerance), allowed=allowed)
         elif self.tolerance is not None and not 0.0 < self.tolerance < math.inf:
-            yield f"tolerance: found {self.tolerance:g} m, allowed: more than 0, finite"
+            found = f"{self.tolerance:g} m"
+            yield Finding(parameter="tolerance", found=found, allowed="more than 0, finite")
         for name, value in (("restarts", self.restarts), ("seed", self.seed)):
             if not isinstance(value, Integral) or value < 0:
-                yield f"{name}: found {shown(value)}, allowed: a whole number, 0 or more"
+                yield Finding(parameter=name, found=shown(value), allowed="a whole number, 0 or more")
 
 
 USUAL_SEARCH = Search()

@@ -10,7 +10,7 @@ import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.inverse.checks import checked
 from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.free_joints import within_limits_by_choice
@@ -59,7 +59,7 @@ def solve(
     position_only = targets.rotation is None
     targets, reasons = checked(targets)
     form = None if position_only or method == "iterative" else closed_form(chain)
-    faults = [*_start_faults(chain, len(targets), start), *search.faults()]
+    faults: list[Finding | str] = [*_start_faults(chain, len(targets), start), *search.faults()]
     if method not in METHODS:
         faults.append(f"method: found {shown(method)}, allowed: {', '.join(METHODS)}")
     if method == "closed" and form is None:

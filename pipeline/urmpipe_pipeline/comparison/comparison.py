@@ -7,12 +7,13 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from urmpipe_models.display import Shown, line_of
+from urmpipe_models.display import line_of
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.change import BaselineComparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Verdict
 from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.results import SCHEMA
 
@@ -26,7 +27,7 @@ def by_tolerance(run: Deviation) -> tuple[bool, float, float]:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Comparison(Shown):
+class Comparison(Result):
     """Some logs held against one reference.
 
     Attributes:

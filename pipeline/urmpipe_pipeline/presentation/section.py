@@ -178,7 +178,7 @@ def no_blocks() -> tuple[Block, ...]:
     return ()
 
 
-def no_figures() -> tuple[Figure, ...]:
+def no_figures() -> tuple[Figure | Drawing | Text, ...]:
     """Return no figures: the default of a section."""
     return ()
 
@@ -197,8 +197,8 @@ class Section:
         verdict: pass, fail or None.
         facts: What it is about; of a judged section the first is what decided.
         tables: What is read first.
-        figures: Returns its plots, and texts that the viewer has room for, too, in order; called only where
-            they are shown.
+        figures: Returns its plots, drawings, and texts that the viewer has room for, too, in order; called
+            only where they are shown. The viewer shows no drawings.
         blocks: Returns what only a page has room for, in order behind the figures: paths in space, what
             takes long to compute, long tables, texts; called only there.
         checks: What was judged. With checks or properties a section is a test suite of JUnit.
@@ -216,7 +216,7 @@ class Section:
     verdict: Verdict = None
     facts: tuple[Fact, ...] = ()
     tables: tuple[Table, ...] = ()
-    figures: Callable[[], Iterable[Figure | Text]] = no_figures
+    figures: Callable[[], Iterable[Figure | Drawing | Text]] = no_figures
     blocks: Callable[[], Iterable[Block]] = no_blocks
     checks: tuple[Check, ...] = ()
     properties: Mapping[str, Any] = field(default_factory=dict)

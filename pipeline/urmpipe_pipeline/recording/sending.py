@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline.recording.store import ROW, TIME
 from urmpipe_pipeline.text import encodable, unique
 
 if TYPE_CHECKING:
@@ -44,7 +45,7 @@ def times_column(t_ns: IntArray) -> TimeColumn:
     """
     import rerun as rr
 
-    return rr.TimeColumn("t", duration=np.asarray(t_ns).astype("timedelta64[ns]"))
+    return rr.TimeColumn(TIME, duration=np.asarray(t_ns).astype("timedelta64[ns]"))
 
 
 def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
@@ -52,12 +53,12 @@ def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
 
     Args:
         t_ns: Times of all rows in integer [ns], shape (n,); None without times.
-        rows: The rows, shape (m,).
+        rows: The rows from 0, shape (m,).
     """
     import rerun as rr
 
     if t_ns is None:
-        return [rr.TimeColumn("row", sequence=np.asarray(rows) + 1)]
+        return [rr.TimeColumn(ROW, sequence=rows + 1)]
     return [times_column(np.asarray(t_ns)[rows])]
 
 

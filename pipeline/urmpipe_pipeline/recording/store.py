@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -25,8 +25,8 @@ SCALARS = "Scalars:scalars"
 PACKED = "urmpipe:packed"
 """The component with the values of any other array, of its own type: many of its rows stand as one."""
 
-ROW = "row"
-"""The timeline of the rows of every array, from 1; of what is packed the first row of each pack."""
+TIME, ROW = "t", "row"
+"""The timelines: times, and the rows of every array, from 1; of what is packed the first row of each pack."""
 
 SLICE = 65_536
 """Rows sent at a time: few enough to keep memory low, many enough to keep the overhead low."""
@@ -38,6 +38,13 @@ PROPERTY = "urmpipe"
 """Name of the recording's property that holds the metadata."""
 
 
+class Opening(NamedTuple):
+    """Where the viewer should stand: a timeline, and the time in [ns] on t or the row from 1 on row."""
+
+    timeline: str
+    at: int
+
+
 class Store:
     """A recording of ours, opened: only its manifest is read until more is asked for.
 
@@ -45,8 +52,7 @@ class Store:
         path: The file.
         rows: How many rows each entity has.
         metadata: The JSON text in its property.
-        opens_at_ns: Where the viewer should stand in [ns]; 0 if nothing is said.
-        opens_at_row: The row, from 1, at which it should stand where there are no times; else None.
+        opening: Where the viewer should stand; at 0 s if nothing is said.
     """
 
     def __init__(self, path: Path) -> None:
@@ -59,9 +65,7 @@ class Store:
         self._store = self._open()
         self.rows = _row_counts(self._store.summary())
         self.metadata = self._metadata()
-        self.opens_at_ns = int(self._property("opens_at_ns") or 0)
-        row = self._property("opens_at_row")
-        self.opens_at_row = None if row is None else int(row)
+        self.opening = Opening(str(self._property("timeline") or TIME), int(self._property("at") or 0))
 
     def error(self, message: str) -> RecordingError:
         """Return an error that names this file."""

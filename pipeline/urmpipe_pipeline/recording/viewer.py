@@ -19,7 +19,7 @@ import numpy as np
 
 from urmpipe_models.errors import ViewerError, for_each
 from urmpipe_models.spelling import pasted
-from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.recording.store import TIME, Opening, Store
 
 if TYPE_CHECKING:
     from rerun.experimental import ViewerClient
@@ -52,24 +52,24 @@ def view_recordings(paths: Sequence[Path]) -> None:
         RecordingError: With every file that is none.
         ViewerError: If there is no display, or the viewer does not start.
     """
-    times = opening_times(paths)
+    opened = openings(paths)
     refuse_without_display(paths, os.environ)
     with ExitStack() as windows:
         processes = []
-        for path, at in times.items():
+        for path, opening in opened.items():
             with suppress(_ClosedError):
-                processes.append(windows.enter_context(open_window(path, at))[0])
+                processes.append(windows.enter_context(open_window(path, opening))[0])
         for process in processes:
             process.wait()
 
 
-def opening_times(paths: Sequence[Path]) -> dict[Path, int]:
-    """Return at which time in [ns] each recording opens.
+def openings(paths: Sequence[Path]) -> dict[Path, Opening]:
+    """Return at which time, or in which row, each recording opens.
 
     Raises:
         RecordingError: With every file that is no recording of urmpipe's.
     """
-    return dict(zip(paths, for_each(lambda path: Store(path).opens_at_ns, paths), strict=True))
+    return dict(zip(paths, for_each(lambda path: Store(path).opening, paths), strict=True))
 
 
 def refuse_without_display(
@@ -95,13 +95,13 @@ def refuse_without_display(
 
 @contextmanager
 def open_window(
-    path: Path, at_ns: int, *, headless: bool = False
+    path: Path, opening: Opening, *, headless: bool = False
 ) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
-    """Run the viewer with a recording open in it, paused at a time; close it at the end.
+    """Run the viewer with a recording open in it, paused at a time or a row; close it at the end.
 
     Args:
         path: The recording.
-        at_ns: The time on the timeline t in [ns]; a recording without times opens at a row that it tells.
+        opening: Where it stands.
         headless: Without a window, such as to take a picture; needs a Vulkan driver, be it in software.
 
     Yields:
@@ -111,7 +111,7 @@ def open_window(
         ViewerError: If it does not start.
     """
     with run_viewer(headless=headless) as (process, url):
-        yield process, _shown(process, url, path, at_ns)
+        yield process, _shown(process, url, path, opening)
 
 
 @contextmanager
@@ -160,16 +160,16 @@ def _free_port() -> int:
         return int(free.getsockname()[1])
 
 
-def _shown(process: subprocess.Popen[bytes], url: str, path: Path, at_ns: int) -> ViewerClient:
-    """Wait until the viewer shows the recording at the time, and return what it is controlled by."""
+def _shown(process: subprocess.Popen[bytes], url: str, path: Path, opening: Opening) -> ViewerClient:
+    """Wait until the viewer shows the recording where it opens, and return what it is controlled by."""
     from rerun.experimental import ViewerClient
 
-    end, row = time.monotonic() + PATIENCE, Store(path).opens_at_row
+    end = time.monotonic() + PATIENCE
     while process.poll() is None and time.monotonic() < end:
         try:
             client = ViewerClient.connect(url)
             client.open(str(path.resolve()))
-            while not _stands(client, at_ns, row) and time.monotonic() < end:
+            while not _stands(client, opening) and time.monotonic() < end:
                 time.sleep(0.1)
             return client
         except OSError:  # it does not listen yet, or has just ended
@@ -184,21 +184,15 @@ def _shown(process: subprocess.Popen[bytes], url: str, path: Path, at_ns: int) -
     )
 
 
-def _stands(client: ViewerClient, at_ns: int, row: int | None) -> bool:
-    """Tell whether the viewer stands at a time, and put it there if not: it must know the timeline first.
-
-    Args:
-        client: What controls the viewer.
-        at_ns: The time on the timeline t in [ns].
-        row: The row on the timeline row instead; None for the time.
-    """
-    name, at = ("t", at_ns) if row is None else ("row", row)
+def _stands(client: ViewerClient, opening: Opening) -> bool:
+    """Tell whether the viewer stands somewhere, and put it there if not: it must know the timeline first."""
+    timeline, at = opening
     for one in client.get_state().recordings:
-        if any(timeline.name == name for timeline in one.timelines):
-            if one.current_timeline == name and one.current_time == at:
+        if any(known.name == timeline for known in one.timelines):
+            if (one.current_timeline, one.current_time) == opening:
                 return True
-            if row is None:
-                client.set_time(name, duration=np.timedelta64(at, "ns"), play_state="paused")
+            if timeline == TIME:
+                client.set_time(timeline, duration=np.timedelta64(at, "ns"), play_state="paused")
             else:
-                client.set_time(name, sequence=row, play_state="paused")
+                client.set_time(timeline, sequence=at, play_state="paused")
     return False

@@ -133,11 +133,9 @@ def _describe(stream: RecordingStream, shown: Presentation, encoded: Encoded, me
     import rerun as rr
 
     stream.send_recording_name(encodable(shown.name))
-    opens: dict[str, Any] = {"opens_at_ns": shown.opens_at_ns}
-    if shown.opens_at_row is not None:
-        opens = {"opens_at_row": shown.opens_at_row + 1}
-    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, **opens))
-    stream.send_blueprint(send_views(stream, shown, _entities(encoded)))
+    blueprint, opening = send_views(stream, shown, _entities(encoded))
+    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, **opening._asdict()))
+    stream.send_blueprint(blueprint)
 
 
 def _entities(encoded: Encoded) -> EntityOf:

@@ -12,7 +12,8 @@ from typing import Literal, TypeAlias
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure, Text
 from urmpipe_pipeline.presentation.figure import Figure as GivenFigure
 from urmpipe_pipeline.presentation.section import Block, Presentation, Ref, Section, Table
-from urmpipe_pipeline.report.figures import SMALL_PX, Links, Span, drawn_figures, span_of
+from urmpipe_pipeline.report.figures import SMALL_PX, Links, drawn_figures, span_of
+from urmpipe_pipeline.report.panels import Span
 from urmpipe_pipeline.report.space import drawn_space
 from urmpipe_pipeline.report.spec import Figure
 from urmpipe_pipeline.report.summary import (

@@ -24,6 +24,9 @@ FAULT = "#b32d00"
 BAND = "rgba(0, 114, 178, 0.06)"
 """The inside of a tolerance."""
 
+MANY_ROWS = 10
+"""With fewer rows each of them has its number at the axis."""
+
 MARGIN = {"l": 64, "r": 12, "t": 24, "b": 48}
 
 
@@ -118,11 +121,12 @@ def time_axis(start: float, end: float) -> Spec:
 
 
 def row_axis(start: float, end: float) -> Spec:
-    """Return an axis of row numbers, with room for the points at both ends."""
-    return axis("row, the first is 0") | {
+    """Return an axis of row numbers from 1, with room for the points at both ends."""
+    return axis("row") | {
         "range": [start - 0.5, end + 0.5],
         "unifiedhovertitle": {"text": "row %{x}"},
-        "nticks": 10,
+        "tickformat": "d",
+        **({"dtick": 1} if end - start < MANY_ROWS else {"nticks": 10}),
     }
 
 

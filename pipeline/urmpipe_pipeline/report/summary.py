@@ -119,7 +119,7 @@ def worst_first(shown: Sequence[tuple[Presentation, Anchors]]) -> list[tuple[Pre
 
 
 def cards_of(shown: Sequence[tuple[Presentation, Anchors]], *, plain: bool) -> tuple[Card, ...]:
-    """Return a card for each judged part, the worst first.
+    """Return a card for each judged part that has something to tell, the worst first.
 
     Args:
         shown: Results, each with where its sections are.
@@ -132,7 +132,8 @@ def cards_of(shown: Sequence[tuple[Presentation, Anchors]], *, plain: bool) -> t
             beside = len(shown) > 1 and section is not one.body
             name = f"{section.title} ({one.name})" if beside else section.title
             card = _card(section, name, one.word, anchors)
-            found.append((_badness(section.verdict, _used(section)), card))
+            if card.size or card.facts:
+                found.append((_badness(section.verdict, _used(section)), card))
     return tuple(card for _, card in sorted(found, key=lambda pair: pair[0]))
 
 

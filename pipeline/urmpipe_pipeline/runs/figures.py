@@ -25,6 +25,9 @@ EULER = {"rz": AXIS_COLOURS["z"], "ry": AXIS_COLOURS["y"], "rx": AXIS_COLOURS["x
 NORM = (AXIS_COLOURS["norm"],)
 """The colour of what is never negative."""
 
+JOINTS_SHARE = 3.4
+"""Height of a plot of joints relative to others: its legend names all of an arm's."""
+
 
 def run_figures(run: Run) -> Iterator[Figure]:
     """Yield the plots of a log that stands alone: joints, speed, motion."""
@@ -53,25 +56,27 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
     joints = f"Joint values of {run.name} over {axis}: {', '.join(run.log.joints)}."
     after = joint_panels(run, "after" if run.audit else "joints", run.q, times_of(run), _marks(run))
     if not run.timed:
-        yield Figure("Joints", "A pose a row: no motion joins them.", joints, (View("Joints", after),))
+        said = "A pose a row: no motion joins them."
+        yield Figure("Joints", said, joints, (View("Joints", after),), share=JOINTS_SHARE)
         return
     if not run.audit:
         said = "No joint had to be repolarized: the values are those of the file."
-        yield Figure("Joints", said, f"{joints} {said}", (View("Joints, no repolarization needed", after),))
+        views = (View("Joints, no repolarization needed", after),)
+        yield Figure("Joints", said, f"{joints} {said}", views, share=JOINTS_SHARE)
         return
     wraps, doubts = len(run.repolarizations), len(run.audit) - len(run.repolarizations)
     marked = f"{wraps} marked{f', {doubts} doubtful' if doubts else ''}"
     before = joint_panels(run, "before", run.log.q, run.log.t_ns, _raw_marks(run))
-    views = View("Joints in the file", before), View(f"Joints repolarized ({marked})", after)
+    both = View("Joints in the file", before), View(f"Joints repolarized ({marked})", after)
     crosses = f" A cross marks each of {text.counted(doubts, 'other finding')}." if doubts else ""
     yield Figure(
         "Joints before and after repolarization",
         f"First as in the file, then repolarized. {text.counted(wraps, 'repolarization')}: a triangle marks"
         f" each, up where a turn was added, down where one was taken away.{crosses}",
         f"{joints} First as in the file, then after {text.counted(wraps, 'repolarization')}.",
-        views,
+        both,
         opened=opened,
-        share=3.0,
+        share=JOINTS_SHARE,
     )
 
 

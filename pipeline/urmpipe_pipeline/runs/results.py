@@ -10,11 +10,12 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.display import line_of, number_of
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.orientation import NAMES, angles
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import JointLog, LogWarning, seconds
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.grid import interpolate
@@ -26,7 +27,7 @@ SCHEMA = 1
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Run(Shown):
+class Run(Result):
     """One ingested log: repolarized, on a uniform grid, with the arm's kinematics.
 
     Attributes:
@@ -109,14 +110,6 @@ class Run(Shown):
             return ["rad" if joint.kind == "revolute" else "m" for joint in self.robot.moving]
         told = (self.log.units.get(name, "rad") for name in self.log.joints)
         return ["rad" if unit in ("rad", "deg") else "m" for unit in told]
-
-    def joint_unit(self, per: str = "") -> str:
-        """Return the SI unit of all joints: rad, m or both.
-
-        Args:
-            per: What divides it: "", "/s" or "/s2".
-        """
-        return " or ".join(f"{unit}{per}" for unit in sorted(set(self.joint_units) or {"rad"}, reverse=True))
 
     def as_run(self) -> Run:
         """Return this run: what results that have a run return of it."""

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import groupby
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.comparison.wording import meter_size, meter_used, meter_words, out_words
+from urmpipe_pipeline.comparison.wording import meter_words, out_words, size_of, used_words
 from urmpipe_pipeline.presentation.figure import Drawing, Text
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
 from urmpipe_pipeline.presentation.section import (
@@ -99,7 +100,7 @@ def _body(simulation: Simulation) -> Section:
         simulation.verdict,
         (*_outcome(simulation), *_facts(simulation)),
         (*meters_table(simulation), *first_signals_table(simulation)),
-        partial(_system_file, simulation),
+        partial(_system, simulation),
         blocks=partial(_page, simulation),
         checks=(end,),
         events=partial(_events, simulation),
@@ -114,12 +115,12 @@ def _outcome(simulation: Simulation) -> Iterator[Fact]:
     if simulation.failed is not None:
         yield Fact("Failed after", Value(simulation.duration, "s"), simulation.failed)
     elif (worst := simulation.judged_worst) is not None:
-        yield from _meter_facts(worst)
+        yield from (replace(one, brief=False) for one in _meter_facts(worst))
 
 
 def _meter_facts(one: DeltaVerdict) -> Iterator[Fact]:
     """Yield what a delta meter found: how much, when, how often it was too much."""
-    yield Fact(meter_size(one), Value(one.worst, "m", one.allowed, one.verdict, one.used), meter_used(one))
+    yield Fact(size_of(one), Value(one.worst, "m", one.allowed, one.verdict, one.used), used_words(one))
     yield Fact("Time", Value(one.t, "s"))
     yield Fact("Out of tolerance", out_words(one.out_of_tolerance, one.samples))
 
@@ -168,15 +169,16 @@ def _section(
     )
 
 
-def _system_file(simulation: Simulation) -> Iterator[Text]:
+def _system(simulation: Simulation) -> Iterator[Drawing | Text]:
+    """Yield the system as a drawing and as its file."""
+    if simulation.system_svg:
+        yield Drawing("System", _system_words(simulation), simulation.system_svg)
     if simulation.system_text:
         yield Text("System file", simulation.system_text)
 
 
 def _page(simulation: Simulation) -> Iterator[Block]:
-    """Yield what only a page shows of a simulation: its system, its paths, its values."""
-    if simulation.system_svg:
-        yield Drawing("System", _system_words(simulation), simulation.system_svg)
+    """Yield what only a page shows of a simulation: its blocks, its paths, its values."""
     yield blocks_table(simulation)
     yield connections_table(simulation)
     yield from path_figure(simulation)

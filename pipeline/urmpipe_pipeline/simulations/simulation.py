@@ -7,27 +7,24 @@ from collections import Counter
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, TypeAlias
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.display import line_of, number_of
 from urmpipe_models.errors import CosimulationError
 from urmpipe_models.spelling import Voice
-from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.runs.results import SCHEMA, Run
+from urmpipe_pipeline.runs.results import SCHEMA
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Result: TypeAlias = "Run | Comparison | Simulation"
-"""What a recording holds."""
 
 ValueType = Literal["Real", "Integer", "Boolean"]
 
@@ -148,7 +145,7 @@ class Arm:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class Simulation(Shown):
+class Simulation(Result):
     """A co-simulated system: its blocks and connections, and every signal until its end or its failure.
 
     Attributes:

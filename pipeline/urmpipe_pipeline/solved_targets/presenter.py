@@ -45,7 +45,7 @@ def present(one: SolvedTargets) -> Presentation:
         f"Targets {one.name}",
         one.verdict,
         tuple(facts(one)),
-        tuple(tables(one)),
+        (*([] if one.reached.all() else [missed_table(one)]), *tables(one)),
         partial(_figures, one),
         partial(_page, one),
         tuple(_checks(one)),
@@ -132,8 +132,6 @@ def _figures(one: SolvedTargets) -> Iterator[Figure]:
 
 def _page(one: SolvedTargets) -> Iterator[Block]:
     """Yield what only a page shows."""
-    if not one.reached.all():
-        yield missed_table(one)
     yield from path_figure(one.as_run())
     yield inputs_table("Input files", one.provenance.inputs)
     yield provenance_table(one.provenance)

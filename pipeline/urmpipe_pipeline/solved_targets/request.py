@@ -11,10 +11,11 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.inverse.closed.closed_form import ClosedForm, closed_form, exact_form
 from urmpipe_models.inverse.search import Search
 from urmpipe_models.inverse.solve import METHODS, Method
+from urmpipe_models.messages import Hint
 from urmpipe_pipeline.solved_targets.given_targets import GivenTargets
 
 TYPED = 1e-3
@@ -78,33 +79,31 @@ def refuse_unsolvable(request: Request, *, recorded: bool) -> None:
         raise OptionError(*faults)
 
 
-def _bad_values(request: Request) -> Iterator[str]:
+def _bad_values(request: Request) -> Iterator[Finding]:
     """Yield which values make no sense."""
     if request.method not in METHODS:
-        yield f"--method: found {shown(request.method)}, allowed: {', '.join(METHODS)}"
-    yield from (f"--{fault}" for fault in request.search.faults())
+        yield Finding(parameter="method", found=shown(request.method), allowed=", ".join(METHODS))
+    yield from request.search.faults()
 
 
-def _not_for_paths(request: Request, recorded: bool) -> Iterator[str]:
+def _not_for_paths(request: Request, recorded: bool) -> Iterator[Finding]:
     """Yield the options that a path does not have."""
     lacks = "positions only" if request.given.targets.rotation is None else "no closed form"
     if request.method == "iterative":
-        yield (
-            "--method: found iterative with a path, allowed: auto; a path takes the closed form of the arm"
-            " if it has one"
-        )
+        hint = Hint("method", "auto", "takes the closed form of the arm if it has one")
+        yield Finding(parameter="method", found="iterative with a path", allowed="auto", hints=(hint,))
     if request.method == "closed" and request.form is None:
-        yield f"--method: found closed with a path of {request.arm.name} that has {lacks}, allowed: auto"
+        found = f"closed with a path of {request.arm.name} that has {lacks}"
+        yield Finding(parameter="method", found=found, allowed="auto")
     if request.every and request.form is None:
-        yield (
-            f"--all: found with a path of {request.arm.name} that has {lacks}, allowed: with poses and an arm"
-            " that has a closed form, whose branches run along the path; or with targets without times"
-        )
+        allowed = "with poses and an arm that has a closed form; or with targets without times"
+        found = f"with a path of {request.arm.name} that has {lacks}"
+        yield Finding(parameter="every", found=found, allowed=allowed)
     elif request.every and not recorded:
-        yield (
-            "--all: found with a path and no recording, allowed: with -o RUN.rrd, where every branch is a"
-            " ghost arm; or with targets without times"
-        )
+        allowed = "with a recording; or with targets without times"
+        hint = Hint("output", "run.rrd", "records every branch as a ghost arm")
+        found = "with a path and no recording"
+        yield Finding(parameter="every", found=found, allowed=allowed, hints=(hint,))
 
 
 def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
@@ -115,26 +114,28 @@ def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArr
     """
     if start is None:
         return None
-    allowed = f"allowed: {len(arm.coordinates)}, one for each of {', '.join(arm.coordinates)}"
+    allowed = f"{len(arm.coordinates)}, one for each of {', '.join(arm.coordinates)}"
     try:
         values = np.asarray(start, dtype=float)
     except (TypeError, ValueError):
-        raise OptionError(f"--start: found {shown(start)}, {allowed}, in rad and m") from None
+        allowed = f"{allowed}, in rad and m"
+        raise OptionError(Finding(parameter="start", found=shown(start), allowed=allowed)) from None
     if values.shape != (len(arm.coordinates),):
-        raise OptionError(f"--start: found {values.size} values, {allowed}")
+        raise OptionError(Finding(parameter="start", found=f"{values.size} values", allowed=allowed))
     if not np.isfinite(values).all():
-        raise OptionError(f"--start: found a value that is not finite, {allowed}, in rad and m")
+        found, allowed = "a value that is not finite", f"{allowed}, in rad and m"
+        raise OptionError(Finding(parameter="start", found=found, allowed=allowed))
     beyond = list(_beyond_limits(arm, values))
     if beyond:
         raise OptionError(*beyond)
     return values
 
 
-def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[str]:
+def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[Finding]:
     """Yield which values of a start the limits of their joints do not allow."""
     for joint, value in zip(arm.moving, start.tolist(), strict=True):
         if not joint.lower - TYPED <= value <= joint.upper + TYPED:
             unit = "rad" if joint.kind == "revolute" else "m"
             degrees = "; in deg?" if unit == "rad" and abs(value) > 2.0 * math.pi else ""
             limits = f"{joint.lower:.6g} to {joint.upper:.6g} {unit}"
-            yield f"--start: found {joint.name} = {value:g}, allowed: {limits}{degrees}"
+            yield Finding(parameter="start", found=f"{joint.name} = {value:g}", allowed=f"{limits}{degrees}")

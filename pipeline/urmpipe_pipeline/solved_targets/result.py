@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray, IntArray, TextArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.display import Shown, line_of, number_of
+from urmpipe_models.display import line_of, number_of
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.inverse.along_path.joint_path import JointPath
 from urmpipe_models.inverse.solutions import Solutions
@@ -20,6 +20,7 @@ from urmpipe_models.inverse.targets import Targets, misses
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.comparison.deviation import Verdict
 from urmpipe_pipeline.joint_log import LogWarning, seconds
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.results import SCHEMA, Run
 from urmpipe_pipeline.solved_targets.motion import run_of_solutions
@@ -30,7 +31,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True, slots=True, eq=False, repr=False)
-class SolvedTargets(Shown):
+class SolvedTargets(Result):
     """The joint values that bring the tool centre point of an arm to n targets.
 
     Attributes:
@@ -79,12 +80,12 @@ class SolvedTargets(Shown):
     joint_log: Path | None = field(default=None, metadata={"stored": False})
 
     def __post_init__(self) -> None:
-        faults = [Finding(fault, self.name) for fault in self._faults()]
+        faults = [Finding(file=self.name, found=found, allowed=allowed) for found, allowed in self._faults()]
         if faults:
             raise LogError(*faults)
 
-    def _faults(self) -> Iterator[str]:
-        """Yield what does not fit together."""
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        """Yield what does not fit together, and what is allowed."""
         n, k, joints = self.solutions.q.shape
         shapes: dict[str, tuple[NDArray[Any] | None, tuple[int, ...]]] = {
             "rows": (self.row, (n,)),
@@ -98,14 +99,14 @@ class SolvedTargets(Shown):
             "samples of the path": (None if self.path is None else self.path.q, (n, joints)),
         }
         if not n:
-            yield "found no target, allowed: one or more"
+            yield "no target", "one or more"
         if joints != len(self.robot.coordinates):
-            yield f"found {joints} joints, allowed: {len(self.robot.coordinates)}"
+            yield f"{joints} joints", f"{len(self.robot.coordinates)}"
         for what, (values, allowed) in shapes.items():
             if values is not None and values.shape != allowed:
-                yield f"found {what} of shape {values.shape}, allowed: {allowed}"
+                yield f"{what} of shape {values.shape}", f"{allowed}"
         if self.t_ns is not None and (np.diff(self.t_ns) <= 0).any():
-            yield "found times that do not rise, allowed: rising times"
+            yield "times that do not rise", "rising times"
 
     def __len__(self) -> int:
         return len(self.row)

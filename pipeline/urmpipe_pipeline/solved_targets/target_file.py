@@ -115,10 +115,10 @@ def read_targets(file: Path, options: ReadOptions | None = None, tsp: float | No
 
 def _plain_length(asked: ReadOptions) -> tuple[ReadOptions, Unit | None]:
     """Return the options without a plain length (mm), and that unit, which is of x, y, z here."""
-    unit = vocabulary().unit(asked.units.get("", ""))
+    unit = vocabulary().unit(asked.unit.get("", ""))
     if unit is None or unit.quantity != "length" or unit.order:
         return asked, None
-    return replace(asked, units={name: one for name, one in asked.units.items() if name}), unit
+    return replace(asked, unit={name: one for name, one in asked.unit.items() if name}), unit
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -108,7 +108,7 @@ def read_map(path: Path) -> LogMap:
             position=_names(tcp, "position"),
             orientation=_names(tcp, "orientation"),
             rotation=tcp.choice("form", FORMS) if tcp.has("form") else None,  # type: ignore[arg-type]
-            units=units,
+            unit=units,
             interval={name: interval for name, interval in intervals if interval},
         ),
         robot=_beside(path, robot) if robot else None,
@@ -167,7 +167,7 @@ def map_of(
         lines += ["", "[tcp]", *toml_lines(said | turned if orientation else said)]
     units = {_called(log, c): c.unit for c in (*position, *orientation) if c.unit != PURE.name}
     clock = {name for c in _of(log, "time") for name in (c.name, c.header, str(c.number)) if name}
-    units |= {name: unit for name, unit in asked.get("units", {}).items() if name in clock}
+    units |= {name: unit for name, unit in asked.get("unit", {}).items() if name in clock}
     if units:
         lines += ["", "[units]", *(f"{toml_text(one)} = {toml_text(unit)}" for one, unit in units.items())]
     return "\n".join(lines) + "\n"

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field, fields, replace
 from numbers import Real
 from typing import Any
 
-from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.orientation import FORMS, RotationForm
 
 COLUMNS = "columns by name or number, such as ['q1', 'q2'] or [2, 3]"
-UNITS = "a mapping, such as {'q1': 'deg'}, or {'': 'deg'} for all joints that turn"
-INTERVALS = "a mapping, such as {'q1': (-180.0, 180.0)}, or with '' for all joints that turn"
+UNITS = "a unit of all joints that turn, such as 'deg', or a mapping, such as {'q1': 'deg'}"
+INTERVALS = "two ends for all joints that turn, or a mapping, such as {'q1': (-180.0, 180.0)}"
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class ReadOptions:
         position: Names or numbers of the recorded x, y, z.
         orientation: Names or numbers of the columns of the recorded orientation, in the order of its form.
         rotation: Form of the recorded orientation, as `RotationForm` lists them.
-        units: Unit of a column by its name or number; by "" that of all joint columns that turn.
+        unit: Unit of a column by its name or number; by "" that of all joint columns that turn.
         period: Time between rows in [s], of a log without a time column.
         skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
         interval: LOW, HIGH of the interval to which the environment limits a joint, by its name; by "" that
@@ -51,7 +51,7 @@ class ReadOptions:
     position: tuple[str, ...] = ()
     orientation: tuple[str, ...] = ()
     rotation: RotationForm | None = None
-    units: Mapping[str, str] = field(default_factory=dict)
+    unit: Mapping[str, str] = field(default_factory=dict)
     period: float | None = None
     skip_bad: bool = False
     interval: Mapping[str, tuple[float, float]] = field(default_factory=dict)
@@ -67,7 +67,7 @@ class ReadOptions:
             if isinstance(value := getattr(self, one.name), Iterator):  # can be looked through only once
                 object.__setattr__(self, one.name, tuple(value))
         wrong = [
-            f"{one.name}: found {shown(value)}, allowed: {allowed}"
+            Finding(parameter=one.name, found=shown(value), allowed=allowed)
             for one in fields(self)
             for value, (fits, allowed) in [(getattr(self, one.name), _KINDS[one.name])]
             if not ((value is None and one.default is None) or fits(value))
@@ -79,11 +79,11 @@ class ReadOptions:
         for name in ("signs", "offsets"):
             object.__setattr__(self, name, tuple(getattr(self, name)))
         object.__setattr__(self, "time", None if self.time is None else str(self.time))
-        object.__setattr__(self, "units", {str(column): unit for column, unit in self.units.items()})
+        object.__setattr__(self, "unit", {str(column): unit for column, unit in self.unit.items()})
 
 
 def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
+    return isinstance(value, str) and value != ""
 
 
 def _is_flag(value: Any) -> bool:
@@ -135,13 +135,18 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "position": _COLUMNS,
     "orientation": _COLUMNS,
     "rotation": (lambda value: _is_text(value) and value in FORMS, ", ".join(FORMS)),
-    "units": (_are_units, UNITS),
+    "unit": (_are_units, UNITS),
     "period": (_is_number, "a number, in s"),
     "skip_bad": _FLAG,
     "interval": (_are_intervals, INTERVALS),
     "repair": _FLAG,
 }
 """What each field takes, and what to say of anything else."""
+
+
+def _for_all(value: Any) -> Any:
+    """Return a value that is given for all joints that turn as a mapping; what is one already as it is."""
+    return {"": value} if isinstance(value, (str, list, tuple)) and value else value
 
 
 def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None) -> ReadOptions:
@@ -156,9 +161,11 @@ def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None
     base = otherwise or ReadOptions()
     known = {field.name for field in fields(ReadOptions)}
     given = {name: value for name, value in values.items() if name in known and value is not None}
-    given["units"] = {**base.units, **given.get("units", {})}
+    given |= {name: _for_all(given[name]) for name in ("unit", "interval") if name in given}
+    if isinstance(given.get("unit", {}), Mapping):
+        given["unit"] = {**base.unit, **given.get("unit", {})}
     if "joints" in given:
         given = {"names": (), "signs": (), "offsets": (), "interval": {}, **given}
-    elif "" not in given.get("interval", {"": None}):
+    elif isinstance(given.get("interval"), Mapping) and "" not in given["interval"]:
         given["interval"] = {**base.interval, **given["interval"]}
     return replace(base, **given)

@@ -113,7 +113,7 @@ def test_errors_of_a_motion_turned_and_moved_are_those_of_evo(align: AlignMode) 
 @pytest.fixture(scope="module")
 def exported(tmp_path_factory: pytest.TempPathFactory) -> tuple[list[Run], list[Path]]:
     """Two logs of one motion, ingested, and the TUM files that `urmpipe export` writes of them."""
-    robot, read, folder = load_robot("urm6"), ReadOptions(units={"": "rad"}), tmp_path_factory.mktemp("tum")
+    robot, read, folder = load_robot("urm6"), ReadOptions(unit={"": "rad"}), tmp_path_factory.mktemp("tum")
     runs = [ingest_log([LOGS / f"{name}.csv"], robot=robot, read=read) for name in ("coppeliasim", "matlab")]
     files = [folder / f"{run.name}.tum" for run in runs]
     for run, file in zip(runs, files, strict=True):

@@ -345,7 +345,7 @@ PRINTED = 6 * np.radians(0.00005) * 1.35
 
 @pytest.fixture(scope="module")
 def demo() -> Comparison:
-    robot, read = load_robot("urm6"), ReadOptions(units={"": "rad"})
+    robot, read = load_robot("urm6"), ReadOptions(unit={"": "rad"})
     path = ingest_log([LOGS / "path.csv"])
     matlab = ingest_log([LOGS / "matlab.csv"], robot=robot, read=read)
     solidworks = ingest_log(log_files(LOGS / "solidworks"), robot=robot, name="solidworks")

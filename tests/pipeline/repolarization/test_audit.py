@@ -232,13 +232,13 @@ def odd_log(path: Path) -> Path:
 
 
 def test_the_audit_comes_back_from_a_recording(tmp_path: Path) -> None:
-    run = ingest_log([odd_log(tmp_path / "a.csv")], read=ReadOptions(units={"": "rad"}))
+    run = ingest_log([odd_log(tmp_path / "a.csv")], read=ReadOptions(unit={"": "rad"}))
     assert [(one.kind, one.row) for one in run.audit] == [("wrap", 21), ("unexplained", 31)]
     assert read_recording(write_recording(run, tmp_path / "a.rrd")).audit == run.audit  # type: ignore[union-attr]
 
 
 def test_rates_across_an_unexplained_step_are_left_out(tmp_path: Path) -> None:
-    run = ingest_log([odd_log(tmp_path / "a.csv")], read=ReadOptions(units={"": "rad"}))
+    run = ingest_log([odd_log(tmp_path / "a.csv")], read=ReadOptions(unit={"": "rad"}))
     assert np.flatnonzero(np.isnan(run.qd[:, 0])).tolist() == [29, 30]
     assert np.flatnonzero(np.isnan(run.qdd[:, 0])).tolist() == [29, 30]
     assert not np.isnan(run.qd[:, 1]).any()
@@ -254,10 +254,10 @@ def test_rates_about_an_in_between_sample_are_left_out_on_any_grid(tmp_path: Pat
     table = np.column_stack([0.005 * np.arange(40), q])
     np.savetxt(tmp_path / "a.csv", table, delimiter=",", header="t,q1", comments="", fmt="%.17g")
     for tsp, left_out in ((None, range(19, 22)), (0.001, range(95, 106))):
-        run = ingest_log([tmp_path / "a.csv"], read=ReadOptions(units={"": "rad"}), tsp=tsp)
+        run = ingest_log([tmp_path / "a.csv"], read=ReadOptions(unit={"": "rad"}), tsp=tsp)
         assert np.flatnonzero(np.isnan(run.qd[:, 0])).tolist() == list(left_out)
         assert np.nanmax(np.abs(run.qd)) < 10.1
-    repaired = ingest_log([tmp_path / "a.csv"], read=ReadOptions(units={"": "rad"}, repair=True))
+    repaired = ingest_log([tmp_path / "a.csv"], read=ReadOptions(unit={"": "rad"}, repair=True))
     np.testing.assert_allclose(repaired.qd[:, 0], 10.0, rtol=1e-10)  # roundings of 1e-15 rad in 10 ms
 
 
@@ -272,7 +272,7 @@ def test_rates_at_the_ends_share_the_first_and_the_last_window() -> None:
 
 
 def test_resampling_leaves_an_unexplained_step_open_and_counts_it(tmp_path: Path) -> None:
-    run = ingest_log([odd_log(tmp_path / "a.csv")], read=ReadOptions(units={"": "rad"}), tsp=0.001)
+    run = ingest_log([odd_log(tmp_path / "a.csv")], read=ReadOptions(unit={"": "rad"}), tsp=0.001)
     assert np.flatnonzero(np.isnan(run.q[:, 0])).tolist() == [146, 147, 148, 149]
     assert not np.isnan(run.q[:, 1]).any()
     assert run.warnings[-1].kind == "step-left-open"

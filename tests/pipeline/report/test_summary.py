@@ -34,17 +34,21 @@ def judged(title: str, verdict: Verdict, used: float | None, *facts: Fact) -> Se
     return Section(title, verdict, (off(used, verdict), *facts))
 
 
+ROWS = (Fact("Rows", Value(3)),)
+
+
 def toy(
     name: str,
     verdict: Verdict,
     *sections: Section,
     word: str = "",
     tables: tuple[Table, ...] = (),
+    facts: tuple[Fact, ...] = ROWS,
     **more: Any,
 ) -> Presentation:
-    body = Section(f"Toy {name}", verdict, tables=tables, sections=sections)
-    facts = (Fact("Which", Ref(f"{name}-1")),)
-    return Presentation(name, f"{name} came out", verdict, facts, body, word, **more)
+    body = Section(f"Toy {name}", verdict, facts, tables, sections=sections)
+    which = (Fact("Which", Ref(f"{name}-1")),)
+    return Presentation(name, f"{name} came out", verdict, which, body, word, **more)
 
 
 def names(page: Page) -> list[str]:
@@ -127,7 +131,7 @@ def test_a_judged_part_that_says_nothing_of_itself_has_no_card_of_its_own() -> N
     gone = judged("baseline", "fail", None), Section("gone", "fail")
     outer = Section("baseline", "fail", (Fact("Since then", "1 gone"),), sections=gone[1:])
     assert names(lay_out([toy("now", "fail", judged("log", "pass", 0.5), outer)])) == ["baseline", "log"]
-    assert names(lay_out([toy("bare", "pass")])) == ["Toy bare"]
+    assert names(lay_out([toy("bare", "pass", facts=())])) == []
 
 
 def test_tables_about_the_parts_stand_with_the_cards_and_others_in_the_part() -> None:

@@ -25,7 +25,7 @@ from urmpipe_pipeline.sources import ReadOptions
 SHARED = Path(__file__).resolve().parents[3].parent / "shared"
 needs_shared = pytest.mark.skipif(not SHARED.is_dir(), reason="the real logs of ../shared are not there")
 URM6 = load_robot("urm6")
-RAD = ReadOptions(units={"": "rad"})
+RAD = ReadOptions(unit={"": "rad"})
 
 
 def write(path: Path, q: FloatArray, header: str = "t,q1,q2,q3,q4,q5,q6", tsp: float = 0.005) -> Path:
@@ -78,7 +78,7 @@ def test_prismatic_joints_are_not_repolarized(tmp_path: Path) -> None:
     run = ingest_log(
         [write(tmp_path / "log.csv", q, "t,q1,q2")],
         robot=arm,
-        read=ReadOptions(units={"q2": "rad", "q1": "m"}),
+        read=ReadOptions(unit={"q2": "rad", "q1": "m"}),
     )
     np.testing.assert_array_equal(run.q[:, 0], q[:, 0])
     assert [one.joint for one in run.repolarizations] == ["q2", "q2"]
@@ -122,7 +122,7 @@ def test_rates_that_agree_in_another_unit_of_time_name_it(
         f" {hint}; the differences are used"
     )
     assert warning.hints == (Hint("unit", {"t 1": wanted}, "reads the time so"),)
-    assert ingest_log([path], read=ReadOptions(units={"t 1": wanted})).warnings == ()
+    assert ingest_log([path], read=ReadOptions(unit={"t 1": wanted})).warnings == ()
 
 
 def test_the_rates_that_export_writes_are_known_again(tmp_path: Path) -> None:

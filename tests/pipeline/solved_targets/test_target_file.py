@@ -35,12 +35,12 @@ def said(targets: TargetFile) -> list[tuple[str, str]]:
 
 # What a file cannot tell by itself, by specimen.
 OPTIONS: dict[str, Mapping[str, Any]] = {
-    "cad_path_no_header": {"units": {"1": "mm"}},
-    "tcp_xyz_mm": {"units": {"TCP_X": "mm"}},
+    "cad_path_no_header": {"unit": {"1": "mm"}},
+    "tcp_xyz_mm": {"unit": {"TCP_X": "mm"}},
     "tcp_rotation_vector": {"rotation": "vector"},
-    "tcp_quaternion_numbered": {"rotation": "quat_wxyz", "units": {"x": "mm"}},
-    "tcp_matrix_16_mm": {"units": {"T_3": "mm"}},
-    "tcp_matrix_no_header": {"units": {"10": "mm"}},
+    "tcp_quaternion_numbered": {"rotation": "quat_wxyz", "unit": {"x": "mm"}},
+    "tcp_matrix_16_mm": {"unit": {"T_3": "mm"}},
+    "tcp_matrix_no_header": {"unit": {"10": "mm"}},
 }
 TRUTHS: dict[str, Truth] = {
     name: truth
@@ -93,7 +93,7 @@ def test_a_matrix_of_a_real_log_without_a_header_is_a_pose() -> None:
     if not path.is_file():
         pytest.skip(f"{path} is not here")
     table = np.loadtxt(path, delimiter=",")[:, -16:].reshape(-1, 4, 4)
-    targets = read_targets(path, ReadOptions(units={"10": "mm"}))
+    targets = read_targets(path, ReadOptions(unit={"10": "mm"}))
     np.testing.assert_allclose(targets.position, table[:, :3, 3] / 1e3, rtol=1e-15, atol=0)
     assert_turned(targets, list(table[:, :3, :3]), atol=1e-8)
 
@@ -158,7 +158,7 @@ def test_orientations_by_names_and_units(read: Read, header: str, cells: str) ->
 
 def test_options_say_what_a_header_does_not(read: Read) -> None:
     text = f"x,y,z,rz,ry,rx\n300,100,500,{DEGREES}\n"
-    targets = read(text, units={"x": "mm", "": "deg"})
+    targets = read(text, unit={"x": "mm", "": "deg"})
     np.testing.assert_allclose(targets.position, [[0.3, 0.1, 0.5]], rtol=1e-15, atol=0)
     assert_turned(targets, [R])
     assert said(targets) == []
@@ -231,7 +231,7 @@ def test_a_map_names_the_columns(read: Read, tmp_path: Path) -> None:
     )
     said = read_map(tmp_path / "lab.toml").read
     targets = read(f"c;a;b;u;v;w\n500;300;100;{DEGREES.replace(',', ';')}\n", **{
-        name: getattr(said, name) for name in ("position", "orientation", "rotation", "units", "joints")
+        name: getattr(said, name) for name in ("position", "orientation", "rotation", "unit", "joints")
     })  # fmt: skip
     np.testing.assert_allclose(targets.position, [[0.3, 0.1, 0.5]], rtol=1e-15, atol=0)
     assert_turned(targets, [R])

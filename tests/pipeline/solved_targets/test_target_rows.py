@@ -391,4 +391,4 @@ def test_options_that_make_no_sense_are_refused(wrong: Wrong) -> None:
     text = "x,y,z\n1,2,3\n"
     assert wrong(text, -1.0) == ["tsp: found -1 s, allowed: a positive time of 1e-9 s or more"]
     assert wrong(text, period=0.0) == ["period: found 0 s, allowed: a positive time of 1e-9 s or more"]
-    assert wrong(text, units={"u": "mm"}) == ["unit: found no column 'u', allowed: x, y, z"]
+    assert wrong(text, unit={"u": "mm"}) == ["unit: found no column 'u', allowed: x, y, z"]

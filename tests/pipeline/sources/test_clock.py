@@ -97,7 +97,7 @@ def test_steps_that_may_be_two_units_are_asked_for(wrong: Wrong, read: Read) -> 
         'log.csv:2, column t: found steps of 600, which may be ms or us; unit={"t": "ms"} or'
         ' unit={"t": "us"} says which'
     ]
-    assert read(text, units={"t": "us"}).t_ns.tolist() == [0, 600_000, 1_200_000]
+    assert read(text, unit={"t": "us"}).t_ns.tolist() == [0, 600_000, 1_200_000]
 
 
 def test_a_step_of_one_is_taken_as_a_second_and_said(read: Read) -> None:
@@ -206,7 +206,7 @@ def test_times_that_64_bits_cannot_hold(wrong: Wrong, read: Read) -> None:
         'log.csv:2, column t [s]: found 1.335e+17 s, allowed: times within 146 years of 0; unit={"t":'
         ' "ns"} reads them so'
     ]
-    assert read(text, units={"t": "ns"}).t_ns.tolist() == [0, 50_000]
+    assert read(text, unit={"t": "ns"}).t_ns.tolist() == [0, 50_000]
     assert wrong(clocked("t [s]", "0", "1", "1e30")) == [
         "log.csv:4, column t [s]: found '1e30', allowed: a number in every row"
     ]
@@ -227,7 +227,7 @@ def test_libfranka_writes_milliseconds(read: Read) -> None:
 def test_a_coarse_clock_is_rebuilt_and_that_is_said(read: Read) -> None:
     """20 Hz, whole seconds: the first and the last second are not whole."""
     stamps = (np.arange(13, 13 + 200) // 20).tolist()
-    log = read(clocked("t [s]", *map(str, stamps)), units={"": "deg"})
+    log = read(clocked("t [s]", *map(str, stamps)), unit={"": "deg"})
     assert log.period == pytest.approx(0.05, rel=1e-9)
     assert (np.abs(log.t + log.clock_start - stamps) <= 1.0).all()
     said = "times in steps of 1 s stand in 20 rows each"
@@ -241,7 +241,7 @@ def test_a_coarse_clock_is_rebuilt_and_that_is_said(read: Read) -> None:
 
 def test_a_coarse_time_of_day_goes_over_midnight(read: Read) -> None:
     cells = [f"23:59:{k // 10 + 50}" if k < 100 else f"00:00:0{k // 10 - 10}" for k in range(200)]
-    log = read(clocked("Time", *cells), units={"": "deg"})
+    log = read(clocked("Time", *cells), unit={"": "deg"})
     assert log.period == pytest.approx(0.1, rel=1e-9)
     assert log.t[-1] == pytest.approx(19.9, rel=1e-9)
 
@@ -274,7 +274,7 @@ def test_a_counter_since_boot_is_not_taken_for_unix_time(
     found = f"found times of our years in steps of {step:g}, which may be {units[0]} or {units[1]}"
     asked = " or ".join(f'unit={{"time": "{unit}"}}' for unit in units)
     assert wrong(text) == [f"log.csv:2, column time: {found}; {asked} says which"]
-    assert read(text, units={"time": units[1]}).period == 0.005
+    assert read(text, unit={"time": units[1]}).period == 0.005
 
 
 def test_minutes_days_and_dates_in_numbers_are_not_taken_for_seconds(read: Read, wrong: Wrong) -> None:
@@ -288,7 +288,7 @@ def test_minutes_days_and_dates_in_numbers_are_not_taken_for_seconds(read: Read,
     said = "found steps of 5.79e-08, as of days or hours, allowed: times in s, ms, us, ns"
     hint = 'convert them; unit={"Time": "s"} takes them as they are'
     assert wrong(excel) == [f"log.csv:2, column Time: {said}; {hint}"]
-    assert read(excel, units={"Time": "s"}).units["Time"] == "s"
+    assert read(excel, unit={"Time": "s"}).units["Time"] == "s"
     date = clocked("Time", "20210411222721.0", "20210411222721.5")
     said = "found 2.02104e+13 s, allowed: times within 146 years of 0"
     hint = "a date is read if it is written as 2021-04-11 22:27:21.5"
@@ -312,7 +312,7 @@ def test_times_of_day_in_numbers_are_refused_where_they_leap(
     said = f"found {times[2]} after {times[1]}, as a time of day hhmmss goes on, allowed: a clock of one unit"
     hint = 'write it as hh:mm:ss; unit={"Time": "s"} takes it as no time of day'
     assert wrong(text) == [f"log.csv:4, column Time: {said}; {hint}"]
-    assert read(text, units={"Time": "s"}).t[1:].tolist()[0] == 1.0
+    assert read(text, unit={"Time": "s"}).t[1:].tolist()[0] == 1.0
 
 
 def test_a_gap_of_forty_seconds_is_no_time_of_day(read: Read) -> None:

@@ -62,7 +62,7 @@ OPTIONS = [
     ),
     *(
         ReadOptions(joints=("2", "3")),
-        ReadOptions(units={"": "deg"}),
+        ReadOptions(unit={"": "deg"}),
         ReadOptions(delimiter=";", decimal=","),
     ),
 ]

@@ -73,7 +73,7 @@ def test_a_header_that_says_degrees_over_radians(read: Read) -> None:
 
 
 def test_the_user_has_the_last_word(read: Read) -> None:
-    log = read(text([*joints(), "x [m]", "y [m]", "z [m]"], Q, FLANGE), UR5E, units={"": "deg"})
+    log = read(text([*joints(), "x [m]", "y [m]", "z [m]"], Q, FLANGE), UR5E, unit={"": "deg"})
     np.testing.assert_allclose(log.q, np.radians(Q), atol=PRINTED)
     (warning,) = log.warnings
     assert warning.kind == "unit-contradiction"
@@ -96,8 +96,8 @@ def test_a_unit_that_the_data_contradict_is_asked_for(
         rf" unit=\"{unit}\" says which",
         said,
     )
-    assert set(read(table, units={"": other}).units.values()) == {"s", other}
-    assert set(read(table, units={"": unit}).units.values()) == {"s", unit}
+    assert set(read(table, unit={"": other}).units.values()) == {"s", other}
+    assert set(read(table, unit={"": unit}).units.values()) == {"s", unit}
 
 
 def test_a_static_log_cannot_tell_its_units_by_a_tool(read: Read) -> None:

@@ -82,8 +82,8 @@ def test_everything_that_a_map_says(write: Write) -> None:
 @pytest.mark.parametrize(
     ("text", "options"),
     [
-        (KUKA, {"units": {"": "deg", "Zeit": "ms"}}),
-        ("0.0 0.1\n0.2 0.3\n0.4 0.6\n", {"units": {"": "rad"}, "period": 0.01}),
+        (KUKA, {"unit": {"": "deg", "Zeit": "ms"}}),
+        ("0.0 0.1\n0.2 0.3\n0.4 0.6\n", {"unit": {"": "rad"}, "period": 0.01}),
         ("sec,nanosec,q1 [deg],q2 [deg]\n5,0,1,2\n5,5000000,2,3\n", {}),
         ("t [s],q2,q1,qd2,qd1\n0,1,2,0,0\n0.1,1,2,0,0\n0.2,1,2,0,0\n", {"joints": ("q2", "q1")}),
         ("t [s],q1 [deg],qx,qy,qz,qw,x [m],y [m],z [m]\n0,1,0,0,0,1,1,2,3\n0.1,2,0,0,0,1,1,2,3\n", {}),

@@ -104,7 +104,7 @@ def test_the_kinematics_tell_of_a_rotation_vector_in_another_unit_than_its_names
         " orientation agrees within 0.00 deg, as vector in rad within "
     )
     assert warning.message.endswith(" deg")
-    given = read(table, UR5E, units={"rotvec_x": "rad"})
+    given = read(table, UR5E, unit={"rotvec_x": "rad"})
     assert given.units["rotvec_z"] == "rad"
 
 
@@ -175,7 +175,7 @@ def test_a_transform_behind_the_joints_of_a_table_without_header(read: Read) -> 
     assert log.tcp_position is not None
     np.testing.assert_allclose(log.tcp_position, POSITION, atol=PRINTED)
     assert log.rotation_form == "matrix"
-    without = read("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()), units={"": "deg"})
+    without = read("".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()), unit={"": "deg"})
     assert without.joints == ("q1", "q2", "q3", "q4", "q5", "q6")
 
 
@@ -204,7 +204,7 @@ def test_named_columns_of_the_pose(read: Read) -> None:
         position=("a1", "a2", "a3"),
         orientation=("b1", "b2", "b3"),
         rotation="vector",
-        units={"a1": "m", "a2": "m", "a3": "m", "b1": "rad", "b2": "rad", "b3": "rad"},
+        unit={"a1": "m", "a2": "m", "a3": "m", "b1": "rad", "b2": "rad", "b3": "rad"},
     )
     assert log.tcp_position is not None
     np.testing.assert_allclose(log.tcp_position, POSITION, atol=PRINTED)

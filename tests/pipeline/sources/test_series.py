@@ -40,7 +40,7 @@ def test_a_column_without_a_unit_tells_none_and_the_user_may(tmp_path: Path) -> 
     path = tmp_path / "table.csv"
     path.write_text("t,u\n0,1\n0.1,2\n", encoding="utf-8")
     assert read_series(path, ["u"]).units == (None,)
-    told = read_series(path, ["u"], ReadOptions(units={"u": "deg"}))
+    told = read_series(path, ["u"], ReadOptions(unit={"u": "deg"}))
     assert told.units == ("rad",)
     assert told.values[1, 0] == 2.0 * 0.017453292519943295
 

@@ -86,7 +86,7 @@ def test_plotjuggler_with_empty_cells() -> None:
 def test_quoted_and_padded_dates() -> None:
     """01/20/2021 can only be the 20th of January."""
     path = LOGS / "plotjuggler" / "simple_parse_timestamp.csv"
-    log = read_log([path], ReadOptions(joints=("A", "B", "C", "D"), units={"": "rad"}))
+    log = read_log([path], ReadOptions(joints=("A", "B", "C", "D"), unit={"": "rad"}))
     assert log.t_ns.tolist() == [0, 200_000_000, 400_000_000, 600_000_000, 610_000_000]
     assert log.clock_start_ns == 1_611_137_492_332_000_000  # 2021-01-20 10:11:32.332 UTC
     assert log.units["timestamp"] == "date"
@@ -136,7 +136,7 @@ def test_joints_and_matrices_without_header(arm: Arm) -> None:
         LogError, match=r"found values up to 179 in phi1, .* and no unit, allowed: rad or deg"
     ):
         read_log([path], robot=arm(6))
-    log = read_log([path], ReadOptions(units={"": "deg"}), arm(6))
+    log = read_log([path], ReadOptions(unit={"": "deg"}), arm(6))
     np.testing.assert_array_equal(log.q[0], np.array([-45, 147, -39, 96, 49, 67]) * (np.pi / 180))
     assert (log.rows, log.first_line) == (20, 2)
 

@@ -172,11 +172,11 @@ def test_an_order_that_nothing_tells_is_asked_for(read: Read, wrong: Wrong) -> N
         ' first or date and time, month first; unit={"timestamp": "dmy"} or unit={"timestamp": "mdy"}'
         " says which"
     ]
-    assert read(text, units={"timestamp": "dmy"}).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
-    assert read(text, units={"timestamp": "mdy"}).clock_start_ns == unix(2021, 1, 2, 23, 59, 59)
+    assert read(text, unit={"timestamp": "dmy"}).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
+    assert read(text, unit={"timestamp": "mdy"}).clock_start_ns == unix(2021, 1, 2, 23, 59, 59)
     header = text.replace("timestamp", "Date (dd/mm/yyyy)")
     assert read(header).t_ns.tolist() == [0, 2 * SECOND, DAY + 3 * SECOND]
-    assert wrong(text, units={"timestamp": "ms"}) == [
+    assert wrong(text, unit={"timestamp": "ms"}) == [
         "unit: found ms for the time 'timestamp', allowed: dmy, mdy"
     ]
 
@@ -211,8 +211,8 @@ def test_digits_behind_a_colon_that_nothing_tells_are_asked_for(read: Read, wron
         ' last colon or time of day, microseconds behind the last colon; unit={"Time": "s"} or'
         ' unit={"Time": "us"} says which'
     ]
-    assert read(text, units={"Time": "us"}).t_ns.tolist() == [0, 5 * US, 10 * US]
-    assert read(text, units={"Time": "ms"}).t_ns.tolist() == [0, 5 * MS, 10 * MS]
+    assert read(text, unit={"Time": "us"}).t_ns.tolist() == [0, 5 * US, 10 * US]
+    assert read(text, unit={"Time": "ms"}).t_ns.tolist() == [0, 5 * MS, 10 * MS]
 
 
 def test_midnight(read: Read, wrong: Wrong) -> None:

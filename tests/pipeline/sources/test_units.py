@@ -50,8 +50,8 @@ def test_units_in_names(read: Read, name: str, unit: str) -> None:
 
 def test_a_unit_that_is_not_known_is_refused(wrong: Wrong) -> None:
     text = "t,q1,q2\n0,30,30\n0.1,31,30\n"
-    assert wrong(text, units={"": "gon"}) == ["unit: found 'gon', allowed: rad, deg"]
-    assert wrong(text, units={"q1": "gon"}) == [
+    assert wrong(text, unit={"": "gon"}) == ["unit: found 'gon', allowed: rad, deg"]
+    assert wrong(text, unit={"q1": "gon"}) == [
         "unit: found 'gon', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
     ]
     assert wrong("t,q1 [gon]\n0,30\n0.1,31\n") == [
@@ -94,20 +94,20 @@ def test_units_given_by_the_user(read: Read, wrong: Wrong, arm: Arm) -> None:
     log = read(
         text,
         arm(3, "revolute", "revolute", "prismatic"),
-        units={"": "deg", "t": "ms", "2": "rad", "q3": "mm"},
+        unit={"": "deg", "t": "ms", "2": "rad", "q3": "mm"},
     )
     assert log.q[0].tolist() == [30.0, 0.5 * DEG, 0.005]
     assert log.period == 0.6
     assert not log.warnings
-    assert wrong(text, units={"": "mm"}) == ["unit: found 'mm', allowed: rad, deg"]
-    assert wrong(text, units={"q1": "inch"}) == [
+    assert wrong(text, unit={"": "mm"}) == ["unit: found 'mm', allowed: rad, deg"]
+    assert wrong(text, unit={"q1": "inch"}) == [
         "unit: found 'inch', allowed: rad, deg, m, mm, cm, s, ms, us, ns, dmy, mdy"
     ]
-    assert wrong(text, units={"q9": "deg"}) == ["unit: found no column 'q9', allowed: t, q1, q2, q3"]
-    assert wrong(text, units={"q1": "s", "t": "s"}) == [
+    assert wrong(text, unit={"q9": "deg"}) == ["unit: found no column 'q9', allowed: t, q1, q2, q3"]
+    assert wrong(text, unit={"q1": "s", "t": "s"}) == [
         "column q1: unit: found the unit s (given as an option), allowed: rad, deg, m, mm, cm"
     ]
-    assert wrong(text, units={"t": "deg"}) == ["unit: found deg for the time 't', allowed: s, ms, us, ns"]
+    assert wrong(text, unit={"t": "deg"}) == ["unit: found deg for the time 't', allowed: s, ms, us, ns"]
 
 
 def test_a_unit_that_does_not_fit_the_robot(wrong: Wrong, arm: Arm) -> None:
@@ -122,19 +122,19 @@ def test_a_unit_that_is_not_known(wrong: Wrong, read: Read) -> None:
         "log.csv, column J1 [counts]: found the unit 'counts', allowed: rad, deg, m, mm, cm;"
         ' unit={"J1": "deg"} says which'
     ]
-    assert read(text, units={"J1": "deg"}).q[0, 0] == 30 * DEG
+    assert read(text, unit={"J1": "deg"}).q[0, 0] == 30 * DEG
 
 
 def test_a_line_of_units_that_are_not_known(read: Read, wrong: Wrong) -> None:
     text = "t,J1,J2\n[s],[counts],[counts]\n0,30,1\n0.1,31,1\n"
     said = 'found the unit \'counts\', allowed: rad, deg, m, mm, cm; unit={"J1": "deg"} says which'
     assert wrong(text) == [f"log.csv, column J1: {said}"]
-    assert read(text, units={"": "deg"}).units == {"t": "s", "J1": "deg", "J2": "deg"}
+    assert read(text, unit={"": "deg"}).units == {"t": "s", "J1": "deg", "J2": "deg"}
     powers = read("t,J1,tau1,M,n\n[s],[rad],[Nm],[kg m2/s2],(1/min)\n0,30,1,1,1\n0.1,31,1,1,1\n")
     assert (powers.joints, powers.units) == (("J1",), {"t": "s", "J1": "rad"})
-    numbered = read("a,b,c\n[t0],[q1],[q2]\n0,30,1\n0.1,31,1\n", joints=("2", "3"), units={"": "deg"})
+    numbered = read("a,b,c\n[t0],[q1],[q2]\n0,30,1\n0.1,31,1\n", joints=("2", "3"), unit={"": "deg"})
     assert numbered.joints == ("[q1]", "[q2]")
-    named = read("of today\n[t],[q],[p]\n0,30,1\n0.1,31,1\n", joints=("2", "3"), units={"": "deg"})
+    named = read("of today\n[t],[q],[p]\n0,30,1\n0.1,31,1\n", joints=("2", "3"), unit={"": "deg"})
     assert named.joints == ("[q]", "[p]")
 
 
@@ -263,7 +263,7 @@ def test_huge_numbers_are_read_without_a_warning_of_numpy(read: Read, wrong: Wro
 
 
 def test_a_unit_given_for_all_joints_against_their_names_is_told(read: Read) -> None:
-    log = read("t,q1 [deg],q2 [deg],q3\n0,1,2,3\n0.1,1,2,3\n", units={"": "rad"})
+    log = read("t,q1 [deg],q2 [deg],q3\n0,1,2,3\n0.1,1,2,3\n", unit={"": "rad"})
     assert log.units == {"t": "s", "q1": "rad", "q2": "rad", "q3": "rad"}
     assert [(warning.kind, warning.message) for warning in log.warnings] == [
         ("unit-contradiction", "q1, q2: taken as rad (given as an option), though their names say deg")
@@ -271,7 +271,7 @@ def test_a_unit_given_for_all_joints_against_their_names_is_told(read: Read) -> 
 
 
 def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None:
-    assert read("t,a,b\n0,1,2\n0.1,1,2\n", joints=[3, 2], time=1, units={2: "deg"}).joints == ("b", "a")
+    assert read("t,a,b\n0,1,2\n0.1,1,2\n", joints=[3, 2], time=1, unit={2: "deg"}).joints == ("b", "a")
     once: Any = (f"q{k}" for k in (1, 2))
     assert ReadOptions(joints=once).joints == ("q1", "q2")
     with pytest.raises(OptionError) as caught:

@@ -196,7 +196,7 @@ def test_columns_that_were_not_used_are_named(tmp_path: Path) -> None:
 
 def test_units_that_the_names_do_not_tell_are_told(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,q1,q2 (arm),q3 [deg]\n0,1,2,3\n1,2,3,4\n")
-    run = urmpipe.ingest(tmp_path / "log.csv", read=ReadOptions(units={"": "deg"}))
+    run = urmpipe.ingest(tmp_path / "log.csv", read=ReadOptions(unit={"": "deg"}))
     result = urmpipe.export(run, tmp_path / "again.csv", rows="file")
     assert [warning.message for warning in result.warnings] == [
         "q1, q2: in deg, which their names do not tell"

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError
+from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.inverse.along_path.branch_walk import walk
 from urmpipe_models.inverse.along_path.joint_path import JointPath, SingularStretch
 from urmpipe_models.inverse.along_path.joint_speeds import too_fast
@@ -83,7 +83,11 @@ def follow(
     """
     targets, reasons = checked(targets)
     begin = np.array(chain.start if start is None else start, dtype=float)
-    faults = [*_time_faults(t_ns, len(targets)), *_start_faults(chain, begin), *search.faults()]
+    faults: list[Finding | str] = [
+        *_time_faults(t_ns, len(targets)),
+        *_start_faults(chain, begin),
+        *search.faults(),
+    ]
     if faults:
         raise OptionError(*faults)
     form = None if targets.rotation is None else exact_form(chain)

@@ -1,7 +1,7 @@
 """What the viewer opens with: verdict, arm and paths at the left; the plots and the events at the right.
 
 No blueprint says at which time the viewer opens: a `time_selection` moves the cursor only while it plays, and
-keeps it there. So `urmpipe view` sets the time, and in the plots stands a line through the instant by which
+keeps it there. So `urmpipe view` sets the time, and in every plot stands a line through the instant by which
 the verdict was decided. Opened otherwise the viewer stands at the first sample: the summary says where to go.
 """
 
@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, TypeAlias
 from urmpipe_pipeline.presentation.figure import Figure, Text
 from urmpipe_pipeline.presentation.section import Event, Presentation, Section
 from urmpipe_pipeline.recording.sending import keys, shown_path
+from urmpipe_pipeline.recording.store import ROW, TIME, Opening
 from urmpipe_pipeline.recording.views.events import events_view
-from urmpipe_pipeline.recording.views.plots import EntityOf, Plots, most_rows, whole_time
+from urmpipe_pipeline.recording.views.plots import LOW, TALL, EntityOf, Plots, whole_axis
 from urmpipe_pipeline.recording.views.scene_drawing import scene_view
 from urmpipe_pipeline.recording.views.summary import summary
 from urmpipe_pipeline.text import encodable
@@ -36,13 +37,21 @@ HEAD_SHARE, LINE_SHARE, MOST_TEXT = 0.12, 0.022, 0.45
 LINE_LENGTH = 115
 """Characters that fit in a line of the summary where it has half of a usual window's width."""
 
+BESIDE = [1, 2]
+"""Shares of the width for a long summary and the plots, where no arm stands below the summary."""
+
+HIGH = 0.16
+"""Share of the height from which a plot has room for many numbers at its axis."""
+
 SEEN_AT_ONCE, COLUMNS = 8, 2
 """Plots of several sections that stand beside each other, and how many abreast; of more, each section is a
 tab."""
 
 
-def send_views(stream: RecordingStream, shown: Presentation, entity_of: EntityOf) -> Blueprint:
-    """Send what is there to be looked at of a presentation, and return the layout of its views.
+def send_views(
+    stream: RecordingStream, shown: Presentation, entity_of: EntityOf
+) -> tuple[Blueprint, Opening]:
+    """Send what is there to be looked at of a presentation, and return the layout and where it opens.
 
     Args:
         stream: Where to.
@@ -51,16 +60,17 @@ def send_views(stream: RecordingStream, shown: Presentation, entity_of: EntityOf
     """
     import rerun as rr
 
-    words = summary(shown)
-    stream.log(shown_path("summary"), rr.TextDocument(words, media_type="text/markdown"), static=True)
     parts = _parts(shown.body)
-    figures = [figure for part in parts for figure in part.figures]
-    whole = whole_time(figures)
-    plots = Plots(stream, entity_of, whole, most_rows(figures))
+    whole, timed = whole_axis(figure for part in parts for figure in part.figures)
+    timed = shown.opens_at_row is None if whole is None else timed
+    opening = Opening(TIME, shown.opens_at_ns) if timed else Opening(ROW, (shown.opens_at_row or 0) + 1)
+    plots = Plots(stream, entity_of, whole, timed)
     scene = shown.scene() if shown.scene is not None else None
     space = None if scene is None else scene_view(stream, scene, shown.opens_at_ns)
-    texts = [text for part in parts for text in part.texts]
-    return _blueprint(_words(stream, texts), words, space, _plots(plots, parts), timed=whole is not None)
+    words = summary(shown, scene)
+    stream.log(shown_path("summary"), rr.TextDocument(words, media_type="text/markdown"), static=True)
+    layout = _blueprint(_words(plots, parts), words, space, _plots(plots, parts), opening.timeline)
+    return layout, opening
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,11 +78,17 @@ class _Part:
     """A section with what the viewer shows of it, its views computed once."""
 
     title: str
+    verdict: str
     key: str
     figures: tuple[Figure, ...]
     texts: tuple[Text, ...]
     events: tuple[Event, ...]
     opened: bool
+
+    @property
+    def instants(self) -> dict[int, str]:
+        """All that its figures mark: a line stands in each of them."""
+        return {at: words for figure in self.figures for at, words in figure.instants.items()}
 
 
 def _parts(body: Section) -> list[_Part]:
@@ -83,22 +99,32 @@ def _parts(body: Section) -> list[_Part]:
         blocks = tuple(section.figures())
         figures = tuple(one for one in blocks if isinstance(one, Figure))
         texts = tuple(one for one in blocks if isinstance(one, Text))
-        title = f"{section.verdict.upper()} {section.title}" if section.verdict else section.title
-        found.append(_Part(encodable(title), key, figures, texts, tuple(section.events()), section.opened))
+        events = tuple(section.events())
+        found.append(
+            _Part(section.title, (section.verdict or "").upper(), key, figures, texts, events, section.opened)
+        )
     return found
 
 
-def _words(stream: RecordingStream, texts: Sequence[Text]) -> View | Container:
-    """Return the summary, with the texts behind it."""
+def _words(plots: Plots, parts: Sequence[_Part]) -> View | Container:
+    """Return the summary, behind it texts, and the events that stand beside no plot."""
     import rerun as rr
     import rerun.blueprint as rrb
 
     views: list[View | Container] = [rrb.TextDocumentView(origin=shown_path("summary"), name="Summary")]
+    texts = [text for part in parts for text in part.texts]
     for key, text in zip(keys([one.title for one in texts]), texts, strict=True):
         entity = shown_path("text", key)
-        stream.log(entity, rr.TextDocument(encodable(text.text)), static=True)
+        plots.stream.log(entity, rr.TextDocument(encodable(text.text)), static=True)
         views.append(rrb.TextDocumentView(origin=entity, name=encodable(text.title)))
+    views += [_events(plots, part) for part in parts if part.events and not part.figures]
     return _tabs(views)
+
+
+def _events(plots: Plots, part: _Part) -> View:
+    """Return the list of the events of a section."""
+    first = (0 if plots.whole is None else plots.whole[0]) if plots.timed else None
+    return events_view(plots.stream, part.events, shown_path("events", part.key), first)
 
 
 def _plots(plots: Plots, parts: Sequence[_Part]) -> View | Container | None:
@@ -107,27 +133,34 @@ def _plots(plots: Plots, parts: Sequence[_Part]) -> View | Container | None:
 
     shown = [part for part in parts if part.figures]
     if not shown:
-        rows = [row for part in parts for row in _rows(plots, part)]
-        return _stacked(rows) if rows else None
+        return None
     if len(shown) == 1:
         return _stacked(_rows(plots, shown[0]))
     if sum(len(figure.views) for part in shown for figure in part.figures) <= SEEN_AT_ONCE:
-        views = [view for part in shown for view, _ in _rows(plots, part)]
+        views = [view for part in shown for view, _ in _rows(plots, part, part.title)]
         return rrb.Grid(*views, grid_columns=COLUMNS if len(views) > 2 * COLUMNS else 1)
-    tabs = [_stacked(_rows(plots, part), part.title) for part in shown]
+    tabs = [_stacked(_rows(plots, part), f"{part.verdict} {part.title}".strip()) for part in shown]
     return rrb.Tabs(*tabs, active_tab=next((i for i, part in enumerate(shown) if part.opened), 0))
 
 
-def _rows(plots: Plots, part: _Part) -> list[Row]:
-    """Return the figures of a section from top to bottom; the events share the row of the last."""
+def _rows(plots: Plots, part: _Part, about: str = "") -> list[Row]:
+    """Return the figures of a section from top to bottom; the events share the row of the last.
+
+    Args:
+        plots: Sends them.
+        part: The section, with at least one figure.
+        about: What stands before the names of the plots.
+    """
     rows: list[Row] = []
-    last: list[View | Container] = []
-    if part.events:
-        first = None if plots.whole is None else plots.whole[0]
-        last.append(events_view(plots.stream, part.events, shown_path("events", part.key), first))
+    last: list[View | Container] = [_events(plots, part)] if part.events else []
+    height = sum(one.share * (len(one.views) if one.opened is None else 1) for one in part.figures)
     for number, figure in enumerate(part.figures):
         root = shown_path("plots", part.key, str(number))
-        sent = [plots.views(figure, view, f"{root}/{i}") for i, view in enumerate(figure.views)]
+        most = TALL if figure.share >= HIGH * height else LOW
+        sent = [
+            plots.views(view, f"{root}/{i}", part.instants, about, most)
+            for i, view in enumerate(figure.views)
+        ]
         views = [one for some in sent for one in some]
         if last and figure is part.figures[-1] and number:
             rows.append((_tabs([*last, *views]), EVENTS_SHARE))
@@ -145,22 +178,27 @@ def _blueprint(
     words: str,
     space: View | None,
     plots: View | Container | None,
-    *,
-    timed: bool,
+    timeline: str,
 ) -> Blueprint:
-    """Return the summary and the 3D view at the left, the plots at the right; without a 3D view stacked."""
+    """Return the summary and the 3D view at the left, the plots at the right.
+
+    Without a 3D view the plots stand below the summary, or beside one that is long.
+    """
     import rerun.blueprint as rrb
 
     length = LINE_LENGTH if space is not None else 2 * LINE_LENGTH
     lines = sum(math.ceil(len(line) / length) for line in words.splitlines())
     share = min(MOST_TEXT, HEAD_SHARE + LINE_SHARE * lines)
-    below = [one for one in (space, plots) if one is not None]
-    root: Container = rrb.Vertical(text, *below[:1], row_shares=[share, 1 - share][: 1 + len(below[:1])])
-    if len(below) == 2:
-        root = rrb.Horizontal(root, below[1], column_shares=[1, 1])
+    root = text
+    if space is not None:
+        root = rrb.Vertical(text, space, row_shares=[share, 1 - share])
+    if plots is not None and space is None and share < MOST_TEXT:
+        root = rrb.Vertical(text, plots, row_shares=[share, 1 - share])
+    elif plots is not None:
+        root = rrb.Horizontal(root, plots, column_shares=BESIDE if space is None else [1, 1])
     return rrb.Blueprint(
         root,
-        rrb.TimePanel(state="collapsed", timeline="t" if timed else "row", play_state="paused"),
+        rrb.TimePanel(state="collapsed", timeline=timeline, play_state="paused"),
         rrb.BlueprintPanel(state="collapsed"),
         rrb.SelectionPanel(state="collapsed"),
         auto_layout=False,
@@ -172,6 +210,7 @@ def _stacked(rows: Sequence[Row], name: str | None = None) -> Container:
     """Return views one below the other."""
     import rerun.blueprint as rrb
 
+    name = None if name is None else encodable(name)
     return rrb.Vertical(*(view for view, _ in rows), row_shares=[share for _, share in rows], name=name)
 
 

@@ -10,6 +10,7 @@ import numpy as np
 from urmpipe_pipeline import text
 from urmpipe_pipeline.presentation.section import Event
 from urmpipe_pipeline.recording.sending import times_at
+from urmpipe_pipeline.recording.store import ROW, TIME
 
 if TYPE_CHECKING:
     from rerun import RecordingStream
@@ -28,7 +29,7 @@ def events_view(
         stream: Where to.
         events: At least one.
         entity: Where they stand.
-        first_ns: The first time in [ns], for what holds for all of it; None without times.
+        first_ns: The first time in [ns], for what holds for all of it; None without times: all is in row 1.
     """
     import rerun as rr
     import rerun.blueprint as rrb
@@ -37,12 +38,12 @@ def events_view(
     ordered = sorted(events, key=lambda one: first if one.t_ns is None else one.t_ns)
     heads = ["" if one.t_ns is None else f"{one.t_ns / 1e9:.4f} s  " for one in ordered]
     at = np.array([first if one.t_ns is None else one.t_ns for one in ordered], dtype=np.int64)
-    times = times_at(at, np.arange(len(at))) if first_ns is not None else times_at(None, np.zeros_like(at))
     lines = [head + _words(one) for head, one in zip(heads, ordered, strict=True)]
     columns = rr.TextLog.columns(text=lines, level=[LEVELS[one.level] for one in ordered])
+    times = times_at(None, np.zeros_like(at)) if first_ns is None else times_at(at, np.arange(len(at)))
     stream.send_columns(entity, times, columns)
     shown = rrb.TextLogColumns(
-        timeline_columns=[rrb.encodings.TimelineColumn(name, visible=False) for name in ("t", "row")],
+        timeline_columns=[rrb.encodings.TimelineColumn(one, visible=False) for one in (TIME, ROW)],
         text_log_columns=["LogLevel", "Body"],
     )
     name = "Events" if first_ns is None else "Events, at t [s]"

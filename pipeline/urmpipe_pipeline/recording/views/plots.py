@@ -47,11 +47,14 @@ log of more than some minutes on a minute of it."""
 BEFORE, AFTER = 0.01, 0.24
 """Time shown before the first sample and after the last, as shares of all: there stands the legend."""
 
+UNITLESS = "-"
+"""What stands for the unit of a number that has none."""
+
 MARGIN = 0.04
 """Free space above and below what is plotted, as a share of it."""
 
-TALL = 8
-"""Multiples of a power of ten that the axis of a plot has room for."""
+TALL, LOW = 8, 4
+"""Multiples of a power of ten that the axis of a high and of a low plot has room for."""
 
 
 @dataclass
@@ -61,24 +64,29 @@ class Plots:
     Attributes:
         stream: Where to.
         entity_of: Where arrays of the result stand.
-        whole: From the first to the last time in [ns]; None without times.
-        rows: How many rows are plotted at most: the axis without times.
+        whole: From the first to the last time in [ns], without times from the first to the last row; None
+            where nothing is plotted.
+        timed: Whether there are times.
     """
 
     stream: RecordingStream
     entity_of: EntityOf
     whole: tuple[int, int] | None
-    rows: int = 0
+    timed: bool
     _looks: dict[str, _Look] = field(default_factory=dict)
     _shares_axis: bool = True
 
-    def views(self, figure: Figure, view: View, root: str) -> list[TimeSeriesView]:
+    def views(
+        self, view: View, root: str, instants: Mapping[int, str], about: str = "", most: int = TALL
+    ) -> list[TimeSeriesView]:
         """Send a view of a figure, and return it; of a long one that of its overview, and that of all rows.
 
         Args:
-            figure: The figure.
-            view: One of its views.
+            view: The view.
             root: The entity that what is drawn stands below.
+            instants: Times in [ns] at which a line goes through it, with a word each.
+            about: What it is of, where plots of several things stand beside each other.
+            most: Multiples of a power of ten that its height has room for.
         """
         panels = [panel for panel in view.panels if panel.over is None]
         if not panels:
@@ -89,19 +97,20 @@ class Plots:
                 self._line(drawn, panel, line, f"{root}/{i}/{j}")
             self._marks(drawn, panel, f"{root}/{i}/marks")
         self._limits(drawn, panels, f"{root}/limits")
+        held = any(panel.small or panel.limit is not None or not panel.signed for panel in panels)
         span = (
-            _span(drawn.extent) if any(panel.small or panel.limit is not None for panel in panels) else None
+            span_with_numbers(min(drawn.extent), max(drawn.extent), most) if held and drawn.extent else None
         )
-        self._instants(drawn, figure.instants, panels, f"{root}/instants")
-        name, unit = encodable(view.name), shown_unit(panels)
-        said = f"{name} [{unit}]" if unit else name
+        legend = len(drawn.names) > 1
+        self._instants(drawn, instants, f"{root}/instants")
+        said = encodable(f"{about}: {view.name}" if about else view.name) + f" [{shown_unit(panels)}]"
         if not drawn.whole:
-            return [self._view(said, drawn.entities, drawn.overrides, span, legend=drawn.legend)]
+            return [self._view(said, drawn.entities, drawn.overrides, span, legend=legend)]
         peaks = f"{said}, every peak of {drawn.rows:,} rows"
-        si = " or ".join(dict.fromkeys(panel.unit for panel in panels))
+        si = " or ".join(dict.fromkeys(panel.unit or UNITLESS for panel in panels))
         return [
-            self._view(peaks, drawn.entities, drawn.overrides, span, legend=drawn.legend),
-            self._view(f"all {drawn.rows:,} rows [{si}]", drawn.whole, {}, None, legend=drawn.legend),
+            self._view(peaks, drawn.entities, drawn.overrides, span, legend=legend),
+            self._view(f"all {drawn.rows:,} rows [{si}]", drawn.whole, {}, None, legend=legend),
         ]
 
     def _view(
@@ -129,18 +138,16 @@ class Plots:
         return view
 
     def _range(self) -> TimeRange | None:
-        """Return the whole time, or all rows, with a margin; None if there is none or but one instant."""
+        """Return the whole time, or all rows, with a margin; None if there is none or but one."""
         import rerun as rr
         import rerun.blueprint as rrb
 
-        if self.whole is None and self.rows > 1:
-            last = self.rows + math.ceil(AFTER * self.rows)
-            return rrb.TimeRange(*(rr.TimeRangeBoundary.absolute(seq=row) for row in (0, last)))
         if self.whole is None or self.whole[0] == self.whole[1]:
             return None
         first, last = self.whole
-        edges = first - BEFORE * (last - first), last + AFTER * (last - first)
-        start, end = (rr.TimeRangeBoundary.absolute(nanos=round(at)) for at in edges)
+        key, span = "nanos" if self.timed else "seq", last - first
+        edges = math.floor(first - BEFORE * span), math.ceil(last + AFTER * span)
+        start, end = (rr.TimeRangeBoundary.absolute(**{key: at}) for at in edges)
         return rrb.TimeRange(start=start, end=end)
 
     def _line(self, drawn: _Drawn, panel: Panel, line: Line, root: str) -> None:
@@ -148,9 +155,9 @@ class Plots:
         t_ns = panel.t_ns if line.t_ns is None else line.t_ns
         rows, factor = len(line.values), factor_of(panel)
         single = line.points or rows == 1 or t_ns is None
-        look = _Look(tuple(map(encodable, line.names)), line.colours, points=single, steps=line.steps)
+        look = _Look(line.names, line.colours, points=single, steps=line.steps)
         stored = self.entity_of(line.values, t_ns)
-        drawn.legend |= len(line.names) > 1
+        drawn.names.update(line.names)
         drawn.rows = max(drawn.rows, rows)
         if stored is not None and factor == 1.0 and rows <= LONG:
             drawn.entities.append(stored)
@@ -220,13 +227,11 @@ class Plots:
             colour = panel.lines[0].colours[0] if len(limits) > 1 else REFERENCE_COLOUR
             look = _Look((said,) * len(values), (colour,) * len(values), width=LIMIT_WIDTH)
             self._send(drawn, f"{root}/{number}", look, t_ns, rows, np.array([values] * len(rows)))
-            drawn.legend = True
+            drawn.names.add(said)
 
-    def _instants(
-        self, drawn: _Drawn, instants: Mapping[int, str], panels: Sequence[Panel], root: str
-    ) -> None:
+    def _instants(self, drawn: _Drawn, instants: Mapping[int, str], root: str) -> None:
         """Show instants as lines as high as what is plotted."""
-        if self.whole is None or self.whole[0] == self.whole[1] or not drawn.extent:
+        if not self.timed or self.whole is None or self.whole[0] == self.whole[1] or not drawn.extent:
             return  # the line's nanosecond would be the whole axis
         ends = np.array([[min(drawn.extent)], [max(drawn.extent)]])
         for number, (at_ns, words) in enumerate(instants.items()):
@@ -243,8 +248,8 @@ class _Drawn:
     whole: list[str] = field(default_factory=list)
     overrides: dict[str, _Look] = field(default_factory=dict)
     extent: list[float] = field(default_factory=list)
+    names: set[str] = field(default_factory=set)
     rows: int = 0
-    legend: bool = False
 
     def reach(self, values: FloatArray) -> None:
         """Take the least and the largest value among those that the axis must show."""
@@ -267,7 +272,7 @@ class _Look:
         """Return it as Rerun has it."""
         import rerun as rr
 
-        colours, names = [rgb(colour) for colour in self.colours], list(self.names)
+        colours, names = [rgb(colour) for colour in self.colours], list(map(encodable, self.names))
         if self.points:
             return rr.SeriesPoints(colors=colours, names=names, marker_sizes=[MARK_SIZE] * len(names))
         return rr.SeriesLines(
@@ -288,23 +293,25 @@ def factor_of(panel: Panel) -> float:
 def shown_unit(panels: Iterable[Panel]) -> str:
     """Return the unit that panels are shown in; of several, all of them."""
     units = (SHOWN[one.unit][0] if one.small and one.unit in SHOWN else one.unit for one in panels)
-    return " or ".join(dict.fromkeys(units))
+    return " or ".join(unit or UNITLESS for unit in dict.fromkeys(units))
 
 
-def whole_time(figures: Iterable[Figure]) -> tuple[int, int] | None:
-    """Return the first and the last time of all panels in [ns]; None where none has times."""
-    ends: list[int] = []
+def whole_axis(figures: Iterable[Figure]) -> tuple[tuple[int, int] | None, bool]:
+    """Return the first and the last time of all panels in [ns], without times their first and last row.
+
+    Returns:
+        Both ends, None where nothing is plotted; and whether they are times.
+    """
+    times: list[int] = []
+    rows = 0
     for panel in (panel for figure in figures for view in figure.views for panel in view.panels):
-        for t_ns in (panel.t_ns, *(line.t_ns for line in panel.lines)):
-            if t_ns is not None and len(t_ns):
-                ends += [int(t_ns[0]), int(t_ns[-1])]
-    return (min(ends), max(ends)) if ends else None
-
-
-def most_rows(figures: Iterable[Figure]) -> int:
-    """Return how many rows any line of some figures has at most."""
-    panels = (panel for figure in figures for view in figure.views for panel in view.panels)
-    return max((len(line.values) for panel in panels for line in panel.lines), default=0)
+        for line in panel.lines:
+            t_ns = panel.t_ns if line.t_ns is None else line.t_ns
+            rows = max(rows, len(line.values))
+            times += [] if t_ns is None or not len(t_ns) else [int(t_ns[0]), int(t_ns[-1])]
+    if times:
+        return (min(times), max(times)), True
+    return ((1, rows) if rows else None), False
 
 
 def overview(values: FloatArray, most: int) -> IntArray:
@@ -343,10 +350,6 @@ def span_with_numbers(low: float, high: float, most: int = TALL) -> tuple[float,
         low, high = (low, 10.0 * power) if high >= -low else (-10.0 * power, high)
     margin = MARGIN * (high - low)
     return low - margin, high + margin
-
-
-def _span(extent: Sequence[float]) -> tuple[float, float] | None:
-    return span_with_numbers(min(extent), max(extent)) if extent else None
 
 
 def _by_shape(marks: Sequence[Mark]) -> dict[Shape, list[Mark]]:

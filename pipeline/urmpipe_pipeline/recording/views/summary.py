@@ -1,4 +1,4 @@
-"""The text beside the arm: the verdict first, then the facts and tables that are brief, then warnings."""
+"""The text beside the arm: the verdict and what explains it first, warnings next, further tables last."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import colour_word
 from urmpipe_pipeline.presentation.brief import brief_columns, brief_facts, brief_tables, head, rows_within
 from urmpipe_pipeline.presentation.digits import written
-from urmpipe_pipeline.presentation.section import Cell, Fact, Presentation, Ref, Section, Table
+from urmpipe_pipeline.presentation.scene import Path, Scene
+from urmpipe_pipeline.presentation.section import Cell, Fact, Judged, Presentation, Ref, Section, Table
 
 ROWS = 12
 """Rows of a table of verdicts that are shown; the others are counted. Of other tables only short ones are."""
@@ -18,38 +19,53 @@ ROWS = 12
 LISTED = 4
 """Warnings that are listed; the others are counted."""
 
+NAMED = 12
+"""Paths whose colours are told; the others are counted."""
 
-def summary(shown: Presentation) -> str:
-    """Return a presentation in a few lines of Markdown."""
+
+def summary(shown: Presentation, scene: Scene | None = None) -> str:
+    """Return a presentation in a few lines of Markdown.
+
+    Args:
+        shown: The presentation.
+        scene: Its scene, if there is one: which path has which colour.
+    """
     word = (shown.verdict or shown.word).upper()
-    head = f"{word}: {plain(shown.headline)}" if word else plain(shown.headline)
-    lines = [f"### {head}", *_facts(shown.facts, strong=True)]
+    title = f"{word}: {plain(shown.headline)}" if word else plain(shown.headline)
+    sections = [shown.body, *(shown.body.sections if len(shown.body.sections) == 1 else ())]
     told = {one.name for one in shown.facts}
-    lines += _section(shown.body, told)
-    if len(shown.body.sections) == 1:
-        lines += _section(shown.body.sections[0], told)
+    lines = [f"### {title}", *_facts(shown.facts, strong=True)]
+    for section in sections:
+        lines += _facts([one for one in section.facts if one.name not in told])
+        lines += ["", f"**{plain(section.notice)}**"] if section.notice else []
+    tables = list(_tables(sections))
+    lines += [line for one in tables if _has_verdicts(one) for line in _table(one)]
+    lines += _colours(scene.paths if scene is not None else ())
     lines += _warnings(list(_all_warnings(shown.body)))
     lines += ["", _where_to_go(shown)]
+    lines += [line for one in tables if not _has_verdicts(one) for line in _table(one)]
     return "\n".join(lines)
 
 
 def _where_to_go(shown: Presentation) -> str:
-    where = f"{text.seconds(shown.opens_at_ns / 1e9)} s" if shown.opens_at_ns else ""
-    if shown.opens_at_row:
-        where = f"row {shown.opens_at_row + 1}"
-    at = f"`urmpipe view` opens this at {where}. " if where else ""
-    return f"{at}Everything else: `urmpipe report` with this file."
+    at = f"{text.seconds(shown.opens_at_ns / 1e9)} s" if shown.opens_at_ns else ""
+    at = f"row {shown.opens_at_row + 1}" if shown.opens_at_row else at
+    opens = f"`urmpipe view` opens this at {at}, other programs at the beginning. " if at else ""
+    return f"{opens}Everything else: `urmpipe report` with this file."
 
 
-def _section(section: Section, told: set[str]) -> Iterator[str]:
-    """Yield the facts that were not told yet, and the tables."""
-    yield from _facts([one for one in section.facts if one.name not in told])
-    if section.notice:
-        yield from ("", f"**{plain(section.notice)}**")
-    for table in brief_tables(section):
-        if len(table.columns[0].cells) <= ROWS or rows_within(table, ROWS).start is not None:
-            yield ""
-            yield from _table(table)
+def _tables(sections: Sequence[Section]) -> Iterator[Table]:
+    """Yield the tables there is room for; of several about the same things the first."""
+    about: set[tuple[str, ...]] = set()
+    for table in (table for section in sections for table in brief_tables(section)):
+        names = tuple(map(written, table.columns[0].cells))
+        if names not in about and (len(names) <= ROWS or _has_verdicts(table)):
+            yield table
+        about.add(names)
+
+
+def _has_verdicts(table: Table) -> bool:
+    return any(isinstance(cell, Judged) for one in table.columns for cell in one.cells)
 
 
 def _facts(facts: Sequence[Fact], *, strong: bool = False) -> Iterator[str]:
@@ -64,13 +80,11 @@ def _facts(facts: Sequence[Fact], *, strong: bool = False) -> Iterator[str]:
 def _table(table: Table) -> Iterator[str]:
     """Yield the brief columns, and as many rows as fit."""
     columns, rows = list(brief_columns(table)), rows_within(table, ROWS)
-    yield _row(map(head, columns))
-    yield f"|{' --- |' * len(columns)}"
+    yield from ("", _row(map(head, columns)), f"|{' --- |' * len(columns)}")
     for cells in zip(*(one.cells[rows] for one in columns), strict=True):
         yield _row(map(_coloured, cells))
     if (left := len(columns[0].cells) - ROWS) > 0:
-        yield ""
-        yield f"and {left} more, all in the report"
+        yield from ("", f"and {left} more, all in the report")
 
 
 def _coloured(cell: Cell, *, unit: bool = False) -> str:
@@ -83,10 +97,21 @@ def _row(cells: Iterable[str]) -> str:
     return f"| {' | '.join(map(plain, cells))} |"
 
 
-def _all_warnings(section: Section) -> Iterator[LogWarning]:
-    yield from section.warnings
+def _colours(paths: Sequence[Path]) -> Iterator[str]:
+    """Yield which path has which colour, where there are several."""
+    words = ((one, colour_word(one.colour)) for one in paths)
+    looks = (f"{plain(one.name)} {word}{', dashed' if one.asked else ''}" for one, word in words if word)
+    named = list(dict.fromkeys(looks))
+    if len(named) > 1:
+        more = [f"and {len(named) - NAMED} more"] if len(named) > NAMED else []
+        yield from ("", f"Paths: {'; '.join([*named[:NAMED], *more])}.")
+
+
+def _all_warnings(section: Section, about: str | None = None) -> Iterator[LogWarning]:
+    """Yield the warnings of a section and below it, each with what it is about."""
+    yield from (one if one.about or not about else one.of(about) for one in section.warnings)
     for one in section.sections:
-        yield from _all_warnings(one)
+        yield from _all_warnings(one, one.title)
 
 
 def _warnings(warnings: Sequence[LogWarning]) -> Iterator[str]:

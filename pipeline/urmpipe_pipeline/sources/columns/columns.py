@@ -143,7 +143,7 @@ def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Un
         LogError: If there is no such column.
     """
     given = {}
-    for text, unit_text in options.units.items():
+    for text, unit_text in options.unit.items():
         unit = vocabulary().unit(unit_text)
         quantities: tuple[Quantity, ...] = ("angle", "length", "time", "date") if text else ("angle",)
         if unit is None or unit.quantity not in quantities:

@@ -17,7 +17,6 @@ from urmpipe.usage import usage_finding
 
 if TYPE_CHECKING:
     from urmpipe_models.errors import Finding
-    from urmpipe_models.spelling import Voice
 
 SHOWN_FINDINGS = 20
 """Errors printed line by line; the others are counted."""
@@ -74,9 +73,9 @@ def findings_of(error: BaseException) -> Sequence[Finding]:
     return [Finding(said)]
 
 
-def print_findings(findings: Sequence[Finding], as_json: bool, voice: Voice) -> None:
+def print_findings(findings: Sequence[Finding], as_json: bool) -> None:
     """Print errors on standard error, a line each, and as one JSON object if it is asked for."""
-    lines = [f"error: {finding.words(voice)}" for finding in findings[:SHOWN_FINDINGS]]
+    lines = [f"error: {finding.words('command line')}" for finding in findings[:SHOWN_FINDINGS]]
     if len(findings) > SHOWN_FINDINGS:
         lines.append(f"error: and {len(findings) - SHOWN_FINDINGS} more")
     with suppress(OSError):  # where standard error takes no more, the exit code tells it all the same
@@ -85,16 +84,15 @@ def print_findings(findings: Sequence[Finding], as_json: bool, voice: Voice) -> 
         from urmpipe.printing.terminal import echo_json
 
         with suppress(OSError):  # where standard output takes no more, that is told already
-            echo_json({"schema": 1, "errors": [one.to_dict(voice) for one in findings]})
+            echo_json({"schema": 1, "errors": [one.to_dict("command line") for one in findings]})
 
 
-def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding], voice: Voice) -> None:
+def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding]) -> None:
     """Write errors to the JUnit file that `compare` was to write, whatever went wrong: also its own options.
 
     Args:
         arguments: The words of the command line.
         findings: What went wrong, at least one.
-        voice: In whose words it is told.
     """
     options = [*takewhile(lambda word: word != "--", arguments), ""]
     equal = "--junit="
@@ -110,4 +108,4 @@ def tell_junit_of(arguments: Sequence[str], findings: Sequence[Finding], voice: 
     from urmpipe_pipeline.tables.junit import write_errors
 
     others = [Path(word) for word in arguments if word != named[0]]
-    write_errors(Path(named[0]), others, findings, voice)
+    write_errors(Path(named[0]), others, findings, "command line")

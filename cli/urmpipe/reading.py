@@ -1,0 +1,121 @@
+"""How a log or a table is read, and the arm that it is about: by keywords, or else as a map says."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, TypedDict
+
+from urmpipe.arm_placing import Frame, Robot, place_robot
+from urmpipe.keyword_checks import PathLike
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.errors import for_each
+from urmpipe_models.orientation import RotationForm
+from urmpipe_models.transform import from_offset
+from urmpipe_pipeline.sources import LogMap, ReadOptions, read_map
+from urmpipe_pipeline.sources.options import read_options
+
+
+class TableReading(TypedDict, total=False):
+    """How a table is read where it cannot tell by itself; None means that it tells.
+
+    Attributes:
+        log_map: A map (TOML) or what `read_map` returned; what is given beside it comes first.
+        rotation: Form of the orientation.
+        delimiter: Sign between cells, or comma, semicolon, tab, spaces, bar.
+        decimal: Decimal sign, or point, comma.
+        time: Name or number (from 1) of the time column; "none" if there is none.
+        unit: Unit of all joints that turn, such as "deg"; or by column, such as {"q1": "deg"}.
+    """
+
+    log_map: PathLike | LogMap | None
+    rotation: RotationForm | None
+    delimiter: str | None
+    decimal: str | None
+    time: str | int | None
+    unit: str | Mapping[str, str] | None
+
+
+class LogReading(TableReading, total=False):
+    """How the rows of a log are read.
+
+    Attributes:
+        source: Who wrote the log: coppeliasim, solidworks, path, ...
+        joints: Names or numbers (from 1) of the joint columns, in the robot's order.
+        period: Time between rows in [s], of a log without a time column.
+        skip_bad: Leave out rows that cannot be read, up to one in a hundred; each is a warning.
+    """
+
+    source: str | None
+    joints: Sequence[str | int] | None
+    period: float | None
+    skip_bad: bool
+
+
+class Reading(LogReading, total=False):
+    """How a log is read, and what its joints are limited to.
+
+    Attributes:
+        interval: LOW, HIGH that the environment limits all joints that turn to, in the file's own unit; or by
+            joint, such as {"q1": (-180, 180)}.
+        repair: Put samples that a linear resampling left on a wrap on the line of their neighbours.
+    """
+
+    interval: tuple[float, float] | Mapping[str, tuple[float, float]] | None
+    repair: bool
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Resolved:
+    """What keywords and map together say.
+
+    Attributes:
+        arm: The arm on its base, with its tool and cut; None without one.
+        robot: How it was given.
+        options: How a table is read.
+    """
+
+    arm: Chain | None
+    robot: Robot | None
+    options: ReadOptions
+
+
+def resolved(
+    reading: Mapping[str, Any],
+    robot: Robot | None = None,
+    base: Frame | None = None,
+    tool: Frame | None = None,
+    base_link: str | None = None,
+    tip_link: str | None = None,
+) -> Resolved:
+    """Return what keywords and map together say; the keywords come before the map.
+
+    Args:
+        reading: Keywords as in `Reading`.
+        robot: Name, file or chain of the arm.
+        base: Where it stands in the world, in [m] and [rad]; as a matrix of shape (4, 4).
+        tool: The tool centre point in the frame of its tip, likewise.
+        base_link: Link of a URDF where it begins.
+        tip_link: Link of a URDF where it ends.
+
+    Raises:
+        UrmpipeError: With everything that is wrong with the map, the arm or a keyword.
+    """
+    given = reading.get("log_map")
+    log_map = given if isinstance(given, LogMap) else LogMap() if given is None else read_map(Path(given))
+    arm = robot if robot is not None else log_map.robot
+    base = base if base is not None or not log_map.base else from_offset(log_map.base)
+    tool = tool if tool is not None or not log_map.tool else from_offset(log_map.tool)
+    parts: tuple[Callable[[], Any], ...] = (
+        lambda: place_robot(arm, base, tool, base_link=base_link, tip_link=tip_link),
+        lambda: read_options(reading, log_map.read),
+    )
+    chain, options = for_each(lambda make: make(), parts)
+    return Resolved(chain, arm, options)
+
+
+def map_files(reading: Mapping[str, Any]) -> list[Path]:
+    """Return the file of the map among reading keywords, if there is one: no output replaces it."""
+    given = reading.get("log_map")
+    return [] if given is None or isinstance(given, LogMap) else [Path(given)]

@@ -1,0 +1,276 @@
+"""One panel of a figure as plotly.js draws it: lines, points, marks, the limit, what is tinted."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_pipeline import text
+from urmpipe_pipeline.joint_log import seconds
+from urmpipe_pipeline.presentation.figure import Line, Mark, Over, Panel, Shape
+from urmpipe_pipeline.report import spec
+from urmpipe_pipeline.report.spec import MUTED, Spec, typed
+from urmpipe_pipeline.report.traces import (
+    DASHES,
+    band,
+    label,
+    level,
+    line,
+    marks,
+    pointer_digits,
+    points_for,
+    precision,
+    shaded,
+    stroke,
+    told,
+)
+
+LOW = 3.0
+"""Largest values above so many limits leave no room for words between the limit and 0."""
+
+DOTS = 1500
+"""Points of a cloud: a browser draws no more of them with ease."""
+
+MARKED = 1000
+"""Marks of a panel at most: a browser draws no more of them with ease."""
+
+DEPTH = 1000.0
+"""So far below the least of the lines' largest values a logarithmic axis reaches."""
+
+SYMBOLS: Mapping[Shape, str] = {
+    "up": "triangle-up",
+    "down": "triangle-down",
+    "cross": "x",
+    "diamond": "diamond",
+}
+"""The shapes of marks in plotly.js's words."""
+
+
+@dataclass(frozen=True, slots=True)
+class Span:
+    """From where to where a horizontal axis goes: in [s], or in rows."""
+
+    start: float
+    end: float
+
+    @property
+    def length(self) -> float:
+        """How long it is."""
+        return self.end - self.start
+
+
+@dataclass(frozen=True, slots=True)
+class Names:
+    """What the legend of a figure calls its lines.
+
+    Attributes:
+        first: Number of the first panel in which a line of a name stands beside others.
+        often: Names of lines that several panels have.
+    """
+
+    first: dict[str, int]
+    often: frozenset[str]
+
+    @classmethod
+    def of(cls, panels: Sequence[Panel]) -> Names:
+        """Return the names of some panels."""
+        each = [[name for one in panel.lines for name in one.names] for panel in panels]
+        first: dict[str, int] = {}
+        for number, names in enumerate(each):
+            for name in names if len(names) > 1 else ():
+                first.setdefault(name, number)
+        counts = Counter(name for names in each for name in set(names))
+        return cls(first, frozenset(name for name, count in counts.items() if count > 1))
+
+    def entry(self, name: str, number: int) -> Spec:
+        """Return whether a line in a panel has its entry there, and what else the entry switches."""
+        return {"legendgroup": name, "showlegend": self.first[name] == number} if name in self.first else {}
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class _Curve:
+    """A column of a line.
+
+    Attributes:
+        line: The line.
+        name: Of the column.
+        colour: As #rrggbb.
+        t_ns: Times in [ns], shape (n,); None without.
+        x: Times in [s] or row numbers, shape (n,).
+        raw: Values in the unit of the panel, shape (n,).
+        values: In the unit that is shown, shape (n,).
+    """
+
+    line: Line
+    name: str
+    colour: str
+    t_ns: IntArray | None
+    x: FloatArray
+    raw: FloatArray
+    values: FloatArray
+
+
+def axis_of(panel: Panel) -> str:
+    """Return what the horizontal axis of a panel measures: t, row, or the title of a quantity."""
+    if panel.over is not None:
+        return panel.over.title
+    timed = panel.t_ns is not None or any(one.t_ns is not None for one in panel.lines)
+    return "t" if timed else "row"
+
+
+def across(panel: Panel, one: Line) -> FloatArray:
+    """Return the times of a line in [s] or its row numbers from 1, shape (n,)."""
+    t_ns = _times(panel, one)
+    return np.arange(1.0, len(one.values) + 1.0) if t_ns is None else seconds(t_ns[:])
+
+
+def _times(panel: Panel, one: Line) -> IntArray | None:
+    return panel.t_ns if one.t_ns is None else one.t_ns
+
+
+def _shown_unit(panel: Panel) -> tuple[str, float]:
+    """Return the unit that a panel is drawn in, and how many of it one of its own is."""
+    if panel.small and panel.unit in text.SHOWN:
+        return text.SHOWN[panel.unit]
+    unit, factor = text.display_unit(panel.unit, panel.display_unit)
+    return unit.replace("/s2", "/s²"), factor
+
+
+def drawn_panel(panel: Panel, number: int, names: Names, span: Span) -> spec.Panel:
+    """Return a panel for `stacked`.
+
+    Args:
+        panel: What is drawn.
+        number: Its number in its figure, from 0.
+        names: What the legend of the figure calls its lines.
+        span: From where to where the horizontal axis goes.
+    """
+    unit, factor = _shown_unit(panel)
+    curves = list(_curves(panel, factor))
+    title = f"{label(panel.title)} [{label(unit) if unit not in ('', '1') else '-'}]"
+    look: Spec = {"rangemode": "normal" if panel.signed else "tozero"}
+    if panel.logarithmic:
+        look = _logarithmic(curves, (panel.limit or 0.0) * factor)
+    elif all(one.line.steps and np.isin(one.raw[np.isfinite(one.raw)], (0.0, 1.0)).all() for one in curves):
+        look = {"range": [-0.1, 1.1], "tickvals": [0, 1]}  # yes or no
+    if panel.over is not None:
+        return spec.Panel(title, list(_clouds(curves, panel.over, panel.peaks, unit)), (), panel.share, look)
+    traces = [
+        *_lines(panel, curves, number, names, unit),
+        *_peaks(panel, curves),
+        *_marks(panel, factor, names, number),
+    ]
+    return spec.Panel(title, traces, _shapes(panel, curves, span, unit, factor), panel.share, look)
+
+
+def _curves(panel: Panel, factor: float) -> Iterator[_Curve]:
+    for one in panel.lines:
+        t_ns, x = _times(panel, one), across(panel, one)
+        columns = np.asarray(one.values[:], dtype=np.float64)
+        columns = columns if columns.ndim == 2 else columns[:, np.newaxis]
+        with np.errstate(over="ignore"):
+            scaled = factor * columns
+        for name, colour, raw, values in zip(one.names, one.colours, columns.T, scaled.T, strict=True):
+            yield _Curve(one, name, colour, t_ns, x, raw, values)
+
+
+def _lines(panel: Panel, curves: Sequence[_Curve], number: int, names: Names, unit: str) -> Iterator[Spec]:
+    """Yield each curve as a line, or as points where nothing joins the rows."""
+    seen: Counter[str] = Counter()  # colours repeat, dashes do not
+    for one in curves:
+        style = stroke(one.colour, DASHES[1 if one.line.dashed else seen[one.colour] % len(DASHES)])
+        style |= {"shape": "hv"} if one.line.steps else {}
+        seen[one.colour] += not one.line.dashed
+        more: Spec = names.entry(one.name, number) | {"line": style}
+        if one.line.points or one.t_ns is None:
+            more |= {"mode": "markers", "marker": {"color": one.colour, "size": 7}, "cliponaxis": False}
+        points = points_for(one.t_ns)
+        trace = line(one.x, one.values, one.name, one.colour, unit, points=points, keep=panel.peaks, **more)
+        if one.name in names.often:
+            trace["hovertemplate"] += f"<extra>{label(panel.title)} {label(one.name)}</extra>"
+        yield trace
+
+
+def _peaks(panel: Panel, curves: Sequence[_Curve]) -> Iterator[Spec]:
+    """Yield a diamond at each row that is marked as the largest, on each curve that was measured."""
+    rows = np.asarray(panel.peaks, dtype=np.int64)
+    for one in curves:
+        if len(rows) and not one.line.dashed:
+            name = label(f"largest {one.name}")
+            yield marks(one.x[rows], one.values[rows], one.colour, SYMBOLS["diamond"], name=name)
+
+
+def _marks(panel: Panel, factor: float, names: Names, number: int) -> Iterator[Spec]:
+    """Yield the marks, those on one line together so that the legend hides them with it."""
+    some: dict[tuple[str, str], list[Mark]] = {}
+    for one in panel.marks[:MARKED]:
+        some.setdefault((one.name, one.colour), []).append(one)
+    for (name, colour), items in some.items():
+        yield marks(
+            np.array([one.t_ns / 1e9 if axis_of(panel) == "t" else one.t_ns + 1 for one in items]),
+            factor * np.array([one.value for one in items]),
+            colour,
+            [SYMBOLS[one.shape] for one in items],
+            name=label(f"{name}, marked"),
+            text=[label(one.words) for one in items],
+            hoverinfo="text",
+            hovertemplate="%{text}<extra></extra>",
+            **(names.entry(name, number) | {"showlegend": False}),
+        )
+
+
+def _shapes(panel: Panel, curves: Sequence[_Curve], span: Span, unit: str, factor: float) -> list[Spec]:
+    """Return the limit as a band between dashed lines, and what is tinted: out of it, or doubtful."""
+    found: list[Spec] = []
+    if panel.tinted is not None:
+        found += shaded(across(panel, panel.lines[0]), np.asarray(panel.tinted[:]), span.length, MUTED)
+    if panel.limit is None:
+        return found
+    high = factor * panel.limit
+    words = f"{'±' if panel.signed else ''}{high:.6g} {label(unit)}".rstrip()
+    if panel.logarithmic:  # there is no band around 0, and no low end
+        return [*found, level(high, words)]
+    measured = [one for one in curves if not one.line.dashed]
+    if measured:
+        out = np.unique(np.concatenate([one.x[np.abs(one.raw) > panel.limit] for one in measured]))
+        found += shaded(out, np.ones(len(out), dtype=np.bool_), span.length)
+    if panel.signed:
+        return [band(-high, high), *found, level(high, words), level(-high)]
+    largest = max((float(np.nanmax(np.abs(one.raw), initial=0.0)) for one in measured), default=0.0)
+    return [band(0.0, high), *found, level(high, words, above=largest > LOW * panel.limit)]
+
+
+def _logarithmic(curves: Sequence[_Curve], limit: float) -> Spec:
+    """Return a logarithmic axis that reaches the limit and far below the least of the largest values."""
+    most = np.array([np.nanmax(np.abs(one.values), initial=0.0) for one in curves])
+    most = most[most > 0.0] if (most > 0.0).any() else np.ones(1)
+    top = max(float(most.max()), limit)
+    return {"type": "log", "range": np.log10([most.min() / DEPTH, 1.5 * top]).tolist()}
+
+
+def _clouds(curves: Sequence[_Curve], over: Over, peaks: Sequence[int], unit: str) -> Iterator[Spec]:
+    """Yield each curve over a quantity, as points spread evenly over the rows; no peak is missing."""
+    quantity = np.asarray(over.values[:], dtype=np.float64)
+    for one in curves:
+        known = np.flatnonzero(np.isfinite(quantity) & np.isfinite(one.values))
+        evenly = np.linspace(0, len(known) - 1, min(DOTS, len(known))).astype(np.int64)
+        kept = np.union1d(known[np.unique(evenly)], np.intersect1d(peaks, known)).astype(np.int64)
+        x, y = quantity[kept], one.values[kept]
+        digits = [pointer_digits(*pair) for pair in ((over.unit, x), (unit, y))]
+        row = "row %{customdata}" if one.t_ns is None else "t %{customdata:.6~f} s"
+        yield {
+            "type": "scatter",
+            "mode": "markers",
+            "name": label(one.name),
+            "x": typed(x, precision(x, digits[0])),
+            "y": typed(y, precision(y, digits[1])),
+            "customdata": typed(one.x[kept], "f8"),
+            "marker": {"color": one.colour, "size": 5, "opacity": 0.55, "line": {"width": 0}},
+            "hovertemplate": f"{label(over.title)} %{{x:{told(x, digits[0])}}} {label(over.unit)}<br>"
+            f"{label(one.name)} %{{y:{told(y, digits[1])}}} {label(unit)}<br>{row}<extra></extra>",
+            "showlegend": False,
+        }
