@@ -10,6 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_euler
 from urmpipe_models.kinematics.forward import PointLog
+from urmpipe_models.row_blocks import norms
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Panel, Shape, View
@@ -189,17 +190,22 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
     if run.timed:
         yield from _point_derivatives(run, tcp)
-    known = np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx)
+    singular = np.any(tcp.singular)
+    known = (
+        np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx)
+        if singular
+        else np.asarray(tcp.euler_zyx)
+    )
     angles = continuous_euler(known) if run.timed else known
     euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
-    tinted = tcp.singular if np.any(tcp.singular) else None
+    tinted = tcp.singular if singular else None
     yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
 
 
 def _point_derivatives(run: Run, tcp: PointLog) -> Iterator[View]:
     """Yield the views of velocity and acceleration."""
     yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), run.t_ns),))
-    size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
+    size = Line(norms(tcp.acceleration), ("‖a‖",), NORM)
     lines = (coordinates(tcp.acceleration), size)
     yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
 
@@ -230,7 +236,7 @@ def _extent_words(tcp: PointLog) -> str:
     low, high = (text.point(end(tcp.position, axis=0)) for end in (np.nanmin, np.nanmax))
     said = f"It stays within ({low}) m and ({high}) m"
     for values, word, unit in ((tcp.velocity, "speed", "m/s"), (tcp.acceleration, "acceleration", "m/s²")):
-        norm = np.linalg.norm(values, axis=1)
+        norm = norms(values)
         if np.isfinite(norm).any():
             said += f"; its {word} reaches {np.nanmax(norm):.4f} {unit}"
     return f"{said}."
