@@ -10,6 +10,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_euler
 from urmpipe_models.kinematics.forward import PointLog
+from urmpipe_models.row_blocks import norms
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Panel, Shape, View
@@ -33,14 +34,8 @@ def run_figures(run: Run) -> Iterator[Figure]:
     """Yield the plots of a log that stands alone: joints, speed, motion."""
     yield from joints_figure(run)
     if run.timed and run.tcp is not None:
-        yield speed_figure(run.name, run.t_ns, lengths(run.tcp.velocity))
+        yield speed_figure(run.name, run.t_ns, norms(run.tcp.velocity))
     yield from motion_figure(run)
-
-
-def lengths(vectors: FloatArray) -> FloatArray:
-    """Return the length of each vector, of shape (n, 3), shape (n,); no array of that size on the way."""
-    known = np.asarray(vectors)
-    return np.asarray(np.sqrt(np.einsum("ij,ij->i", known, known)))
 
 
 def times_of(run: Run) -> IntArray | None:
@@ -194,18 +189,19 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
     if run.timed:
         yield from _point_derivatives(run, tcp)
-    tinted, angles = (np.asarray(tcp.singular) if np.any(tcp.singular) else None), tcp.euler_zyx
-    known = angles if tinted is None else np.where(tinted[:, np.newaxis], np.nan, angles)
-    euler = Line(
-        continuous_euler(known) if run.timed else known, tuple(EULER), tuple(EULER.values()), points=points
-    )
+    tinted = np.asarray(tcp.singular) if np.any(tcp.singular) else None
+    known = np.asarray(tcp.euler_zyx)
+    if tinted is not None:
+        known = np.where(tinted[:, np.newaxis], np.nan, known)
+    angles = continuous_euler(known) if run.timed else known
+    euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
     yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
 
 
 def _point_derivatives(run: Run, tcp: PointLog) -> Iterator[View]:
     """Yield the views of velocity and acceleration."""
     yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), run.t_ns),))
-    size = Line(lengths(tcp.acceleration), ("‖a‖",), NORM)
+    size = Line(norms(tcp.acceleration), ("‖a‖",), NORM)
     lines = (coordinates(tcp.acceleration), size)
     yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
 
@@ -236,7 +232,7 @@ def _extent_words(tcp: PointLog) -> str:
     low, high = (text.point(end(tcp.position, axis=0)) for end in (np.nanmin, np.nanmax))
     said = f"It stays within ({low}) m and ({high}) m"
     for values, word, unit in ((tcp.velocity, "speed", "m/s"), (tcp.acceleration, "acceleration", "m/s²")):
-        norm = lengths(values)
+        norm = norms(values)
         if np.isfinite(norm).any():
             said += f"; its {word} reaches {np.nanmax(norm):.4f} {unit}"
     return f"{said}."
