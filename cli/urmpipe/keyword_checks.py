@@ -14,6 +14,7 @@ from urmpipe.kinds import kind_of
 from urmpipe_models.errors import Finding, LogError, OptionError, RecordingError, shown
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.recording import is_recording
+from urmpipe_pipeline.sources.options import read_options
 from urmpipe_pipeline.text import counted
 
 Parameters = ParamSpec("Parameters")
@@ -58,7 +59,8 @@ def _checked(
     @wraps(function)
     def called(*args: Parameters.args, **kwargs: Parameters.kwargs) -> Made:
         given = known.bind(*args, **kwargs).arguments
-        if wrong := list(_wrong(function.__name__, given, defaults)):
+        read = {key: given[key] for key, _ in reading if key in given}
+        if wrong := [*_wrong(function.__name__, given, defaults), *_wrong_reading(read)]:
             raise OptionError(*wrong)
         made = function(*args, **kwargs)
         for message in dict.fromkeys(_unseen(made, given.values())):
@@ -75,6 +77,14 @@ def _wrong(function: str, given: Mapping[str, Any], defaults: Mapping[str, Any])
         kind = kind_of(function, name)
         if kind is not None and value is not defaults[name] and not kind.fits(value):
             yield Finding(parameter=name, found=shown(value), allowed=kind.allowed)
+
+
+def _wrong_reading(given: Mapping[str, Any]) -> Iterator[Finding]:
+    """Yield which of the keywords that say how a log is read are not of their kinds."""
+    try:
+        read_options(given)
+    except OptionError as error:
+        yield from error.findings
 
 
 def _unseen(made: Any, given: Iterable[Any]) -> Iterator[str]:

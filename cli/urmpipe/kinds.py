@@ -85,7 +85,7 @@ def _is_unit(value: Any) -> bool:
 
 
 def _is_table(value: Any) -> bool:
-    from urmpipe.systems.log_tables import LogTable
+    from urmpipe.log_table import LogTable
 
     return isinstance(value, LogTable) or _is_path(value)
 
@@ -141,6 +141,7 @@ KINDS = {
     "ik.tolerance": Kind(_is_number, "a number, in m"),
     "inputs": PATHS,
     "junit": PATH,
+    "lazy": FLAG,
     "log_map": Kind(_is_map, "a map (TOML), or what `read_map` returned"),
     "method": _one_of("auto", "closed", "iterative"),
     "name_or_path": ROBOT_FILE,

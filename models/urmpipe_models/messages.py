@@ -83,7 +83,7 @@ class Message:
         told = (
             f"{name}{said}" for name, said in (("found ", self.found), ("allowed: ", self.allowed)) if said
         )
-        said = ": ".join(filter(None, (self.message, ", ".join(told))))
+        said = (": " if self.found else ", ").join(filter(None, (self.message, ", ".join(told))))
         if self.parameter:
             said = f"{subject(self.parameter, voice)}: {said}"
         return one_line("; ".join([said, *hint_words(self.hints, voice)]))

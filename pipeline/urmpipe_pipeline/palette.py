@@ -64,11 +64,6 @@ def run_colour(index: int) -> str:
     return list(RUN_COLOURS.values())[index % len(RUN_COLOURS)]
 
 
-def run_colour_word(index: int) -> str:
-    """Return the word for the colour of a run, counted from 0."""
-    return list(RUN_COLOURS)[index % len(RUN_COLOURS)]
-
-
 def rgb(colour: str) -> tuple[int, int, int]:
     """Return red, green and blue of #rrggbb, each 0..255."""
     return int(colour[1:3], 16), int(colour[3:5], 16), int(colour[5:7], 16)
@@ -83,8 +78,3 @@ def colour_word(colour: str) -> str:
 def ghost_colour(index: int) -> str:
     """Return the colour of a further branch of solved joint values as #rrggbb, counted from 0."""
     return list(GHOST_COLOURS.values())[index % len(GHOST_COLOURS)]
-
-
-def ghost_colour_word(index: int) -> str:
-    """Return the word for the colour of a further branch, counted from 0."""
-    return list(GHOST_COLOURS)[index % len(GHOST_COLOURS)]

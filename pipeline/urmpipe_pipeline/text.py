@@ -6,7 +6,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from urmpipe_models.measure_units import factor
+from urmpipe_models.measure_units import factor, units_of
 
 NOTHING = "–"
 """Stands where there is no value."""
@@ -19,6 +19,17 @@ FINEST = 1e-3
 
 SHOWN = {si: (unit, factor(si, unit)) for si, unit in (("m", "mm"), ("rad", "deg"))}
 """The units that people read, and how many of them one of the SI unit is."""
+
+
+def display_unit(unit: str, wanted: str) -> tuple[str, float]:
+    """Return the unit to show a quantity in, and how many of it one of its own is.
+
+    Args:
+        unit: Its own unit, one of SI.
+        wanted: The unit that people prefer; empty for none. One that is not known, or measures something else
+            (an FMU may say anything), is not shown: the own one is.
+    """
+    return (wanted, factor(unit, wanted)) if wanted in units_of(unit) else (unit, 1.0)
 
 
 def number(value: float | None, unit: str, against: float | None = None) -> str:
@@ -48,24 +59,19 @@ def quantity(value: float | None, unit: str, against: float | None = None) -> st
     return f"{number(value, unit, against)} {SHOWN[unit][0]}"
 
 
-def millimetres(value: float | None, against: float | None = None) -> str:
-    """Return a length in [m] as [mm], as `number` does."""
-    return number(value, "m", against)
-
-
 def limit(value: float | None, unit: str = "m") -> str:
     """Return a tolerance in [m] as [mm] or in [rad] as [deg], with no more digits than it has."""
     return NOTHING if value is None else f"{value * SHOWN[unit][1]:.6g}"
 
 
-def metres(value: float) -> str:
-    """Return a coordinate in [m]: tenths of a millimetre."""
-    return f"{value:.4f}" if math.isfinite(value) else NOTHING
+def allowed(value: float, unit: str = "m") -> str:
+    """Return a tolerance with the unit that people read: "3.5 mm", "0.5 deg"."""
+    return f"{limit(value, unit)} {SHOWN[unit][0]}"
 
 
 def point(values: Any) -> str:
-    """Return x, y, z in [m]."""
-    return ", ".join(metres(float(value)) for value in values)
+    """Return x, y, z in [m]: tenths of a millimetre."""
+    return ", ".join(f"{value:.4f}" if math.isfinite(value) else NOTHING for value in values)
 
 
 def seconds(value: float) -> str:
@@ -74,11 +80,6 @@ def seconds(value: float) -> str:
         return NOTHING
     text = f"{round(value, 6) + 0.0:.6f}"  # + 0.0: no -0.000
     return text[:-3] + text[-3:].rstrip("0")
-
-
-def offset(value: float) -> str:
-    """Return a shift in time in [s] with its sign."""
-    return f"{'+' if round(value, 6) > 0 else ''}{seconds(value)} s"
 
 
 def standard_error(value: float) -> str:
@@ -130,11 +131,6 @@ def unique(names: Sequence[str]) -> list[str]:
             candidate, number = f"{name}-{number}", number + 1
         result.append(candidate)
     return result
-
-
-def size(count: int) -> str:
-    """Return a file's length in bytes, with thin spaces between thousands."""
-    return f"{count:,}".replace(",", "\u202f")
 
 
 def exact(value: Any) -> str:

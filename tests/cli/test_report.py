@@ -32,7 +32,7 @@ def recording(urmpipe: RunCommand, tmp_path: Path) -> Path:
 def test_a_format_without_a_folder_is_refused(urmpipe: RunCommand, recording: Path) -> None:
     ran = urmpipe("report", recording, "--format", "svg")
     assert (ran.code, ran.out) == (2, "")
-    assert "--format: found without --figures, allowed: with --figures DIR" in ran.err
+    assert "--formats: found without figures; --figures FIGURES names their folder" in ran.err
     assert not recording.with_suffix(".html").exists()
 
 

@@ -315,7 +315,7 @@ def test_an_fmu_that_fails_at_once_leaves_an_empty_recording(following: Path, tm
 
 def test_a_map_says_how_the_log_of_a_block_is_read(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,q1,q2\n0,180,90\n0.01,170,80\n", encoding="utf-8")
-    run = urmpipe.ingest(tmp_path / "log.csv", read=urmpipe.ReadOptions(unit={"": "deg"}))
+    run = urmpipe.ingest(tmp_path / "log.csv", unit={"": "deg"})
     urmpipe.write_map(run, tmp_path / "lab.toml")
     system = tmp_path / "system.toml"
     block = '[blocks.log]\nunit = "log_source"\nlog = "log.csv"\nmap = "lab.toml"\n'

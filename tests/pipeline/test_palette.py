@@ -19,7 +19,6 @@ from urmpipe_pipeline.palette import (
     joint_colour,
     rgb,
     run_colour,
-    run_colour_word,
 )
 
 Numbers = NDArray[np.float64]
@@ -99,4 +98,4 @@ def test_colours_stand_out_on_white_and_in_the_viewer(colour: str) -> None:
 
 def test_colours_start_again() -> None:
     assert joint_colour(0) == joint_colour(8) == JOINT_COLOURS[0]
-    assert (run_colour(8), run_colour_word(8), colour_word("#21c3ff")) == ("#21c3ff", "sky blue", "sky blue")
+    assert (run_colour(8), colour_word("#21c3ff")) == ("#21c3ff", "sky blue")

@@ -31,7 +31,7 @@ KINDS = {
     "arrays": "ARRAYS of recordings, exports, attributes: changed or lost (must stay)",
     "times": "TIMES of arrays (must stay)",
     "scene": "WHAT IS DRAWN IN SPACE and lists of other components: changed or lost",
-    "traces": "TRACES of reports: changed or lost",
+    "traces": "TRACES of reports, in any order",
     "shown": "NUMBERS SHOWN in reports and texts, in any order",
     "keys": "KEYS renamed, lost, new",
     "entities": "ARRAYS RENAMED, regrouped, new",
@@ -97,8 +97,6 @@ def _moved(name: str, one: Column) -> str:
 
 def _kind(name: str, one: Column) -> str:
     """Return what a change of a column means."""
-    if _file(name).endswith((".html", ".svg")) and one["kind"] in {"numbers", "arrays"}:
-        return "traces"
     return "verdicts" if JUDGED.search(name) and "shape" not in one else str(one["kind"])
 
 
@@ -107,12 +105,12 @@ def _file(name: str) -> str:
 
 
 def _how(one: Column, other: Column) -> str:
-    """Return the first values that differ, or of numbers in any order those that are gone and new."""
+    """Return the first values that differ, or of those in any order which are gone and new."""
     if "values" not in one or "values" not in other:
         return f"hash differs; {one.get('shape', one['n'])} -> {other.get('shape', other['n'])}"
     a: list[str] = one["values"]
     b: list[str] = other["values"]
-    if one["kind"] == "shown":
+    if one["kind"] in {"shown", "traces"}:
         gone, new = list((Counter(a) - Counter(b)).elements()), list((Counter(b) - Counter(a)).elements())
         return f"{len(gone)} gone: {' '.join(gone[:8])}; {len(new)} new: {' '.join(new[:8])}"
     was, now = next(

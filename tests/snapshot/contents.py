@@ -59,7 +59,7 @@ def column(kind: str, values: Sequence[str]) -> dict[str, Any]:
     """Return a column of texts."""
     words = "\n".join(values)
     found = {"kind": kind, "n": len(values), "hash": _sha(words.encode("utf-8", "surrogatepass"))}
-    return found | ({"values": list(values)} if len(words) <= FEW or kind == "shown" else {})
+    return found | ({"values": list(values)} if len(words) <= FEW or kind in {"shown", "traces"} else {})
 
 
 def array(
@@ -140,7 +140,7 @@ def _grouped(pairs: Iterable[tuple[str, Any]]) -> Columns:
         else:
             texts[name].append(value)
     return found | {
-        name: column("numbers" if all(map(_is_number, some)) else "words", some)
+        name: column("numbers" if all(map(_is_number, some)) and set(some) - {"", "null"} else "words", some)
         for name, some in texts.items()
     }
 
@@ -195,12 +195,12 @@ def _mat(path: Path) -> Columns:
 def _page(path: Path) -> Columns:
     """Return the visible numbers and words of a page or a drawing, and the arrays that its figures draw."""
     source = path.read_text(encoding="utf-8")
-    found: Columns = {}
     specs = re.findall(r'<script type="application/json">(.*?)</script>', source, re.DOTALL)
-    for number, spec in enumerate(specs):
-        found |= tree(json.loads(spec, object_hook=_unpacked)["data"], f"figure {number} ")
+    traces = [tree(json.loads(spec, object_hook=_unpacked)["data"]) for spec in specs]
+    drawn = [f"{one['shape']} {one['hash']}" for found in traces for one in found.values() if "shape" in one]
     seen = re.sub(r"<(script|style|head)\b.*?</\1>|<[^>]*>", "\n", source, flags=re.DOTALL)
-    return found | text(re.sub(r"\s*\n\s*", "\n", unescape(seen)))
+    words = text(re.sub(r"\s*\n\s*", "\n", unescape(seen)))
+    return {"traces": column("traces", sorted(drawn))} | words
 
 
 def _unpacked(value: dict[str, Any]) -> Any:
@@ -225,7 +225,7 @@ def _recording(path: Path) -> Columns:
             if about.metadata[b"rerun:kind"] == b"data" and about.name != "metadata":
                 there = cells.is_valid().to_numpy(zero_copy_only=False)
                 parts[f"{chunk.entity_path} {about.name}"].append((t[there], *_flat(cells.drop_null())))
-    return {name: _joined(name, some) for name, some in parts.items()}
+    return {name: _joined(name, some) for name, some in parts.items() if any(part[2].size for part in some)}
 
 
 def _flat(cells: Any) -> tuple[NDArray[Any], NDArray[Any]]:

@@ -177,7 +177,8 @@ def _noise_level(
         OptionError: If it is no such mapping, or there is no baseline.
     """
     if noise is not None and baseline is None:
-        raise OptionError(Finding("found without an earlier comparison", parameter="noise", hints=(EARLIER,)))
+        allowed = "with an earlier comparison"
+        raise OptionError(Finding(parameter="noise", found="no baseline", allowed=allowed, hints=(EARLIER,)))
     return complete_noise(noise)
 
 

@@ -12,16 +12,18 @@ from urmpipe_pipeline.presentation.result import Result
 
 
 @public
-def read_recording(path: PathLike) -> Result:
+def read_recording(path: PathLike, *, lazy: bool = False) -> Result:
     """Return the result that a recording holds: a Run, a Comparison, a Simulation, ...
 
     Args:
         path: A recording (.rrd) that urmpipe wrote.
+        lazy: Whether arrays are read only when they are used, a slice of rows alone; the file must stand as
+            long. They are used as arrays are, and `np.asarray` makes one of them.
 
     Raises:
-        RecordingError: If it is no recording, was cut off, is not of urmpipe, or of a newer layout.
+        RecordingError: If it is no recording, was cut off, is not of urmpipe, or of another layout.
     """
-    found: Result = results.read_recording(Path(path))
+    found: Result = results.read_recording(Path(path), lazy=lazy)
     return found
 
 

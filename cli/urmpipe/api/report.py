@@ -104,7 +104,7 @@ def report(
     def read(numbered: tuple[int, PathLike | Result]) -> Result:
         """Return a result, read if it is a recording, and tell how far it is."""
         number, one = numbered
-        found = read_recording(Path(one)) if isinstance(one, (str, Path)) else one
+        found = read_recording(Path(one), lazy=True) if isinstance(one, (str, Path)) else one
         reading(number / len(given))
         return found
 

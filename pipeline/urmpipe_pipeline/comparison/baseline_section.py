@@ -1,21 +1,23 @@
-"""What changed since an earlier comparison, as a section: what is worse first."""
+"""What changed since an earlier comparison, as a section and as checks: what is worse first."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from typing import Literal
+from collections.abc import Callable, Iterator, Sequence
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.change import BaselineComparison, Change
-from urmpipe_pipeline.comparison.change_wording import WORDS, since_words
-from urmpipe_pipeline.comparison.checks import gone_check
-from urmpipe_pipeline.comparison.symbols import symbol
+from urmpipe_pipeline.comparison.change import BaselineComparison, Change, Worse
+from urmpipe_pipeline.comparison.deviation import Verdict
+from urmpipe_pipeline.comparison.wording import quantity_name, size_of, symbol
 from urmpipe_pipeline.json_values import plain
-from urmpipe_pipeline.presentation.parts import columns_of, table_of
-from urmpipe_pipeline.presentation.section import Cell, Fact, Judged, Ref, Section, Table, Value
+from urmpipe_pipeline.presentation.digits import written
+from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
+from urmpipe_pipeline.presentation.section import Cell, Check, Fact, Judged, Ref, Section, Table, Value
 
 NAMED = 30
 """Quantities and logs that a fact names; more are counted."""
+
+WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out", "samples": "samples"}
+"""What people call what may be worse."""
 
 
 def baseline_section(found: BaselineComparison, rank: int) -> Section:
@@ -25,15 +27,69 @@ def baseline_section(found: BaselineComparison, rank: int) -> Section:
         found: What changed.
         rank: The place of the section among its neighbours.
     """
-    gone = (one for one in found.gone if one.quantity is None)
+    said = "a log of the baseline, not compared any more"
+    gone = [
+        Section(one.run, "fail", checks=(_check(one.run, "log is there", f"{one.run}: {said}"),))
+        for one in found.gone
+        if one.quantity is None
+    ]
     return Section(
         f"Against the baseline {found.name}",
         found.verdict,
         tuple(_facts(found)),
         tuple(_tables(found)),
-        sections=tuple(Section(one.run, "fail", checks=(gone_check(one),)) for one in gone),
+        sections=tuple(gone),
         rank=rank,
     )
+
+
+def baseline_checks(found: BaselineComparison, run: str) -> Iterator[Check]:
+    """Yield a check for each quantity of a log that was compared then.
+
+    Args:
+        found: What changed.
+        run: The log's name.
+    """
+    for one in found.changes:
+        if one.run == run:
+            noise = text.allowed(one.noise, one.now.unit)
+            said = f"{size_of(one.now)}: {worse_words(one)} (noise {noise})" if one.worse else ""
+            yield _check(run, quantity_name(one.now), said)
+    for lost in found.gone:
+        if lost.run == run:
+            said = f"{lost.quantity}: in the baseline, not compared any more"
+            yield _check(run, f"{lost.quantity} is there", said)
+
+
+def _check(run: str, name: str, said: str) -> Check:
+    """Return a check that fails if there is something to say."""
+    about = f"{run} against baseline"
+    return Check(name, "fail" if said else "pass", said, about, kind="worse-than-baseline")
+
+
+def since_words(found: BaselineComparison) -> str:
+    """Return how much is worse than a baseline: "5 quantities worse, 1 gone", "nothing worse"."""
+    count = len(found.worse)
+    said = [f"{count} {'quantity' if count == 1 else 'quantities'} worse"] if count else []
+    said += [f"{len(found.gone)} gone"] if found.gone else []
+    return ", ".join(said) or "nothing worse"
+
+
+def worse_words(one: Change) -> str:
+    """Return what of a quantity is worse, before and now: "max 1.0000 → 2.0000 mm, out 1.0 % → 3.0 %"."""
+    pairs = {name: _pair(one, name) for name in one.worse}
+    return ", ".join(
+        f"{WORDS[name]} {written(before)} → {written(now, unit=True)}"
+        for name, (before, now) in pairs.items()
+    )
+
+
+def _pair(one: Change, name: Worse) -> tuple[Value, Value]:
+    """Return a statistic before and now, with digits that tell them apart if it changed."""
+    before, now = getattr(one.before, name), getattr(one.now, name)
+    unit = {"share_out": "%", "samples": ""}.get(name, one.now.unit)
+    told = name in (*one.worse, *one.better)
+    return Value(before, unit, now if told else None), Value(now, unit, before if told else None)
 
 
 def _facts(found: BaselineComparison) -> Iterator[Fact]:
@@ -42,10 +98,8 @@ def _facts(found: BaselineComparison) -> Iterator[Fact]:
     yield Fact("Worse", _listed(worse))
     yield Fact("Gone", _listed(list(map(str, found.gone))))
     yield Fact("New", _listed(list(map(str, found.new))))
-    levels = [
-        (kind, value, "rad" if kind in ("angle", "joint") else "m") for kind, value in found.noise.items()
-    ]
-    noise = (f"{kind} {text.limit(value, unit)} {text.SHOWN[unit][0]}" for kind, value, unit in levels)
+    units = {"angle": "rad", "joint": "rad"}
+    noise = (f"{kind} {text.allowed(value, units.get(kind, 'm'))}" for kind, value in found.noise.items())
     yield Fact("Noise", ", ".join(noise), "smaller changes are not listed")
     yield Fact("Recording of the baseline", str(found.recording or ""), brief=False)
 
@@ -66,68 +120,41 @@ def _listed(names: list[str]) -> str:
     return ", ".join(names[:NAMED]) + more
 
 
-def _words(found: tuple[Literal["max", "rms", "share_out", "samples"], ...]) -> str:
+def _words(found: Sequence[Worse]) -> str:
     return ", ".join(WORDS[name] for name in found)
 
 
-def _statistic(name: Literal["max", "rms"], when: Literal["before", "now"]) -> Callable[[Change], Cell]:
-    """Return what makes the cell of a statistic: with digits that tell before and now apart if it changed."""
+def _columns(name: Worse) -> dict[str, tuple[str, Callable[[Change], Cell]]]:
+    """Return a statistic before and now; a share or a count only where it changed."""
 
-    def cell(one: Change) -> Cell:
-        before, now = getattr(one.before, name), getattr(one.now, name)
-        quiet = abs(now - before) <= one.noise
-        value, other = (before, now) if when == "before" else (now, before)
-        return Value(value, one.now.unit, None if quiet else other)
+    def cells(one: Change) -> tuple[Cell, Cell]:
+        shown = name in ("max", "rms", *one.worse, *one.better)
+        return _pair(one, name) if shown else (None, None)
 
-    return cell
-
-
-def _share(when: Literal["before", "now"]) -> Callable[[Change], Cell]:
-    """Return what makes the cell of the share out of tolerance, where that changed."""
-
-    def cell(one: Change) -> Cell:
-        if "share_out" not in (*one.worse, *one.better):
-            return None
-        before, now = one.before.share_out, one.now.share_out
-        return Value(before, "%", now) if when == "before" else Value(now, "%", before)
-
-    return cell
+    word = WORDS[name]
+    return {
+        f"{word}_before": (f"{word} before", lambda one: cells(one)[0]),
+        f"{word}_now": (f"{word} now", lambda one: cells(one)[1]),
+    }
 
 
-def _samples(when: Literal["before", "now"]) -> Callable[[Change], Cell]:
-    """Return what makes the cell of the samples that a quantity rests on, where that changed."""
-
-    def cell(one: Change) -> Cell:
-        return Value(getattr(one, when).samples) if "samples" in (*one.worse, *one.better) else None
-
-    return cell
+def _verdict(one: Change, verdict: Verdict | None) -> Judged:
+    """Return a verdict where it changed."""
+    return Judged(verdict if one.before.verdict != one.now.verdict else None)
 
 
-def _verdict(when: Literal["before", "now"]) -> Callable[[Change], Cell]:
-    """Return what makes the cell of a verdict, where that changed."""
-
-    def cell(one: Change) -> Cell:
-        return Judged(getattr(one, when).verdict if one.before.verdict != one.now.verdict else None)
-
-    return cell
-
-
-_HEADS: dict[str, tuple[str, Callable[[Change], Cell]]] = {
+_HEADS: Heads[Change] = {
     "run": ("Log", lambda one: Ref(one.run)),
     "quantity": ("Quantity", lambda one: symbol(one.now)),
     "worse": ("worse", lambda one: _words(one.worse)),
     "better": ("better", lambda one: _words(one.better)),
-    "max_before": ("max before", _statistic("max", "before")),
-    "max_now": ("max now", _statistic("max", "now")),
-    "rms_before": ("rms before", _statistic("rms", "before")),
-    "rms_now": ("rms now", _statistic("rms", "now")),
-    "out_before": ("out before", _share("before")),
-    "out_now": ("out now", _share("now")),
-    "samples_before": ("samples before", _samples("before")),
-    "samples_now": ("samples now", _samples("now")),
+    **_columns("max"),
+    **_columns("rms"),
+    **_columns("share_out"),
+    **_columns("samples"),
     "largest_change": ("most at one sample", lambda one: Value(one.largest, one.now.unit)),
     "t_largest_change": ("at t", lambda one: Value(one.t_largest, "s")),
-    "verdict_before": ("verdict before", _verdict("before")),
-    "verdict_now": ("verdict now", _verdict("now")),
+    "verdict_before": ("verdict before", lambda one: _verdict(one, one.before.verdict)),
+    "verdict_now": ("verdict now", lambda one: _verdict(one, one.now.verdict)),
 }
 """The columns of what changed, by their keys."""

@@ -11,7 +11,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import OptionError
-from urmpipe_pipeline.comparison.deviation import AXES, Verdict
+from urmpipe_pipeline.comparison.deviation import AXES, Kind, Verdict
 from urmpipe_pipeline.comparison.tolerance import allowed_for
 
 
@@ -44,9 +44,14 @@ class DeltaVerdict:
     verdict: Verdict
 
     @property
+    def kind(self) -> Kind:
+        """Of what the worst quantity is measured: axis or norm."""
+        return "norm" if self.quantity == "norm" else "axis"
+
+    @property
     def allowed(self) -> float | None:
         """What is allowed of the worst quantity in [m]; None if it has no tolerance."""
-        return _allowed(self.quantity, self.tolerance)
+        return allowed_for(self.quantity, self.kind, self.tolerance)
 
     @property
     def used(self) -> float | None:
@@ -94,7 +99,7 @@ def delta_verdict(
         return None
     x, y, z = np.abs(delta).T
     sizes = np.column_stack((x, y, z, np.sqrt(x * x + y * y + z * z)))  # summed as the model does it
-    held = [_allowed(axis, tolerance) for axis in AXES]
+    held = [allowed_for(axis, "norm" if axis == "norm" else "axis", tolerance) for axis in AXES]
     allowed = np.array([math.inf if one is None else one for one in held])
     known = np.isfinite(sizes).all(axis=1)
     out = ~known | (sizes > allowed).any(axis=1)
@@ -131,10 +136,6 @@ def _shares(sizes: FloatArray, allowed: FloatArray) -> FloatArray:
     """Return the shares of what is allowed that sizes use up: of nothing allowed, anything is infinite."""
     with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
         return np.where(sizes > 0.0, sizes / allowed, 0.0)
-
-
-def _allowed(quantity: str, tolerance: Mapping[str, float]) -> float | None:
-    return allowed_for(quantity, "norm" if quantity == "norm" else "axis", tolerance)
 
 
 def _check(block: str, tolerance: Mapping[str, float]) -> None:

@@ -13,9 +13,14 @@ from urmpipe_pipeline.comparison.alignment import tool_with
 from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
-from urmpipe_pipeline.comparison.symbols import size_of, used_words
 from urmpipe_pipeline.comparison.trajectory import Sync
-from urmpipe_pipeline.comparison.wording import decided_words, out_words, stretch_words
+from urmpipe_pipeline.comparison.wording import (
+    decided_words,
+    out_words,
+    size_of,
+    stretch_words,
+    used_words,
+)
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts
@@ -103,7 +108,7 @@ def alignment_words(one: Deviation) -> tuple[str, str]:
 
 def _vector(metres: tuple[float, ...]) -> str:
     """Return a vector in [m] as (x, y, z) in [mm]."""
-    return f"({', '.join(text.millimetres(value) for value in metres)})"
+    return f"({', '.join(text.number(value, 'm') for value in metres)})"
 
 
 def _furthest_joint(one: Deviation) -> Iterator[Fact]:
@@ -149,4 +154,4 @@ def _sliding(one: Deviation) -> str:
     if not sliding:
         return ""
     names = ", ".join(held.quantity for held in sliding)
-    return f"in m for joints that slide: {names} {text.limit(sliding[0].tolerance, 'm')} mm"
+    return f"in m for joints that slide: {names} {text.limit(sliding[0].tolerance)} mm"

@@ -10,8 +10,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES, Deviation, Statistics
-from urmpipe_pipeline.comparison.symbols import SYMBOLS, symbol
-from urmpipe_pipeline.comparison.wording import amount_words, correlation
+from urmpipe_pipeline.comparison.wording import SYMBOLS, amount_words, symbol
 from urmpipe_pipeline.palette import (
     AXIS_COLOURS,
     DEVIATION_COLOUR,
@@ -19,9 +18,11 @@ from urmpipe_pipeline.palette import (
     joint_colour,
     run_colour,
 )
+from urmpipe_pipeline.presentation.digits import written
 from urmpipe_pipeline.presentation.figure import Figure, Line, Over, Panel, SpaceFigure, View
 from urmpipe_pipeline.presentation.parts import ends, spot_at
 from urmpipe_pipeline.presentation.scene import Path, Spot
+from urmpipe_pipeline.presentation.section import Value
 from urmpipe_pipeline.runs.figures import joints_figure, motion_figure, speed_figure
 
 APART = 30.0
@@ -39,7 +40,7 @@ def overview_figure(comparison: Comparison) -> Iterator[Figure]:
     largest = [one.statistics["norm"].max for one in ranking]
     logarithmic = min(largest) > 0.0 and max(largest) > APART * min(largest)
     order = "; ".join(
-        f"{place}. {one.name}: at most {text.millimetres(one.statistics['norm'].max)} mm, {one.verdict}"
+        f"{place}. {one.name}: at most {text.quantity(one.statistics['norm'].max, 'm')}, {one.verdict}"
         for place, one in enumerate(ranking, start=1)
     )
     lines = tuple(
@@ -113,12 +114,13 @@ def correlation_words(r: float | None) -> str:
     """Say what the correlation of norm and speed means."""
     if r is None:
         return "The norm or the speed does not change, so there is no correlation."
+    said = f"r = {written(Value(r, '1', signed=True))}: deviation"
     strength = next((word for least, word in STRENGTHS if abs(r) >= least), "")
     if not strength:
-        return f"r = {correlation(r)}: deviation does not correlate with speed."
+        return f"{said} does not correlate with speed."
     if r > 0:
-        return f"r = {correlation(r)}: deviation grows {strength} with speed, as it does with a lag in time."
-    return f"r = {correlation(r)}: deviation shrinks {strength} with speed."
+        return f"{said} grows {strength} with speed, as it does with a lag in time."
+    return f"{said} shrinks {strength} with speed."
 
 
 def column(values: FloatArray, index: int) -> FloatArray:

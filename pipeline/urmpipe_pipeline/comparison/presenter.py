@@ -43,7 +43,7 @@ def present(result: Comparison) -> Presentation:
     colour = run_colour(result.runs.index(worst))
     return Presentation(
         name=result.name,
-        headline=verdict_words([result]),
+        headline=verdict_words(result),
         verdict=result.verdict,
         facts=(*decisive_facts(worst, colour), *_against(result)),
         body=_body(result),
@@ -56,10 +56,11 @@ def present(result: Comparison) -> Presentation:
 
 
 def _against(result: Comparison) -> tuple[Fact, ...]:
-    """Return what was the reference and what is allowed."""
+    """Return what was the reference and what is allowed, of joints in the units of those compared."""
+    units = {held.unit for one in result.runs for held in one.joint_statistics.values()}
     return (
         Fact("Reference", result.reference.name, brief=False),
-        Fact("Tolerance", tolerance_words(result), brief=False),
+        Fact("Tolerance", tolerance_words(result.tolerance, units or {"rad"}), brief=False),
     )
 
 

@@ -4,30 +4,26 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import fields, replace
-from typing import TypeAlias
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.facts import alignment_words, largest
-from urmpipe_pipeline.comparison.symbols import size_of, symbol
+from urmpipe_pipeline.comparison.wording import size_of, symbol
 from urmpipe_pipeline.palette import run_colour
-from urmpipe_pipeline.presentation.parts import columns_of, minute, spot_at
+from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute, spot_at
 from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Place, Ref, Table, Value
 
 ABOUT = {"axis": "position", "norm": "position", "path": "path", "angle": "orientation", "joint": "joints"}
 """What the kinds of deviation are about."""
-
-Heads: TypeAlias = Mapping[str, tuple[str, Callable[[Deviation], Cell]]]
-"""Title of each column, and its cell for a log, by its key."""
 
 
 def ranking_tables(result: Comparison) -> tuple[Table, ...]:
     """Return the logs from best to worst: how far off, then when, where and how compared; none of one log."""
     if len(result.runs) < 2:
         return ()
-    names: Heads = {"run": ("Log", lambda one: reference_of(result, one))}
-    far: Heads = {
+    names: Heads[Deviation] = {"run": ("Log", lambda one: reference_of(result, one))}
+    far: Heads[Deviation] = {
         **names,
         "verdict": ("Verdict", lambda one: Judged(one.verdict)),
         "decided_by": ("Decided by", lambda one: size_of(one.decisive)),
@@ -52,7 +48,7 @@ def reference_of(result: Comparison, one: Deviation) -> Ref:
     return Ref(one.name, run_colour(result.runs.index(one)))
 
 
-def _sizes(result: Comparison) -> Heads:
+def _sizes(result: Comparison) -> Heads[Deviation]:
     """Return the columns of the largest deviations, and of how much was out and covered."""
     return {
         "max_x": ("max |Δx|", lambda one: largest(one.statistics["x"])),
@@ -68,10 +64,10 @@ def _sizes(result: Comparison) -> Heads:
     }
 
 
-def _conditions(result: Comparison, names: Heads) -> Iterator[Column]:
+def _conditions(result: Comparison, names: Heads[Deviation]) -> Iterator[Column]:
     """Yield the columns of when and where each log is worst, and how it was compared."""
     runs = result.ranking
-    heads: Heads = {
+    heads: Heads[Deviation] = {
         **names,
         "t": ("decided at t", lambda one: Value(one.decisive.t_max, "s")),
         "place": ("log there at x, y, z", lambda one: Place(spot_at(one.place(one.decisive)))),
@@ -136,7 +132,7 @@ def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, floa
     def number(key: str) -> tuple[str, Callable[[Statistics], Cell]]:
         return key, lambda held: Value(getattr(held, key), held.unit)
 
-    heads: dict[str, tuple[str, Callable[[Statistics], Cell]]] = {
+    heads: Heads[Statistics] = {
         "quantity": ("Quantity", symbol),
         "verdict": ("Verdict", lambda held: Judged(held.verdict)),
         "tolerance": ("tolerance", lambda held: Value(held.tolerance, held.unit, given=True)),

@@ -73,8 +73,10 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
     for kind, value in tolerance.items():
         unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
         if value > most:
-            shown, bare = text.limit(value, unit), f"{value:g}"
-            said = f"a tolerance of {shown} {other} ({kind}) lets anything pass: {bare} is in {unit}"
+            bare = f"{value:g}"
+            said = (
+                f"a tolerance of {text.allowed(value, unit)} ({kind}) lets anything pass: {bare} is in {unit}"
+            )
             hints = (
                 Hint("tolerance", f"{kind}={bare}{other}", f"if {other} was meant"),
                 Hint("tolerance", f"{kind}={bare}{unit}", "if not"),
@@ -92,9 +94,9 @@ def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> 
     for kind, allowed in tolerance.items():
         level = allowed_for(kind, "axis" if kind in AXES else kind, noise)
         if level is not None and level >= allowed:
-            unit, other = ("rad", "deg") if "rad" in UNITS[kind] else ("m", "mm")
-            said = f"a noise of {text.limit(level, unit)} {other} ({kind}) reaches the tolerance of"
-            why = f"{text.limit(allowed, unit)} {other}: nothing within it can be worse than the baseline"
+            unit = "rad" if "rad" in UNITS[kind] else "m"
+            said = f"a noise of {text.allowed(level, unit)} ({kind}) reaches the tolerance of"
+            why = f"{text.allowed(allowed, unit)}: nothing within it can be worse than the baseline"
             yield LogWarning(LARGE_NOISE, f"{said} {why}; a number without a unit is in {unit}")
 
 
@@ -124,7 +126,7 @@ def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
 
 def _cause(apart: float) -> str:
     """Return what usually lies behind a distance in [m] between kinematics and recorded tool centre point."""
-    usual = f"{text.limit(CALIBRATION)} mm"
+    usual = text.allowed(CALIBRATION)
     if apart <= CALIBRATION:
         return (
             f"usual up to {usual} where a controller knows its arm's calibration, which the robot here lacks"

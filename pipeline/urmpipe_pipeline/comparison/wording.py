@@ -3,45 +3,30 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping, Sequence
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics, Stretch
-from urmpipe_pipeline.comparison.symbols import SYMBOLS, allowed_words, portion_words, size_of, used_words
+from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation, Statistics, Stretch
+from urmpipe_pipeline.presentation.digits import held
+from urmpipe_pipeline.presentation.section import Value
+
+SYMBOLS = dict(zip(AXES, ("Δx", "Δy", "Δz", "‖Δ‖"), strict=True))
+"""The quantities of a deviation as people read them."""
 
 NAMED = 3
 """Logs out of tolerance that a verdict names; more are only counted."""
 
 
-def verdict_words(comparisons: Sequence[Comparison]) -> str:
-    """Return which logs are out of tolerance against what, or that all are within, and on how much it rests.
-
-    Args:
-        comparisons: At least one.
-    """
-    runs = [run for one in comparisons for run in one.runs]
-    failed = [run for run in runs if run.verdict == "fail"]
-    references = {one.reference.name for one in comparisons}
-    said = f"{_who(failed or runs, len(runs))} {'out of' if failed else 'within'} tolerance"
-    said += f" against {references.pop()}" if len(references) == 1 else ""
-    points = {_points(one) for one in comparisons}
-    said += points.pop() if len(points) == 1 else ""
-    said += part_words([one.covered(run) for one in comparisons for run in one.runs])
-    return said + _since(comparisons, failed=bool(failed))
-
-
-def _since(comparisons: Sequence[Comparison], *, failed: bool) -> str:
-    """Return that comparisons are worse than their baselines."""
-    worse = [one.baseline.name for one in comparisons if one.baseline and one.baseline.verdict == "fail"]
-    if not worse:
-        return ""
-    joined = ", and" if failed else ", but"
-    if len(comparisons) == 1:
-        return f"{joined} worse than the baseline {worse[0]}"
-    than = "is worse than its baseline" if len(worse) == 1 else "are worse than their baselines"
-    return f"{joined} {len(worse)} of {len(comparisons)} comparisons {than}"
+def verdict_words(one: Comparison) -> str:
+    """Return which logs are out of tolerance against what, or that all are within, and what that rests on."""
+    failed = [run for run in one.runs if run.verdict == "fail"]
+    said = f"{_who(failed or one.runs, len(one.runs))} {'out of' if failed else 'within'} tolerance"
+    said += f" against {one.reference.name}{_points(one)}{_part(one)}"
+    if one.baseline and one.baseline.verdict == "fail":
+        said += f", {'and' if failed else 'but'} worse than the baseline {one.baseline.name}"
+    return said
 
 
 def _who(runs: Sequence[Deviation], total: int) -> str:
@@ -64,15 +49,41 @@ def _points(one: Comparison) -> str:
     return f", by the joints {'on both sides' if every else 'of the reference'}"
 
 
-def decided_words(one: Statistics) -> str:
-    """Return how much of how much a quantity is, and when.
+def _part(one: Comparison) -> str:
+    """Return what a verdict does not rest on: "; only 40.0 % of the reference was judged"; else nothing."""
+    partly = [share for share in map(one.covered, one.runs) if share < WHOLE]
+    if not partly:
+        return ""
+    if len(one.runs) == 1:
+        return f"; only {text.percent(partly[0])} of the reference was judged"
+    verb = "covers" if len(partly) == 1 else "cover"
+    return f"; {text.counted(len(partly), 'log')} {verb} only a part of the reference"
 
-    As in "|Δx| = 4.2000 mm of 3.5 mm allowed (1.2 times the tolerance) at t = 1.250 s".
-    """
-    if _lacks(one):
-        return amount_words(one)
-    used = f" ({used_words(one)})" if one.tolerance is not None else ""
-    return f"{amount_words(one)}{used} at t = {text.seconds(one.t_max)} s"
+
+def symbol(one: Statistics | DeltaVerdict) -> str:
+    """Return what a quantity is called: Δx, ‖Δ‖, path, angle, or a joint by its name."""
+    return SYMBOLS[one.quantity] if one.kind in ("axis", "norm") else one.quantity
+
+
+def size_of(one: Statistics | DeltaVerdict) -> str:
+    """Return what the absolute value of a quantity is called: |Δx|, ‖Δ‖, path, angle, |Δ phi1|."""
+    if one.kind == "joint":
+        return f"|Δ {one.quantity}|"
+    return f"|{symbol(one)}|" if one.kind == "axis" else symbol(one)
+
+
+def quantity_name(one: Statistics) -> str:
+    """Return the name of a quantity, unique in its log: a joint may be called x."""
+    return f"joint {one.quantity}" if one.kind == "joint" else one.quantity
+
+
+def used_words(one: Statistics | DeltaVerdict) -> str:
+    """Return how much of its tolerance a quantity uses up: "71.0 % of the tolerance"; nothing without one."""
+    if one.used is None:
+        return ""
+    if isinstance(one, Statistics) and one.missing:
+        return f"no value at {one.missing} of {(one.samples or 0) + one.missing} samples"
+    return "" if math.isinf(one.used) else f"{text.portion(one.used)} the tolerance"
 
 
 def amount_words(one: Statistics) -> str:
@@ -80,14 +91,29 @@ def amount_words(one: Statistics) -> str:
 
     Where a quantity with a tolerance lacks values, that: "angle has no value at 3 of 40 samples".
     """
-    if _lacks(one):
+    if one.tolerance is not None and one.missing:
         return f"{size_of(one)} has {used_words(one)}"
-    return f"{size_of(one)} = {text.quantity(one.max, one.unit, one.tolerance)}{of_allowed(one)}"
+    return f"{size_of(one)} = {held(Value(one.max, one.unit, one.tolerance))}"
 
 
-def _lacks(one: Statistics) -> bool:
-    """Tell whether a quantity is out of its tolerance because it lacks values."""
-    return one.tolerance is not None and one.missing > 0
+def decided_words(one: Statistics) -> str:
+    """Return how much of how much a quantity is, and when.
+
+    As in "|Δx| = 4.2000 mm of 3.5 mm allowed (1.2 times the tolerance) at t = 1.250 s".
+    """
+    lacks = one.tolerance is not None and one.missing
+    return amount_words(one) if lacks else _at(amount_words(one), used_words(one), one.t_max)
+
+
+def meter_words(one: DeltaVerdict) -> str:
+    """Return what a delta meter found: how much of how much, when, and how often it was too much."""
+    amount = "has no value" if one.used is None else f"= {held(Value(one.worst, 'm', one.allowed))}"
+    said = _at(f"{size_of(one)} {amount}", used_words(one), one.t)
+    return f"{said}; out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
+
+
+def _at(amount: str, used: str, t: float) -> str:
+    return f"{amount}{f' ({used})' if used else ''} at t = {text.seconds(t)} s"
 
 
 def out_words(out: int, of: int) -> str:
@@ -97,64 +123,27 @@ def out_words(out: int, of: int) -> str:
 
 def stretch_words(found: Stretch) -> str:
     """Return how long and from when a log was out of tolerance: "0.500 s from t = 1.250 s"."""
-    if found.samples == 1:
-        return f"1 sample at t = {text.seconds(found.t)} s"
-    return f"{text.seconds(found.duration)} s from t = {text.seconds(found.t)} s"
+    lasts = "1 sample at" if found.samples == 1 else f"{text.seconds(found.duration)} s from"
+    return f"{lasts} t = {text.seconds(found.t)} s"
 
 
-def of_allowed(one: Statistics) -> str:
-    """Return of how much a quantity is: " of 3.5 mm allowed"; nothing without a tolerance."""
-    if one.tolerance is None:
-        return ""
-    return f" of {text.limit(one.tolerance, one.unit)} {text.SHOWN[one.unit][0]} allowed"
-
-
-def tolerance_words(comparison: Comparison) -> str:
-    """Return what a comparison allows, that of joints in the units of those that were compared."""
-    units = {one.unit for run in comparison.runs for one in run.joint_statistics.values()}
-    return allowed_words(comparison.tolerance, units or {"rad"})
-
-
-def part_words(covered: Sequence[float]) -> str:
-    """Return what a verdict does not rest on: "; only 40.0 % of the reference was judged"; else nothing.
+def tolerance_words(allowed: Mapping[str, float], joint_units: Iterable[str] = ("rad",)) -> str:
+    """Return a comparison's tolerance as people read it: "±3.5 mm per axis, 0.5 deg of orientation".
 
     Args:
-        covered: Share of the reference that each log covers, 0..1.
+        allowed: In [m] or [rad], by kind or coordinate.
+        joint_units: The units of the joints that are held to a tolerance, rad or m.
     """
-    partly = [share for share in covered if share < WHOLE]
-    if not partly:
-        return ""
-    if len(covered) == 1:
-        return f"; only {text.percent(partly[0])} of the reference was judged"
-    verb = "covers" if len(partly) == 1 else "cover"
-    return f"; {text.counted(len(partly), 'log')} {verb} only a part of the reference"
-
-
-def meter_words(one: DeltaVerdict) -> str:
-    """Return what a delta meter found: how much of how much, when, and how often it was too much."""
-    used = meter_used(one)
-    said = f"{meter_amount(one)}{f' ({used})' if used else ''} at t = {text.seconds(one.t)} s"
-    return f"{said}; out of tolerance: {out_words(one.out_of_tolerance, one.samples)}"
-
-
-def meter_used(one: DeltaVerdict) -> str:
-    """Return how much of its tolerance a delta meter uses up; nothing without a value, or if 0 is allowed."""
-    return "" if one.used is None or math.isinf(one.used) else portion_words(one.used)
-
-
-def meter_amount(one: DeltaVerdict) -> str:
-    """Return how far a delta meter goes, and of how much: "|Δx| = 4.2000 mm of 3.5 mm allowed"."""
-    if one.used is None:
-        return f"{meter_size(one)} has no value"
-    amount = text.quantity(one.worst, "m", one.allowed)
-    return f"{meter_size(one)} = {amount} of {text.limit(one.allowed)} mm allowed"
-
-
-def meter_size(one: DeltaVerdict) -> str:
-    """Return what the absolute value that a delta meter is judged by is called: |Δx| or ‖Δ‖."""
-    return SYMBOLS["norm"] if one.quantity == "norm" else f"|{SYMBOLS[one.quantity]}|"
-
-
-def correlation(r: float | None) -> str:
-    """Return a correlation with its sign; a dash where it is not known."""
-    return text.NOTHING if r is None else f"{round(r, 3) + 0.0:+.3f}"  # + 0.0: no -0.000
+    words = {
+        "axis": "±{} per axis",
+        "norm": "{} norm",
+        "path": "{} from the path",
+        "angle": "{} of orientation",
+        "joint": "±{} per joint",
+        **{axis: f"±{{}} {axis}" for axis in "xyz"},
+    }
+    units = {"angle": ["rad"], "joint": sorted(set(joint_units), reverse=True)}
+    return ", ".join(
+        words[kind].format(" or ±".join(text.allowed(value, unit) for unit in units.get(kind, ["m"])))
+        for kind, value in allowed.items()
+    )

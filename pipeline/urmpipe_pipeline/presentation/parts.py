@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
-from typing import Any, Generic, TypeVar, overload
+from typing import Any, Generic, TypeAlias, TypeVar, overload
 
 import numpy as np
 
@@ -17,6 +17,9 @@ from urmpipe_pipeline.presentation.section import Cell, Column, Fact, Table, Val
 from urmpipe_pipeline.provenance import Provenance
 
 Item = TypeVar("Item")
+
+Heads: TypeAlias = Mapping[str, tuple[str, Callable[[Item], Cell]]]
+"""The title of each column by its key, and what makes its cells."""
 
 
 class Cells(Sequence[Cell], Generic[Item]):
@@ -45,15 +48,8 @@ class Cells(Sequence[Cell], Generic[Item]):
         return self._cell(self._items[index])
 
 
-def columns_of(
-    items: Sequence[Item], heads: Mapping[str, tuple[str, Callable[[Item], Cell]]]
-) -> tuple[Column, ...]:
-    """Return columns whose cells are made when they are shown.
-
-    Args:
-        items: What the rows are of.
-        heads: Title of each column, and what makes its cells, by its key.
-    """
+def columns_of(items: Sequence[Item], heads: Heads[Item]) -> tuple[Column, ...]:
+    """Return columns about some items, a row each; their cells are made when they are shown."""
     return tuple(Column(key, title, Cells(items, cell)) for key, (title, cell) in heads.items())
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -11,6 +11,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogColumn
 from urmpipe_pipeline.presentation.parts import (
+    Heads,
     columns_of,
     inputs_table,
     provenance_table,
@@ -73,7 +74,7 @@ def log_tables(run: Run) -> Iterator[Table]:
 
 def audit_table(run: Run, *, brief: bool = False) -> Table:
     """Return what the repolarizer found: joint, row, instant, step, turns before and after."""
-    heads: dict[str, tuple[str, Callable[[AuditEntry], Cell]]] = {
+    heads: Heads[AuditEntry] = {
         "kind": ("What", lambda one: one.kind),
         "joint": ("Joint", lambda one: one.joint),
         "row": ("Row", lambda one: Value(one.row)),
@@ -112,7 +113,7 @@ def inference_table(run: Run, *, brief: bool = False) -> Table:
 
 def columns_table(run: Run) -> Table:
     """Return the columns of the file that were used, and in which units they were read."""
-    heads: dict[str, tuple[str, Callable[[LogColumn], Cell]]] = {
+    heads: Heads[LogColumn] = {
         "name": ("Column", lambda one: one.name),
         "role": ("Holds", lambda one: one.role),
         "unit": ("Unit", lambda one: one.unit),

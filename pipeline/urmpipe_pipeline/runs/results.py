@@ -111,14 +111,6 @@ class Run(Result):
         told = (self.log.units.get(name, "rad") for name in self.log.joints)
         return ["rad" if unit in ("rad", "deg") else "m" for unit in told]
 
-    def joint_unit(self, per: str = "") -> str:
-        """Return the SI unit of all joints: rad, m or both.
-
-        Args:
-            per: What divides it: "", "/s" or "/s2".
-        """
-        return " or ".join(f"{unit}{per}" for unit in sorted(set(self.joint_units) or {"rad"}, reverse=True))
-
     def as_run(self) -> Run:
         """Return this run: what results that have a run return of it."""
         return self

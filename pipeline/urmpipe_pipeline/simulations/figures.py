@@ -10,8 +10,8 @@ from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.comparison.deviation import AXES
-from urmpipe_pipeline.comparison.symbols import SYMBOLS
 from urmpipe_pipeline.comparison.tolerance import allowed_for
+from urmpipe_pipeline.comparison.wording import SYMBOLS
 from urmpipe_pipeline.palette import AXIS_COLOURS, run_colour
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, SpaceFigure, View
 from urmpipe_pipeline.presentation.parts import ends

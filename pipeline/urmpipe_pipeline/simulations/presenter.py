@@ -9,7 +9,7 @@ from itertools import groupby
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.comparison.wording import meter_size, meter_used, meter_words, out_words
+from urmpipe_pipeline.comparison.wording import meter_words, out_words, size_of, used_words
 from urmpipe_pipeline.presentation.figure import Drawing, Text
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, recording_fact
 from urmpipe_pipeline.presentation.section import (
@@ -120,7 +120,7 @@ def _outcome(simulation: Simulation) -> Iterator[Fact]:
 
 def _meter_facts(one: DeltaVerdict) -> Iterator[Fact]:
     """Yield what a delta meter found: how much, when, how often it was too much."""
-    yield Fact(meter_size(one), Value(one.worst, "m", one.allowed, one.verdict, one.used), meter_used(one))
+    yield Fact(size_of(one), Value(one.worst, "m", one.allowed, one.verdict, one.used), used_words(one))
     yield Fact("Time", Value(one.t, "s"))
     yield Fact("Out of tolerance", out_words(one.out_of_tolerance, one.samples))
 

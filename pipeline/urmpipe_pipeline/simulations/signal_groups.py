@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import groupby
 
+from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.display_unit import display_unit
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS, REFERENCE_COLOUR
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
@@ -54,15 +54,10 @@ class Group:
         return tuple(one.names if self.family else one.variables for one in self.signals)
 
     @property
-    def bracket(self) -> str:
-        """The unit as it stands behind a name: rad, or - for numbers without one."""
-        return self.unit or "-"
-
-    @property
     def shown(self) -> tuple[str, float]:
         """The unit that people like to see them in, if all have the same, and how many of it one unit is."""
         wanted = {one.display_unit for one in self.signals}
-        return display_unit(self.unit, wanted.pop() if len(wanted) == 1 else "")
+        return text.display_unit(self.unit, wanted.pop() if len(wanted) == 1 else "")
 
     @property
     def colours(self) -> tuple[tuple[str, ...], ...]:

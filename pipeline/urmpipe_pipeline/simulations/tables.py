@@ -5,14 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TypeAlias, overload
+from typing import overload
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
-from urmpipe_pipeline.comparison.symbols import SYMBOLS
-from urmpipe_pipeline.presentation.parts import columns_of, table_of
+from urmpipe_pipeline.comparison.wording import SYMBOLS
+from urmpipe_pipeline.presentation.parts import Heads, columns_of, table_of
 from urmpipe_pipeline.presentation.section import Cell, Judged, Ref, Table, Value
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation, extremes
 
@@ -25,7 +25,7 @@ AT_ONCE = 5
 
 def meters_table(simulation: Simulation) -> Iterator[Table]:
     """Yield what each delta meter found, if there is one."""
-    heads: dict[str, tuple[str, Callable[[DeltaVerdict], Cell]]] = {
+    heads: Heads[DeltaVerdict] = {
         "block": ("Delta meter", lambda one: Ref(one.block)),
         "verdict": ("Verdict", lambda one: Judged(one.verdict)),
         "quantity": ("of", lambda one: SYMBOLS[one.quantity]),
@@ -105,9 +105,6 @@ class Scalar:
         return not len(self.values) or bool(np.ptp(self.values) == 0.0)
 
 
-_Heads: TypeAlias = dict[str, tuple[str, Callable[[Scalar], Cell]]]
-
-
 def signals_table(simulation: Simulation) -> Table:
     """Return the ends and the extremes of every scalar signal."""
     scalars = list(_scalars(simulation, simulation.signals))
@@ -178,14 +175,15 @@ def _scalars(simulation: Simulation, signals: Sequence[Signal]) -> Iterator[Scal
             yield Scalar(signal.block, name, signal.unit, values, t)
 
 
-def _heads() -> _Heads:
+def _heads() -> Heads[Scalar]:
     """Return the columns of the extremes, by their keys."""
 
     def number(key: str) -> Callable[[Scalar], Cell]:
         return lambda one: Value(one.extremes[key], "s" if key.startswith("t_") else "")
 
-    titles = {
-        "first": "first", "min": "min", "t_min": "at t", "max": "max", "t_max": "at t", "last": "last",
-    }  # fmt: skip
-    heads: _Heads = {"name": ("Signal", lambda one: one.name), "unit": ("Unit", lambda one: one.unit)}
-    return heads | {key: (title, number(key)) for key, title in titles.items()}
+    keys = ("first", "min", "t_min", "max", "t_max", "last")
+    return {
+        "name": ("Signal", lambda one: one.name),
+        "unit": ("Unit", lambda one: one.unit),
+        **{key: ("at t" if key.startswith("t_") else key, number(key)) for key in keys},
+    }

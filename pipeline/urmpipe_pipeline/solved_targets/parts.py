@@ -16,7 +16,7 @@ from urmpipe_models.inverse.along_path.joint_speeds import TooFast
 from urmpipe_models.inverse.along_path.jumps import Jump
 from urmpipe_models.inverse.closed.closed_form import method_words
 from urmpipe_pipeline import text
-from urmpipe_pipeline.palette import ghost_colour_word, run_colour_word
+from urmpipe_pipeline.palette import colour_word, ghost_colour, run_colour
 from urmpipe_pipeline.presentation.parts import columns_of, recording_fact, spot_at, table_of
 from urmpipe_pipeline.presentation.section import Cell, Column, Event, Fact, Place, Table, Value
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -117,10 +117,10 @@ def tables(one: SolvedTargets) -> Iterator[Table]:
             "Branches",
             {"branch": "Branch", "drawn": "Drawn", "rows": "Rows"},
             [
-                ("chosen", f"solid, its tip {run_colour_word(0)}", Value(int(one.reached.sum()))),
+                ("chosen", f"solid, its tip {colour_word(run_colour(0))}", Value(int(one.reached.sum()))),
                 *(
-                    (ghost.name, ghost_colour_word(i), Value(int(np.isfinite(ghost.q).all(axis=1).sum())))
-                    for i, ghost in enumerate(found)
+                    (one.name, colour_word(ghost_colour(i)), Value(int(np.isfinite(one.q).all(axis=1).sum())))
+                    for i, one in enumerate(found)
                 ),
             ],
         )
@@ -194,8 +194,7 @@ def unreached_facts(one: SolvedTargets) -> Iterator[Fact]:
 def _stretches(one: SolvedTargets) -> Iterator[tuple[list[int], str]]:
     """Yield stretches of rows, from 0, that have no solution for one reason but for its numbers, or have one.
 
-    The reason is the first of a row's, of the row in the middle where the numbers differ; empty of rows with a
-    solution.
+    The reason is the first of the row in the middle where numbers differ; empty of rows with a solution.
     """
     reasons = [(reason or "").split("; ")[0] for reason in one.reasons]
     for _, some in groupby(range(len(reasons)), lambda row: NUMBER.sub("#", reasons[row])):

@@ -83,7 +83,7 @@ class ReadOptions:
 
 
 def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
+    return isinstance(value, str) and value != ""
 
 
 def _is_flag(value: Any) -> bool:
@@ -144,6 +144,11 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
 """What each field takes, and what to say of anything else."""
 
 
+def _for_all(value: Any) -> Any:
+    """Return a value that is given for all joints that turn as a mapping; what is one already as it is."""
+    return {"": value} if isinstance(value, (str, list, tuple)) and value else value
+
+
 def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None) -> ReadOptions:
     """Return the reading options among some named values; None means not given.
 
@@ -156,13 +161,11 @@ def read_options(values: Mapping[str, Any], otherwise: ReadOptions | None = None
     base = otherwise or ReadOptions()
     known = {field.name for field in fields(ReadOptions)}
     given = {name: value for name, value in values.items() if name in known and value is not None}
-    for name in ("unit", "interval"):  # one for all joints that turn
-        if name in given and not isinstance(given[name], Mapping):
-            given[name] = {"": given[name]}
-    if "unit" not in given or _are_units(given["unit"]):
+    given |= {name: _for_all(given[name]) for name in ("unit", "interval") if name in given}
+    if isinstance(given.get("unit", {}), Mapping):
         given["unit"] = {**base.unit, **given.get("unit", {})}
     if "joints" in given:
         given = {"names": (), "signs": (), "offsets": (), "interval": {}, **given}
-    elif "" not in given.get("interval", {"": None}):
+    elif isinstance(given.get("interval"), Mapping) and "" not in given["interval"]:
         given["interval"] = {**base.interval, **given["interval"]}
     return replace(base, **given)

@@ -58,10 +58,12 @@ def cells(items: Sequence[Any]) -> np.ndarray[tuple[int, int], np.dtype[np.objec
 
 
 def _for_matlab(value: Any) -> Any:
-    """Return a value with its lists as rows of cells, at every depth."""
+    """Return a value with its lists as rows of cells, at every depth, and its arrays read."""
     if isinstance(value, Mapping):
         return {key: _for_matlab(one) for key, one in value.items()}
-    return cells([_for_matlab(one) for one in value]) if isinstance(value, list) else value
+    if isinstance(value, list):
+        return cells([_for_matlab(one) for one in value])
+    return np.asarray(value) if hasattr(value, "__array__") else value
 
 
 def _size(value: Any) -> int:

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import csv
 from pathlib import Path
 
-from urmpipe_pipeline.csv_rows import write_rows
+from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.presentation.section import Advice, Cell, Judged, Place, Ref, Table, Value
 from urmpipe_pipeline.text import exact
 
@@ -23,8 +24,13 @@ def write_table(table: Table, part: Path, path: Path) -> None:
     Raises:
         OutputError: If it did not read back as it was written.
     """
-    rows = zip(*(map(_cell, column.cells) for column in table.columns), strict=True)
-    write_rows([[column.key for column in table.columns], *map(list, rows)], part, path)
+    cells = zip(*(map(_cell, column.cells) for column in table.columns), strict=True)
+    rows = [[column.key for column in table.columns], *map(list, cells)]
+    with part.open("w", encoding="utf-8", errors="surrogateescape", newline="") as file:
+        csv.writer(file, lineterminator="\n").writerows(rows)
+    with part.open(encoding="utf-8", errors="surrogateescape", newline="") as file:
+        if list(csv.reader(file)) != rows:
+            raise OutputError(Finding("reads back otherwise than written", str(path)))
 
 
 def _cell(cell: Cell) -> str:

@@ -16,7 +16,6 @@ import pytest
 import urmpipe
 from urmpipe.arm_placing import frame_of
 from urmpipe_models.transform import Transform, from_offset
-from urmpipe_pipeline.sources import ReadOptions
 
 COMMANDS = ("ingest", "compare", "ik", "report", "export", "simulate", "build_fmu", "view")
 
@@ -55,7 +54,7 @@ def test_a_run_is_held_as_its_log_is_with_another_tool(folder: Path, run: urmpip
 
 def test_what_cannot_be_applied_to_a_run_is_refused(folder: Path, run: urmpipe.Run) -> None:
     with pytest.raises(urmpipe.OptionError) as error:
-        urmpipe.compare(run, run, read=ReadOptions(time="none"), tsp=0.01, derivative="savgol")
+        urmpipe.compare(run, run, time="none", tsp=0.01, derivative="savgol")
     assert str(error.value) == (
         "read, tsp, derivative: found with what was ingested before, allowed: with a log; a run or a"
         " recording stands as `ingest` made it"
@@ -159,7 +158,7 @@ def test_a_warning_is_shown_once(tmp_path: Path) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t [s],q1,q2,q3,q4,q5,q6\n" + "".join(f"{i / 100},0,{i / 90},0,0,0,0\n" for i in range(9)))
     with pytest.warns(urmpipe.UrmpipeWarning, match="no unit is given"):
-        run = urmpipe.ingest(log, "urm6", read=ReadOptions(period=0.01))
+        run = urmpipe.ingest(log, "urm6", period=0.01)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         compared = urmpipe.compare(run, run, tolerance=0.01)

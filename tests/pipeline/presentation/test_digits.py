@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import pytest
 
 from urmpipe_models.messages import Hint
@@ -14,11 +16,30 @@ from urmpipe_pipeline.text import NOTHING
     ("cell", "with_unit", "without"),
     [
         (Value(0.0025, "m"), "2.5000 mm", "2.5000"),
+        (Value(0.0, "m"), "0.0000 mm", "0.0000"),
+        (Value(-0.4123456789, "m"), "-412.3457 mm", "-412.3457"),
+        (Value(8.5e-17, "m"), "8.500e-14 mm", "8.500e-14"),
+        (Value(1e-9, "rad"), "5.730e-08 deg", "5.730e-08"),
         (Value(0.0035, "m", given=True), "3.5 mm", "3.5"),
         (Value(0.00350000001, "m", 0.0035), "3.50000001 mm", "3.50000001"),  # it is out of its limit
+        (Value(0.00349996, "m", 0.0035), "3.49996 mm", "3.49996"),
+        (Value(0.0035, "m", 0.0035), "3.5000 mm", "3.5000"),
+        (Value(5.00001e-7, "m", 5e-7), "5.00001e-04 mm", "5.00001e-04"),
+        (Value(5e-7, "m", 5e-7), "5.000e-04 mm", "5.000e-04"),
+        (Value(math.radians(0.5000004), "rad", math.radians(0.5)), "0.5000004 deg", "0.5000004"),
+        (Value(math.radians(0.5), "rad", math.radians(0.5)), "0.5000 deg", "0.5000"),
         (Value(-0.5, "rad", signed=True), "-28.6479 deg", "-28.6479"),
         (Value(0.5, "rad", signed=True), "+28.6479 deg", "+28.6479"),
         (Value(1.25, "s"), "1.250 s", "1.250"),
+        (Value(2.0625, "s"), "2.0625 s", "2.0625"),
+        (Value(1 / 3, "s"), "0.333333 s", "0.333333"),
+        (Value(-1e-9, "s"), "0.000 s", "0.000"),
+        (Value(math.nan, "s"), NOTHING, NOTHING),
+        (Value(0.0, "%"), "0 %", "0 %"),
+        (Value(1.0, "%"), "100 %", "100 %"),
+        (Value(1e-6, "%"), "0.0001 %", "0.0001 %"),
+        (Value(0.0699, "%"), "7.0 %", "7.0 %"),
+        (Value(0.99999, "%"), "99.99 %", "99.99 %"),  # never rounded to none or all
         (Value(0.125, "%"), "12.5 %", "12.5 %"),
         (Value(0.12501, "%", 0.12502), "12.501 %", "12.501 %"),  # it differs from what it is held against
         (Value(-0.00004, "1", signed=True), "0.000", "0.000"),
@@ -26,7 +47,7 @@ from urmpipe_pipeline.text import NOTHING
         (Value(1, signed=True), "+1", "+1"),
         (Value(0.25, "N.m"), "0.25 N.m", "0.25"),
         (Value(None, "m"), NOTHING, NOTHING),
-        (Value(float("nan"), "m", given=True), NOTHING, NOTHING),
+        (Value(math.nan, "m", given=True), NOTHING, NOTHING),
         (Place((0.1, -0.2, 0.30004)), "(0.1000, -0.2000, 0.3000) m", "(0.1000, -0.2000, 0.3000)"),
         (Judged("fail"), "FAIL", "FAIL"),
         (Judged(None), NOTHING, NOTHING),

@@ -8,10 +8,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from urmpipe_pipeline.display_unit import display_unit
 from urmpipe_pipeline.palette import AXIS_COLOURS, JOINT_COLOURS
 from urmpipe_pipeline.simulations.signal_groups import groups_of
 from urmpipe_pipeline.simulations.simulation import Signal, SimulatedBlock, Simulation
+from urmpipe_pipeline.text import display_unit
 
 MakeSimulation = Callable[..., Simulation]
 
@@ -20,12 +20,12 @@ def test_signals_stand_by_block_and_unit_and_what_is_judged_by_itself(
     make_simulation: MakeSimulation,
 ) -> None:
     simulation = make_simulation(3)
-    found = [(one.block, one.variables, one.bracket) for one in groups_of(simulation)]
+    found = [(one.block, one.variables, one.unit) for one in groups_of(simulation)]
     assert found == [
         ("log", "q", "rad"),
         ("chain", "p7", "m"),
         ("meter", "delta, norm", "m"),
-        ("meter", "out_of_tolerance", "-"),
+        ("meter", "out_of_tolerance", ""),
     ]
     judged = groups_of(simulation)[2]
     assert judged.verdict is simulation.verdicts[0]

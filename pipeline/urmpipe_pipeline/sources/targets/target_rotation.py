@@ -100,7 +100,7 @@ def rotation_units(
         return units, []
     why = ", though most are beyond a turn" if beyond else ""
     said = f"no unit is given for {listed(columns)}: they are taken as rad{why}"
-    return units, [LogWarning("assumed-unit", said, hints=unit_hints(columns, "deg"))]
+    return units, [LogWarning("assumed-unit", said, hints=unit_hints(columns[:1], "deg"))]
 
 
 def target_rotations(

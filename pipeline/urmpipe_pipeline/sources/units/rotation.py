@@ -92,7 +92,7 @@ def settle_rotation(
     if len(sound) == 1:
         taken = choices[0][1][0].name
         said = f"no unit is given for {names}: they are taken as {taken}"
-        hints = unit_hints(columns, OTHER_UNIT[taken])
+        hints = unit_hints(columns[:1], OTHER_UNIT[taken])
         return _settled(columns, choices[0], "their names", LogWarning("assumed-unit", said, hints=hints))
     said = f"{names} may be of several forms: the recorded orientation is not used"
     hints = tuple(Hint("rotation", form, "says which") for form in sound)
@@ -151,7 +151,7 @@ def _settled_by_kinematics(
     told, better = choices[0][1][0].name, best[0][1][0].name
     names = ", ".join(column.name for column in columns)
     said = f"{names}: {told} contradicts the kinematics: taken as {better}: {best[1]}"
-    hints = unit_hints(columns, told)
+    hints = unit_hints(columns[:1], told)
     return _settled(columns, *best, LogWarning("unit-contradiction", said, hints=hints))
 
 

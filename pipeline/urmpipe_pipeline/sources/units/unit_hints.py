@@ -32,7 +32,8 @@ def unit_inference(columns: Sequence[Column], unit: str, evidence: str) -> Infer
         evidence: Why.
     """
     names, other = tuple(column.name for column in columns), OTHER_UNIT.get(unit)
-    hints = unit_hints(columns, other, "") if other else ()
+    turning = len(columns) > 1 and unit in ("rad", "deg")
+    hints = (Hint("unit", {"" if turning else called(columns[0]): other}),) if other else ()
     return Inference(f"unit of {', '.join(names)}", unit, evidence, "unit", names, hints)
 
 

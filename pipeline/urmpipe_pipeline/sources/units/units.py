@@ -23,6 +23,9 @@ from urmpipe_pipeline.sources.vocabulary import KnownSource, Quantity, Unit, voc
 
 GIVEN = "given as an option"
 
+JOINTS = "prismatic joints"
+"""Columns whose units do not follow from each other's."""
+
 MOST_TURNS = 4
 """A joint value of more turns than this is not taken as rad without being told."""
 
@@ -83,7 +86,7 @@ class UnitFinder:
         slides = [j for j in unknown if kinds[j] == "prismatic"]
         turns = [j for j in unknown if kinds[j] != "prismatic"]
         if slides:
-            self._assume("m", "prismatic joints", [columns[j] for j in slides])
+            self._assume("m", JOINTS, [columns[j] for j in slides])
         if turns:
             told = {unit for unit in found if unit is not None and unit.quantity == "angle"}
             bounds = Bounds.of(robot, turns)
@@ -304,5 +307,9 @@ class UnitFinder:
         names = ", ".join(column.name for column in columns)
         self._note(columns, unit, "assumed")
         said = f"no unit is given for {names}: the {what} are taken as {unit}"
-        hints = unit_hints(columns, OTHER_UNIT[unit])
+        other, does = OTHER_UNIT[unit], "reads them otherwise"
+        turning = (Hint("unit", {"": other}, does),)  # of all joints that turn
+        hints = (
+            turning if unit == "rad" else unit_hints(columns if what == JOINTS else columns[:1], other, does)
+        )
         self._assumed.append(LogWarning("assumed-unit", said, hints=hints))
