@@ -13,7 +13,7 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from recorded import columns, entities, packed, rows_of, static, times_of, views
-from toys import COLOURS, PLOT, STEP_NS, Toy, figure, laid_out, line, panel, recorded, shown, toy
+from toys import COLOURS, PLOT, STEP_NS, Toy, figure, line, panel, recorded, root_of, shown, toy
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.figure import Figure, Mark, Over, Panel, Shape, View
 from urmpipe_pipeline.recording.views.plots import (
@@ -37,9 +37,8 @@ def plots(path: Path) -> list[str]:
 
 def first_plot(one: Figure) -> Any:
     """Return the first plot of a layout of one figure and a short summary."""
-    layout, _ = laid_out(shown(one))
-    _, plots = layout.root_container.contents  # type: ignore[union-attr]
-    return next(iter(plots.contents))  # type: ignore[union-attr]
+    _, plots = root_of(shown(one)).contents
+    return next(iter(plots.contents))
 
 
 # --- lines -----------------------------------------------------------------------------------------
