@@ -206,6 +206,20 @@ def test_a_long_array_has_an_overview_that_keeps_every_extreme(small: bool, tmp_
     assert {f"{PLOT}/0/0", "/values"} <= set(views(path)["ViewContents:query"])
 
 
+def test_a_long_array_of_a_hidden_view_is_plotted_itself_and_seen_whole(tmp_path: Path) -> None:
+    one = toy(rows=LONG + 1)
+    values = np.array(one.values)
+    values[LONG // 2, 0], values[-1, 1], values[7, 0] = np.nan, 9.0, np.inf
+    one = Toy(one.t_ns, values)
+    views = View("opened", (panel(one, line(values[:, 0] + 1.0)),)), View("hidden", (panel(one),))
+    both = Figure("both", "caption", "alt", views, {STEP_NS: "decides"})
+    path = recorded(shown(both), tmp_path, one)
+    hidden = PLOT.replace("/0/0", "/0/1")
+    assert entities(path, hidden) == {f"{hidden}/instants/0"}
+    ends = columns(path, f"{hidden}/instants/0", SCALARS)
+    assert ends == [[np.min(values[np.isfinite(values)])], [9.0]]
+
+
 def test_what_is_plotted_over_a_quantity_is_left_to_the_report() -> None:
     one = toy()
     over = Over(one.values[:, 0], "‖v‖", "m/s")
