@@ -136,8 +136,8 @@ def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
     family, rows = angles.copy(), np.repeat(swapped, lengths)
     family[rows] = _other(angles[rows], apart)
     turns = np.cumsum(np.rint((family[steep] - family[steep - 1]) / FULL_TURN), axis=0)
-    for column, turned in zip(family.T, turns.T, strict=True):
-        column -= FULL_TURN * np.repeat(np.append(0.0, turned), lengths)
+    for k, turned in enumerate(turns.T):
+        family[:, k] -= FULL_TURN * np.repeat(np.append(0.0, turned), lengths)
     return family
 
 

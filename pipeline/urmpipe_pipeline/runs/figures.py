@@ -33,9 +33,14 @@ def run_figures(run: Run) -> Iterator[Figure]:
     """Yield the plots of a log that stands alone: joints, speed, motion."""
     yield from joints_figure(run)
     if run.timed and run.tcp is not None:
-        velocity = np.asarray(run.tcp.velocity)
-        yield speed_figure(run.name, run.t_ns, np.sqrt(np.einsum("ij,ij->i", velocity, velocity)))
+        yield speed_figure(run.name, run.t_ns, lengths(run.tcp.velocity))
     yield from motion_figure(run)
+
+
+def lengths(vectors: FloatArray) -> FloatArray:
+    """Return the length of each vector, of shape (n, 3), shape (n,); no array of that size on the way."""
+    known = np.asarray(vectors)
+    return np.asarray(np.sqrt(np.einsum("ij,ij->i", known, known)))
 
 
 def times_of(run: Run) -> IntArray | None:
@@ -140,7 +145,7 @@ def motion_figure(run: Run) -> Iterator[Figure]:
             share=2.2,
         )
         return
-    point = point_name(run)
+    point, tcp = point_name(run), run.tcp
     if not run.timed:
         yield Figure(
             "Poses of the tool centre point",
@@ -156,7 +161,7 @@ def motion_figure(run: Run) -> Iterator[Figure]:
         f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a, and its Euler"
         " angles (moving Z-Y-X, in the colours of their axes), by forward kinematics. The angles go on past"
         f" ±π, so that none jumps.{_singular_words(run.tcp)}",
-        f"Motion of {point} of {run.name} over time by forward kinematics. {_extent_words(run.tcp)}",
+        lambda: f"Motion of {point} of {run.name} over time by forward kinematics. {_extent_words(tcp)}",
         tuple(views),
         share=2.2,
     )
@@ -200,7 +205,7 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
 def _point_derivatives(run: Run, tcp: PointLog) -> Iterator[View]:
     """Yield the views of velocity and acceleration."""
     yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), run.t_ns),))
-    size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
+    size = Line(lengths(tcp.acceleration), ("‖a‖",), NORM)
     lines = (coordinates(tcp.acceleration), size)
     yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
 
@@ -231,7 +236,7 @@ def _extent_words(tcp: PointLog) -> str:
     low, high = (text.point(end(tcp.position, axis=0)) for end in (np.nanmin, np.nanmax))
     said = f"It stays within ({low}) m and ({high}) m"
     for values, word, unit in ((tcp.velocity, "speed", "m/s"), (tcp.acceleration, "acceleration", "m/s²")):
-        norm = np.linalg.norm(values, axis=1)
+        norm = lengths(values)
         if np.isfinite(norm).any():
             said += f"; its {word} reaches {np.nanmax(norm):.4f} {unit}"
     return f"{said}."
