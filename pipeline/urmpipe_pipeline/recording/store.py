@@ -83,6 +83,9 @@ class Store:
             width: Shape of a row.
             dtype: Type of the values.
 
+        Returns:
+            In the units of its field, shape (end - first, *width).
+
         Raises:
             RecordingError: If some of them are missing, or are none of that type and shape.
         """

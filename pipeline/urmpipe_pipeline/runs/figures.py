@@ -171,7 +171,7 @@ def coordinates(values: FloatArray) -> Line:
     """Return x, y and z of something in their colours, by these names in all panels.
 
     Args:
-        values: Shape (n, 3).
+        values: In any unit, shape (n, 3).
     """
     return Line(values, tuple("xyz"), COORDINATES)
 

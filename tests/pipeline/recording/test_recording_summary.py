@@ -115,10 +115,10 @@ def test_warnings_say_what_they_are_about_and_many_are_counted() -> None:
 
 
 def test_each_path_is_told_with_its_colour() -> None:
-    def path(name: str, colour: str, **more: bool) -> Path:
-        return Path(name, np.zeros((2, 3)), None, colour, **more)
+    def path(name: str, colour: str) -> Path:
+        return Path(name, np.zeros((2, 3)), None, colour)
 
-    asked = path("asked for", REFERENCE_COLOUR, asked=True)
+    asked = replace(path("asked for", REFERENCE_COLOUR), asked=True)
     paths = (asked, replace(asked, line=False), path("a|b", run_colour(0)), path("x50", DEVIATION_COLOUR))
     assert "Paths: asked for grey, dashed; a\\|b orange; x50 crimson." in lines(shown(), Scene(paths=paths))
     assert not [line for line in lines(shown(), Scene(paths=paths[2:3])) if line.startswith("Paths")]
