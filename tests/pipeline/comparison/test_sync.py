@@ -21,6 +21,7 @@ from urmpipe_pipeline.comparison.sync_fine import line_at
 from urmpipe_pipeline.comparison.sync_views import views
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+from urmpipe_pipeline.operands import load_runs
 
 Motion = Callable[[FloatArray], FloatArray]
 
@@ -372,11 +373,9 @@ def test_similarity_is_that_of_the_best_turn_where_frames_may_be_turned() -> Non
 
 @pytest.fixture(scope="module")
 def demo() -> dict[str, Trajectory]:
-    robot = load_robot("urm6")
-    from urmpipe_pipeline.operands import load_run
-
     names = ("path.csv", "coppeliasim.csv", "matlab.csv", "solidworks", "counter_rotating.csv")
-    return {name.split(".")[0]: trajectory(load_run(LOGS / name, robot=robot)) for name in names}
+    runs = load_runs([LOGS / name for name in names], robot=load_robot("urm6"))
+    return {run.name: trajectory(run) for run in runs}
 
 
 def test_the_offsets_of_the_demo_logs_are_found(demo: dict[str, Trajectory]) -> None:

@@ -21,7 +21,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import RecordingError
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
-from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
+from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_runs
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.recording.layout import opening_time, viewer_layout
 from urmpipe_pipeline.recording.overview import LONG
@@ -233,7 +233,7 @@ def test_the_summary_says_how_it_ended_and_what_is_joined(make_simulation: MakeS
 def test_a_simulation_is_nothing_to_compare(make_simulation: MakeSimulation, tmp_path: Path) -> None:
     path = write_recording(make_simulation(5), tmp_path / "a.rrd")
     with pytest.raises(RecordingError) as caught:
-        load_run(path)
+        load_runs([path])
     assert str(caught.value) == f"{path}: {SIMULATION}"
     assert load_comparison(path) is None
 
