@@ -85,7 +85,7 @@ def _is_unit(value: Any) -> bool:
 
 
 def _is_table(value: Any) -> bool:
-    from urmpipe.systems.log_tables import LogTable
+    from urmpipe.log_table import LogTable
 
     return isinstance(value, LogTable) or _is_path(value)
 

@@ -140,13 +140,13 @@ def test_a_jump_over_rows_that_are_not_reached_tells_from_where_it_comes(
 def test_all_of_a_path_needs_a_recording_and_a_closed_form(capsys: Captured, folder: Path) -> None:
     assert run(["ik", "default.csv", "--robot", "arm6", "--tsp", "1", "--all"]) == 2
     assert capsys.readouterr().err == (
-        "error: --all: found with a path and no recording, allowed: with -o RUN.rrd, where every branch is a"
-        " ghost arm; or with targets without times\n"
+        "error: --every: found with a path and no recording, allowed: with a recording; or with targets"
+        " without times; --output run.rrd records every branch as a ghost arm\n"
     )
     assert run(["ik", "default.csv", "--robot", "urm6", "--tsp", "1", "--all", "-o", "a.rrd"]) == 2
     assert capsys.readouterr().err == (
-        "error: --all: found with a path of urm6 that has no closed form, allowed: with poses and an arm that"
-        " has a closed form, whose branches run along the path; or with targets without times\n"
+        "error: --every: found with a path of urm6 that has no closed form, allowed: with poses and an arm"
+        " that has a closed form; or with targets without times\n"
     )
 
 

@@ -60,21 +60,20 @@ def test_a_unit_that_is_given_twice_alike_is_one(folder: Path) -> None:
 def test_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv")
     assert said == (
-        "error: found no robot; allowed: --robot NAME|FILE, a TOML, a URDF or one of arm6, articulated6r,"
+        "error: --robot: found none, allowed: a TOML, a URDF or one of arm6, articulated6r,"
         " iiwa14, panda, ur3, ur5, ur10, ur3e, ur5e, ur10e, urm4, urm6, urm8"
     )
 
 
 def test_a_tool_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv", "--tool", "0,0,0.1")
-    assert said == (
-        "error: found --base, --tool, --base-link or --tip without a robot; allowed: with --robot NAME|FILE"
-    )
+    assert said == ("error: --tool: found without a robot; --robot NAME|FILE gives one")
 
 
 def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:
     assert refused(capsys, "nowhere.csv", "--robot", "arm6", "-o", "log.txt") == [
-        "error: -o: found 'log.txt', allowed: a name that ends in .csv (a joint log) or .rrd (a recording)",
+        "error: --output: found 'log.txt', allowed: a name that ends in .csv (a joint log) or .rrd (a"
+        " recording)",
         "error: nowhere.csv: found no such file",
     ]
 
@@ -114,7 +113,7 @@ JOINT = (
         (JOINT.format("j", "fixed", "b"), "robot fixed: has no moving joint; at least one is needed"),
         (
             '<link name="c"/>' + JOINT.format("j", "revolute", "b") + JOINT.format("k", "revolute", "c"),
-            "found 2 ends with 1 moving joints; choose a tip link (--tip): b, c",
+            "found 2 ends with 1 moving joints; --tip-link LINK chooses one: b, c",
         ),
     ],
 )
@@ -130,8 +129,8 @@ def test_a_robot_that_is_no_arm(capsys: Captured, folder: Path, joints: str, sai
         ("x,y,z\n", "targets.csv:1: found a header and no rows, allowed: a row a sample"),
         (
             "t,q1,q2\n0,1,2\n1,2,3\n",
-            "targets.csv: found no position in q1, q2, allowed: x, y, z; name them so in the header, or in a"
-            ' map (--map): [tcp] position = ["A", "B", "C"]',
+            "targets.csv: found no position in q1, q2, allowed: x, y, z; name them so in the header;"
+            ' --log-map FILE.toml says which they are: [tcp] position = ["A", "B", "C"]',
         ),
     ],
 )
@@ -152,7 +151,7 @@ def test_targets_in_mm_that_are_read_as_m(capsys: Captured, folder: Path) -> Non
     assert run(["ik", "mm.csv", "--robot", "arm6", "--restarts", "0"]) == 1
     assert capsys.readouterr().err == (
         "warning: no unit is given for x, y, z: they are taken as m, though every row is beyond any arm;"
-        " --unit mm says otherwise\n"
+        " --unit mm reads them otherwise\n"
     )
     for units in (["mm"], ["x=mm"], ["m", "x=mm", "y=mm", "z=mm"]):
         given = [word for unit in units for word in ("--unit", unit)]
@@ -184,8 +183,8 @@ def test_a_closed_form_that_there_is_not(capsys: Captured) -> None:
 
 def test_a_method_that_a_path_does_not_take(capsys: Captured) -> None:
     assert refused(capsys, "targets.csv", "--robot", "arm6", "--tsp", "1", "--method", "iterative") == [
-        "error: --method: found iterative with a path, allowed: auto; a path takes the closed form of the"
-        " arm if it has one"
+        "error: --method: found iterative with a path, allowed: auto; --method auto takes the closed form of"
+        " the arm if it has one"
     ]
 
 
@@ -225,7 +224,7 @@ def test_values_that_make_no_sense(capsys: Captured, option: str, value: str, sa
 def test_errors_as_json(capsys: Captured) -> None:
     assert run(["ik", "targets.csv", "--json"]) == 2
     (error,) = json.loads(capsys.readouterr().out)["errors"]
-    assert error["message"].startswith("found no robot; allowed: --robot NAME|FILE")
+    assert error["message"].startswith("--robot: found none, allowed: ")
 
 
 def test_a_robot_among_the_operands_is_told_by_its_option(capsys: Captured) -> None:

@@ -192,6 +192,6 @@ def test_a_pose_in_degrees_is_told_of(urmpipe: Any) -> None:
     ran = urmpipe("robot", "show", "urm6", "--q", "0,90,0,3,0,0")
     assert (ran.code, ran.err) == (
         0,
-        "warning: --q: found phi2 = 90 rad (5156.62 deg): in deg? Allowed: rad\n",
+        "warning: --q: these values look like degrees: found phi2 = 90 rad (5156.62 deg), allowed: rad\n",
     )
     assert urmpipe("robot", "show", "urm6", "--q", "0,3.14,0,3,0,0").err == ""

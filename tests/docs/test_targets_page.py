@@ -82,7 +82,7 @@ def test_the_names_of_orientations_are_known(tmp_path: Path, names: tuple[str, .
     turned = Rotation.from_rotvec([0, 0, 0.3]).as_matrix()
     assert targets.rotation is not None
     np.testing.assert_allclose(targets.rotation[0], turned, rtol=0, atol=1e-15)  # a rounding
-    kuka = "no unit is given for A, B, C: they are taken as rad; --unit A=deg says otherwise"
+    kuka = "no unit is given for A, B, C: they are taken as rad"
     assert [warning.message for warning in targets.warnings] == ([kuka] if "A" in names else [])
 
 

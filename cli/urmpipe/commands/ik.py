@@ -93,7 +93,7 @@ def ik(
     \b
     Examples:
       urmpipe ik targets.csv --robot arm6
-      urmpipe ik targets.csv --robot ur5e --all --json
+      urmpipe ik targets.csv --robot ur5e --every --json
       urmpipe ik targets.csv --robot ur5e --start 0,-1.6,1.6,0,1.6,0 -o ik.rrd
       urmpipe ik path.csv --robot urm6 -o joints.csv
       urmpipe ik path.csv --robot ur5e --tolerance 3.5mm -o run.rrd

@@ -9,9 +9,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe.arm_placing import place_robot
+from urmpipe.log_table import LogTable
 from urmpipe.reading import resolved
 from urmpipe.systems.held_logs import between_samples, clock_of, on_points
-from urmpipe.systems.log_tables import LogTable, read_table
+from urmpipe.systems.log_tables import read_table
 from urmpipe.systems.units import Backend, column_names, unit_of
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.build import chosen_backend

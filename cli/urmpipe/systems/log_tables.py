@@ -5,11 +5,11 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 
 from urmpipe.keyword_checks import PathLike
+from urmpipe.log_table import LogTable, Quantity
 from urmpipe.reading import resolved
 from urmpipe_fmus.table import Table
 from urmpipe_models.arrays import FloatArray
@@ -17,40 +17,10 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
 from urmpipe_models.spelling import IN_MAP, IN_NO_FILE
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
+from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.operands import log_files
 from urmpipe_pipeline.sources import LogMap, ReadOptions, read_log
 from urmpipe_pipeline.text import counted
-
-
-class Quantity(NamedTuple):
-    """Columns of a table that are one variable.
-
-    Attributes:
-        name: The variable.
-        unit: Its unit; SI, spelled as FMI does.
-        size: How many columns it has; None for a variable that is no array.
-    """
-
-    name: str
-    unit: str
-    size: int | None = None
-
-
-class LogTable(NamedTuple):
-    """A log as a unit takes it.
-
-    Attributes:
-        table: Its rows.
-        columns: What the columns of the table are, from the left.
-        files: Its files.
-        warnings: What a person should know of it.
-    """
-
-    table: Table
-    columns: tuple[Quantity, ...]
-    files: tuple[Path, ...]
-    warnings: tuple[LogWarning, ...]
 
 
 def read_table(

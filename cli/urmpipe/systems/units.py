@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, Any, Literal
 
 from urmpipe.arm_placing import Robot, place_robot
 from urmpipe.keyword_checks import PathLike
-from urmpipe.systems.log_tables import LogTable, read_mapped_table
+from urmpipe.log_table import LogTable
+from urmpipe.systems.log_tables import read_mapped_table
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.units import make_unit, unit_name, unit_options

@@ -40,7 +40,7 @@ class Mark:
     """A mark on a line.
 
     Attributes:
-        t_ns: Its time in [ns] (its row where the panel has no times).
+        t_ns: Its time in [ns] (its row, from 0, where the panel has no times).
         value: In the panel's unit.
         shape: Turned up or down for turns added or taken, a cross for a doubt, a diamond for the largest.
         colour: As #rrggbb.

@@ -113,7 +113,7 @@ def _spec(figure: Figure, panels: Sequence[Panel], span: Span) -> Spec:
         return found
     timed = axis_of(panels[0]) == "t"
     axis = spec.time_axis if timed else spec.row_axis
-    places = ((at / 1e9 if timed else at, words) for at, words in figure.instants.items())
+    places = ((at / 1e9 if timed else at + 1, words) for at, words in figure.instants.items())
     through = [instant(at, words, span.start, span.end) for at, words in places]
     found = spec.stacked(drawn, axis(span.start, span.end), through)
     if through and names.first:

@@ -123,9 +123,9 @@ def axis_of(panel: Panel) -> str:
 
 
 def across(panel: Panel, one: Line) -> FloatArray:
-    """Return the times of a line in [s] or its row numbers, shape (n,)."""
+    """Return the times of a line in [s] or its row numbers from 1, shape (n,)."""
     t_ns = _times(panel, one)
-    return np.arange(len(one.values), dtype=np.float64) if t_ns is None else seconds(t_ns[:])
+    return np.arange(1.0, len(one.values) + 1.0) if t_ns is None else seconds(t_ns[:])
 
 
 def _times(panel: Panel, one: Line) -> IntArray | None:
@@ -211,7 +211,7 @@ def _marks(panel: Panel, factor: float, names: Names, number: int) -> Iterator[S
         some.setdefault((one.name, one.colour), []).append(one)
     for (name, colour), items in some.items():
         yield marks(
-            np.array([one.t_ns for one in items]) / (1e9 if axis_of(panel) == "t" else 1.0),
+            np.array([one.t_ns / 1e9 if axis_of(panel) == "t" else one.t_ns + 1 for one in items]),
             factor * np.array([one.value for one in items]),
             colour,
             [SYMBOLS[one.shape] for one in items],

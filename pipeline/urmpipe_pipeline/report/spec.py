@@ -121,8 +121,8 @@ def time_axis(start: float, end: float) -> Spec:
 
 
 def row_axis(start: float, end: float) -> Spec:
-    """Return an axis of row numbers, with room for the points at both ends."""
-    return axis("row, the first is 0") | {
+    """Return an axis of row numbers from 1, with room for the points at both ends."""
+    return axis("row") | {
         "range": [start - 0.5, end + 0.5],
         "unifiedhovertitle": {"text": "row %{x}"},
         "tickformat": "d",

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.inverse.checks import ROTATION_TOLERANCE
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
@@ -74,10 +74,11 @@ def given_targets(
         OptionError: If an array has another shape, or times do not fit.
     """
     if tsp is not None and not (isinstance(tsp, Real) and 0.0 < tsp < math.inf):
-        raise OptionError(f"tsp: found {shown(tsp)}, allowed: a positive time in s")
+        raise OptionError(Finding(parameter="tsp", found=shown(tsp), allowed="a positive time in s"))
     if isinstance(given, (str, Path)):
         if t is not None:
-            raise OptionError("t: found times beside a file, allowed: with arrays; a file has its own")
+            allowed = "with arrays; a file has its own"
+            raise OptionError(Finding(parameter="t", found="times beside a file", allowed=allowed))
         return _of_file(Path(given), tsp, read)
     targets, faults = (given, ()) if isinstance(given, Targets) else _of_array(_numbers("targets", given))
     count = len(targets)
@@ -106,12 +107,13 @@ def _numbers(name: str, given: ArrayLike) -> FloatArray:
     allowed = SHAPES if name == "targets" else "numbers"
     if hasattr(given, "columns"):
         example = 'table[["x", "y", "z"]].to_numpy()'
-        raise OptionError(f"{name}: found a table, allowed: an array of shape {allowed}, such as {example}")
+        allowed = f"an array of shape {allowed}, such as {example}"
+        raise OptionError(Finding(parameter=name, found="a table", allowed=allowed))
     try:
         return np.asarray(given, dtype=float)
     except (TypeError, ValueError):
         found = f"{type(given).__name__} that is no array of numbers"
-        raise OptionError(f"{name}: found a {found}, allowed: {allowed}") from None
+        raise OptionError(Finding(parameter=name, found=f"a {found}", allowed=allowed)) from None
 
 
 def _of_array(array: FloatArray) -> tuple[Targets, tuple[str, ...]]:
@@ -121,7 +123,8 @@ def _of_array(array: FloatArray) -> tuple[Targets, tuple[str, ...]]:
     if array.ndim == 2 and array.shape[1] == 3:
         return Targets(array), ()
     if array.ndim != 3 or array.shape[1:] != (4, 4):
-        raise OptionError(f"targets: found an array of shape {array.shape}, allowed: {SHAPES}")
+        found = f"an array of shape {array.shape}"
+        raise OptionError(Finding(parameter="targets", found=found, allowed=SHAPES))
     wrong = ~(np.abs(array[:, 3] - LAST_ROW).max(axis=1) <= ROTATION_TOLERANCE)
     faults = tuple(
         f"the last row of the matrix is {', '.join(f'{value:g}' for value in row)}, allowed: 0, 0, 0, 1"
@@ -147,17 +150,20 @@ def _times(count: int, t: ArrayLike | None, tsp: float | None) -> IntArray | Non
     return None if seconds is None else np.round(seconds * 1e9).astype(np.int64)
 
 
-def _faults(count: int, t: FloatArray | None, tsp: float | None) -> Iterator[str]:
+def _faults(count: int, t: FloatArray | None, tsp: float | None) -> Iterator[Finding]:
     """Yield what is wrong with arrays and their times in [s]."""
     if not count:
-        yield "targets: found none, allowed: one or more"
+        yield Finding(parameter="targets", found="none", allowed="one or more")
     if t is not None and tsp is not None:
-        yield "found t and tsp, allowed: one of both"
+        yield Finding(found="t and tsp", allowed="one of both")
     if t is None:
         return
     if t.shape != (count,):
-        yield f"t: found shape {t.shape}, allowed: ({count},), one time for each target, in s"
+        allowed = f"({count},), one time for each target, in s"
+        yield Finding(parameter="t", found=f"shape {t.shape}", allowed=allowed)
     elif not (np.abs(t) < LONGEST).all():
-        yield f"t: found a time that is not finite or too large, allowed: up to {LONGEST:g} s"
+        found = "a time that is not finite or too large"
+        yield Finding(parameter="t", found=found, allowed=f"up to {LONGEST:g} s")
     elif (np.diff(np.round(t * 1e9)) <= 0.0).any():
-        yield "t: found times that do not increase, allowed: strictly increasing, by 1 ns or more"
+        allowed = "strictly increasing, by 1 ns or more"
+        yield Finding(parameter="t", found="times that do not increase", allowed=allowed)

@@ -194,8 +194,7 @@ def unreached_facts(one: SolvedTargets) -> Iterator[Fact]:
 def _stretches(one: SolvedTargets) -> Iterator[tuple[list[int], str]]:
     """Yield stretches of rows, from 0, that have no solution for one reason but for its numbers, or have one.
 
-    The reason is the first of a row's, of the row in the middle where the numbers differ; empty of rows with a
-    solution.
+    The reason is the first of the row in the middle where numbers differ; empty of rows with a solution.
     """
     reasons = [(reason or "").split("; ")[0] for reason in one.reasons]
     for _, some in groupby(range(len(reasons)), lambda row: NUMBER.sub("#", reasons[row])):

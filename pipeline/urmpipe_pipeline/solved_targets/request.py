@@ -90,26 +90,20 @@ def _not_for_paths(request: Request, recorded: bool) -> Iterator[Finding]:
     """Yield the options that a path does not have."""
     lacks = "positions only" if request.given.targets.rotation is None else "no closed form"
     if request.method == "iterative":
-        allowed = "auto; a path takes the closed form of the arm if it has one"
-        yield Finding(parameter="method", found="iterative with a path", allowed=allowed)
+        hint = Hint("method", "auto", "takes the closed form of the arm if it has one")
+        yield Finding(parameter="method", found="iterative with a path", allowed="auto", hints=(hint,))
     if request.method == "closed" and request.form is None:
         found = f"closed with a path of {request.arm.name} that has {lacks}"
         yield Finding(parameter="method", found=found, allowed="auto")
     if request.every and request.form is None:
-        yield Finding(
-            f"found with a path of {request.arm.name} that has {lacks}",
-            parameter="every",
-            allowed="with poses and an arm that has a closed form, whose branches run along the path; or with"
-            " targets without times",
-        )
+        allowed = "with poses and an arm that has a closed form; or with targets without times"
+        found = f"with a path of {request.arm.name} that has {lacks}"
+        yield Finding(parameter="every", found=found, allowed=allowed)
     elif request.every and not recorded:
-        yield Finding(
-            "found with a path and no recording",
-            parameter="every",
-            allowed="with a recording (.rrd), where every branch is a ghost arm; or with targets without"
-            " times",
-            hints=(Hint("output", None, "names one"),),
-        )
+        allowed = "with a recording; or with targets without times"
+        hint = Hint("output", "run.rrd", "records every branch as a ghost arm")
+        found = "with a path and no recording"
+        yield Finding(parameter="every", found=found, allowed=allowed, hints=(hint,))
 
 
 def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArray | None:
@@ -129,8 +123,8 @@ def start_of(arm: Chain, start: Sequence[float] | FloatArray | None) -> FloatArr
     if values.shape != (len(arm.coordinates),):
         raise OptionError(Finding(parameter="start", found=f"{values.size} values", allowed=allowed))
     if not np.isfinite(values).all():
-        found = "a value that is not finite"
-        raise OptionError(Finding(parameter="start", found=found, allowed=f"{allowed}, in rad and m"))
+        found, allowed = "a value that is not finite", f"{allowed}, in rad and m"
+        raise OptionError(Finding(parameter="start", found=found, allowed=allowed))
     beyond = list(_beyond_limits(arm, values))
     if beyond:
         raise OptionError(*beyond)
@@ -144,5 +138,4 @@ def _beyond_limits(arm: Chain, start: FloatArray) -> Iterator[Finding]:
             unit = "rad" if joint.kind == "revolute" else "m"
             degrees = "; in deg?" if unit == "rad" and abs(value) > 2.0 * math.pi else ""
             limits = f"{joint.lower:.6g} to {joint.upper:.6g} {unit}"
-            found = f"{joint.name} = {value:g}"
-            yield Finding(parameter="start", found=found, allowed=f"{limits}{degrees}")
+            yield Finding(parameter="start", found=f"{joint.name} = {value:g}", allowed=f"{limits}{degrees}")

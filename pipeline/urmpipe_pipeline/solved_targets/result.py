@@ -80,12 +80,12 @@ class SolvedTargets(Result):
     joint_log: Path | None = field(default=None, metadata={"stored": False})
 
     def __post_init__(self) -> None:
-        faults = [Finding(fault, self.name) for fault in self._faults()]
+        faults = [Finding(file=self.name, found=found, allowed=allowed) for found, allowed in self._faults()]
         if faults:
             raise LogError(*faults)
 
-    def _faults(self) -> Iterator[str]:
-        """Yield what does not fit together."""
+    def _faults(self) -> Iterator[tuple[str, str]]:
+        """Yield what does not fit together, and what is allowed."""
         n, k, joints = self.solutions.q.shape
         shapes: dict[str, tuple[NDArray[Any] | None, tuple[int, ...]]] = {
             "rows": (self.row, (n,)),
@@ -99,14 +99,14 @@ class SolvedTargets(Result):
             "samples of the path": (None if self.path is None else self.path.q, (n, joints)),
         }
         if not n:
-            yield "found no target, allowed: one or more"
+            yield "no target", "one or more"
         if joints != len(self.robot.coordinates):
-            yield f"found {joints} joints, allowed: {len(self.robot.coordinates)}"
+            yield f"{joints} joints", f"{len(self.robot.coordinates)}"
         for what, (values, allowed) in shapes.items():
             if values is not None and values.shape != allowed:
-                yield f"found {what} of shape {values.shape}, allowed: {allowed}"
+                yield f"{what} of shape {values.shape}", f"{allowed}"
         if self.t_ns is not None and (np.diff(self.t_ns) <= 0).any():
-            yield "found times that do not rise, allowed: rising times"
+            yield "times that do not rise", "rising times"
 
     def __len__(self) -> int:
         return len(self.row)

@@ -80,13 +80,13 @@ def near_singular_warnings(
         yield LogWarning("near-singular", said)
 
 
-def start_warnings(chain: Chain, start: FloatArray | None, given_by: str = "start") -> Iterator[LogWarning]:
+def start_warnings(chain: Chain, start: FloatArray | None, parameter: str = "start") -> Iterator[LogWarning]:
     """Yield a warning of a pose that is hardly in rad.
 
     Args:
         chain: The arm.
         start: The pose in [rad] or [m], shape (joints,).
-        given_by: The keyword that gave it.
+        parameter: The keyword by which it was given.
     """
     if start is None:
         return
@@ -96,8 +96,9 @@ def start_warnings(chain: Chain, start: FloatArray | None, given_by: str = "star
         if joint.kind == "revolute" and abs(value) > MANY_TURNS
     ]
     if found:
-        said = f"found {', '.join(found)}: in deg? Allowed: rad"
-        yield LogWarning("start-unit", said, parameter=given_by)
+        said = "these values look like degrees"
+        told = ", ".join(found)
+        yield LogWarning("start-unit", said, parameter=parameter, found=told, allowed="rad")
 
 
 def within_pi_warnings(chain: Chain, q: FloatArray) -> Iterator[LogWarning]:
@@ -120,13 +121,15 @@ def shortfall_warnings(solutions: Solutions, row: IntArray) -> Iterator[LogWarni
     if short.any():
         worst = int(np.argmax(short))
         said = (
-            f"{rows_text(row[short > 0.0])}: out of reach, the nearest point within tolerance is taken: up"
-            f" to {1e3 * short[worst]:.4g} mm away, in row {row[worst]}"
+            f"{rows_text(row[short > 0.0])}: out of reach, the nearest point within the tolerance is taken:"
+            f" up to {1e3 * short[worst]:.4g} mm away, in row {row[worst]}"
         )
         yield LogWarning("nearest-point", said)
 
 
-def far_warnings(chain: Chain, targets: Targets, row: IntArray, reached: BoolArray) -> Iterator[LogWarning]:
+def far_warnings(
+    chain: Chain, targets: Targets, row: IntArray, reached: BoolArray, *, of_file: bool
+) -> Iterator[LogWarning]:
     """Yield a warning of targets that are far out of reach, and would not be if they were in mm.
 
     Args:
@@ -134,6 +137,7 @@ def far_warnings(chain: Chain, targets: Targets, row: IntArray, reached: BoolArr
         targets: What was asked for.
         row: Data row of each, shape (n,).
         reached: True of those that have a solution, shape (n,).
+        of_file: Whether a file holds them, of which one may say the unit.
     """
     reach = longest(chain)
     away = np.linalg.norm(targets.position - np.asarray(chain.base.translation, dtype=float), axis=1)
@@ -144,7 +148,8 @@ def far_warnings(chain: Chain, targets: Targets, row: IntArray, reached: BoolArr
             f"{rows_text(row[far])}: up to {away[far].max():.6g} m from the base, while {chain.name} reaches"
             f" no farther than {reach:.4g} m: in mm?"
         )
-        yield LogWarning("too-far", said, hints=(Hint("unit", {"": "mm"}, "reads a file so"),))
+        hints = (Hint("unit", {"": "mm"}, "reads the file so"),) if of_file else ()
+        yield LogWarning("too-far", said, allowed="m", hints=hints)
 
 
 def longest(chain: Chain) -> float:

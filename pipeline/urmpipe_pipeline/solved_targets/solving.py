@@ -159,7 +159,8 @@ def _far(request: Request, reached: BoolArray) -> Iterator[LogWarning]:
     """Yield a warning of targets that may be in mm, unless their file has one already."""
     given = request.given
     if not any(warning.kind == "assumed-unit" for warning in given.warnings):
-        yield from far_warnings(request.arm, given.targets, given.row, reached)
+        of_file = given.file is not None
+        yield from far_warnings(request.arm, given.targets, given.row, reached, of_file=of_file)
 
 
 def _with_faults(reasons: TextArray, faults: Sequence[str]) -> TextArray:

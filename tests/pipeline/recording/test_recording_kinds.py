@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
-from recording_contents import times_of
+from recorded import times_of
 from same_results import assert_same
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
 from urmpipe_pipeline import results

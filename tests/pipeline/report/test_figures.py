@@ -260,10 +260,10 @@ def test_rows_without_times_are_points_that_nothing_joins() -> None:
     found = drawn(figure(panel(WAVE[:5], t_ns=None), instants={3: "here"}))
     (points,) = found.spec["data"]
     assert points["mode"] == "markers"
-    np.testing.assert_array_equal(numbers(points["x"]), np.arange(5.0))
-    assert found.spec["layout"]["xaxis"]["title"]["text"] == "row, the first is 0"
+    np.testing.assert_array_equal(numbers(points["x"]), np.arange(1.0, 6.0))
+    assert found.spec["layout"]["xaxis"]["title"]["text"] == "row"
     assert found.over == "row"
-    assert found.spec["layout"]["shapes"][0]["x0"] == 3
+    assert found.spec["layout"]["shapes"][0]["x0"] == 4
 
 
 def test_panels_of_other_axes_become_figures_of_their_own() -> None:

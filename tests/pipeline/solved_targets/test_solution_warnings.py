@@ -96,7 +96,8 @@ def test_the_nearest_point_tells_how_far_it_is_from_the_target() -> None:
     assert list(shortfall_warnings(found, np.array([1, 4, 5]))) == [
         LogWarning(
             "nearest-point",
-            "row 4: out of reach, the nearest point is taken (--tolerance): up to 2.1 mm away, in row 4",
+            "row 4: out of reach, the nearest point within the tolerance is taken: up to 2.1 mm away,"
+            " in row 4",
         )
     ]
     assert not list(shortfall_warnings(solutions(), np.array([1, 4, 5])))
@@ -106,12 +107,15 @@ def test_targets_in_mm_are_told_from_those_out_of_reach() -> None:
     arm = load_robot("arm6")
     position = np.array([[-69.0, 0.0, 112.0], [0.9, 0.0, 0.0], [np.nan, 0.0, 0.0], [-0.069, 0.0, 0.112]])
     reached = np.array([False, False, False, True])
-    (found,) = far_warnings(arm, Targets(position), np.arange(1, 5), reached)
-    assert found.kind == "too-far"
+    (found,) = far_warnings(arm, Targets(position), np.arange(1, 5), reached, of_file=True)
+    assert (found.kind, found.allowed) == ("too-far", "m")
     assert found.message == (
-        "row 1: up to 131.548 m from the base, while arm6 reaches no farther than 0.4001 m:"
-        " in mm? Allowed: m, or of a file --unit mm"
+        "row 1: up to 131.548 m from the base, while arm6 reaches no farther than 0.4001 m: in mm?"
     )
+    (hint,) = found.hints
+    assert (hint.parameter, hint.value) == ("unit", {"": "mm"})
+    (of_arrays,) = far_warnings(arm, Targets(position), np.arange(1, 5), reached, of_file=False)
+    assert of_arrays == replace(found, hints=())
 
 
 @pytest.mark.parametrize("name", ["arm6", "articulated6r", "panda", "ur5e", "urm6"])
@@ -152,7 +156,10 @@ def test_a_start_in_degrees_is_told_of() -> None:
     assert list(start_warnings(arm, np.array([0.0, 45.0, -90.0, 3.0, 0.0, 0.0]))) == [
         LogWarning(
             "start-unit",
-            "--start: found phi2 = 45 rad (2578.31 deg), phi3 = -90 rad (-5156.62 deg): in deg? Allowed: rad",
+            "these values look like degrees",
+            parameter="start",
+            found="phi2 = 45 rad (2578.31 deg), phi3 = -90 rad (-5156.62 deg)",
+            allowed="rad",
         )
     ]
 
@@ -166,8 +173,8 @@ def test_a_joint_with_limits_that_within_pi_leaves_beyond_pi_is_told_of() -> Non
     assert list(within_pi_warnings(limited, q)) == [
         LogWarning(
             "beyond-pi",
-            "--within-pi: wrist_3_joint goes to 200.535 deg: it is for joints without limits; a joint with"
-            " limits stays",
+            "wrist_3_joint goes to 200.535 deg: it is for joints without limits; a joint with limits stays",
+            parameter="within_pi",
         )
     ]
     assert not list(within_pi_warnings(limited, np.clip(q, -np.pi, np.pi)))

@@ -258,12 +258,12 @@ def _draw_targets(stream: RecordingStream, targets: DrawnTargets, size: float) -
 
 
 def _missed(targets: DrawnTargets, size: float) -> Points3D:
-    """Return the targets that are not reached: few with their reasons, many as a thin line."""
+    """Return the targets that are not reached: few with their reasons, many smaller."""
     import rerun as rr
 
     few = len(targets.missed) <= LABELLED
     labels = list(map(encodable, targets.reasons))
-    radii, colours = [(MISSED if few else ASKED) * size], [rgb(DEVIATION_COLOUR)]
+    radii, colours = [(MISSED if few else TARGET) * size], [rgb(DEVIATION_COLOUR)]
     return rr.Points3D(targets.missed, colors=colours, radii=radii, labels=labels, show_labels=few)
 
 

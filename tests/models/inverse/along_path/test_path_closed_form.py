@@ -340,7 +340,7 @@ def test_all_that_is_wrong_with_the_options_is_told_at_once() -> None:
         "t_ns: found 5 ns at sample 2 after 5 ns, allowed: times that rise",
         "start: found [0., 0., 0., 0., 0.], allowed: 6 finite numbers, in rad or m, one each of"
         f" {', '.join(arm.coordinates)}",
-        *search.faults(),
+        *map(str, search.faults()),
     ]
     with pytest.raises(
         OptionError, match=r"t_ns: found float64 of shape \(2,\), allowed: integer ns of shape \(3,\)"
