@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from made_runs import off
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_models.transform import translation
@@ -32,11 +33,6 @@ Compared = Callable[..., Comparison]
 
 ROUNDING = 1e-15
 """Positions of 1 m round at 2e-16 m, and are taken apart twice."""
-
-
-def off(x: float, samples: int = 100) -> FloatArray:
-    """A deviation that grows from 0 to x along x."""
-    return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
 
 
 def test_the_same_comparison_did_not_change(arms: Compared) -> None:

@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from made_runs import off
 from presented import Untouched, cells, every_section, facts, figures
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
@@ -23,11 +24,6 @@ from urmpipe_pipeline.presentation.section import Check, Place, Ref, Section
 from urmpipe_pipeline.results import present
 
 Compared = Callable[..., Comparison]
-
-
-def off(x: float, samples: int = 100) -> FloatArray:
-    """A deviation that grows from 0 to x along x."""
-    return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
 
 
 def noisy(seed: int, size: float = 0.001, samples: int = 60) -> FloatArray:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray
+from made_runs import off
 from urmpipe_models.errors import Finding, LogError, OutputError
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -22,11 +22,6 @@ from urmpipe_pipeline.results import present
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 
 Compared = Callable[..., Comparison]
-
-
-def off(x: float, samples: int = 100) -> FloatArray:
-    """A deviation that grows from 0 to x along x."""
-    return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
 
 
 def written(result: Comparison, path: Path) -> ET.Element:
