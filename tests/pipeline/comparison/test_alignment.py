@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from asserting import there
 from made_runs import path_run, run_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import LogError
@@ -59,8 +60,7 @@ def test_a_motion_that_stands_elsewhere_is_brought_back(mode: AlignMode) -> None
     log = path_run(before, (FRAME * turn).as_quat(), name="log")
     found = aligned(path_run(position, turn.as_quat()), log, mode)
     np.testing.assert_allclose(found.actual, position, atol=ROUNDING)
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, 0.0, atol=ROUNDING)
+    np.testing.assert_allclose(there(found.angle), 0.0, atol=ROUNDING)
     assert found.alignment.mode == mode
     assert found.alignment.angle == pytest.approx(FRAME.magnitude(), abs=ROUNDING)
     assert found.alignment.tool == (0.0, 0.0, 0.0)
@@ -97,8 +97,7 @@ def test_start_goes_by_the_first_pose_that_both_sides_have() -> None:
     )
     assert len(found.sample) == 200
     np.testing.assert_allclose(found.actual, position, atol=ROUNDING)
-    assert found.angle is not None
-    assert np.isnan(found.angle).tolist() == [True] * 7 + [False] * 193
+    assert np.isnan(there(found.angle)).tolist() == [True] * 7 + [False] * 193
     assert found.statistics["angle"].sample_max >= 7
 
 
@@ -244,8 +243,7 @@ def test_the_tool_that_is_advised_takes_the_deviation_away(own: tuple[float, ...
     run = arm_run(recorded_with, from_offset(own) if own else None)
     found = compare_recorded(run, CompareOptions(align="tool")).runs[0]
     assert found.statistics["norm"].max < ROUNDING
-    assert run.robot is not None
-    advised = tool_with(run.robot, found.alignment)
+    advised = tool_with(there(run.robot), found.alignment)
     np.testing.assert_allclose(advised, (0.02, -0.01, 0.17, *own[3:]), atol=ROUNDING)
     told = arm_run(recorded_with, from_offset(advised))
     assert compare_recorded(told).runs[0].statistics["norm"].max < ROUNDING
@@ -254,11 +252,9 @@ def test_the_tool_that_is_advised_takes_the_deviation_away(own: tuple[float, ...
 def test_one_log_alone_has_an_angle_between_kinematics_and_record() -> None:
     run = arm_run(from_rpy(0.0, 0.0, 0.25))
     found = compare_recorded(run).runs[0]
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, 0.25, atol=ROUNDING)
+    np.testing.assert_allclose(there(found.angle), 0.25, atol=ROUNDING)
     start = compare_recorded(run, CompareOptions(align="start")).runs[0]
-    assert start.angle is not None
-    assert (start.angle[0], start.delta[0, 3]) == pytest.approx((0.0, 0.0), abs=ROUNDING)
+    assert (there(start.angle)[0], start.delta[0, 3]) == pytest.approx((0.0, 0.0), abs=ROUNDING)
     assert start.alignment.angle == pytest.approx(0.25, abs=ROUNDING)
 
 
@@ -275,5 +271,4 @@ def test_orientations_turn_with_the_log() -> None:
         FRAME.apply(position), turn.as_quat(), name="log"
     )  # turned in place only, not in orientation
     found = aligned(path_run(position, turn.as_quat()), log, "rigid")
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, FRAME.magnitude(), atol=ROUNDING)
+    np.testing.assert_allclose(there(found.angle), FRAME.magnitude(), atol=ROUNDING)

@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from asserting import there
 from made_runs import off
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import OptionError
@@ -205,8 +206,7 @@ def test_samples_left_out_between_others_are_lost_time(paths: Compared) -> None:
 def test_another_base_and_another_tool_are_told(arms: Compared) -> None:
     before = arms({"a": np.zeros((20, 6))})
     run = before.runs[0]
-    assert run.run.robot is not None
-    robot = run.run.robot.placed(base=translation(0.0, 0.0, 1.0), tool=translation(0.0, 0.0, 0.12))
+    robot = there(run.run.robot).placed(base=translation(0.0, 0.0, 1.0), tool=translation(0.0, 0.0, 0.12))
     now = replace(before, runs=(replace(run, run=replace(run.run, robot=robot)),))
     assert against_baseline(now, before).differences == (
         Difference("base of a", [0.0] * 6, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),

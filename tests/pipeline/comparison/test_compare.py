@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import there
 from made_runs import TSP, URM6, path_run, run_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.visual import Mesh, Visual
@@ -119,8 +120,7 @@ def test_an_estimate_that_is_not_certain_is_told(q: FloatArray) -> None:
     rng = np.random.default_rng(3)
     wanted = path_run(positions_over_log(URM6, q) + rng.normal(scale=0.011, size=(500, 3)))
     result = compare_runs(wanted, [run_of(q)], CompareOptions(sync="auto"))
-    precision = result.runs[0].sync.precision
-    assert precision is not None
+    precision = there(result.runs[0].sync.precision)
     assert precision > 0.1 * TSP
     said = [one.message for one in result.warnings if one.kind == "sync-uncertain"]
     assert len(said) == 1

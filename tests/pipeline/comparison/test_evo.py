@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from asserting import there
 from exported import export_result
 from made_runs import path_run
 from urmpipe_models.arrays import FloatArray
@@ -52,15 +53,13 @@ def evo_errors(
 
 
 def as_evo(run: Run) -> PoseTrajectory3D:
-    assert run.log.tcp_rotation is not None
-    return PoseTrajectory3D(run.log.tcp_position, run.log.tcp_rotation[:, [3, 0, 1, 2]], run.t)
+    return PoseTrajectory3D(run.log.tcp_position, there(run.log.tcp_rotation)[:, [3, 0, 1, 2]], run.t)
 
 
 def assert_agree(deviation: Deviation, reference: Run, log: Run, align: AlignMode) -> None:
     distance, angle = evo_errors(as_evo(reference), as_evo(log), align)
     np.testing.assert_allclose(deviation.delta[:, 3], distance, rtol=0, atol=METRES)
-    assert deviation.angle is not None
-    np.testing.assert_allclose(deviation.angle, angle, rtol=0, atol=RADIANS)
+    np.testing.assert_allclose(there(deviation.angle), angle, rtol=0, atol=RADIANS)
     assert deviation.statistics["norm"].rms == pytest.approx(np.sqrt(np.mean(distance**2)), abs=METRES)
 
 
@@ -116,5 +115,4 @@ def test_what_is_exported_gives_evo_the_same_errors(
     first, second = (read_tum_trajectory_file(file) for file in files)
     distance, angle = evo_errors(first, second, align)
     np.testing.assert_allclose(deviation.delta[:, 3], distance, rtol=0, atol=METRES)
-    assert deviation.angle is not None
-    np.testing.assert_allclose(deviation.angle, angle, rtol=0, atol=RADIANS)
+    np.testing.assert_allclose(there(deviation.angle), angle, rtol=0, atol=RADIANS)

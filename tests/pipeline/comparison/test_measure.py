@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
+from asserting import there
 from made_runs import path_run, run_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
@@ -60,8 +61,7 @@ def held(reference: Run, log: Run, **tolerance: float) -> Deviation:
 def test_joints_are_held_against_each_other_in_their_units() -> None:
     off = np.array([0.01, -0.02, 0.003])
     found = held(arm_run(joints() + off, NAMES), arm_run(joints(), NAMES))
-    assert found.joint_delta is not None
-    np.testing.assert_allclose(found.joint_delta, np.tile(off, (300, 1)), atol=1e-15)
+    np.testing.assert_allclose(there(found.joint_delta), np.tile(off, (300, 1)), atol=1e-15)
     units = {name: one.unit for name, one in found.joint_statistics.items()}
     assert units == {"a": "rad", "b": "rad", "s": "m"}
     assert found.joint_turns == (0, 0, 0)
@@ -70,11 +70,9 @@ def test_joints_are_held_against_each_other_in_their_units() -> None:
 def test_joints_of_the_same_names_are_matched_by_name_and_others_by_place() -> None:
     q = joints()[:, [0, 1, 0]]
     by_name = held(arm_run(q[:, [1, 0, 2]], ("b", "a", "c"), "rrr"), arm_run(q, ("a", "b", "c"), "rrr"))
-    assert by_name.joint_delta is not None
-    assert np.abs(by_name.joint_delta).max() == 0.0
+    assert np.abs(there(by_name.joint_delta)).max() == 0.0
     by_place = held(arm_run(q, ("x", "y", "z"), "rrr"), arm_run(q, ("a", "b", "c"), "rrr"))
-    assert by_place.joint_delta is not None
-    assert np.abs(by_place.joint_delta).max() == 0.0
+    assert np.abs(there(by_place.joint_delta)).max() == 0.0
     assert list(by_place.joint_statistics) == ["a", "b", "c"]
 
 
@@ -82,8 +80,7 @@ def test_turns_counted_apart_at_the_start_are_no_deviation() -> None:
     off = np.array([TURN + 0.01, -3 * TURN - 0.02, 0.0])
     found = held(arm_run(joints() + off, NAMES), arm_run(joints(), NAMES))
     assert found.joint_turns == (1, -3, 0)
-    assert found.joint_delta is not None
-    np.testing.assert_allclose(found.joint_delta[:, :2], [[0.01, -0.02]] * 300, atol=1e-14)
+    np.testing.assert_allclose(there(found.joint_delta)[:, :2], [[0.01, -0.02]] * 300, atol=1e-14)
 
 
 def test_a_start_beside_half_a_turn_is_counted_to_the_near_side() -> None:
@@ -192,8 +189,7 @@ def test_the_angle_is_that_between_recorded_orientations_of_any_form(form: Rotat
         path_run(position, rotation.as_quat(), "quat_xyzw"),
         path_run(position, recorded(turned, way), form, name="log"),
     )
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, 0.5, atol=1e-14)  # some tens of rounding errors
+    np.testing.assert_allclose(there(found.angle), 0.5, atol=1e-14)  # some tens of rounding errors
     assert (found.statistics["angle"].unit, found.statistics["angle"].kind) == ("rad", "angle")
 
 
@@ -207,8 +203,7 @@ def test_the_reference_turns_on_the_great_arc_between_its_samples() -> None:
         path_run(position, rotation.as_quat(), "quat_xyzw", tsp=0.02),
         path_run(at, wanted.as_quat(), "quat_xyzw", name="log"),
     )
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, 0.0, atol=1e-14)
+    np.testing.assert_allclose(there(found.angle), 0.0, atol=1e-14)
     assert found.statistics["norm"].max < 1e-14
 
 
@@ -221,8 +216,7 @@ def test_missing_orientations_leave_the_angle_open_between_their_neighbours() ->
     )
     log = path_run(at, np.tile([0.0, 0, 0, 1], (39, 1)), "quat_xyzw", name="log")
     found = held(path_run(position, quat, "quat_xyzw", tsp=0.01), log, angle=4.0)
-    assert found.angle is not None
-    assert np.flatnonzero(np.isnan(found.angle)).tolist() == [9, 10, 11]  # 4.5, 5 and 5.5
+    assert np.flatnonzero(np.isnan(there(found.angle))).tolist() == [9, 10, 11]  # 4.5, 5 and 5.5
     assert len(found.sample) == 39
     angle = found.statistics["angle"]
     assert (angle.verdict, angle.samples, angle.missing, angle.out_of_tolerance) == ("fail", 36, 3, 3)
@@ -328,8 +322,7 @@ def demo() -> Comparison:
 def test_a_log_that_is_late_deviates_as_fast_as_it_moves(demo: Comparison) -> None:
     """Fig. 9b of [UrmArm2021]_: the norm is largest where the effector is fastest."""
     matlab = demo.runs[0]
-    assert matlab.speed_correlation is not None
-    assert matlab.speed_correlation > 0.9999
+    assert there(matlab.speed_correlation) > 0.9999
     assert matlab.speed[matlab.worst] > 0.999 * matlab.speed.max()
 
 
