@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, is_dataclass
 from typing import Any
 
@@ -31,8 +31,8 @@ def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
 
 
 def _parts(whole: Any) -> dict[Any, Any] | None:
-    """Return what stands in a dataclass, a mapping or a tuple by its name, key or place; None of anything else."""
-    if is_dataclass(whole) and not isinstance(whole, type):  # its recording says where it stands: no part of it
+    """Return the parts of a dataclass, a mapping or a tuple by name, key or place; None of anything else."""
+    if is_dataclass(whole) and not isinstance(whole, type):  # `recording` says where it stands: no part of it
         return {each.name: getattr(whole, each.name) for each in fields(whole) if each.name != "recording"}
     if isinstance(whole, Mapping):
         return dict(whole)
