@@ -95,7 +95,8 @@ class Message:
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return its fields for JSON, with the sentence as `message`."""
-        return asdict(self) | {"message": self.sentence(voice)}  # type: ignore[call-overload, no-any-return]
+        told: dict[str, Any] = asdict(self)  # type: ignore[call-overload]
+        return told | {"message": self.sentence(voice), "hints": list(told["hints"])}
 
 
 @dataclass(frozen=True, slots=True)

@@ -140,7 +140,7 @@ def _in_file(parameter: str, value: Any) -> str:
     key = IN_FILE[parameter]
     if not isinstance(value, Mapping):
         return f"{key} = {_in_toml(value)}"
-    paths = (key + (f".{name if name.isidentifier() else _quoted(name)}" if name else "") for name in value)
+    paths = (f"{key}.{name if name.isidentifier() else _quoted(name)}" for name in value)
     return ", ".join(f"{path} = {_in_toml(one)}" for path, one in zip(paths, value.values(), strict=True))
 
 

@@ -69,7 +69,9 @@ class Inference:
 
     def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
         """Return its fields for JSON, and `otherwise`."""
-        return asdict(self) | {"otherwise": self.otherwise(voice)}
+        told = asdict(self)
+        lists = {name: list(told[name]) for name in ("columns", "hints")}
+        return told | lists | {"otherwise": self.otherwise(voice)}
 
     def otherwise(self, voice: Voice = "python") -> str:
         """Return how to have it otherwise; empty where it cannot be."""

@@ -12,7 +12,6 @@ import numpy as np
 import pytest
 
 import urmpipe as package
-from urmpipe_pipeline.sources import ReadOptions
 
 RunCommand = Callable[..., Any]
 HEADER = ["joint", "row", "t", "kind", "step", "from", "to"]
@@ -90,8 +89,8 @@ def test_repair_and_interval_reach_the_repolarizer(urmpipe: RunCommand, log: Pat
     outside = urmpipe("ingest", log, "--interval", "q2=-90:90")
     assert outside.code == 2
     assert outside.err == (
-        "error: log.csv, column q2: found 40 values outside, first 100 deg in row 21, allowed: -90..90 deg"
-        " (--interval)\n"
+        "error: log.csv, row 21, column q2: --interval: found 40 values outside, first 100 deg in row"
+        " 21, allowed: -90..90 deg\n"
     )
 
 
@@ -103,8 +102,7 @@ def test_an_interval_that_is_none_is_a_usage_error(urmpipe: RunCommand, log: Pat
 
 
 def test_the_options_hold_in_python(log: Path, tmp_path: Path) -> None:
-    read = ReadOptions(repair=True, interval={"q1": (-180.0, 180.0)})
-    run = package.ingest(log, read=read, audit=tmp_path / "a.csv")
+    run = package.ingest(log, repair=True, interval={"q1": (-180.0, 180.0)}, audit=tmp_path / "a.csv")
     assert [one.kind for one in run.audit] == ["unexplained", "repaired", "wrap", "ambiguous"]
     assert run.recording is None
     assert (tmp_path / "a.csv").read_text().count("\n") == 5

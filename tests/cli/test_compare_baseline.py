@@ -118,26 +118,27 @@ def test_how_a_comparison_is_made_is_refused_for_one_that_is(capsys: Captured) -
     )
     assert run(["compare", "a.rrd"]) == 2
     assert said(capsys) == (
-        "error: a.rrd: found the recording of a comparison, allowed: one that ingest wrote; to hold it"
-        " against another comparison, give it alone, with --baseline OTHER.rrd"
+        "error: a.rrd: found the recording of a comparison, allowed: one that ingest wrote; --baseline"
+        " RUN.rrd compares it, alone, with an earlier one"
     )
 
 
 def test_a_baseline_is_the_recording_of_a_comparison(capsys: Captured) -> None:
     assert run(["ingest", "good.csv", "--robot", "ur5e", "-q"]) == 0
     for baseline, found in (
-        ("good.rrd", "found a recording (run), allowed: that of a comparison (--baseline)"),
+        ("good.rrd", "--baseline: found a recording (run), allowed: that of a comparison"),
         ("good.csv", "found no recording of urmpipe, allowed: a .rrd that ingest, compare or simulate wrote"),
         (
             "missing.rrd",
-            "found no such file, allowed: the recording of an earlier comparison; before there is one:"
-            " without --baseline",
+            "--baseline: found no such file, allowed: the recording of an earlier comparison",
         ),
     ):
         assert compare("good.csv", "--baseline", baseline, "-q") == 2
         assert said(capsys) == f"error: {baseline}: {found}"
     assert compare("good.csv", "--noise", "1um", "-q") == 2
-    assert said(capsys) == "error: --noise: found without --baseline, allowed: with an earlier comparison"
+    assert said(capsys) == (
+        "error: --noise: found no baseline, allowed: with an earlier comparison; --baseline RUN.rrd names one"
+    )
     assert compare("good.csv", "--baseline", "good.rrd", "--noise", "-1", "-q") == 2
     assert said(capsys) == f"error: --noise: found '-1', {ALLOWED}"
 

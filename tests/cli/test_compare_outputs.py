@@ -214,7 +214,7 @@ def test_an_offset_of_clocks_may_have_its_unit(offset: str) -> None:
 
 def test_results_are_operands_of_the_function() -> None:
     before = urmpipe.compare("wanted.csv", ["good.csv"], robot="ur5e")
-    now = urmpipe.compare(before, baseline=before, noise=0.0, junit="v.xml", statistics="v.csv")
+    now = urmpipe.compare(before, baseline=before, noise=0.0, junit="v.xml", csv="v.csv")
     assert now.verdict == "pass"
     assert now.baseline is not None
     assert (now.baseline.worse, now.baseline.noise["axis"]) == ((), 0.0)
@@ -266,7 +266,7 @@ def test_all_that_is_wrong_with_any_log_is_told_at_once(capsys: Captured) -> Non
     assert compare("still.csv", "good.csv", "rest.csv", "--sync", "auto") == 2
     errors = [line for line in capsys.readouterr().err.splitlines() if line.startswith("error: ")]
     assert [line.split(":")[1] for line in errors] == [" still.csv", " rest.csv"]
-    assert all("--sync auto: found no motion of the joints in this log" in line for line in errors)
+    assert all("--sync: auto: found no motion of the joints in this log" in line for line in errors)
 
 
 def test_strict_names_the_log_of_each_warning(capsys: Captured) -> None:
@@ -274,7 +274,8 @@ def test_strict_names_the_log_of_each_warning(capsys: Captured) -> None:
         lines = Path(f"{name}.csv").read_text().splitlines()
         Path(f"{name}.csv").write_text("\n".join([lines[0].replace(" [rad]", ""), *lines[1:]]))
     assert compare("good.csv", "slack.csv", "--strict") == 2
-    said = "no unit is given for q1, q2, q3, q4, q5, q6: the joints are taken as rad; --unit says otherwise"
+    said = "no unit is given for q1, q2, q3, q4, q5, q6: the joints are taken as rad; --unit deg"
     assert capsys.readouterr().err.splitlines() == [
-        f"error: assumed-unit: {name}: {said} (--strict)" for name in ("good", "slack")
+        "error: --strict: found 2 warnings, allowed: none",
+        *(f"error: {name}: {said} reads them otherwise" for name in ("good", "slack")),
     ]

@@ -110,7 +110,7 @@ def test_explain_prints_alternatives_and_writes_nothing(lab: Path, capsys: Captu
     assert run([*INGEST, "--explain"]) == 0
     out = capsys.readouterr().out
     assert "Otherwise" in out
-    assert "--delimiter CHAR" in out
+    assert "--delimiter SIGN" in out
     assert sorted(path.name for path in Path.cwd().iterdir()) == ["log.csv"]
 
 
@@ -194,7 +194,7 @@ def test_all_outputs_are_written_or_none(lab: Path, capsys: Captured) -> None:
     assert run([*INGEST, "--audit", "a.csv", "--write-map", "./a.csv"]) == 2
     assert capsys.readouterr().err == "error: found a.csv as audit and as map; allowed: a name for each\n"
     assert run([*INGEST, "--explain", "-o", "a.rrd"]) == 2
-    assert "-o: found a.rrd with --explain" in capsys.readouterr().err
+    assert "--output: found a.rrd with explain" in capsys.readouterr().err
     assert run([*INGEST, "--audit", "a.csv", "--write-map", "m.toml"]) == 0
     assert "Audit: a.csv  (0 lines)" in capsys.readouterr().out
     assert sorted(path.name for path in Path.cwd().iterdir()) == ["a.csv", "log.csv", "log.rrd", "m.toml"]

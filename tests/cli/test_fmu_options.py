@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from urmpipe.options.named import option_value
-from urmpipe.systems.log_tables import read_table
+from urmpipe.systems.log_tables import read_mapped_table, read_table
 from urmpipe.systems.units import unit_of
 from urmpipe_datasets import LOGS
 from urmpipe_fmus.units import unit_names
@@ -94,16 +94,16 @@ def test_a_row_without_a_value_is_an_error(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,q1,q2\n0,1,2\n1,,2\n2,1,2\n", encoding="utf-8")
     assert refusal("log_source", log=path) == [
-        f"{path}, column q[1]: found 1 row without a value, allowed: one in every row"
+        f"{path}, row 2, column q[1]: found 1 row without a value, allowed: one in every row"
     ]
 
 
 def test_a_unit_says_what_it_lacks() -> None:
     assert refusal("kinematic_chain") == [
-        "unit kinematic_chain: found no robot, allowed: --robot NAME|FILE, in a system file robot = ..."
+        "unit kinematic_chain: found no robot; robot=NAME|FILE gives one, in a system file robot = ..."
     ]
     assert refusal("log_source") == [
-        "unit log_source: found no log, allowed: --log LOG, in a system file log = ..."
+        "unit log_source: found no log; log=LOG gives one, in a system file log = ..."
     ]
     assert refusal("repolarizer") == [
         "unit repolarizer: option joints: not found, it needs the number of joints, such as 6"
@@ -148,7 +148,7 @@ def test_a_chain_is_taken_as_a_robot() -> None:
         (("delta_meter", "--platforms", "linux64,amiga"), "found amiga, allowed: linux64, win64"),
         (("log_source", "--log", "missing.csv"), "missing.csv: found no such file"),
         (("missing.py",), "missing.py"),
-        (("delta_meter", "--map", "lab.toml"), "--map: found without a log, allowed: with --log LOG"),
+        (("delta_meter", "--map", "lab.toml"), "--log-map: found without a log; --log LOG names one"),
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_is_written(
@@ -161,16 +161,16 @@ def test_what_is_wrong_is_one_line_and_nothing_is_written(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_options_of_ingest_are_told_with_the_way_to_a_unit(tmp_path: Path) -> None:
+def test_a_unit_is_told_what_a_map_says_of_its_log(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("t,q1,q2\n0,1,2\n1,1.1,2.1\n", encoding="utf-8")
-    warning = next(one for one in read_table(path).warnings if "--unit" in one.message)
-    way = (
-        "(an option of urmpipe ingest, kept by its --write-map FILE for --map FILE, in a system for"
-        ' map = "FILE")'
+    *_, warning = (one for one in read_mapped_table(path).warnings if one.kind == "assumed-unit")
+    assert warning.words("command line").endswith(
+        '; --log-map FILE.toml with units."" = "deg" reads them otherwise'
     )
-    assert warning.message.endswith(f"; --unit says otherwise {way}")
     path.write_text("time,q1,q2\n0,1,2\n1000,1,2\n2000,1,2\n", encoding="utf-8")
     (said,) = refusal("log_source", log=path)
-    assert "say which with --unit" in said
-    assert said.endswith(way)
+    assert '; log_map=FILE.toml with units.time = "ms" says which' in said
+    (tmp_path / "lab.toml").write_text('[units]\ntime = "ms"\n', encoding="utf-8")
+    table = read_mapped_table(path, log_map=tmp_path / "lab.toml").table
+    assert table.t_ns.tolist() == [0, 10**9, 2 * 10**9]

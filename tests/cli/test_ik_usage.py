@@ -67,9 +67,7 @@ def test_without_a_robot(capsys: Captured) -> None:
 
 def test_a_tool_without_a_robot(capsys: Captured) -> None:
     (said,) = refused(capsys, "targets.csv", "--tool", "0,0,0.1")
-    assert said == (
-        "error: --tool: found without a robot; --robot NAME|FILE gives one"
-    )
+    assert said == ("error: --tool: found without a robot; --robot NAME|FILE gives one")
 
 
 def test_all_that_is_wrong_is_told_at_once(capsys: Captured) -> None:

@@ -6,6 +6,7 @@ import json
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
+from dataclasses import fields
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -18,6 +19,7 @@ from hypothesis import strategies as st
 
 from urmpipe.main import COMMANDS, cli, run
 from urmpipe.options.types import OffsetType
+from urmpipe_models.errors import Finding
 
 RunCommand = Callable[..., Any]
 """What the fixture `urmpipe` gives: arguments in; exit code, standard output and standard error out."""
@@ -146,7 +148,7 @@ def test_an_error_is_one_line_and_json_if_asked_for(urmpipe: RunCommand) -> None
     assert ran.code == 2
     answer = json.loads(ran.out)
     assert answer["schema"] == 1
-    assert answer["errors"][0].keys() == {"file", "line", "row", "column", "message"}
+    assert answer["errors"][0].keys() == {one.name for one in fields(Finding)}
     assert answer["errors"][0]["file"] == "missing.csv"
 
 

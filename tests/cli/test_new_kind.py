@@ -16,7 +16,7 @@ import pytest
 from rerun.chunk import RrdReader
 
 import urmpipe
-from recording_contents import columns, views
+from recorded import columns, views
 from same_results import assert_same
 from urmpipe.printing.presentation import print_presentation
 from urmpipe.printing.terminal import print_json

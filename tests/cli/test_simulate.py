@@ -197,8 +197,8 @@ def test_the_list_has_the_shipped_systems_with_their_arguments(urmpipe: RunComma
         ),
         (
             ("one-drive", "--write-system", "mine.toml", "--step", "1ms", "--set", "C=2", "-o", "run.rrd"),
-            "error: --write-system: found with --output, --set, --step, allowed: alone, as nothing is run;"
-            " change the file",
+            "error: --step: found beside a system that is written, allowed: with a system that is run; change"
+            " the file",
         ),
         (("log-to-delta", "--step", "nan"), "found 'nan', allowed: a positive time in s"),
         (("log-to-delta", "-o", "missing/run.rrd"), "found no folder missing, allowed: a folder that exists"),

@@ -15,7 +15,7 @@ from urmpipe_pipeline.joint_log import LogWarning
     ("hint", "option", "keyword", "key"),
     [
         (Hint("unit", {"q1": "deg"}), "--unit q1=deg", 'unit={"q1": "deg"}', 'units.q1 = "deg"'),
-        (Hint("unit", {"": "deg"}), "--unit deg", 'unit="deg"', 'units = "deg"'),
+        (Hint("unit", {"": "deg"}), "--unit deg", 'unit="deg"', 'units."" = "deg"'),
         (
             Hint("unit", {"q1": "deg", "a b": "mm"}),
             "--unit q1=deg --unit 'a b=mm'",
@@ -81,7 +81,7 @@ def test_what_hints_do_is_told_once_and_no_file_tells_what_it_cannot_say(voice: 
 
 def test_the_subject_is_spelled_as_who_reads_it_writes_it() -> None:
     found = Finding(parameter="base_link", found="'a'", allowed="b")
-    assert found.words("command line") == "base_link: found 'a', allowed: b"
+    assert found.words("command line") == "--base-link: found 'a', allowed: b"
     assert str(found) == "base_link: found 'a', allowed: b"
     assert Finding("a", parameter="time").words("system file") == "clock.column: a"
 

@@ -217,7 +217,7 @@ def _earlier(baseline: PathLike | Comparison) -> Comparison:
     path = Path(baseline)
     if not path.exists():
         said = "found no such file, allowed: the recording of an earlier comparison"
-        raise RecordingError(Finding(f"{said}; before there is one, none", str(path), parameter="baseline"))
+        raise RecordingError(Finding(said, str(path), parameter="baseline"))
     refuse_foreign([path])
     result = read_recording(path)
     if not isinstance(result, Comparison):

@@ -160,7 +160,8 @@ def _given(
 ) -> GivenTargets:
     """Return targets with their rows and times; raise a `LogError` if they are a recording."""
     if isinstance(targets, (str, Path)) and Path(targets).is_file() and is_recording(Path(targets)):
-        raise LogError(Finding("found a recording, allowed: a table (CSV) of targets", str(targets)))
+        allowed = "a table (CSV) of targets"
+        raise LogError(Finding(file=str(targets), found="a recording", allowed=allowed))
     return given_targets(targets, t, tsp, read)
 
 

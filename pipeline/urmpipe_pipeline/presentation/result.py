@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from urmpipe_models.display import Shown
+from urmpipe_models.spelling import Voice
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -30,5 +31,5 @@ class Result(Shown):
         """Return its numbers as a table."""
 
     @abstractmethod
-    def to_dict(self) -> dict[str, Any]:
-        """Return the object that `--json` prints."""
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+        """Return the object that `--json` prints, its messages in somebody's words."""

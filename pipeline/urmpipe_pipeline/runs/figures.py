@@ -190,15 +190,11 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
     if run.timed:
         yield from _point_derivatives(run, tcp)
-    singular = np.any(tcp.singular)
-    known = (
-        np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx)
-        if singular
-        else np.asarray(tcp.euler_zyx)
+    tinted, angles = (np.asarray(tcp.singular) if np.any(tcp.singular) else None), tcp.euler_zyx
+    known = angles if tinted is None else np.where(tinted[:, np.newaxis], np.nan, angles)
+    euler = Line(
+        continuous_euler(known) if run.timed else known, tuple(EULER), tuple(EULER.values()), points=points
     )
-    angles = continuous_euler(known) if run.timed else known
-    euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
-    tinted = tcp.singular if singular else None
     yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
 
 

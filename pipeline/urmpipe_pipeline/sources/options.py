@@ -66,6 +66,8 @@ class ReadOptions:
         for one in fields(self):
             if isinstance(value := getattr(self, one.name), Iterator):  # can be looked through only once
                 object.__setattr__(self, one.name, tuple(value))
+        for name in ("unit", "interval"):
+            object.__setattr__(self, name, _for_all(getattr(self, name)))
         wrong = [
             Finding(parameter=one.name, found=shown(value), allowed=allowed)
             for one in fields(self)
@@ -83,7 +85,11 @@ class ReadOptions:
 
 
 def _is_text(value: Any) -> bool:
-    return isinstance(value, str) and value != ""
+    return isinstance(value, str)
+
+
+def _is_word(value: Any) -> bool:
+    return _is_text(value) and value != ""
 
 
 def _is_flag(value: Any) -> bool:
@@ -110,7 +116,7 @@ def _are(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
 
 
 def _are_units(value: Any) -> bool:
-    return isinstance(value, Mapping) and all(map(_is_text, value.values()))
+    return isinstance(value, Mapping) and all(map(_is_word, value.values()))
 
 
 def _are_intervals(value: Any) -> bool:
@@ -119,7 +125,7 @@ def _are_intervals(value: Any) -> bool:
     )
 
 
-_TEXT = (_is_text, "a text")
+_TEXT = (_is_word, "a text, not empty")
 _COLUMNS = (_are(_is_column), COLUMNS)
 _FLAG = (_is_flag, "True or False")
 
@@ -127,7 +133,7 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "source": _TEXT,
     "delimiter": _TEXT,
     "decimal": _TEXT,
-    "time": (_is_column, "a column by name or number"),
+    "time": (lambda value: _is_column(value) and value != "", "a column by name or number"),
     "joints": _COLUMNS,
     "names": (_are(_is_column), "a list of names, such as ['q1', 'q2']"),
     "signs": (_are(_is_number), "a list of 1 or -1, such as [1, -1]"),

@@ -16,7 +16,7 @@ from urmpipe_models.display import Shown
 from urmpipe_pipeline.comparison.change import Absent, BaselineComparison
 from urmpipe_pipeline.simulations.simulation import Signal, Simulation
 
-OTHERS = {"LogMap", "ReadOptions", "Targets", "Transform"}
+OTHERS = {"LogMap", "LogReading", "ReadOptions", "Reading", "TableReading", "Targets", "Transform"}
 """Public classes that are no results: what they hold is what they show."""
 
 

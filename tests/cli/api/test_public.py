@@ -56,8 +56,10 @@ def test_what_cannot_be_applied_to_a_run_is_refused(folder: Path, run: urmpipe.R
     with pytest.raises(urmpipe.OptionError) as error:
         urmpipe.compare(run, run, time="none", tsp=0.01, derivative="savgol")
     assert str(error.value) == (
-        "read, tsp, derivative: found with what was ingested before, allowed: with a log; a run or a"
-        " recording stands as `ingest` made it"
+        "time: found with what was ingested before, allowed: with a log; a run or a recording stands"
+        " as `ingest` made it\ntsp: found with what was ingested before, allowed: with a log; a run or"
+        " a recording stands as `ingest` made it\nderivative: found with what was ingested before,"
+        " allowed: with a log; a run or a recording stands as `ingest` made it"
     )
     with pytest.raises(urmpipe.UrmpipeError, match="allowed: 7"):
         urmpipe.compare(folder / "path.csv", run, "panda")
@@ -136,16 +138,24 @@ def test_a_tool_much_longer_than_its_arm_is_allowed() -> None:
 
 
 def test_all_keywords_of_a_wrong_kind_are_told_at_once() -> None:
-    wrong: dict[str, Any] = {"robot": 6, "tsp": "5ms", "read": {}, "strict": 1, "output": ""}
+    wrong: dict[str, Any] = {
+        "robot": 6,
+        "tsp": "5ms",
+        "skip_bad": 1,
+        "log_map": {},
+        "strict": 1,
+        "output": "",
+    }
     with pytest.raises(urmpipe.OptionError) as error:
         urmpipe.ingest("log.csv", progress=True, **wrong)  # type: ignore[arg-type]
     assert str(error.value).splitlines() == [
         "robot: found 6, allowed: a name, a TOML or URDF file, or a Chain, such as urmpipe.load_robot(NAME)",
-        "read: found {}, allowed: ReadOptions, such as the `read` of a map: urmpipe.read_map(FILE).read",
         "tsp: found '5ms', allowed: a number, in s",
         "strict: found 1, allowed: True or False",
         "output: found '', allowed: a path: text or a Path, not empty",
         "progress: found True, allowed: a function of the share that is done, 0 to 1, such as print",
+        "log_map: found {}, allowed: a map (TOML), or what `read_map` returned",
+        "skip_bad: found 1, allowed: True or False",
     ]
 
 
@@ -194,7 +204,7 @@ def test_files_may_be_text(folder: Path, run: urmpipe.Run, tmp_path: Path) -> No
     urmpipe.write_recording(run, f"{tmp_path}/log.rrd")
     assert isinstance(urmpipe.read_recording(f"{tmp_path}/log.rrd"), urmpipe.Run)
     urmpipe.write_map(run, f"{tmp_path}/log.toml")
-    again = urmpipe.ingest(folder / "log.csv", "urm6", read=urmpipe.read_map(f"{tmp_path}/log.toml").read)
+    again = urmpipe.ingest(folder / "log.csv", "urm6", log_map=f"{tmp_path}/log.toml")
     assert (again.q == run.q).all()
 
 

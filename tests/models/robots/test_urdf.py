@@ -93,7 +93,7 @@ def test_of_several_ends_the_one_with_most_moving_joints_is_the_tip(urdf: Any) -
     branches = [link("r"), link("a"), link("b"), link("c"), joint("j1", "r", "a"), joint("j2", "a", "b")]
     assert urdf(robot(*branches, joint("camera", "a", "c", "fixed"))).coordinates == ("j1", "j2")
     assert complaint(urdf, robot(*branches, joint("j3", "a", "c"))) == [
-        "arm.urdf: found 2 ends with 2 moving joints; choose a tip link (--tip): b, c"
+        "arm.urdf: found 2 ends with 2 moving joints; tip_link=LINK chooses one: b, c"
     ]
     assert urdf(robot(*branches, joint("j3", "a", "c")), tip_link="c").coordinates == ("j1", "j3")
 
@@ -105,8 +105,8 @@ def test_joints_that_the_arm_carries_beside_its_tip_need_a_choice_and_wheels_bel
     arm += [joint("j2", "a", "b"), joint("left", "b", "c")]
     finger = joint("right", "b", "d", inside='<mimic joint="left"/>')
     assert complaint(urdf, robot(*arm, finger)) == [
-        "arm.urdf: found right on the arm beside the way to c, as of a gripper; choose a tip link"
-        " (--tip): b, c, d"
+        "arm.urdf: found right on the arm beside the way to c, as of a gripper; tip_link=LINK chooses"
+        " one: b, c, d"
     ]
     assert urdf(robot(*arm, finger), tip_link="b").coordinates == ("j1", "j2")
     assert urdf(robot(*arm, joint("wheel", "r", "d"))).coordinates == ("j1", "j2", "left")
@@ -330,7 +330,7 @@ def test_the_fingers_of_a_gripper(shared: Path) -> None:
         read_urdf(path)
     assert str(caught.value) == (
         f"{path}: found panda_finger_joint2 on the arm beside the way to panda_leftfinger, as of a gripper;"
-        " choose a tip link (--tip): panda_hand, panda_hand_tcp, panda_leftfinger,"
+        " tip_link=LINK chooses one: panda_hand, panda_hand_tcp, panda_leftfinger,"
         " panda_rightfinger"
     )
     with pytest.raises(RobotError) as caught:

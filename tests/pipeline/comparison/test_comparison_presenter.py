@@ -15,6 +15,7 @@ from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import AXES
+from urmpipe_pipeline.comparison.scene import LEAST_SEEN
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.palette import run_colour
 from urmpipe_pipeline.presentation.figure import Figure, SpaceFigure
@@ -232,6 +233,29 @@ def test_the_arm_stands_where_its_aligned_path_is(arms: Compared, align: str) ->
     np.testing.assert_allclose(
         positions_over_log(arm.chain, one.run.q[one.sample]), one.actual, rtol=0, atol=1e-12
     )
+
+
+@pytest.mark.parametrize(
+    ("largest", "factor"),
+    [
+        (0.0, None),
+        (0.9 * LEAST_SEEN / 50, None),
+        (1.1 * LEAST_SEEN / 50, 50),
+        (0.99 / 50, 50),
+        (1.01 / 50, 20),
+        (0.49, 2),
+        (0.51, None),
+    ],
+)
+def test_a_deviation_is_enlarged_as_far_as_it_stays_inside_the_scene(
+    paths: Compared, largest: float, factor: int | None
+) -> None:
+    """`largest` is a share of the radius of the scene, which is half of the path's metre."""
+    shown = present(paths({"a": off(0.5 * largest)})).scene
+    assert shown is not None
+    scene = shown()
+    assert scene is not None
+    assert (scene.enlarged and scene.enlarged[1]) == factor
 
 
 def test_a_page_shows_the_paths_coloured_by_the_deviation(paths: Compared) -> None:

@@ -1,4 +1,4 @@
-"""The views of a recording: which plots stand where, what is open, and at which time."""
+"""What the viewer opens with: which views stand where, what is open, and at which time."""
 
 from __future__ import annotations
 
@@ -9,138 +9,180 @@ from typing import Any
 
 import numpy as np
 import pytest
+from rerun.blueprint import Container
 from rerun.chunk import RrdReader
 
-from recording_contents import views
+from recorded import columns, entities, views
+from toys import Toy, figure, laid_out, panel, recorded, shown, toy
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.recording.entities import places_of
-from urmpipe_pipeline.recording.layout import eye_and_target, viewer_layout
-from urmpipe_pipeline.recording.plots import SHARED_AXIS, Plots
-from urmpipe_pipeline.recording.scene import scene_of
-from urmpipe_pipeline.recording.shown_units import MARGIN, span_with_numbers
-from urmpipe_pipeline.recording.store import Store
-from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW, FILLED, WIDE
-from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
+from urmpipe_pipeline.presentation.figure import Drawing, Figure, Text, View
+from urmpipe_pipeline.presentation.scene import Path as Way
+from urmpipe_pipeline.presentation.scene import Scene
+from urmpipe_pipeline.presentation.section import Event, Presentation, Section
+from urmpipe_pipeline.recording.store import Opening
+from urmpipe_pipeline.recording.viewer import openings
+from urmpipe_pipeline.recording.views.blueprint import EVENTS_SHARE, SEEN_AT_ONCE
 from urmpipe_pipeline.results import write_recording
-from urmpipe_pipeline.runs.results import Run
+from urmpipe_pipeline.simulations.simulation import Simulation
 
-MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
+MakeSimulation = Callable[..., Simulation]
+EVENT = Event(5_000_000, "it happened")
 
 
-def test_what_is_doubtful_is_counted_in_the_title(make_run: MakeRun) -> None:
-    doubt = AuditEntry("phi2", 2, 0.005, 0.0, -1.5, 0, 0, "unexplained")
-    run = make_run(rows=50)
-    titles = []
-    for audit in ((), run.audit, (*run.audit, doubt), (doubt,)):
-        *_, (view, *_) = Plots(run).joints(replace(run, audit=audit), places_of(run)[0])
-        titles.append(view.name)
-    assert titles == [
-        "Joints, no repolarization needed [rad]",
-        "Joints repolarized (1 marked) [rad]",
-        "Joints repolarized (1 marked, 1 doubtful) [rad]",
-        "Joints repolarized (0 marked, 1 doubtful) [rad]",
-    ]
+def tree(view: Any) -> Any:
+    """Return a layout as lists of names: of containers their kind, what is open, and what stands in them."""
+    if not isinstance(view, Container):
+        return view.name
+    opened = {} if view.active_tab is None else {"open": view.active_tab}
+    return [type(view).__name__, *([view.name] if view.name else []), opened, *map(tree, view.contents)]
 
 
-def test_joints_that_needed_no_repolarization_are_one_plot_with_the_file_behind_it(make_run: MakeRun) -> None:
-    run = replace(make_run(rows=50), audit=())
-    (row,) = Plots(run).joints(run, places_of(run)[0])
-    assert [view.name for view in row] == [
-        "Joints, no repolarization needed [rad]",
-        "Joints in the file [rad]",
-    ]
+def layout(one: Presentation) -> Any:
+    """Return the layout of a presentation as lists of names."""
+    return tree(laid_out(one)[0].root_container)
 
 
-@pytest.mark.parametrize("rows", [1, 2, 1500])
-def test_all_of_the_scene_is_in_view(rows: int, make_run: MakeRun) -> None:
-    scene = scene_of(make_run(rows=rows))
-    eye, target = eye_and_target(scene)
-    forward = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(forward, [0.0, 0.0, 1.0])
-    right /= np.linalg.norm(right)
-    above = np.cross(right, forward)
-    seen = (scene.points() - eye) @ np.column_stack((right, above, forward))
-    edge = np.tan(FIELD_OF_VIEW / 2)
-    reach = np.abs(seen[:, :2] / seen[:, 2:]).max(axis=0) / [WIDE * edge, edge]
-    assert reach.max() == pytest.approx(FILLED)
+def plain(*names: str, **more: Any) -> Figure:
+    """Return a figure with a view of each name."""
+    views = tuple(View(name, (panel(toy()),)) for name in names)
+    return replace(figure(name=names[0]), views=views, **more)
 
 
-def test_a_comparison_opens_where_the_verdict_on_the_worst_log_was_decided(
-    make_run: MakeRun, make_comparison: MakeComparison, tmp_path: Path
+def scene() -> Scene:
+    one = toy(columns=3)
+    return Scene("Paths [m]", paths=(Way("one", one.values, one.t_ns, "#c25000"),))
+
+
+def test_a_figure_is_a_row_of_tabs_and_events_share_the_last() -> None:
+    figures = plain("a", "b", opened=1, share=3.0), plain("c", "d", opened=None, share=2.0), plain("e", "f")
+    one = shown(*figures, scene=scene(), events=lambda: [EVENT])
+    assert layout(one) == [
+        "Horizontal", {},
+        ["Vertical", {}, "Summary", "Paths [m]"],
+        [
+            "Vertical", {},
+            ["Tabs", {"open": 1}, "a [rad]", "b [rad]"],
+            "c [rad]", "d [rad]",
+            ["Tabs", {"open": 0}, "Events, at t [s]", "e [rad]", "f [rad]"],
+        ],
+    ]  # fmt: skip
+    _, plots = laid_out(one)[0].root_container.contents  # type: ignore[union-attr]
+    assert plots.row_shares == [3.0, 2.0, 2.0, EVENTS_SHARE]  # type: ignore[union-attr]
+
+
+def test_the_events_of_a_single_plot_stand_below_it() -> None:
+    one = shown(plain("a"), events=lambda: [EVENT])
+    assert layout(one) == ["Vertical", {}, "Summary", ["Vertical", {}, "a [rad]", "Events, at t [s]"]]
+
+
+def sections(count: int, views: int, opened: int) -> tuple[Section, ...]:
+    names = [f"v{k}" for k in range(views)]
+    return tuple(
+        Section(f"s{k}", "fail" if k == opened else "pass", figures=lambda: [plain(*names, opened=None)],
+                opened=k == opened, events=lambda: [EVENT])
+        for k in range(count)
+    )  # fmt: skip
+
+
+def test_plots_of_several_sections_are_tabs_with_their_verdict_and_one_is_open() -> None:
+    one = shown(scene=scene(), sections=sections(3, 4, opened=1))
+    _, plots = laid_out(one)[0].root_container.contents  # type: ignore[union-attr]
+    assert plots.active_tab == 1  # type: ignore[union-attr]
+    assert [tab.name for tab in plots.contents] == ["PASS s0", "FAIL s1", "PASS s2"]  # type: ignore[union-attr]
+
+
+def test_few_plots_of_several_sections_stand_beside_each_other_with_their_section() -> None:
+    one = shown(sections=sections(SEEN_AT_ONCE, 1, opened=1))
+    _, grid = layout(one)[2:]
+    assert grid[:3] == ["Grid", {}, "s0: v0 [rad]"]
+    _, plots = laid_out(one)[0].root_container.contents  # type: ignore[union-attr]
+    assert plots.grid_columns == 2  # type: ignore[union-attr]
+
+
+def test_texts_and_events_without_a_plot_are_tabs_behind_the_summary(tmp_path: Path) -> None:
+    body = Section(
+        "body",
+        figures=lambda: [Drawing("Drawing", "alt", "<svg/>"), Text("File", "line\n  two"), Text("File", "b")],
+        events=lambda: [EVENT],
+        sections=(Section("s", figures=lambda: [plain("a")]),),
+    )
+    one = replace(shown(), body=body)
+    assert layout(one)[2] == ["Tabs", {"open": 0}, "Summary", "File", "File", "Events, at t [s]"]
+    path = recorded(one, tmp_path)
+    assert columns(path, "/shown/text/File", "TextDocument:text") == [["line\n  two"]]
+    assert columns(path, "/shown/text/File-2", "TextDocument:text") == [["b"]]
+
+
+def test_a_long_summary_stands_beside_the_plots_where_there_is_no_scene() -> None:
+    short = shown(plain("a"))
+    long = replace(short, headline="word " * 1000)
+    assert layout(short)[0] == "Vertical"
+    assert layout(long) == ["Horizontal", {}, "Summary", ["Vertical", {}, "a [rad]"]]
+    with_arm = replace(long, scene=scene)
+    assert layout(with_arm)[2] == ["Vertical", {}, "Summary", "Paths [m]"]
+
+
+def test_without_plots_and_scene_the_summary_stands_alone() -> None:
+    assert layout(shown()) == ["Tabs", {}, "Summary"]
+
+
+@pytest.mark.parametrize("timed", [True, False])
+def test_it_opens_at_its_time_or_its_row(timed: bool, tmp_path: Path) -> None:
+    one = toy()
+    plot = panel(one) if timed else replace(panel(one), t_ns=None)
+    told = replace(shown(figure(plot)), opens_at_ns=30_000_000, opens_at_row=None if timed else 6)
+    path = recorded(told, tmp_path, one)
+    wanted = Opening("t", 30_000_000) if timed else Opening("row", 7)
+    assert openings([path]) == {path: wanted}
+    assert laid_out(told)[0].time_panel.timeline == wanted.timeline  # type: ignore[union-attr]
+    assert laid_out(replace(told, opens_at_row=None))[1].timeline == wanted.timeline
+
+
+def test_results_open_where_their_verdict_was_decided(
+    make_comparison: MakeComparison, make_simulation: MakeSimulation, tmp_path: Path
 ) -> None:
     comparison = make_comparison(("solidworks", "coppeliasim"))
-    worst = comparison.ranking[-1]
     path = write_recording(comparison, tmp_path / "both.rrd")
-    assert Store(path).opens_at_ns / 1e9 == worst.decisive.t_max > 0
-    assert Store(write_recording(make_run(), tmp_path / "run.rrd")).opens_at_ns == 0
+    assert openings([path])[path].at / 1e9 == comparison.worst.decisive.t_max > 0
+    path = write_recording(make_simulation(), tmp_path / "simulation.rrd")
+    assert openings([path])[path].at == 1_250_000_000
 
 
-def test_the_layout_is_in_the_file(make_comparison: MakeComparison, tmp_path: Path) -> None:
+def test_the_layout_of_a_comparison_is_in_the_file(make_comparison: MakeComparison, tmp_path: Path) -> None:
     found = views(write_recording(make_comparison(("a b", "reference")), tmp_path / "both.rrd"))
     names = found["ViewBlueprint:display_name"]
     assert {
         "Arm of reference and paths [m], in crimson the deviation x50",
-        "delta = asked for - a b [mm]",
         "Distance from the path [mm]",
         "Angle between the orientations [deg]",
         "Joints, reference - log [deg]",
         "Joints in the file [rad]",
         "Joints repolarized (2 marked) [rad]",
-        "Speed of the TCP [m/s]",
+        "Speed of the tool centre point [m/s]",
     } <= set(names)
     assert all("[" in name for name in names if name != "Summary")
     assert {"PASS a b", "PASS reference"} <= set(found["ContainerBlueprint:display_name"])
-    assert {"/overview/delta/a\\ b", "/overview/delta/reference\\ \\(2\\)", "/tolerance/delta/**"} <= set(
-        found["ViewContents:query"]
+
+
+def test_what_is_drawn_stands_below_one_root_and_on_no_clock_of_the_writer(
+    make_comparison: MakeComparison, tmp_path: Path
+) -> None:
+    """The other entities are the arrays of the result, at the paths of their fields."""
+    path = write_recording(make_comparison(rows=50), tmp_path / "both.rrd")
+    roots = {entity.split("/")[1] for entity in entities(path)}
+    assert roots == {"shown", "reference", "runs"}
+    timelines = {name for chunk in RrdReader(path).store().stream() for name in chunk.timeline_names}
+    assert timelines == {"t", "row"}
+
+
+def test_names_that_no_viewer_can_show_are_shown_as_far_as_they_can(tmp_path: Path) -> None:
+    one = toy()
+    odd = ("a\udc80b", "a/b", "a/b", "", "a\\ ", "**")
+    parts = tuple(
+        Section(name, figures=lambda: [plain(*odd)], events=lambda: [Event(0, "\udcff?")]) for name in odd
     )
-
-
-def test_the_worst_log_and_what_decides_are_open(make_comparison: MakeComparison) -> None:
-    comparison = make_comparison(("far", "near", "farther"))
-    far, near, farther = comparison.runs
-    layout = viewer_layout(replace(comparison, runs=(far, farther, near)), scene_of(comparison))
-    tabs: Any = list(layout.root_container.contents)[1]
-    assert (tabs.contents[tabs.active_tab].name, len(tabs.contents)) == ("FAIL farther", 3)
-    assert tabs.contents[0].contents[0].active_tab == 0
-    path = replace(far.statistics["path"], tolerance=1e-9)
-    decided = replace(far, statistics={**far.statistics, "path": path})
-    alone = viewer_layout(replace(comparison, runs=(decided,)), scene_of(comparison))
-    column: Any = list(alone.root_container.contents)[1]
-    first, joints, *_ = column.contents
-    assert first.contents[first.active_tab].name == "Distance from the path [mm]"
-    assert joints.name == "Joints, reference - log [deg]"
-
-
-def test_an_axis_shows_more_numbers_than_0() -> None:
-    """The viewer writes powers of ten and, where there is room, their multiples."""
-    for low, high, most, reach in (
-        (-0.9, 0.5, 8, (-1.0, 0.5)),
-        (-0.2, 0.9, 8, (-0.2, 1.0)),
-        (-0.25, 0.15, 8, (-0.25, 0.15)),
-        (0.0, 0.6, 4, (0.0, 1.0)),
-        (2.0, 3.0, 8, (0.0, 3.0)),
-    ):
-        found = span_with_numbers(low, high, most)
-        margin = MARGIN * (reach[1] - reach[0])
-        assert found == pytest.approx((reach[0] - margin, reach[1] + margin))
-    assert span_with_numbers(0.0, 0.0, 8) is None
-
-
-def time_axis(run: Run, path: Path) -> list[int]:
-    """Return from when to when in [ns] the one view that linked plots follow shows a run."""
-    reader = RrdReader(write_recording(run, path))
-    (entry,) = reader.blueprints()
-    (batch,) = (
-        chunk.to_record_batch()
-        for chunk in reader.stream(store=entry)
-        if chunk.entity_path == f"/view/{SHARED_AXIS}/TimeAxis"
-    )
-    (axis,) = batch.column("TimeAxis:view_range").to_pylist()
-    return [axis[0][end] for end in ("start", "end")]
-
-
-def test_every_plot_shows_the_whole_time(make_run: MakeRun, make_solved: MakeRun, tmp_path: Path) -> None:
-    """Else the viewer opens a long log on a minute of it; linked plots take the range of one known view."""
-    assert time_axis(make_run(rows=2001), tmp_path / "run.rrd") == [-100_000_000, 12_400_000_000]
-    assert time_axis(make_solved(rows=51), tmp_path / "solved.rrd") == [-10_000_000, 1_240_000_000]
+    told = replace(shown(sections=parts), name="\udcff", headline="\udcff|*")
+    path = recorded(told, tmp_path, Toy(one.t_ns, np.asarray(one.values)))
+    assert len(entities(path, "/shown/events")) == len(odd)
+    assert "a?b [rad]" in views(path)["ViewBlueprint:display_name"]

@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from toys import eye_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.kinematics.forward import frames_over_log, points_over_log
@@ -28,11 +29,9 @@ from urmpipe_pipeline.palette import (
     rgb,
     run_colour,
 )
-from urmpipe_pipeline.recording.layout import eye_and_target
-from urmpipe_pipeline.recording.scene import Scene, scene_of
-from urmpipe_pipeline.recording.viewer import open_window, opening_times, run_viewer
+from urmpipe_pipeline.recording.viewer import open_window, openings, run_viewer
 from urmpipe_pipeline.recording.views.camera import FIELD_OF_VIEW
-from urmpipe_pipeline.results import write_recording
+from urmpipe_pipeline.results import present, write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -41,6 +40,7 @@ MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
 MakeSolved = Callable[..., SolvedTargets]
 Picture = NDArray[np.uint8]
+Eye = tuple[FloatArray, FloatArray]
 
 DRIVERS = sorted(Path("/usr/share/vulkan/icd.d").glob("lvp_icd*.json"))
 PATIENCE = 40.0
@@ -119,7 +119,7 @@ def scene_at(viewer: Any, at: float, path: Path, drawn: Callable[[Picture], bool
     from PIL import Image
 
     end, target = time.monotonic() + PATIENCE, path.with_suffix(".png")
-    while not (views := [view for view in viewer.get_state().views if view.name.startswith(SCENE_VIEW)]):
+    while not (views := [view for view in viewer.get_state().views if view.name.startswith("Arm and")]):
         assert time.monotonic() < end, "the viewer showed no 3D view"
         time.sleep(0.1)
     viewer.set_time(timeline="t", duration=at)
@@ -131,9 +131,9 @@ def scene_at(viewer: Any, at: float, path: Path, drawn: Callable[[Picture], bool
             return picture
 
 
-def projected(scene: Scene, points: FloatArray, picture: Picture) -> FloatArray:
+def projected(eye_and_target: Eye, points: FloatArray, picture: Picture) -> FloatArray:
     """Return where points in [m], shape (n, 3), stand in a picture of the 3D view, in pixels x, y."""
-    eye, centre = eye_and_target(scene)
+    eye, centre = eye_and_target
     forward = (centre - eye) / np.linalg.norm(centre - eye)
     right = np.cross(forward, [0.0, 0.0, 1.0])
     right /= np.linalg.norm(right)
@@ -181,7 +181,7 @@ def test_a_comparison_in_the_viewer(viewer: Any, make_comparison: MakeComparison
     picture = look(viewer, path, 12.0, right)
     assert complaints(viewer) == []
     assert_drawn(picture, left=[*JOINT_COLOURS[:5], REFERENCE_COLOUR], right=right)
-    assert "delta = asked for - a b/c.d [x] Ω [mm]" in view_names(viewer)
+    assert "delta = reference - log [mm]" in view_names(viewer)
 
 
 def test_a_branch_in_the_viewer_is_there_only_where_there_is_such_a_solution(
@@ -221,14 +221,14 @@ def test_a_log_without_a_robot_in_the_viewer(viewer: Any, make_run: MakeRun, tmp
     assert "Arm and paths [m]" not in view_names(viewer)
 
 
-def missed(scene: Scene, points: FloatArray, colours: Sequence[str], picture: Picture) -> list[str]:
+def missed(eye: Eye, points: FloatArray, colours: Sequence[str], picture: Picture) -> list[str]:
     """Return the colours that do not stand where the points with them are projected.
 
     A joint's ball is 17 pixels wide, and up to half of it is hidden by the links that meet there: of the 169
     pixels at most 6 from its middle, 20 are of its colour. That leaves room for rounding, for smoothed edges
     and for what hides it, not for a ball that stands beside the place.
     """
-    places = projected(scene, points, picture)
+    places = projected(eye, points, picture)
     return [
         colour
         for colour, place in zip(colours, places, strict=True)
@@ -248,19 +248,19 @@ def assert_stands(
 
     The times are such that nothing hides a point.
     """
-    scene, path = scene_of(run), folder / "run.rrd"
+    eye, path = eye_of(present(run)), folder / "run.rrd"
     viewer.open(str(write_recording(run, path)))
     at_both = [points(run.q[round(at / run.tsp)][np.newaxis]) for at in times]
     for at, standing in zip(times, at_both, strict=True):
 
         def drawn(picture: Picture, wanted: FloatArray = standing) -> bool:
             """Tell whether all points are where they should be."""
-            return not missed(scene, wanted, colours, picture)
+            return not missed(eye, wanted, colours, picture)
 
         picture = scene_at(viewer, at, path, drawn)
-        assert missed(scene, standing, colours, picture) == [], f"at {at} s"
+        assert missed(eye, standing, colours, picture) == [], f"at {at} s"
     # The last two move by more than twice the reach in which they are looked for.
-    first, second = (projected(scene, standing, picture) for standing in at_both)
+    first, second = (projected(eye, standing, picture) for standing in at_both)
     assert (np.linalg.norm(second - first, axis=1)[-2:] > 2 * 6).all()
     assert complaints(viewer) == []
 
@@ -311,15 +311,18 @@ def test_a_long_log_is_seen_whole(viewer: Any, make_run: MakeRun, tmp_path: Path
     assert "Joints in the file [rad], every peak of 120,000 rows" in view_names(viewer)
 
 
-def test_view_opens_where_the_verdict_was_decided(make_comparison: MakeComparison, tmp_path: Path) -> None:
+def test_view_opens_where_the_verdict_was_decided_and_at_a_row_where_there_are_no_times(
+    make_comparison: MakeComparison, make_solved: MakeSolved, tmp_path: Path
+) -> None:
     comparison = make_comparison()
-    path = write_recording(comparison, tmp_path / "both.rrd")
-    worst = comparison.ranking[-1]
-    with open_window(path, opening_times([path])[path], headless=True) as (process, client):
-        (shown,) = client.get_state().recordings
-        assert (shown.current_timeline, shown.current_time) == ("t", round(worst.decisive.t_max * 1e9))
-        assert complaints(client) == []
-    assert process.poll() is not None
+    decided = round(comparison.worst.decisive.t_max * 1e9)
+    for result, wanted in ((comparison, ("t", decided)), (make_solved(timed=False), ("row", 3))):
+        path = write_recording(result, tmp_path / "opened.rrd")
+        with open_window(path, openings([path])[path], headless=True) as (process, client):
+            (shown,) = client.get_state().recordings
+            assert (shown.current_timeline, shown.current_time) == wanted
+            assert complaints(client) == []
+        assert process.poll() is not None
 
 
 def test_a_simulation_shows_its_arm_its_verdict_and_its_signals(
@@ -329,7 +332,7 @@ def test_a_simulation_shows_its_arm_its_verdict_and_its_signals(
     picture = look(viewer, path, 1.25, [AXIS_COLOURS["y"], AXIS_COLOURS["norm"], REFERENCE_COLOUR])
     names = {view.name for view in viewer.get_state().views}
     assert names >= {
-        SCENE_VIEW, "Summary", "log: q [rad]", "chain: p7 [m]", "meter: delta, norm [m]",
+        SCENE_VIEW, "Summary", "log: q [rad]", "chain: p7 [m]", "meter: delta, norm [mm]",
         "meter: out_of_tolerance [-]",
     }  # fmt: skip
     right = picture[:, picture.shape[1] // 2 :]

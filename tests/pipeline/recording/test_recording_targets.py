@@ -15,6 +15,7 @@ from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import Targets
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.palette import AXIS_COLOURS, rgb
+from urmpipe_pipeline.presentation import scene as presentation
 from urmpipe_pipeline.recording.views.geometry import NEAR, ball, drawn_arm, drawn_targets, extent
 from urmpipe_pipeline.results import present, write_recording
 from urmpipe_pipeline.solved_targets.result import SolvedTargets
@@ -25,7 +26,7 @@ MakeSolved = Callable[..., SolvedTargets]
 ROOT = "/shown/scene/targets"
 
 
-def shown_targets(one: SolvedTargets) -> Targets:
+def shown_targets(one: SolvedTargets) -> presentation.Targets:
     """Return the targets of a scene."""
     found = scene(one).targets
     assert found is not None
@@ -58,7 +59,8 @@ def test_a_long_path_is_dashed_and_positions_are_points(make_solved: MakeSolved)
     assert len(long.strips) > 10
     few = make_solved(rows=20, timed=False)
     points = drawn_targets(shown_targets(replace(few, targets=Targets(few.targets.position), angle=None)))
-    np.testing.assert_array_equal(points.points, few.targets.position)
+    np.testing.assert_array_equal(points.points, few.targets.position[few.reached])
+    np.testing.assert_array_equal(points.missed, few.targets.position[~few.reached])
     assert (len(points.origin), points.strips) == (0, ())
 
 

@@ -16,6 +16,7 @@ from urmpipe_models.inverse.search import USUAL_SEARCH
 from urmpipe_models.inverse.targets import misses, targets_of
 from urmpipe_models.orientation import matrices
 from urmpipe_models.robots.catalogue import load_robot
+from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.section import Presentation, Table, Value
 from urmpipe_pipeline.results import present
 from urmpipe_pipeline.solved_targets.given_targets import given_targets
@@ -32,9 +33,8 @@ STEP_NS = 10_000_000
 
 def way(rows: int) -> FloatArray:
     """Return a slow motion of six joints."""
-    return np.array([0.3, 0.8, -0.6, 0.5, 0.7, 0.2]) + 0.2 * np.sin(
-        np.outer(np.arange(rows) / 40, np.arange(1, 7))
-    )
+    sway = np.sin(np.outer(np.arange(rows) / 40, np.arange(1, 7)))
+    return np.asarray(np.array([0.3, 0.8, -0.6, 0.5, 0.7, 0.2]) + 0.2 * sway)
 
 
 @pytest.fixture(scope="module")
@@ -130,6 +130,7 @@ def panels(shown: Presentation) -> list[tuple[bool, bool]]:
     return [
         (panel.t_ns is not None, line.points)
         for figure in shown.body.figures()
+        if isinstance(figure, Figure)
         for view in figure.views
         for panel in view.panels
         for line in panel.lines

@@ -240,7 +240,7 @@ def test_no_more_than_one_row_in_a_hundred_is_left_out(read: Read, wrong: Wrong)
     assert read(joined(*lines), skip_bad=True).rows == 297
     lines[221] = "torn"
     assert wrong(joined(*lines), skip_bad=True)[-1] == (
-        "log.csv: skip_bad: 4 of 300 rows cannot be read: allowed: 1% of them"
+        "log.csv: skip_bad: 4 of 300 rows cannot be read, allowed: 1% of them"
     )
 
 

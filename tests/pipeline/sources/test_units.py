@@ -275,15 +275,15 @@ def test_numbers_name_columns_and_what_is_no_list_is_refused(read: Read) -> None
     once: Any = (f"q{k}" for k in (1, 2))
     assert ReadOptions(joints=once).joints == ("q1", "q2")
     with pytest.raises(OptionError) as caught:
-        ReadOptions(joints="q1", position=3, units="deg", interval=2.0)  # type: ignore[arg-type]
+        ReadOptions(joints="q1", position=3, unit=3, interval=2.0)  # type: ignore[arg-type]
     columns = "allowed: columns by name or number, such as ['q1', 'q2'] or [2, 3]"
     assert str(caught.value).split("\n") == [
         f"joints: found 'q1', {columns}",
         f"position: found 3, {columns}",
-        "units: found 'deg', allowed: a mapping, such as {'q1': 'deg'}, or {'': 'deg'} for all joints that"
-        " turn",
-        "interval: found 2.0, allowed: a mapping, such as {'q1': (-180.0, 180.0)}, or with '' for all joints"
-        " that turn",
+        "unit: found 3, allowed: a unit of all joints that turn, such as 'deg', or a mapping, such as"
+        " {'q1': 'deg'}",
+        "interval: found 2.0, allowed: two ends for all joints that turn, or a mapping, such as"
+        " {'q1': (-180.0, 180.0)}",
     ]
 
 

@@ -17,7 +17,6 @@ from hypothesis import strategies as st
 from scipy.io import loadmat
 
 import urmpipe
-from urmpipe_pipeline.sources import ReadOptions
 from urmpipe_pipeline.tables import FORMATS, Format
 from urmpipe_pipeline.tables.times import EXPONENTS
 
@@ -196,7 +195,7 @@ def test_columns_that_were_not_used_are_named(tmp_path: Path) -> None:
 
 def test_units_that_the_names_do_not_tell_are_told(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,q1,q2 (arm),q3 [deg]\n0,1,2,3\n1,2,3,4\n")
-    run = urmpipe.ingest(tmp_path / "log.csv", read=ReadOptions(unit={"": "deg"}))
+    run = urmpipe.ingest(tmp_path / "log.csv", unit="deg")
     result = urmpipe.export(run, tmp_path / "again.csv", rows="file")
     assert [warning.message for warning in result.warnings] == [
         "q1, q2: in deg, which their names do not tell"
@@ -284,7 +283,7 @@ def test_times_that_were_rebuilt_and_rows_that_were_left_out_are_said(tmp_path: 
     ]
     bad = [f"{k * 0.1:.1f},{'oops' if k == 50 else k * 0.001}" for k in range(200)]
     (tmp_path / "bad.csv").write_text("\n".join(["t [s],q1 [rad]", *bad]) + "\n")
-    run = urmpipe.ingest(tmp_path / "bad.csv", read=ReadOptions(skip_bad=True))
+    run = urmpipe.ingest(tmp_path / "bad.csv", skip_bad=True)
     left = urmpipe.export(run, tmp_path / "b.csv", rows="file").warnings
     assert [(warning.kind, warning.row) for warning in left] == [("not-exported", 51)]
     assert left[0].message.startswith("data row 51 of the file is left out: ")

@@ -122,7 +122,7 @@ class DrawnTargets:
     Attributes:
         origin: Where targets with an orientation are, shape (m, 3).
         axes: Their x, y and z axes [-], shape (m, 3, 3), an axis a column.
-        points: Targets drawn as points, shape (k, 3).
+        points: Targets reached that are drawn as points, shape (k, 3).
         strips: The way through targets with times, dashed, shape (any, 3) each.
         reached: Every target that is reached, shape (r, 3).
         missed: Targets that are not, shape (u, 3).
@@ -214,13 +214,14 @@ def drawn_targets(targets: Targets) -> DrawnTargets:
     framed = few and targets.quat_xyzw is not None
     turned = targets.quat_xyzw[there] if framed and targets.quat_xyzw is not None else np.empty((0, 4))
     position, none = targets.position[there], np.empty((0, 3))
+    reached = targets.position[there & targets.reached]
     missed = np.flatnonzero(there & ~targets.reached)[:MOST]
     return DrawnTargets(
         origin=position if framed else none,
         axes=matrices(turned),
-        points=none if framed or (timed and not few) else position[:MOST],
+        points=none if framed or (timed and not few) else reached[:MOST],
         strips=dashed(lines_of(targets.position)) if timed else (),
-        reached=targets.position[there & targets.reached],
+        reached=reached,
         missed=targets.position[missed],
         reasons=tuple(targets.reasons[row] if targets.reasons else "" for row in missed.tolist()),
     )

@@ -77,7 +77,8 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
     centre, size = ball(points)
     stream.log(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     labelled = [one for one in scene.arms if one.label]
-    labels = drawn_labels(labelled, 2.0 * size, opens_row(scene, opens_at_ns))
+    row = opens_row(scene, opens_at_ns) if labelled else 0
+    labels = drawn_labels(labelled, 2.0 * size, row)
     for key, path in zip(keys([one.path.name for one in paths]), paths, strict=True):
         _draw_path(stream, path, key, size)
     for number, spot in enumerate(spot for spot in scene.spots if spot.always):
@@ -258,12 +259,12 @@ def _draw_targets(stream: RecordingStream, targets: DrawnTargets, size: float) -
 
 
 def _missed(targets: DrawnTargets, size: float) -> Points3D:
-    """Return the targets that are not reached: few with their reasons, many as a thin line."""
+    """Return the targets that are not reached: few with their reasons, many smaller."""
     import rerun as rr
 
     few = len(targets.missed) <= LABELLED
     labels = list(map(encodable, targets.reasons))
-    radii, colours = [(MISSED if few else ASKED) * size], [rgb(DEVIATION_COLOUR)]
+    radii, colours = [(MISSED if few else TARGET) * size], [rgb(DEVIATION_COLOUR)]
     return rr.Points3D(targets.missed, colors=colours, radii=radii, labels=labels, show_labels=few)
 
 

@@ -1,0 +1,53 @@
+"""Which meshes can be drawn, and what is told of those that cannot."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from urmpipe_models.chains.chain import Chain, Joint
+from urmpipe_models.chains.visual import Box, Mesh, Visual
+from urmpipe_models.transform import translation
+from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.meshes import drawable, missing_visuals
+from urmpipe_pipeline.runs.ingest import kinematics
+
+
+def test_one_warning_tells_of_all_meshes_that_are_missing(tmp_path: Path) -> None:
+    there = tmp_path / "there.STL"
+    there.write_bytes(b"solid")
+    (tmp_path / "folder.stl").mkdir()
+    (tmp_path / "picture.png").write_bytes(b"")
+    files = [there, tmp_path / "gone.stl", tmp_path / "gone.stl", tmp_path / "folder.stl"]
+    meshes = [Mesh(str(file)) for file in [*files, tmp_path / "picture.png", "package://gone/a.dae"]]
+    visuals = (Visual(None, Box((1.0, 1.0, 1.0))), *(Visual(None, mesh) for mesh in meshes))
+    robot = Chain("arm", (Joint("j"),), visuals=visuals)
+    assert missing_visuals(robot) == [
+        LogWarning(
+            "visual-missing",
+            f"4 of 5 mesh files of robot arm cannot be drawn, the first {tmp_path / 'gone.stl'}:"
+            " lines stand for the links; allowed: .stl, .obj, .glb, .gltf, .dae files that are there",
+        )
+    ]
+    assert missing_visuals(replace(robot, visuals=visuals[:2])) == []
+    assert kinematics(robot, *(np.zeros((1, 1)),) * 3)[1] == missing_visuals(robot)
+
+
+@pytest.mark.parametrize(
+    ("document", "whole"),
+    [
+        ({"buffers": [{"uri": "data:application/octet-stream;base64,AA=="}]}, True),
+        ({"buffers": [{"uri": "arm.bin"}]}, False),
+        ({"images": [{"uri": "arm.png"}]}, False),
+        ([], False),
+        ({"buffers": None}, False),
+    ],
+)
+def test_a_gltf_that_needs_other_files_is_not_drawn(document: object, whole: bool, tmp_path: Path) -> None:
+    path = tmp_path / "arm.gltf"
+    path.write_text(json.dumps(document), encoding="utf-8")
+    assert drawable(Visual(None, Mesh(str(path)), translation(0.0, 0.0, 0.0))) is whole
