@@ -37,7 +37,7 @@ def table(rows: int, *, judged: bool, title: str = "Log") -> Table:
 
 
 def lines(one: Presentation, scene: Scene | None = None) -> list[str]:
-    return summary(one, scene).splitlines()
+    return "\n".join(summary(one, scene)).splitlines()
 
 
 def test_the_verdict_comes_first_then_what_explains_it() -> None:

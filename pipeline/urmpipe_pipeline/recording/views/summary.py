@@ -23,8 +23,8 @@ NAMED = 12
 """Paths whose colours are told; the others are counted."""
 
 
-def summary(shown: Presentation, scene: Scene | None = None) -> str:
-    """Return a presentation in a few lines of Markdown.
+def summary(shown: Presentation, scene: Scene | None = None) -> tuple[str, str]:
+    """Return a presentation in a few lines of Markdown: what is to be seen at once, and further tables below.
 
     Args:
         shown: The presentation.
@@ -43,8 +43,8 @@ def summary(shown: Presentation, scene: Scene | None = None) -> str:
     lines += _colours(scene.paths if scene is not None else ())
     lines += _warnings(list(_all_warnings(shown.body)))
     lines += ["", _where_to_go(shown)]
-    lines += [line for one in tables if not _has_verdicts(one) for line in _table(one)]
-    return "\n".join(lines)
+    below = (line for one in tables if not _has_verdicts(one) for line in _table(one))
+    return "\n".join(lines), "\n".join(below)
 
 
 def _where_to_go(shown: Presentation) -> str:
