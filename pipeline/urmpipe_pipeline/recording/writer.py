@@ -24,7 +24,7 @@ from urmpipe_pipeline.text import encodable
 if TYPE_CHECKING:
     from rerun import RecordingStream
 
-AHEAD = 8
+AHEAD = 3
 """Slices under way at a time: there is always one to be written, and memory stays low."""
 
 SPARE = 64 * 2**20
