@@ -18,10 +18,10 @@ from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, Text, View
 from urmpipe_pipeline.presentation.scene import Path as Way
 from urmpipe_pipeline.presentation.scene import Scene
-from urmpipe_pipeline.presentation.section import Event, Presentation, Section
+from urmpipe_pipeline.presentation.section import Column, Event, Presentation, Section, Table
 from urmpipe_pipeline.recording.store import Opening
 from urmpipe_pipeline.recording.viewer import openings
-from urmpipe_pipeline.recording.views.blueprint import EVENTS_SHARE, SEEN_AT_ONCE
+from urmpipe_pipeline.recording.views.blueprint import EVENTS_SHARE, LINE_SHARE, PEEK, SEEN_AT_ONCE
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.simulations.simulation import Simulation
 
@@ -121,6 +121,16 @@ def test_a_long_summary_stands_beside_the_plots_where_there_is_no_scene() -> Non
     assert layout(long) == ["Horizontal", {}, "Summary", ["Vertical", {}, "a [rad]"]]
     with_arm = replace(long, scene=scene)
     assert layout(with_arm)[2] == ["Vertical", {}, "Summary", "Paths [m]"]
+
+
+def test_tables_that_are_read_later_leave_the_room_to_the_arm() -> None:
+    table = Table("Signals", (Column("name", "Name", [f"signal {k}" for k in range(12)]),))
+    shares = []
+    for tables in ((), (table,)):
+        left, _ = root_of(shown(plain("a"), scene=scene(), tables=tables)).contents
+        shares.append(left.row_shares[0])
+    assert shares[1] - shares[0] == pytest.approx(PEEK * LINE_SHARE)
+    assert layout(shown(plain("a"), tables=(table,)))[0] == "Horizontal"
 
 
 def test_without_plots_and_scene_the_summary_stands_alone() -> None:
