@@ -125,16 +125,20 @@ def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
 
     Between two samples that step little, neither the family nor the turns change.
     """
-    steep = np.flatnonzero((np.abs(np.diff(angles, axis=0)) > SMALL_STEP).any(axis=1)) + 1
+    steps = (np.abs(np.diff(column)) > SMALL_STEP for column in angles.T)  # one by one: a log may be long
+    steep = np.flatnonzero(np.logical_or.reduce(list(steps))) + 1
     if not len(steep):
-        return angles + 0.0
+        return angles
     before, after = angles[steep - 1], angles[steep]
     own, across = (_distance(one, before) for one in (after, _other(after, apart)))
     lengths = np.diff(steep, prepend=0, append=len(angles))
     swapped = np.append(False, np.cumsum(across < own) % 2 == 1)
-    family = np.where(np.repeat(swapped, lengths)[:, np.newaxis], _other(angles, apart), angles)
+    family, rows = angles.copy(), np.repeat(swapped, lengths)
+    family[rows] = _other(angles[rows], apart)
     turns = np.cumsum(np.rint((family[steep] - family[steep - 1]) / FULL_TURN), axis=0)
-    return family - FULL_TURN * np.repeat(np.vstack((np.zeros(3), turns)), lengths, axis=0)
+    for column, turned in zip(family.T, turns.T, strict=True):
+        column -= FULL_TURN * np.repeat(np.append(0.0, turned), lengths)
+    return family
 
 
 def _other(angles: FloatArray, apart: FloatArray) -> FloatArray:

@@ -173,10 +173,10 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
         yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), t_ns),))
         size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
         yield View("TCP acceleration", (Panel("a", "m/s2", (coordinates(tcp.acceleration), size), t_ns),))
-    known = np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx)
+    tinted = np.asarray(tcp.singular) if np.any(tcp.singular) else None
+    known = tcp.euler_zyx if tinted is None else np.where(tinted[:, np.newaxis], np.nan, tcp.euler_zyx)
     angles = continuous_euler(known) if run.timed else known
     euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
-    tinted = tcp.singular if np.any(tcp.singular) else None
     yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
 
 

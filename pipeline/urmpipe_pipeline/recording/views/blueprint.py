@@ -60,13 +60,13 @@ def send_views(
     """
     import rerun as rr
 
+    scene = shown.scene() if shown.scene is not None else None
+    space = None if scene is None else scene_view(stream, scene, shown.opens_at_ns)
     parts = _parts(shown.body)
     whole, timed = whole_axis(figure for part in parts for figure in part.figures)
     timed = shown.opens_at_row is None if whole is None else timed
     opening = Opening(TIME, shown.opens_at_ns) if timed else Opening(ROW, (shown.opens_at_row or 0) + 1)
     plots = Plots(stream, entity_of, whole, timed)
-    scene = shown.scene() if shown.scene is not None else None
-    space = None if scene is None else scene_view(stream, scene, shown.opens_at_ns)
     words = summary(shown, scene)
     stream.log(shown_path("summary"), rr.TextDocument(words, media_type="text/markdown"), static=True)
     layout = _blueprint(_words(plots, parts), words, space, _plots(plots, parts), opening.timeline)
@@ -158,7 +158,7 @@ def _rows(plots: Plots, part: _Part, about: str = "") -> list[Row]:
         root = shown_path("plots", part.key, str(number))
         most = TALL if figure.share >= HIGH * height else LOW
         sent = [
-            plots.views(view, f"{root}/{i}", part.instants, about, most)
+            plots.views(view, f"{root}/{i}", part.instants, about, most, opened=figure.opened in (None, i))
             for i, view in enumerate(figure.views)
         ]
         views = [one for some in sent for one in some]

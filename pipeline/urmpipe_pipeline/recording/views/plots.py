@@ -77,7 +77,14 @@ class Plots:
     _shares_axis: bool = True
 
     def views(
-        self, view: View, root: str, instants: Mapping[int, str], about: str = "", most: int = TALL
+        self,
+        view: View,
+        root: str,
+        instants: Mapping[int, str],
+        about: str = "",
+        most: int = TALL,
+        *,
+        opened: bool = True,
     ) -> list[TimeSeriesView]:
         """Send a view of a figure, and return it; of a long one that of its overview, and that of all rows.
 
@@ -87,11 +94,12 @@ class Plots:
             instants: Times in [ns] at which a line goes through it, with a word each.
             about: What it is of, where plots of several things stand beside each other.
             most: Multiples of a power of ten that its height has room for.
+            opened: Whether it is seen first; else arrays of the result need no overview.
         """
         panels = [panel for panel in view.panels if panel.over is None]
         if not panels:
             return []
-        drawn = _Drawn()
+        drawn = _Drawn(opened)
         for i, panel in enumerate(panels):
             for j, line in enumerate(panel.lines):
                 self._line(drawn, panel, line, f"{root}/{i}/{j}")
@@ -159,9 +167,9 @@ class Plots:
         stored = self.entity_of(line.values, t_ns)
         drawn.names.update(line.names)
         drawn.rows = max(drawn.rows, rows)
-        if stored is not None and factor == 1.0 and rows <= LONG:
+        if stored is not None and factor == 1.0 and (rows <= LONG or not drawn.opened):
             drawn.entities.append(stored)
-            drawn.reach(line.values)
+            drawn.reach(line.values[:LONG])
             if self._looks.setdefault(stored, look) != look:
                 drawn.overrides[stored] = look
             elif self._looks[stored] is look:
@@ -242,8 +250,9 @@ class Plots:
 
 @dataclass
 class _Drawn:
-    """What was sent of a view."""
+    """What was sent of a view, and whether it is seen first."""
 
+    opened: bool
     entities: list[str] = field(default_factory=list)
     whole: list[str] = field(default_factory=list)
     overrides: dict[str, _Look] = field(default_factory=dict)
