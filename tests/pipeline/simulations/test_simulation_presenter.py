@@ -108,10 +108,11 @@ def test_the_extremes_are_those_of_the_json(make_simulation: MakeSimulation) -> 
 
 def test_a_page_shows_the_system_and_the_path_of_the_tip(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation()
-    blocks = list(present(simulation).body.blocks())
-    assert next(one.svg for one in blocks if isinstance(one, Drawing)) == simulation.system_svg
-    assert list(present(simulation).body.figures()) == [Text("System file", simulation.system_text)]
-    space = next(one for one in blocks if isinstance(one, SpaceFigure))
+    body = present(simulation).body
+    drawing, file = body.figures()
+    assert isinstance(drawing, Drawing) and drawing.svg == simulation.system_svg
+    assert file == Text("System file", simulation.system_text)
+    space = next(one for one in body.blocks() if isinstance(one, SpaceFigure))
     arm = simulation.arms[0]
     np.testing.assert_array_equal(space.paths[0].position, positions_over_log(arm.chain, arm.q))
 
