@@ -91,6 +91,9 @@ class Store:
             dtype: Type of the values.
             t_ns: Rising times of all rows in integer [ns], where these tell the rows.
 
+        Returns:
+            In the units of its field, shape (end - first, *width).
+
         Raises:
             RecordingError: If some of them are missing, or are none of that type and shape.
         """

@@ -15,7 +15,7 @@ from urmpipe_models.errors import Finding, OutputError
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output, know_own
-from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
+from urmpipe_pipeline.presentation.exports import UNIT_UNSAID, Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.csv_file import write_csv
 from urmpipe_pipeline.tables.identity import is_export
 from urmpipe_pipeline.tables.mat_file import write_mat
@@ -125,10 +125,11 @@ def export_result(
     target = output or Path(f"{name}{ending}.{options.to}")
     if options.to == "tum":
         return _export_poses(exports, exports.poses[poses](rows), target, rows, inputs)
-    table = exports.rows[rows].table(options.to != "csv")
+    table = exports.rows[rows].table()
     write_all([target], [_writer(exports, table, options.to, rows, target)], options.to, inputs)
     names = tuple((column.name, column.unit) for column in table.columns)
-    return Exported((ExportedFile(target, table.rows),), options.to, rows, names, 0, table.warnings)
+    told = tuple(one for one in table.warnings if options.to == "csv" or one.kind != UNIT_UNSAID)
+    return Exported((ExportedFile(target, table.rows),), options.to, rows, names, 0, told)
 
 
 def _writer(

@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from asserting import there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.baseline import complete_noise
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -68,8 +69,7 @@ def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArra
     assert (
         one.out_of_tolerance == above + len(rows) == int(np.count_nonzero(measured.outside({"angle": 1.0})))
     )
-    assert one.share_out is not None
-    assert round(one.share_out * len(values)) == one.out_of_tolerance
+    assert round(there(one.share_out) * len(values)) == one.out_of_tolerance
     assert one.verdict == ("fail" if above or rows else "pass")
     free = describe(measured, t, count, {"axis": 1.0})
     assert (free.verdict, free.out_of_tolerance, free.missing) == (None, None, len(rows))
