@@ -16,16 +16,8 @@ from recorded import columns, entities, packed, rows_of, static, times_of, views
 from toys import COLOURS, PLOT, STEP_NS, Toy, figure, line, panel, recorded, root_of, shown, toy
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.figure import Figure, Mark, Over, Panel, Shape, View
-from urmpipe_pipeline.recording.views.plots import (
-    COPIED,
-    LONG,
-    LOW,
-    MARGIN,
-    ROWS,
-    SHARED_AXIS,
-    TALL,
-    span_with_numbers,
-)
+from urmpipe_pipeline.recording.views.axes import LOW, MARGIN, TALL, span_with_numbers
+from urmpipe_pipeline.recording.views.plots import COPIED, LONG, ROWS, SHARED_AXIS
 
 SCALARS = "Scalars:scalars"
 
