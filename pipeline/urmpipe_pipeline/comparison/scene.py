@@ -44,12 +44,7 @@ def comparison_scene(result: Comparison) -> Scene:
         paths.append(larger)
     whose = f"Arm of {shown.name}" if arms and several else "Arm"
     said = f", in crimson the {larger.name}" if larger else ""
-    return Scene(
-        f"{whose} and paths [m]{said}",
-        arms,
-        tuple(paths),
-        (_decided(shown, several=several),),
-    )
+    return Scene(f"{whose} and paths [m]{said}", arms, tuple(paths), (_decided(shown, several=several),))
 
 
 def shown_log(result: Comparison) -> Deviation:
