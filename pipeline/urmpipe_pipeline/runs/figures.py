@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_euler
 from urmpipe_models.kinematics.forward import PointLog
+from urmpipe_models.row_blocks import norms
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Panel, Shape, View
@@ -33,8 +35,7 @@ def run_figures(run: Run) -> Iterator[Figure]:
     """Yield the plots of a log that stands alone: joints, speed, motion."""
     yield from joints_figure(run)
     if run.timed and run.tcp is not None:
-        velocity = np.asarray(run.tcp.velocity)
-        yield speed_figure(run.name, run.t_ns, np.sqrt(np.einsum("ij,ij->i", velocity, velocity)))
+        yield speed_figure(run.name, run.t_ns, norms(run.tcp.velocity))
     yield from motion_figure(run)
 
 
@@ -128,6 +129,7 @@ def motion_figure(run: Run) -> Iterator[Figure]:
     if not views:
         return
     title, point = "Motion", point_name(run)
+    alt: str | Callable[[], str]
     angles = "Euler angles (moving Z-Y-X, in the colours of their axes), by forward kinematics."
     if run.tcp is None:
         caption = "As the log recorded it: without a robot there are no kinematics."
@@ -140,7 +142,7 @@ def motion_figure(run: Run) -> Iterator[Figure]:
             f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a, and its"
         )
         caption += f" {angles} The angles go on past ±π, so that none jumps.{_singular_words(run.tcp)}"
-        alt = f"Motion of {point} of {run.name} over time by forward kinematics. {_extent_words(run.tcp)}"
+        alt = partial(_extent_words, f"Motion of {point} of {run.name}", run.tcp)
     yield Figure(title, caption, alt, views, share=2.2)
 
 
@@ -153,7 +155,7 @@ def coordinates(values: FloatArray) -> Line:
     """Return x, y and z of something in their colours, by these names in all panels.
 
     Args:
-        values: Shape (n, 3).
+        values: In any unit, shape (n, 3).
     """
     return Line(values, tuple("xyz"), COORDINATES)
 
@@ -171,10 +173,12 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
     if run.timed:
         yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), t_ns),))
-        size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
+        size = Line(norms(tcp.acceleration), ("‖a‖",), NORM)
         yield View("TCP acceleration", (Panel("a", "m/s2", (coordinates(tcp.acceleration), size), t_ns),))
     tinted = np.asarray(tcp.singular) if np.any(tcp.singular) else None
-    known = tcp.euler_zyx if tinted is None else np.where(tinted[:, np.newaxis], np.nan, tcp.euler_zyx)
+    known = np.asarray(tcp.euler_zyx)
+    if tinted is not None:
+        known = np.where(tinted[:, np.newaxis], np.nan, known)
     angles = continuous_euler(known) if run.timed else known
     euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
     yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
@@ -197,14 +201,14 @@ def _singular_words(tcp: PointLog) -> str:
     return said if np.any(tcp.singular) else ""
 
 
-def _extent_words(tcp: PointLog) -> str:
+def _extent_words(motion: str, tcp: PointLog) -> str:
     """Say between which places a point moves and how fast."""
     if not np.isfinite(tcp.position).any():
-        return "It has no value."
+        return f"{motion} over time by forward kinematics. It has no value."
     low, high = (text.point(end(tcp.position, axis=0)) for end in (np.nanmin, np.nanmax))
-    said = f"It stays within ({low}) m and ({high}) m"
+    said = f"{motion} over time by forward kinematics. It stays within ({low}) m and ({high}) m"
     for values, word, unit in ((tcp.velocity, "speed", "m/s"), (tcp.acceleration, "acceleration", "m/s²")):
-        norm = np.linalg.norm(values, axis=1)
+        norm = norms(values)
         if np.isfinite(norm).any():
             said += f"; its {word} reaches {np.nanmax(norm):.4f} {unit}"
     return f"{said}."

@@ -107,8 +107,9 @@ def run_of(
     log = replace(log, inferences=(*log.inferences, *found.inferences))
     clocked = any(column.role == "time" for column in log.columns)
     timed = options.period is not None or clocked
-    doubts = implausible(log, found.q, robot, turning(log, robot), found.broken[:, 1:], timed=timed)
     grid = make_grid(log, tsp)
+    turns = turning(log, robot)
+    doubts = implausible(log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=grid.tsp)
     q, left_open = grid.resample_joints(found.q, found.unresolved)
     warnings = [*log.warnings, *far_from_recorded(robot, log), *found.warnings, *doubts]
     warnings += [*grid.warnings, *left_open, *([UNUSED_PERIOD] if clocked and options.period else [])]

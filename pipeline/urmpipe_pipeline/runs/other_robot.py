@@ -68,5 +68,5 @@ def _beyond_limits(run: Run, robot: Chain) -> list[LogWarning]:
     clocked = any(column.role == "time" for column in run.log.columns)
     timed = clocked or read.get("period") is not None
     turns = turning(run.log, robot)
-    doubts = implausible(run.log, found.q, robot, turns, found.broken[:, 1:], timed=timed)
+    doubts = implausible(run.log, found.q, robot, turns, found.broken[:, 1:], timed=timed, tsp=run.tsp)
     return [warning for warning in doubts if warning.kind in BY_LIMITS]

@@ -58,6 +58,7 @@ def implausible(
     told: NDArray[np.int64],
     *,
     timed: bool,
+    tsp: float = 0.0,
 ) -> list[LogWarning]:
     """Return what an arm would hardly have done.
 
@@ -68,13 +69,14 @@ def implausible(
         turning: Which joints turn (the others slide), shape (joints,).
         told: Row and joint index of steps that a warning speaks of already, shape (u, 2).
         timed: Whether the times are those of the motion; else nothing is said of speeds.
+        tsp: Period of the grid in [s]: one as long as values stay takes each of them once.
     """
     if len(q) < 2 or not q.shape[1]:
         return []
     motion = JointMotion.of(log, q, turning)
     outliers = outlying_ends(motion)
     held = pace(motion)
-    warnings = [*outlier_warnings(motion, outliers), *repeated_samples(motion, held)]
+    warnings = [*outlier_warnings(motion, outliers), *repeated_samples(motion, held, tsp)]
     if robot is not None:
         warnings += beyond_limits(motion, robot)
     if timed:
@@ -143,15 +145,17 @@ def pace(motion: JointMotion) -> float:
     return float(runs[moving].mean())
 
 
-def repeated_samples(motion: JointMotion, rows: float) -> list[LogWarning]:
-    """Return a warning if the values stay the same for several rows, as `pace` tells."""
-    if rows == 1.0:
+def repeated_samples(motion: JointMotion, rows: float, tsp: float) -> list[LogWarning]:
+    """Return a warning if values stay for several rows, as `pace` tells, longer than tsp in [s]."""
+    time = rows * motion.period
+    once = float(f"{time:.4g}")
+    if rows == 1.0 or tsp >= once:
         return []
-    repeats, time = _repeats(motion.q), rows * motion.period
+    repeats = _repeats(motion.q)
     said = f"the joint values change only every {rows:.3g} rows ({time * 1e3:.4g} ms)"
     count = f"{int(repeats.sum())} of {len(motion.q)} rows repeat the row before"
     said = f"{said}, {count}: a slow controller polled fast?"
-    hints = (Hint("tsp", float(f"{time:.4g}"), "takes each value once"),)
+    hints = (Hint("tsp", once, "takes each value once"),)
     return [LogWarning("repeated-samples", said, int(np.argmax(repeats)) + 2, hints=hints)]
 
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -72,6 +72,15 @@ def test_a_kind_of_ones_own_comes_back_as_it_was(tmp_path: Path) -> None:
     assert_same(read_recording(path), wanted)
     assert read_recording(path).recording == path
     assert sorted(times_of(path, "/error")) == wanted.t_ns.tolist()
+
+
+@pytest.mark.usefixtures("known")
+def test_times_that_do_not_rise_come_back_as_they_were(tmp_path: Path) -> None:
+    wanted = accuracy()
+    t_ns = wanted.t_ns.copy()
+    t_ns[[3, SLICE]] = t_ns[2], t_ns[5]
+    wanted = replace(wanted, t_ns=t_ns)
+    assert_same(read_recording(write_recording(wanted, tmp_path / "toy.rrd")), wanted)
 
 
 def everything(rows: Any) -> list[Any]:

@@ -34,6 +34,9 @@ EVENTS_SHARE = 2.2
 HEAD_SHARE, LINE_SHARE, MOST_TEXT = 0.12, 0.022, 0.45
 """Shares of the height for the summary: its title, each line, and all of it at most."""
 
+PEEK = 3
+"""Lines of further tables that are seen without scrolling where an arm stands below: it needs the room."""
+
 LINE_LENGTH = 115
 """Characters that fit in a line of the summary where it has half of a usual window's width."""
 
@@ -68,7 +71,8 @@ def send_views(
     opening = Opening(TIME, shown.opens_at_ns) if timed else Opening(ROW, (shown.opens_at_row or 0) + 1)
     plots = Plots(stream, entity_of, whole, timed)
     words = summary(shown, scene)
-    stream.log(shown_path("summary"), rr.TextDocument(words, media_type="text/markdown"), static=True)
+    text = "\n".join(words)
+    stream.log(shown_path("summary"), rr.TextDocument(text, media_type="text/markdown"), static=True)
     layout = _blueprint(_words(plots, parts), words, space, _plots(plots, parts), opening.timeline)
     return layout, opening
 
@@ -175,7 +179,7 @@ def _rows(plots: Plots, part: _Part, about: str = "") -> list[Row]:
 
 def _blueprint(
     text: View | Container,
-    words: str,
+    words: tuple[str, str],
     space: View | None,
     plots: View | Container | None,
     timeline: str,
@@ -187,7 +191,8 @@ def _blueprint(
     import rerun.blueprint as rrb
 
     length = LINE_LENGTH if space is not None else 2 * LINE_LENGTH
-    lines = sum(math.ceil(len(line) / length) for line in words.splitlines())
+    first, below = (sum(math.ceil(len(line) / length) for line in part.splitlines()) for part in words)
+    lines = first + (below if space is None else min(below, PEEK))
     share = min(MOST_TEXT, HEAD_SHARE + LINE_SHARE * lines)
     root = text
     if space is not None:

@@ -169,7 +169,7 @@ class Plots:
         drawn.rows = max(drawn.rows, rows)
         if stored is not None and factor == 1.0 and (rows <= LONG or not drawn.opened):
             drawn.entities.append(stored)
-            drawn.reach(line.values[:LONG])
+            drawn.reach(line.values)
             if self._looks.setdefault(stored, look) != look:
                 drawn.overrides[stored] = look
             elif self._looks[stored] is look:
@@ -262,9 +262,12 @@ class _Drawn:
 
     def reach(self, values: FloatArray) -> None:
         """Take the least and the largest value among those that the axis must show."""
-        known = np.asarray(values)[np.isfinite(values)]
-        if known.size:
-            self.extent += [float(known.min()), float(known.max())]
+        known = np.asarray(values)
+        ends = [ufunc.reduce(known, axis=None, initial=np.nan) for ufunc in (np.fmin, np.fmax)]
+        if np.isinf(ends).any():
+            known = known[np.isfinite(known)]
+            ends = [ufunc.reduce(known, axis=None, initial=np.nan) for ufunc in (np.fmin, np.fmax)]
+        self.extent += [float(end) for end in ends if not np.isnan(end)]
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,60 @@
+"""An option of a command and the keyword of its function have one name, but for dashes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from inspect import signature
+from typing import Any
+
+import click
+import pytest
+
+import urmpipe
+from urmpipe.commands.compare import compare
+from urmpipe.commands.export import export
+from urmpipe.commands.fmu import fmu
+from urmpipe.commands.ik import ik
+from urmpipe.commands.ingest import ingest
+from urmpipe.commands.report import report
+from urmpipe.commands.simulate import simulate
+from urmpipe.commands.view import view
+from urmpipe_models.spelling import option_of
+
+COMMANDS: dict[str, tuple[click.Command, Callable[..., Any]]] = {
+    "build": (fmu.commands["build"], urmpipe.build_fmu),
+    "compare": (compare, urmpipe.compare),
+    "export": (export, urmpipe.export),
+    "ik": (ik, urmpipe.ik),
+    "ingest": (ingest, urmpipe.ingest),
+    "report": (report, urmpipe.report),
+    "simulate": (simulate, urmpipe.simulate),
+    "view": (view, urmpipe.view),
+}
+
+OPERANDS = {
+    "build": {"unit"},
+    "compare": {"reference", "logs"},
+    "export": {"result"},
+    "ik": {"targets"},
+    "ingest": {"log"},
+    "report": {"results"},
+    "simulate": {"system"},
+    "view": {"recordings"},
+}
+"""Keywords that stand without an option on the command line."""
+
+OF_PYTHON = {"inputs", "progress", "told", "voice", "t"}
+"""Keywords for callbacks, arrays and for who prints."""
+
+OF_COMMANDS = {"as_json", "quiet", "explain", "listed", "write_system", "version"}
+"""Options of what is printed instead of a result, or beside it."""
+
+
+@pytest.mark.parametrize("name", COMMANDS)
+def test_each_option_is_a_keyword_and_each_keyword_an_option(name: str) -> None:
+    command, function = COMMANDS[name]
+    options = {one.name: one for one in command.params if isinstance(one, click.Option) and one.expose_value}
+    keywords = set(signature(function).parameters) - OPERANDS[name] - OF_PYTHON
+    assert set(options) - OF_COMMANDS == keywords
+    for keyword in keywords:
+        assert option_of(keyword) in options[keyword].opts
