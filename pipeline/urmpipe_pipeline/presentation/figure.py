@@ -167,8 +167,7 @@ class Drawing:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A text that is shown letter by letter, such as a file."""
+    """A text that is shown letter by letter, such as a file; a page opens it only on request."""
 
     title: str
     text: str
-    folded: bool = True

@@ -18,12 +18,7 @@ from made_runs import off
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_models.transform import translation
-from urmpipe_pipeline.comparison.baseline import (
-    DEFAULT_NOISE,
-    against_baseline,
-    complete_noise,
-    parse_noise,
-)
+from urmpipe_pipeline.comparison.baseline import DEFAULT_NOISE, against_baseline, complete_noise, parse_noise
 from urmpipe_pipeline.comparison.baseline_section import worse_words
 from urmpipe_pipeline.comparison.change import Absent, Difference
 from urmpipe_pipeline.comparison.comparison import Comparison

@@ -120,10 +120,7 @@ def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compa
 
 def test_a_large_tolerance_without_a_unit_is_told(paths: Compared) -> None:
     assert told(paths({"log": off(50)}, tolerance={"axis": 3.5, "norm": 0.1})) == [
-        (
-            "large-tolerance",
-            "a tolerance of 3500 mm (axis) lets anything pass: 3.5 is in m",
-        )
+        ("large-tolerance", "a tolerance of 3500 mm (axis) lets anything pass: 3.5 is in m")
     ]
     assert [one.message for one in large_tolerances({"angle": 0.5, "joint": 0.17})] == [
         "a tolerance of 28.6479 deg (angle) lets anything pass: 0.5 is in rad"

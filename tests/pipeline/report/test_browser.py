@@ -96,10 +96,7 @@ def opened(
 ) -> Iterator[Page]:
     """A page at its top. It must have had no error and asked no one for anything when it closes."""
     context = browser.new_context(
-        viewport={"width": width, "height": 900},
-        java_script_enabled=script,
-        has_touch=phone,
-        is_mobile=phone,
+        viewport={"width": width, "height": 900}, java_script_enabled=script, has_touch=phone, is_mobile=phone
     )
     page = context.new_page()
     complaints: list[str] = []

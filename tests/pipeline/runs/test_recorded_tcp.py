@@ -105,10 +105,7 @@ def test_a_tool_that_was_not_told_is_found() -> None:
 
 @pytest.mark.parametrize(
     ("base", "said"),
-    [
-        ((0.0, 0.02, -0.005), "0,0.02,-0.005"),
-        ((0.0, 0.0, 0.0, 0.0, 0.0, 0.1), "0,0,0,0,0,0.1"),
-    ],
+    [((0.0, 0.02, -0.005), "0,0.02,-0.005"), ((0.0, 0.0, 0.0, 0.0, 0.0, 0.1), "0,0,0,0,0,0.1")],
 )
 def test_a_small_shift_of_the_base_is_found(base: tuple[float, ...], said: str) -> None:
     recorded = positions_over_log(UR5E.placed(base=from_offset(base)), Q)
