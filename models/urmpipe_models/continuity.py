@@ -21,6 +21,9 @@ SMALL_STEP = np.pi / 4.0
 """If no angle steps by more in [rad], no sample needs another name: two angles of the other one are at least
 three times as far off."""
 
+OTHER_SIGNS = np.array([1.0, -1.0, 1.0])
+"""What the angles are multiplied by in the other name of a rotation."""
+
 
 def continuous_quaternions(quat_xyzw: FloatArray) -> FloatArray:
     """Return quaternions with the sign that is nearest to the one before.
@@ -125,21 +128,27 @@ def _euler(angles: FloatArray, apart: FloatArray) -> FloatArray:
 
     Between two samples that step little, neither the family nor the turns change.
     """
-    steep = np.flatnonzero((np.abs(np.diff(angles, axis=0)) > SMALL_STEP).any(axis=1)) + 1
+    steps = (np.abs(np.diff(column)) > SMALL_STEP for column in angles.T)  # column by column: little memory
+    steep = np.flatnonzero(np.logical_or.reduce([*steps])) + 1
     if not len(steep):
         return angles + 0.0
     before, after = angles[steep - 1], angles[steep]
     own, across = (_distance(one, before) for one in (after, _other(after, apart)))
     lengths = np.diff(steep, prepend=0, append=len(angles))
     swapped = np.append(False, np.cumsum(across < own) % 2 == 1)
-    family = np.where(np.repeat(swapped, lengths)[:, np.newaxis], _other(angles, apart), angles)
-    turns = np.cumsum(np.rint((family[steep] - family[steep - 1]) / FULL_TURN), axis=0)
-    return family - FULL_TURN * np.repeat(np.vstack((np.zeros(3), turns)), lengths, axis=0)
+    swaps = np.repeat(swapped, lengths)
+    result = angles.copy()
+    for column, sign, half in zip(result.T, OTHER_SIGNS, apart, strict=True):
+        if swapped.any():
+            column[swaps] = column[swaps] * sign + half
+        turns = np.cumsum(np.rint((column[steep] - column[steep - 1]) / FULL_TURN))
+        column[:] -= FULL_TURN * np.repeat(np.append(0.0, turns), lengths)
+    return result
 
 
 def _other(angles: FloatArray, apart: FloatArray) -> FloatArray:
     """Return the other Euler angles in [rad] of the same rotations, shape (n, 3)."""
-    return np.asarray(angles * np.array([1.0, -1.0, 1.0]) + apart)
+    return np.asarray(angles * OTHER_SIGNS + apart)
 
 
 def _distance(a: FloatArray, b: FloatArray) -> FloatArray:

@@ -6,6 +6,10 @@ import os
 from collections.abc import Callable, Sequence
 from typing import TypeVar
 
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+
 BLOCK = 16384
 """Rows worked on at a time: long enough that NumPy outweighs Python, short enough for a core's cache."""
 
@@ -19,6 +23,18 @@ Result = TypeVar("Result")
 def row_blocks(count: int, size: int = BLOCK) -> list[slice]:
     """Return the slices that part `count` rows into blocks of `size`, the last one shorter."""
     return [slice(start, min(start + size, count)) for start in range(0, count, size)]
+
+
+def norms(vectors: FloatArray) -> FloatArray:
+    """Return the lengths of vectors, in their unit, shape (n,), with memory for a block of rows beside them.
+
+    Args:
+        vectors: In any unit, shape (n, k).
+    """
+    lengths = np.empty(len(vectors))
+    for block in row_blocks(len(vectors)):
+        lengths[block] = np.linalg.norm(vectors[block], axis=1)
+    return lengths
 
 
 def side_by_side(

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import TypeAlias
+from typing import Any, TypeAlias
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
@@ -45,22 +45,27 @@ def load_runs(
     """Return the runs of several operands; the reading options hold for every log among them.
 
     Args:
-        operands: Recordings, logs, paths, folders; runs, and solved targets as theirs.
+        operands: Recordings (.rrd), logs and paths (CSV), folders whose CSV files make one log; runs, and
+            solved targets as theirs.
         robot: The arm; of a recording or a run it replaces the one inside.
         read: How to read the CSV files, all of them.
         tsp: Period of the grid in [s], of the CSV files.
         derivative: How the joints of CSV files are differentiated.
 
     Raises:
-        UrmpipeError: With everything that is wrong with any of them.
+        UrmpipeError: With everything that is wrong with any of them: a bad CSV, a recording without a run.
     """
 
     def run_of(operand: Path | MadeRun) -> Run:
-        """Return the run that an operand is, or is read as."""
+        """Return the run that an operand is, is recorded in, or is read as."""
         if not isinstance(operand, Path):
             return on_robot(operand.as_run(), robot)
+        name = operand.resolve().name if operand.is_dir() else None
+        how: dict[str, Any] = {"robot": robot, "read": read, "tsp": tsp, "derivative": derivative}
         try:
-            return load_run(operand, robot=robot, read=read, tsp=tsp, derivative=derivative)
+            if _is_recording(operand):
+                return on_robot(_recorded(operand).as_run(), robot)
+            return ingest_log(log_files(operand), **how, name=name)
         except LogError as error:  # of several logs, each is named
             found = (one if one.file else replace(one, file=str(operand)) for one in error.findings)
             raise LogError(*found) from error
@@ -68,35 +73,10 @@ def load_runs(
     return for_each(run_of, operands)
 
 
-def load_run(
-    operand: Path,
-    *,
-    robot: Chain | None = None,
-    read: ReadOptions | None = None,
-    tsp: float | None = None,
-    derivative: Method | None = None,
-) -> Run:
-    """Return the run of one operand: read from a recording, or ingested on the way.
-
-    Args:
-        operand: A recording (.rrd), a log or path (CSV), or a folder whose CSV files make one log.
-        robot: The arm; of a recording it replaces the one inside.
-        read: How to read a CSV where it cannot tell by itself.
-        tsp: Period of the grid in [s], of a CSV.
-        derivative: How a CSV's joints are differentiated.
-
-    Raises:
-        LogError: If the CSV is bad.
-        RecordingError: If the recording is bad, or holds no run.
-    """
-    if not _is_recording(operand):
-        name = operand.resolve().name if operand.is_dir() else None
-        return ingest_log(
-            log_files(operand), robot=robot, read=read, tsp=tsp, derivative=derivative, name=name
-        )
+def _recorded(operand: Path) -> MadeRun:
     result = read_recording(operand)
     if isinstance(result, (Run, SolvedTargets)):
-        return on_robot(result.as_run(), robot)
+        return result
     if isinstance(result, Comparison):
         raise RecordingError(Finding(COMPARISON, str(operand), hints=(WITH_BASELINE,)))
     raise RecordingError(Finding(SIMULATION, file=str(operand)))

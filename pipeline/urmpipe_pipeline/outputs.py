@@ -17,41 +17,21 @@ from typing import Literal
 from urmpipe_models.errors import Finding, OutputError
 
 OutputKind = Literal[
-    "recording",
-    "report",
-    "map",
-    "export",
-    "audit",
-    "junit",
-    "statistics",
-    "figure",
-    "drawing",
-    "fmu",
-    "joints",
-    "system",
-]
+    "recording", "report", "map", "export", "audit", "junit", "statistics", "figure", "drawing", "fmu",
+    "joints", "system",
+]  # fmt: skip
 
 NOUNS: dict[str, str] = {
-    "junit": "JUnit file",
-    "statistics": "table of statistics",
-    "fmu": "FMU",
-    "joints": "joint log",
+    "junit": "JUnit file", "statistics": "table of statistics", "fmu": "FMU", "joints": "joint log",
     "system": "system file",
-}
+}  # fmt: skip
 """What people call a kind, where that is not its name."""
 
 SUFFIXES: dict[OutputKind, tuple[str, ...]] = {
-    "recording": (".rrd",),
-    "report": (".html", ".htm"),
-    "map": (".toml",),
-    "audit": (".csv",),
-    "junit": (".xml",),
-    "statistics": (".csv",),
-    "drawing": (".svg",),
-    "fmu": (".fmu",),
-    "joints": (".csv",),
+    "recording": (".rrd",), "report": (".html", ".htm"), "map": (".toml",), "audit": (".csv",),
+    "junit": (".xml",), "statistics": (".csv",), "drawing": (".svg",), "fmu": (".fmu",), "joints": (".csv",),
     "system": (".toml",),
-}
+}  # fmt: skip
 """How a file of a kind is called; exports and figures say it by their formats."""
 
 OPENED: tuple[OutputKind, ...] = ("recording", "report")
@@ -81,15 +61,6 @@ JUNIT_HEADER = '<?xml version="1.0" encoding="UTF-8"?><!-- urmpipe: verdict of a
 DRAWING_HEADER = "<!-- Generator: urmpipe "
 """How a drawing of ours (SVG) begins."""
 
-FIRST_LINES: dict[str, str] = {
-    "map": MAP_HEADER,
-    "audit": ",".join(AUDIT_COLUMNS),
-    "statistics": STATISTICS_HEADER,
-    "junit": JUNIT_HEADER,
-    "drawing": DRAWING_HEADER,
-}
-"""How the first line of a text of ours begins, by kind."""
-
 FIGURE = re.compile(rb"\A<!-- Generator: urmpipe |\A\x89PNG.{29}.{4}tEXtSoftware\0urmpipe ", re.DOTALL)
 """How a figure of ours (SVG, PNG) tells where it comes from."""
 
@@ -103,7 +74,15 @@ JOINTS = re.compile(rb"\A[^\n]*," + TARGET_ROW.encode() + rb"\r?\n")
 GENERATION_TOOL = re.compile(rb"<fmiModelDescription\s[^>]*\sgenerationTool=\"urmpipe\b")
 """How the model description of an FMU of ours tells where it comes from."""
 
-_MARKS = {"figure": FIGURE, "joints": JOINTS}
+FIRST_LINES = {
+    "map": MAP_HEADER, "audit": ",".join(AUDIT_COLUMNS), "statistics": STATISTICS_HEADER,
+    "junit": JUNIT_HEADER, "drawing": DRAWING_HEADER,
+}  # fmt: skip
+_MARKS: dict[str, re.Pattern[bytes]] = {
+    "figure": FIGURE,
+    "joints": JOINTS,
+    **{kind: re.compile(re.escape(first.encode())) for kind, first in FIRST_LINES.items()},
+}
 """How the head of an output of ours matches, by kind."""
 
 HEAD = 4096
@@ -237,7 +216,4 @@ def _is_ours(path: Path, kind: OutputKind) -> bool:
     if kind in _known:
         return _known[kind](path)
     with path.open("rb") as file:
-        head = file.read(HEAD)
-    if kind in _MARKS:
-        return _MARKS[kind].match(head) is not None
-    return head.startswith(FIRST_LINES[kind].encode())
+        return _MARKS[kind].match(file.read(HEAD)) is not None

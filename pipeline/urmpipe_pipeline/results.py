@@ -66,10 +66,7 @@ def kind_of(result: Result) -> Kind:
 
 
 def write_recording(
-    result: Result,
-    path: Path,
-    inputs: Sequence[Path] = (),
-    progress: Callable[[float], None] | None = None,
+    result: Result, path: Path, inputs: Sequence[Path] = (), progress: Callable[[float], None] | None = None
 ) -> Path:
     """Write the recording of a result, read it back, and put it in its place.
 

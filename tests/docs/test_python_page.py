@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 import urmpipe
+from asserting import there
 from urmpipe.main import COMMANDS, cli, run
 from urmpipe_datasets import LOGS
 
@@ -93,8 +94,7 @@ def options() -> dict[str, set[str]]:
     context = click.Context(cli)
     found: dict[str, set[str]] = {}
     for name in COMMANDS:
-        command = cli.get_command(context, name)
-        assert command is not None
+        command = there(cli.get_command(context, name))
         for one in command.commands.values() if isinstance(command, click.Group) else [command]:
             if name not in ("demo", "robot") and one.name != "check":
                 params = [param for param in one.params if isinstance(param, click.Option)]

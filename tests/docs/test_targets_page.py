@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from asserting import there
 from urmpipe_pipeline.outputs import TARGET_ROW
 from urmpipe_pipeline.solved_targets.target_file import TargetFile, read_targets
 from urmpipe_pipeline.sources import read_log
@@ -46,8 +47,7 @@ def test_a_german_table_in_mm_and_degrees_holds_the_same(tmp_path: Path) -> None
 
 def test_a_table_with_times_is_a_path(tmp_path: Path) -> None:
     targets = targets_of(tmp_path, PATH)
-    assert targets.t_ns is not None
-    assert (targets.t_ns.tolist(), targets.rotation) == ([0, 5_000_000, 10_000_000], None)
+    assert (there(targets.t_ns).tolist(), targets.rotation) == ([0, 5_000_000, 10_000_000], None)
 
 
 def test_wrong_rows_have_the_reasons_of_the_page(tmp_path: Path) -> None:
@@ -80,8 +80,7 @@ def test_the_names_of_orientations_are_known(tmp_path: Path, names: tuple[str, .
     assert set(names) <= set(NAMES)
     targets = targets_of(tmp_path, f"x,y,z,{','.join(names)}\n1,2,3,{cells}\n")
     turned = Rotation.from_rotvec([0, 0, 0.3]).as_matrix()
-    assert targets.rotation is not None
-    np.testing.assert_allclose(targets.rotation[0], turned, rtol=0, atol=1e-15)  # a rounding
+    np.testing.assert_allclose(there(targets.rotation)[0], turned, rtol=0, atol=1e-15)  # a rounding
     kuka = "no unit is given for A, B, C: they are taken as rad"
     assert [warning.message for warning in targets.warnings] == ([kuka] if "A" in names else [])
 

@@ -14,6 +14,7 @@ from typing import Any
 
 import pytest
 
+from asserting import there
 from urmpipe_fmus.cosim import (
     Block,
     Connection,
@@ -253,8 +254,7 @@ def system(
 
 def fmu_of(block: Block) -> Path:
     """Return the FMU of a block that names one."""
-    assert block.fmu is not None
-    return block.fmu
+    return there(block.fmu)
 
 
 def planned(*arguments: Any, column: Callable[[LogInput], LogColumn] | None = None, **options: Any) -> Plan:

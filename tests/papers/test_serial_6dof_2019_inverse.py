@@ -11,6 +11,7 @@ import math
 import numpy as np
 import pytest
 
+from asserting import there
 from serial_6dof_rows import INVERSE
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.closed.spherical_wrist import SphericalWrist, spherical_wrist
@@ -32,11 +33,8 @@ REACH = 372.5294643797
 
 @pytest.fixture(scope="module")
 def inverse() -> SphericalWrist:
-    found = screws(ARM)
-    assert found is not None
-    form = spherical_wrist(found, ARM.coordinates)
-    assert form is not None
-    return form
+    found = there(screws(ARM))
+    return there(spherical_wrist(found, ARM.coordinates))
 
 
 def target(

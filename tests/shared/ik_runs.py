@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe.main import run
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.inverse.targets import targets_of
@@ -28,7 +29,6 @@ def answer(capsys: Captured, code: int, *arguments: str | Path) -> dict[str, Any
 def write_path(path: Path, robot: str, q: FloatArray, period: float = 0.01) -> None:
     """Write the poses of joint values as a path of poses."""
     targets = targets_of(load_robot(robot), q)
-    assert targets.rotation is not None
-    quat = quaternions(targets.rotation.reshape(-1, 9), "matrix")
+    quat = quaternions(there(targets.rotation).reshape(-1, 9), "matrix")
     table = np.column_stack([period * np.arange(len(q)), targets.position, quat])
     np.savetxt(path, table, delimiter=",", header="t,x,y,z,qx,qy,qz,qw", comments="", fmt="%.16g")

@@ -5,8 +5,10 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import Any
 
+from asserting import there
 from urmpipe_pipeline.presentation.figure import Figure
-from urmpipe_pipeline.presentation.section import Cell, Section, Table, Value
+from urmpipe_pipeline.presentation.scene import Scene
+from urmpipe_pipeline.presentation.section import Cell, Presentation, Section, Table, Value
 
 
 def cells(table: Table) -> dict[str, list[Any]]:
@@ -27,6 +29,11 @@ def facts(section: Section) -> dict[str, Any]:
 def figures(section: Section) -> list[Figure]:
     """The plots of a section."""
     return [one for one in section.figures() if isinstance(one, Figure)]
+
+
+def scene_of(shown: Presentation) -> Scene:
+    """The scene of what has one."""
+    return there(there(shown.scene)())
 
 
 def every_section(section: Section) -> Iterator[Section]:

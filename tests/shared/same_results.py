@@ -17,21 +17,23 @@ def assert_same(found: Any, wanted: Any, place: str = "result") -> None:
             assert found.tolist() == wanted.tolist(), place
         else:
             assert found.tobytes() == wanted.tobytes(), place
-    elif is_dataclass(wanted) and not isinstance(wanted, type):
-        assert type(found) is type(wanted), place
-        for field in fields(wanted):
-            if field.name != "recording":  # where it stands: not a part of what is recorded
-                assert_same(getattr(found, field.name), getattr(wanted, field.name), f"{place}.{field.name}")
-    elif isinstance(wanted, Mapping):
-        assert list(found) == list(wanted), place
-        for key, value in wanted.items():
-            assert_same(found[key], value, f"{place}[{key!r}]")
-    elif isinstance(wanted, tuple):
-        assert isinstance(found, tuple), place
-        assert len(found) == len(wanted), place
-        for i, (one, other) in enumerate(zip(found, wanted, strict=True)):
-            assert_same(one, other, f"{place}[{i}]")
     elif isinstance(wanted, float) and np.isnan(wanted):
         assert np.isnan(found), place
-    else:
+    elif (parts := _parts(wanted)) is None:
         assert found == wanted, place
+    else:
+        other = _parts(found)
+        assert type(found) is type(wanted) or isinstance(wanted, Mapping), place
+        assert other is not None, place
+        assert list(other) == list(parts), place
+        for name, part in parts.items():
+            assert_same(other[name], part, f"{place}.{name}")
+
+
+def _parts(whole: Any) -> dict[Any, Any] | None:
+    """Return the parts of a dataclass, a mapping or a tuple by name, key or place; None of anything else."""
+    if is_dataclass(whole) and not isinstance(whole, type):  # `recording` says where it stands: no part of it
+        return {each.name: getattr(whole, each.name) for each in fields(whole) if each.name != "recording"}
+    if isinstance(whole, Mapping):
+        return dict(whole)
+    return dict(enumerate(whole)) if isinstance(whole, tuple) else None

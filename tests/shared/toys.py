@@ -84,12 +84,17 @@ def laid_out(one: Presentation) -> tuple[Blueprint, Opening]:
     return send_views(rr.RecordingStream("toy"), one, lambda values, t_ns: None)
 
 
+def root_of(one: Presentation) -> Any:
+    """Return the outermost container of a presentation's layout."""
+    return laid_out(one)[0].root_container
+
+
 def eye_of(one: Presentation) -> tuple[FloatArray, FloatArray]:
     """Return where the eye of a presentation's 3D view is and what it looks at in [m], shape (3,) each."""
-    left, *_ = laid_out(one)[0].root_container.contents  # type: ignore[union-attr]
+    left, *_ = root_of(one).contents
     (controls,) = (
         view.properties["EyeControls3D"]
-        for view in left.contents  # type: ignore[union-attr]
+        for view in left.contents
         if "EyeControls3D" in getattr(view, "properties", {})
     )
     eye, target = (

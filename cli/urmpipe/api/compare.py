@@ -28,12 +28,11 @@ from urmpipe_models.tolerance import DEFAULT_TOLERANCE
 from urmpipe_pipeline.comparison.baseline import against_baseline, complete_noise
 from urmpipe_pipeline.comparison.compare import CompareOptions, Tcp, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
-from urmpipe_pipeline.comparison.left_out import BEYOND
 from urmpipe_pipeline.comparison.sync import SyncOption
 from urmpipe_pipeline.comparison.tables import statistics_rows
 from urmpipe_pipeline.comparison.tolerance import kinds_with_unit, parse_tolerance
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.comparison.warnings import EXCHANGED, LARGE_NOISE, large_noises
+from urmpipe_pipeline.comparison.warnings import BEYOND, EXCHANGED, LARGE_NOISE, large_noises
 from urmpipe_pipeline.operands import MadeRun, is_log, load_comparison, load_runs
 from urmpipe_pipeline.outputs import OutputKind
 from urmpipe_pipeline.results import kind_of, present, read_recording

@@ -48,14 +48,12 @@ class Change:
     @property
     def worse(self) -> tuple[Worse, ...]:
         """What of it is larger than before by more than the noise; samples: it rests on far fewer."""
-        return self._larger(self.before, self.now, self.share_noise and self.share_noise[1], self.periods)
+        return self._grown(before=0, now=1)
 
     @property
     def better(self) -> tuple[Worse, ...]:
         """What of it is smaller than before by more than the noise; samples: it rests on far more."""
-        return self._larger(
-            self.now, self.before, self.share_noise and self.share_noise[0], self.periods[::-1]
-        )
+        return self._grown(before=1, now=0)
 
     @property
     def changed(self) -> bool:
@@ -63,21 +61,17 @@ class Change:
         moved = self.largest is not None and self.largest > self.noise
         return bool(self.worse or self.better or moved or self.before.verdict != self.now.verdict)
 
-    def _larger(
-        self, one: Statistics, other: Statistics, share_noise: float | None, periods: tuple[float, float]
-    ) -> tuple[Worse, ...]:
-        """Return what of the other is larger than of the one by more than the noise, or rests on less."""
-        found: list[Worse] = []
-        if other.max > one.max + self.noise:
-            found.append("max")
-        if other.rms > one.rms + self.noise:
-            found.append("rms")
-        if share_noise is not None and (other.share_out or 0.0) > (one.share_out or 0.0) + share_noise:
+    def _grown(self, *, before: int, now: int) -> tuple[Worse, ...]:
+        """Return what is larger on one side (0 the baseline, 1 now) than on the other, or rests on less."""
+        one, other = ((self.before, self.now)[side] for side in (before, now))
+        found: list[Worse] = ["max"] if other.max > one.max + self.noise else []
+        found += ["rms"] if other.rms > one.rms + self.noise else []
+        noise = self.share_noise
+        if noise is not None and (other.share_out or 0.0) > (one.share_out or 0.0) + noise[now]:
             found.append("share_out")
-        if one.samples and other.samples is not None:
-            lasted, lasts = one.samples * periods[0], other.samples * periods[1]
-            if lasts < KEPT * lasted:
-                found.append("samples")
+        lasted, lasts = (one.samples or 0) * self.periods[before], other.samples
+        if lasts is not None and lasts * self.periods[now] < KEPT * lasted:
+            found.append("samples")
         return tuple(found)
 
     def to_dict(self) -> dict[str, Any]:

@@ -17,21 +17,18 @@ from urmpipe_pipeline import text
 from urmpipe_pipeline.comparison.alignment import align, check_align
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.left_out import left_out_warnings
-from urmpipe_pipeline.comparison.matching import (
-    NO_ROBOT,
-    Matched,
-    as_recorded,
-    by_kinematics,
-    file_of,
-    lacking,
-    match,
-)
+from urmpipe_pipeline.comparison.matching import NO_ROBOT, as_recorded, by_kinematics, file_of, lacking, match
 from urmpipe_pipeline.comparison.measure import measure, unheld
 from urmpipe_pipeline.comparison.sync import SyncOption, check_sync, sync_doubts, synchronise
 from urmpipe_pipeline.comparison.tolerance import check_tolerance
-from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
-from urmpipe_pipeline.comparison.warnings import exchanged, large_tolerances, recorded_apart, thin_evidence
+from urmpipe_pipeline.comparison.trajectory import AlignMode, Trajectory
+from urmpipe_pipeline.comparison.warnings import (
+    exchanged,
+    large_tolerances,
+    left_out_warnings,
+    recorded_apart,
+    thin_evidence,
+)
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.meshes import missing_visuals
 from urmpipe_pipeline.provenance import provenance
@@ -45,8 +42,6 @@ Tcp = Literal["fk", "recorded"]
 RECORDED_APART = 1e-3
 """Distance in [m] between kinematics and recorded tool centre point that is told where neither is judged: a
 third of the default tolerance."""
-
-ONE_CLOCK = "its joints and its recorded tool centre point stand in the same rows"
 
 
 @dataclass(frozen=True, slots=True)
@@ -117,20 +112,15 @@ def compare_runs(reference: Run, runs: Sequence[Run], options: CompareOptions | 
         lambda named: _deviation(*named, wanted, trajectory(named[1], chosen.tcp), chosen),
         zip(names, runs, strict=True),
     )
-    told = [*_told_of(reference), *exchanged(reference, runs)]
-    told += _differing_robots([reference, *runs], chosen.tcp)
+    told = [*(one.of(reference.name) for one in reference.warnings), *exchanged(reference, runs)]
+    if chosen.tcp == "fk":
+        told += _differing_robots([reference, *runs])
     if chosen.tcp == "fk" and wanted.joints:
         told += [one for run in (reference, *runs) for one in recorded_apart(run, RECORDED_APART)]
     elif chosen.tcp == "fk":
-        told += [one for run in deviations for one in _lacking_tool(run)]
+        failed = [one for one in deviations if one.verdict == "fail"]
+        told += [hint.of(one.name) for one in failed for hint in lacking_tool(one.run.robot, one.run.log)]
     return _comparison(wanted, deviations, chosen, told)
-
-
-def _lacking_tool(one: Deviation) -> list[LogWarning]:
-    """Return what the tool centre point that a log recorded says of why the log is out of tolerance."""
-    if one.verdict == "pass" or one.run.robot is None:
-        return []
-    return [hint.of(one.name) for hint in lacking_tool(one.run.robot, one.run.log)]
 
 
 def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOption) -> None:
@@ -148,14 +138,9 @@ def _refuse_poses_as_motion(reference: Run, runs: Sequence[Run], sync: SyncOptio
         raise OptionError(Finding(parameter="sync", found=found, allowed="start, row by row"))
 
 
-def _told_of(reference: Run) -> list[LogWarning]:
-    """Return the warnings of a reference, which a comparison holds as a trajectory alone."""
-    return [one.of(reference.name) for one in reference.warnings]
-
-
-def _differing_robots(runs: Sequence[Run], tcp: Tcp) -> list[LogWarning]:
+def _differing_robots(runs: Sequence[Run]) -> list[LogWarning]:
     """Return a warning if the runs were held against each other by the kinematics of different arms."""
-    arms = [(run.name, run.robot.name) for run in runs if tcp == "fk" and run.log.joints and run.robot]
+    arms = [(run.name, run.robot.name) for run in runs if run.log.joints and run.robot]
     if len({arm for _, arm in arms}) < 2:
         return []
     said = ", ".join(f"{name} as {arm}" for name, arm in arms)
@@ -175,7 +160,7 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
     """
     chosen = options or CompareOptions()
     if chosen.sync != "start":
-        allowed = f"start, since {ONE_CLOCK}"
+        allowed = "start, since its joints and its recorded tool centre point stand in the same rows"
         raise OptionError(Finding(parameter="sync", found=f"{chosen.sync} for one log", allowed=allowed))
     log = run.log
     if not log.joints:
@@ -184,20 +169,16 @@ def compare_recorded(run: Run, options: CompareOptions | None = None) -> Compari
         raise LogError(lacking(run, *NO_ROBOT))
     if log.tcp_position is None:
         said = "one log, which recorded no tool centre point; allowed: a reference before the log"
-        alike = (
-            replace(one.as_finding(), file=file_of(run)) for one in log.warnings if one.kind == TCP_NOT_READ
-        )
-        raise LogError(lacking(run, said), *alike)
-    recorded = Trajectory(
-        f"{run.name} (recorded)", log.t_ns, log.tcp_position, log.files, quat_xyzw=log.tcp_quat_xyzw
-    )
+        doubts = [one.as_finding() for one in log.warnings if one.kind == TCP_NOT_READ]
+        raise LogError(lacking(run, said), *(replace(one, file=file_of(run)) for one in doubts))
+    name = f"{run.name} (recorded)"
+    recorded = Trajectory(name, log.t_ns, log.tcp_position, log.files, log.tcp_quat_xyzw)
     position, rotation = poses_over_log(run.robot, _on_rows(run))
     quat = continuous_quaternions(quaternions(rotation.reshape(-1, 9), "matrix"))
-    computed = Trajectory(run.name, log.t_ns, position, log.files, quat_xyzw=quat)
-    deviation = _deviation(run.name, run, recorded, computed, chosen)
-    found = _comparison(recorded, [deviation], chosen)
-    doubts = lacking_tool(run.robot, log) if deviation.verdict == "fail" else []
-    return replace(found, warnings=(*found.warnings, *doubts))
+    computed = Trajectory(run.name, log.t_ns, position, log.files, quat)
+    found = _comparison(recorded, [_deviation(run.name, run, recorded, computed, chosen)], chosen)
+    lacks = lacking_tool(run.robot, log) if found.verdict == "fail" else []
+    return replace(found, warnings=(*found.warnings, *lacks))
 
 
 def _on_rows(run: Run) -> FloatArray:
@@ -221,48 +202,27 @@ def _comparison(
         warnings += sync_doubts(one.name, one.sync, one.run.tsp)
         warnings += left_out_warnings(one, reference)
         warnings += thin_evidence(one)
-        if _lacks_joints(reference, one):
-            warnings.append(_joints_not_compared(reference, one))
-    warnings += _shapes_gone(deviations)
+        if reference.joints and one.run.log.joints and one.joint_delta is None:
+            said = f"no joint is compared: {unheld(reference, one.run)}"
+            warnings.append(LogWarning("joints-not-compared", said, about=one.name))
+    warnings += _shapes_gone([one.run for one in deviations])
     inputs = [*reference.files, *(file for one in deviations for file in one.run.log.files)]
-    given = {
-        "tolerance": dict(options.tolerance),
-        "tcp": options.tcp,
-        "sync": options.sync,
-        "align": options.align,
-    }
-    name = (
-        f"{deviations[0].name}-against-{reference.name}"
-        if len(deviations) == 1
-        else f"against-{reference.name}"
-    )
+    given = {name: getattr(options, name) for name in ("tcp", "sync", "align")}
+    name = f"{deviations[0].name}-" if len(deviations) == 1 else ""
     return Comparison(
-        name=name,
-        reference=reference,
-        runs=tuple(deviations),
-        tolerance=dict(options.tolerance),
-        warnings=tuple(warnings),
-        provenance=provenance("compare", given, inputs),
+        f"{name}against-{reference.name}",
+        reference,
+        tuple(deviations),
+        dict(options.tolerance),
+        tuple(warnings),
+        provenance("compare", {"tolerance": dict(options.tolerance), **given}, inputs),
     )
 
 
-def _shapes_gone(deviations: Sequence[Deviation]) -> list[LogWarning]:
+def _shapes_gone(runs: Sequence[Run]) -> list[LogWarning]:
     """Return what cannot be drawn of the arms any more: a recording keeps the names of mesh files only."""
-    arms = [one.run for one in deviations if one.run.robot]
-    told = {warning for run in arms for warning in run.warnings}
-    gone = dict.fromkeys(warning for run in arms if run.robot for warning in missing_visuals(run.robot))
-    return [warning for warning in gone if warning not in told]
-
-
-def _lacks_joints(reference: Trajectory, one: Deviation) -> bool:
-    """Tell whether both sides have joints that were not compared."""
-    return bool(reference.joints and one.run.log.joints) and one.joint_delta is None
-
-
-def _joints_not_compared(reference: Trajectory, one: Deviation) -> LogWarning:
-    """Return the warning that says why."""
-    said = f"no joint is compared: {unheld(reference, one.run)}"
-    return LogWarning("joints-not-compared", said, about=one.name)
+    gone = dict.fromkeys(warning for run in runs if run.robot for warning in missing_visuals(run.robot))
+    return [warning for warning in gone if not any(warning in run.warnings for run in runs)]
 
 
 def _deviation(
@@ -270,15 +230,8 @@ def _deviation(
 ) -> Deviation:
     """Return the deviation of one trajectory, at its own samples."""
     sync = synchronise(reference, actual, options.sync, options.align)
-    matched = align(_matched(run, reference, actual, sync), options.align, run)
-    return measure(name, run, reference, matched, options.tolerance)
-
-
-def _matched(run: Run, reference: Trajectory, actual: Trajectory, sync: Sync) -> Matched:
-    """Return both sides at the same times, at least one of them."""
     matched = match(reference, actual, sync)
     if not len(matched.sample):
-        raise LogError(
-            lacking(run, f"no sample in common with {reference.name} (time offset {sync.offset} s)")
-        )
-    return matched
+        said = f"no sample in common with {reference.name} (time offset {sync.offset} s)"
+        raise LogError(lacking(run, said))
+    return measure(name, run, reference, align(matched, options.align, run), options.tolerance)

@@ -72,8 +72,7 @@ class Comparison(Result):
     @property
     def own_warnings(self) -> tuple[LogWarning, ...]:
         """The warnings that are about no single log."""
-        names = {run.name for run in self.runs}
-        return tuple(one for one in self.warnings if one.about not in names)
+        return tuple(one for one in self.warnings if one.about not in [run.name for run in self.runs])
 
     @property
     def ranking(self) -> tuple[Deviation, ...]:
@@ -82,13 +81,8 @@ class Comparison(Result):
         Those that pass come first, and among them (as among the others) those that cover the reference; then
         the share of a tolerance that is used up decides, then the rms norm.
         """
-
-        def place(run: Deviation) -> tuple[bool, bool, float, float]:
-            """Return what a log is ranked by, the least first."""
-            failed, used, rms = by_tolerance(run)
-            return failed, self.covered(run) < WHOLE, used, rms
-
-        return tuple(sorted(self.runs, key=place))
+        by_used = sorted(self.runs, key=by_tolerance)
+        return tuple(sorted(by_used, key=lambda run: (run.verdict == "fail", self.covered(run) < WHOLE)))
 
     @property
     def worst(self) -> Deviation:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import numpy as np
@@ -67,17 +67,8 @@ class DeltaVerdict:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object."""
-        return {
-            "block": self.block,
-            "tolerance": dict(self.tolerance),
-            "quantity": self.quantity,
-            "worst": self.worst if math.isfinite(self.worst) else None,
-            "t": self.t,
-            "sample": self.sample,
-            "samples": self.samples,
-            "out_of_tolerance": self.out_of_tolerance,
-            "verdict": self.verdict,
-        }
+        told = asdict(self) | {"worst": self.worst if math.isfinite(self.worst) else None}
+        return {name: value for name, value in told.items() if name != "variables"}
 
 
 def delta_verdict(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -35,7 +36,7 @@ def exports(comparison: Comparison) -> Exports:
         "verdict": comparison.verdict,
         "runs": [run.name for run in comparison.runs],
     }
-    rows = Rows(lambda units_told: delta_table(comparison), lambda table: _fields(comparison))
+    rows = Rows(partial(delta_table, comparison), lambda table: _fields(comparison))
     poses = {"": lambda rows: _poses(comparison)}
     return Exports("comparison", about, {"compared": rows}, poses, {}, (NO_ORIENTATION,))
 

@@ -14,13 +14,7 @@ from urmpipe_pipeline.comparison.causes import causes
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.trajectory import Sync
-from urmpipe_pipeline.comparison.wording import (
-    decided_words,
-    out_words,
-    size_of,
-    stretch_words,
-    used_words,
-)
+from urmpipe_pipeline.comparison.wording import decided_words, out_words, size_of, stretch_words, used_words
 from urmpipe_pipeline.presentation.parts import spot_at
 from urmpipe_pipeline.presentation.section import Advice, Fact, Place, Ref, Value
 from urmpipe_pipeline.runs.parts import log_facts

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, fields, replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -56,18 +57,9 @@ class Matched:
         Args:
             kept: Indices of the samples [-], shape (k,).
         """
-        return replace(
-            self,
-            sample=self.sample[kept],
-            t_ns=self.t_ns[kept],
-            reference=self.reference[kept],
-            actual=self.actual[kept],
-            reference_quat=None if self.reference_quat is None else self.reference_quat[kept],
-            actual_quat=None if self.actual_quat is None else self.actual_quat[kept],
-            reference_q=None if self.reference_q is None else self.reference_q[kept],
-            actual_q=None if self.actual_q is None else self.actual_q[kept],
-            left_out=self.left_out + len(self.sample) - len(kept),
-        )
+        values = ((one.name, getattr(self, one.name)) for one in fields(self))
+        some: dict[str, Any] = {name: array[kept] for name, array in values if isinstance(array, np.ndarray)}
+        return replace(self, **some, left_out=self.left_out + len(self.sample) - len(kept))
 
 
 ORIENTED = "joints with a robot, or a recorded orientation"
@@ -86,16 +78,7 @@ def by_kinematics(run: Run) -> Trajectory:
     if run.tcp is None:
         raise LogError(lacking(run, *NO_ROBOT))
     quat = continuous_quaternions(quaternions(run.tcp.euler_zyx, "zyx"))
-    return Trajectory(
-        run.name,
-        run.t_ns,
-        run.tcp.position,
-        run.log.files,
-        quat,
-        run.log.joints,
-        tuple(run.joint_units),
-        run.q,
-    )
+    return _trajectory(run, run.tcp.position, quat)
 
 
 def as_recorded(run: Run) -> Trajectory:
@@ -107,18 +90,14 @@ def as_recorded(run: Run) -> Trajectory:
     if run.tcp_recorded is None:
         hint = Hint("tcp", "fk", "goes by the joints of a log with a robot")
         raise LogError(lacking(run, "no recorded tool centre point", hint))
-    joints = run.log.joints
-    units = tuple(run.joint_units) if joints else ()
-    return Trajectory(
-        run.name,
-        run.t_ns,
-        run.tcp_recorded,
-        run.log.files,
-        _recorded_quat(run),
-        joints,
-        units,
-        run.q if joints else None,
-    )
+    return _trajectory(run, run.tcp_recorded, _recorded_quat(run))
+
+
+def _trajectory(run: Run, position: FloatArray, quat: FloatArray | None) -> Trajectory:
+    """Return where a run was, with the joints that it has."""
+    joints, units = run.log.joints, tuple(run.joint_units)
+    q = run.q if joints else None
+    return Trajectory(run.name, run.t_ns, position, run.log.files, quat, joints, units, q)
 
 
 def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
@@ -138,8 +117,8 @@ def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
     sample = np.flatnonzero(np.isfinite(wanted).all(axis=1) & np.isfinite(log.position).all(axis=1))
     at_ns = at_ns[sample]
     reference_q, actual_q = _joints(reference, log, sample, at_ns)
-    before = reference.t_ns < log.t_ns[0] + shift - ROUNDING_NS
-    after = reference.t_ns > log.t_ns[-1] + shift + ROUNDING_NS
+    first, last = log.t_ns[[0, -1]] + shift
+    outside = (reference.t_ns < first - ROUNDING_NS) | (reference.t_ns > last + ROUNDING_NS)
     return Matched(
         sample=sample,
         t_ns=log.t_ns[sample],
@@ -150,7 +129,7 @@ def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
         reference_q=reference_q,
         actual_q=actual_q,
         left_out=len(log.t_ns) - len(sample),
-        reference_left_out=int(np.count_nonzero(before | after)),
+        reference_left_out=int(np.count_nonzero(outside)),
         sync=sync,
         alignment=Alignment(),
     )

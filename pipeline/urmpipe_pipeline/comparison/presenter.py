@@ -10,18 +10,8 @@ from urmpipe_pipeline.comparison.baseline_section import baseline_section
 from urmpipe_pipeline.comparison.checks import log_checks, log_properties
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
-from urmpipe_pipeline.comparison.facts import (
-    alignment_words,
-    decisive_facts,
-    deviation_facts,
-    sync_words,
-)
-from urmpipe_pipeline.comparison.figures import (
-    deviation_figures,
-    overview_figure,
-    path_figure,
-    speed_cloud,
-)
+from urmpipe_pipeline.comparison.facts import alignment_words, decisive_facts, deviation_facts, sync_words
+from urmpipe_pipeline.comparison.figures import deviation_figures, overview_figure, path_figure, speed_cloud
 from urmpipe_pipeline.comparison.scene import comparison_scene
 from urmpipe_pipeline.comparison.tables import (
     comparison_lines,

@@ -40,16 +40,11 @@ def comparison_scene(result: Comparison) -> Scene:
         *_reference(result.reference, shown),
         *(_log(one, run_colour(i)) for i, one in enumerate(result.runs)),
     ]
-    larger = _enlarged(shown, _radius(arms, paths))
+    if larger := _enlarged(shown, _radius(arms, paths)):
+        paths.append(larger)
     whose = f"Arm of {shown.name}" if arms and several else "Arm"
-    said = f", in crimson the deviation x{larger[1]}" if larger else ""
-    return Scene(
-        f"{whose} and paths [m]{said}",
-        arms,
-        (*paths, *([larger[0]] if larger else [])),
-        (_decided(shown, several=several),),
-        enlarged=(len(paths), larger[1]) if larger else None,
-    )
+    said = f", in crimson the {larger.name}" if larger else ""
+    return Scene(f"{whose} and paths [m]{said}", arms, tuple(paths), (_decided(shown, several=several),))
 
 
 def shown_log(result: Comparison) -> Deviation:
@@ -103,8 +98,8 @@ def _decided(one: Deviation, *, several: bool) -> Spot:
     return Spot(spot_at(one.actual[one.decided_at]), said, DEVIATION_COLOUR)
 
 
-def _enlarged(one: Deviation, radius: float) -> tuple[Path, int] | None:
-    """Return reference + factor (actual - reference) of a log and the factor; None where it shows nothing.
+def _enlarged(one: Deviation, radius: float) -> Path | None:
+    """Return reference + factor (actual - reference) of a log; None where it shows nothing.
 
     Only that of the log whose arm is drawn: a line a log would hide all of them.
     """
@@ -112,9 +107,8 @@ def _enlarged(one: Deviation, radius: float) -> tuple[Path, int] | None:
     if factor is None or not one.run.timed:
         return None
     position = one.reference + factor * (np.asarray(one.actual) - one.reference)
-    row = one.decided_at
-    name = f"deviation x{factor}"
-    return Path(name, position, one.t_ns, DEVIATION_COLOUR, sample=one.sample, kept=(row,)), factor
+    kept = (one.decided_at,)
+    return Path(f"deviation x{factor}", position, one.t_ns, DEVIATION_COLOUR, sample=one.sample, kept=kept)
 
 
 def _factor(largest: float, radius: float) -> int | None:

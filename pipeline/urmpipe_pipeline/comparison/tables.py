@@ -11,7 +11,7 @@ from urmpipe_pipeline.comparison.deviation import WHOLE, Deviation, Statistics
 from urmpipe_pipeline.comparison.facts import alignment_words, largest
 from urmpipe_pipeline.comparison.wording import size_of, symbol
 from urmpipe_pipeline.palette import run_colour
-from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute, spot_at
+from urmpipe_pipeline.presentation.parts import Heads, columns_of, minute, rows_table, spot_at
 from urmpipe_pipeline.presentation.section import Cell, Column, Judged, Place, Ref, Table, Value
 
 ABOUT = {"axis": "position", "norm": "position", "path": "path", "angle": "orientation", "joint": "joints"}
@@ -150,9 +150,4 @@ def _statistics(one: Deviation, own: list[Statistics], starts: Mapping[int, floa
 def statistics_rows(result: Comparison) -> Table:
     """Return what --csv writes: a row a log and quantity; lengths in [m], angles in [rad], times in [s]."""
     keys = ("run", "sync_offset", *(field.name for field in fields(Statistics)))
-    rows = list(result.rows())
-    return Table("Statistics", tuple(Column(key, key, [_plain(row[key]) for row in rows]) for key in keys))
-
-
-def _plain(value: str | float | None) -> Cell:
-    return value if value is None or isinstance(value, str) else Value(value)
+    return rows_table("Statistics", keys, result.rows())

@@ -9,13 +9,18 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.deviation import AXES, Deviation
+from urmpipe_pipeline.comparison.deviation import AXES, WHOLE, Deviation
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for
+from urmpipe_pipeline.comparison.trajectory import Trajectory
 from urmpipe_pipeline.joint_log import LogWarning
+from urmpipe_pipeline.runs.grid import ROUNDING_NS
 from urmpipe_pipeline.runs.results import Run
 
 EXCHANGED = "path-as-log"
 """The kind of a doubt about the order of what was given: it says nothing against a log."""
+
+BEYOND = "sync-left-out"
+"""Kind of the warning that says what an offset between the clocks leaves out: no doubt about the log."""
 
 LARGE_NOISE = "large-noise"
 """The kind of a doubt about the noise of a baseline: another baseline has its own."""
@@ -33,6 +38,49 @@ LARGE_LENGTH = 0.1
 
 LARGE_ANGLE = float(np.radians(10.0))
 """A larger tolerance in [rad] was meant in deg."""
+
+
+def left_out_warnings(one: Deviation, reference: Trajectory) -> Iterator[LogWarning]:
+    """Yield what was not compared of a log and of the reference.
+
+    Samples that an offset moves beyond the reference's time are what `sync` asks for; they are told apart
+    from those that lack a value, lie in a gap, or come after a reference that started together with the log.
+    A part of the reference that was not judged is told however the clocks were put together.
+
+    Args:
+        one: The deviation of the log.
+        reference: What was asked for, whole.
+    """
+    samples, whole = one.left_out + len(one.sample), len(reference.t_ns)
+    beyond = _beyond(one, reference) if one.sync.offset else 0
+    if one.left_out > beyond:
+        said = f"{one.left_out - beyond} of {samples} samples have no reference or no value"
+        yield LogWarning("left-out", said, about=one.name)
+    partly = one.reference_left_out > (1.0 - WHOLE) * whole
+    if partly:
+        yield LogWarning("not-covered", _covered(one, reference), about=one.name)
+    if one.sync.offset and (beyond or (one.reference_left_out and not partly)):
+        theirs = f"{one.reference_left_out} of {whole} samples of {reference.name}"
+        said = f"the offset of {one.sync.offset:.6g} s leaves {beyond} of {samples} samples and {theirs}"
+        yield LogWarning(BEYOND, f"{said} without the other side", about=one.name)
+
+
+def _covered(one: Deviation, reference: Trajectory) -> str:
+    """Say how much of the time of the reference a log lasts, and by which offset."""
+    kept = len(reference.t_ns) - one.reference_left_out
+    first, last = one.sync.offset, one.sync.offset + float(one.run.t[-1])
+    lasts = min(last, float(reference.t[-1])) - max(first, 0.0)
+    share = text.percent(kept / len(reference.t_ns))
+    shifted = f" at the offset of {one.sync.offset:.6g} s" if one.sync.offset else ""
+    said = f"{text.seconds(lasts)} s of the {text.seconds(reference.t[-1])} s of {reference.name}"
+    return f"it covers {said} ({share}){shifted}: the rest was not judged"
+
+
+def _beyond(one: Deviation, reference: Trajectory) -> int:
+    """Return how many samples of a log lie outside the time of the reference."""
+    at_ns = one.run.t_ns + round(one.sync.offset * 1e9)
+    before, after = at_ns < reference.t_ns[0] - ROUNDING_NS, at_ns > reference.t_ns[-1] + ROUNDING_NS
+    return int(np.count_nonzero(before | after))
 
 
 def thin_evidence(one: Deviation) -> Iterator[LogWarning]:

@@ -15,6 +15,9 @@ from urmpipe_pipeline.joint_log import LogWarning
 DATE, TIME_OF_DAY = "date", "time of day"
 """Units of clocks that are text."""
 
+UNIT_UNSAID = "unit-not-in-name"
+"""The kind of a warning that is about formats which do not keep the units beside the names: CSV."""
+
 DAY = 24 * 3_600 * 10**9
 """A day in [ns]."""
 
@@ -105,12 +108,12 @@ class Rows:
     """One choice of rows.
 
     Attributes:
-        table: Returns the columns; told whether the format keeps the units beside the names.
+        table: Returns the columns.
         fields: Returns the struct of MATLAB's MAT, of the table: numbers, arrays, texts, structs, and lists
             (cells).
     """
 
-    table: Callable[[bool], ExportTable]
+    table: Callable[[], ExportTable]
     fields: Callable[[ExportTable], Mapping[str, Any]]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Literal, TypeAlias
 
@@ -123,7 +123,7 @@ class Figure:
     Attributes:
         title: Its heading.
         caption: What is drawn and what to look for, one or two sentences.
-        alt: What it shows, for who does not see it.
+        alt: What it shows, for who does not see it; a function where that takes a look at all its arrays.
         views: At least one.
         instants: Times in [ns] at which a line goes through all panels, with a word each.
         opened: Number of the view that the viewer opens; None: all of them, one below the other.
@@ -132,7 +132,7 @@ class Figure:
 
     title: str
     caption: str
-    alt: str
+    alt: str | Callable[[], str]
     views: tuple[View, ...]
     instants: Mapping[int, str] = field(default_factory=dict)
     opened: int | None = 0
@@ -167,8 +167,7 @@ class Drawing:
 
 @dataclass(frozen=True, slots=True)
 class Text:
-    """A text that is shown letter by letter, such as a file."""
+    """A text that is shown letter by letter, such as a file; a page opens it only on request."""
 
     title: str
     text: str
-    folded: bool = True

@@ -77,6 +77,16 @@ def table_of(
     return Table(title, tuple(columns), note, brief, folded)
 
 
+def rows_table(title: str, keys: Iterable[str], rows: Iterable[Mapping[str, Any]]) -> Table:
+    """Return a table for CSV: rows of numbers in SI and words by their keys."""
+    every = list(rows)
+    return Table(title, tuple(Column(key, key, [_plain(row[key]) for row in every]) for key in keys))
+
+
+def _plain(value: str | float | None) -> Cell:
+    return value if value is None or isinstance(value, str) else Value(value)
+
+
 def inputs_table(title: str, files: Iterable[SourceFile]) -> Table:
     """Return input files by name, length and hash."""
     heads = {"file": "File", "size": "Size [bytes]", "sha256": "SHA-256"}

@@ -118,7 +118,6 @@ class Scene:
         paths: From the back to the front.
         spots: Places with a word.
         targets: What was asked for, if it was poses.
-        enlarged: Index of the path that shows a deviation larger than it is, with its factor; None without.
     """
 
     title: str = ""
@@ -126,4 +125,3 @@ class Scene:
     paths: tuple[Path, ...] = ()
     spots: tuple[Spot, ...] = ()
     targets: Targets | None = None
-    enlarged: tuple[int, int] | None = None

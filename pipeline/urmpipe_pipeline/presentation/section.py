@@ -173,18 +173,8 @@ class Event:
 Block: TypeAlias = Table | Figure | SpaceFigure | Drawing | Text
 
 
-def no_blocks() -> tuple[Block, ...]:
-    """Return no blocks: the default of a section."""
-    return ()
-
-
-def no_figures() -> tuple[Figure | Drawing | Text, ...]:
-    """Return no figures: the default of a section."""
-    return ()
-
-
-def no_events() -> tuple[Event, ...]:
-    """Return no events: the default of a section."""
+def nothing() -> tuple[()]:
+    """Return nothing: the default of what is made only where it is shown."""
     return ()
 
 
@@ -216,11 +206,11 @@ class Section:
     verdict: Verdict = None
     facts: tuple[Fact, ...] = ()
     tables: tuple[Table, ...] = ()
-    figures: Callable[[], Iterable[Figure | Drawing | Text]] = no_figures
-    blocks: Callable[[], Iterable[Block]] = no_blocks
+    figures: Callable[[], Iterable[Figure | Drawing | Text]] = nothing
+    blocks: Callable[[], Iterable[Block]] = nothing
     checks: tuple[Check, ...] = ()
     properties: Mapping[str, Any] = field(default_factory=dict)
-    events: Callable[[], Iterable[Event]] = no_events
+    events: Callable[[], Iterable[Event]] = nothing
     warnings: tuple[LogWarning, ...] = ()
     notice: str = ""
     sections: tuple[Section, ...] = ()

@@ -33,7 +33,7 @@ class Column:
 
     Attributes:
         at: Its path in the result, such as /runs/matlab/delta.
-        values: Shape (n, ...).
+        values: In the units of its field, shape (n, ...).
         t_ns: Time of each row in integer [ns], shape (n,); None where it has none.
         plotted: Whether its rows stand by themselves, as plots want them: floats in one or two dimensions.
     """

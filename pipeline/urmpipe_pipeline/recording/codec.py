@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
+import numpy as np
+
 from urmpipe_pipeline.recording.array_form import ArrayOf, Column, In, Out
 from urmpipe_pipeline.recording.forms import form_of, has_default, parts_of, stored
 
@@ -18,11 +20,13 @@ class Encoded:
         tree: All but its arrays, as JSON has it.
         columns: Its arrays.
         entities: The path of each array by its `id` and that of its times; see `entity_of`.
+        clocks: The path of the times by which the rows of a plotted array are known, by its own.
     """
 
     tree: Any
     columns: tuple[Column, ...]
     entities: Mapping[tuple[int, int], str]
+    clocks: Mapping[str, str]
 
     def entity_of(self, array: Any, t_ns: Any = None) -> str:
         """Return the path of an array on some times; empty for one that has no values, which is not kept."""
@@ -38,7 +42,15 @@ def encode(result: Any) -> Encoded:
     at = Out("", None, [], {})
     cls: Any = type(result)
     tree = form_of(cls).write(result, at)
-    return Encoded(tree, tuple(at.columns), at.paths)
+    return Encoded(tree, tuple(at.columns), at.paths, _clocks(at))
+
+
+def _clocks(at: Out) -> dict[str, str]:
+    """Return the path of the times of each plotted array whose times rise, so that they tell its rows."""
+    times = {id(one.t_ns): one.t_ns for one in at.columns if one.plotted and one.t_ns is not None}
+    paths = {key: at.paths.get((key, id(None))) for key, t_ns in times.items() if (np.diff(t_ns) > 0).all()}
+    found = ((one.at, paths.get(id(one.t_ns))) for one in at.columns if one.plotted)
+    return {own: clock for own, clock in found if clock is not None}
 
 
 def decode(cls: Any, tree: Any, array: ArrayOf) -> Any:

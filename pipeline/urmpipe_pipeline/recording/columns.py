@@ -14,15 +14,23 @@ if TYPE_CHECKING:
     from rerun import ComponentColumn, TimeColumn
 
 
-def column_rows(column: Column, rows: slice) -> tuple[list[TimeColumn], list[ComponentColumn]]:
-    """Return the times and the values of some rows of an array, one by one where it is plotted."""
+def column_rows(
+    column: Column, rows: slice, *, numbered: bool = True
+) -> tuple[list[TimeColumn], list[ComponentColumn]]:
+    """Return the times and the values of some rows of an array, one by one where it is plotted.
+
+    Args:
+        column: The array.
+        rows: Which of its rows.
+        numbered: Whether plotted rows have numbers: they need none where their times tell them apart.
+    """
     import rerun as rr
 
     values = np.asarray(column.values[rows] if column.values.ndim else column.values)
     if not column.plotted:
         packed = rr.ComponentColumn(PACKED, Values(values), lengths=[values.size])
         return [rr.TimeColumn(ROW, sequence=np.array([rows.start + 1]))], [packed]
-    times = [rr.TimeColumn(ROW, sequence=np.arange(rows.start + 1, rows.stop + 1))]
-    if column.t_ns is not None:
-        times.insert(0, times_column(column.t_ns[rows]))
+    times = [] if column.t_ns is None else [times_column(column.t_ns[rows])]
+    if numbered:
+        times.append(rr.TimeColumn(ROW, sequence=np.arange(rows.start + 1, rows.stop + 1)))
     return times, [scalar_column(values.reshape(len(values), -1))]

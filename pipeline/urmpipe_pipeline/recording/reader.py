@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
-from urmpipe_pipeline.recording.array_form import CodecError
+from urmpipe_models.errors import shown
+from urmpipe_pipeline.recording.array_form import ArrayOf, CodecError
 from urmpipe_pipeline.recording.codec import decode
 from urmpipe_pipeline.recording.rows import Rows
 from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store
@@ -35,22 +37,31 @@ def read_result(path: Path, kinds: Mapping[str, type], *, lazy: bool = False) ->
     if cls is None:
         raise store.error(f"found a result of kind {document.get('kind')!r}, allowed: {', '.join(kinds)}")
     try:
-        result = decode(cls, document.get("result"), _reads(store, lazy))
+        result = decode(cls, document.get("result"), _reads(store, lazy, document.get("clocks")))
     except CodecError as error:
         raise store.error(f"found damaged metadata, {error}") from error
     located = any(one.name == "recording" for one in fields(result))
     return replace(result, recording=path) if located else result
 
 
-def _reads(store: Store, lazy: bool) -> Callable[[str, tuple[int, ...], np.dtype[Any]], Any]:
+def _reads(store: Store, lazy: bool, clocks: Any) -> ArrayOf:
     """Return what reads the array of a path, once."""
+    if not isinstance(clocks, dict) or not clocks.keys().isdisjoint(clocks.values()):
+        raise CodecError(f"found {shown(clocks)}, allowed: the paths of times by those of arrays")
     known: dict[tuple[str, tuple[int, ...], str], Any] = {}
 
     def array(at: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> Any:
         key = at, shape, dtype.str
         if key not in known:
             rows = shape or (1,)
-            found = Rows(lambda first, end: store.read(at, first, end, rows[1:], dtype), rows, dtype)
+
+            def read(first: int, end: int) -> NDArray[Any]:
+                """Return some of the rows."""
+                clock = array(clocks[at], rows[:1], np.dtype(np.int64)) if at in clocks else None
+                t_ns = None if clock is None else np.asarray(clock)
+                return store.read(at, first, end, rows[1:], dtype, t_ns)
+
+            found = Rows(read, rows, dtype)
             known[key] = found if lazy and shape else found.whole.reshape(shape)
         return known[key]
 

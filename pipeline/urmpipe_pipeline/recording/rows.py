@@ -42,7 +42,7 @@ class Rows(NDArrayOperatorsMixin):
 
     @property
     def whole(self) -> NDArray[Any]:
-        """The array, which stays in memory."""
+        """The array in its own units, shape (n, ...), which stays in memory."""
         if self._whole is None:
             self._whole = self._read(0, len(self))
         return self._whole

@@ -64,7 +64,7 @@ def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
 
 @dataclass(frozen=True)
 class Values:
-    """Values of any type as those of a component: Rerun's own batches would copy them once more."""
+    """Values of any type, unit and shape (...,) of a component: Rerun's batches would copy them once more."""
 
     array: NDArray[Any]
 

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -72,7 +73,13 @@ class Store:
         return RecordingError(Finding(message, str(self.path)))
 
     def read(
-        self, entity: str, first: int, end: int, width: tuple[int, ...], dtype: np.dtype[Any]
+        self,
+        entity: str,
+        first: int,
+        end: int,
+        width: tuple[int, ...],
+        dtype: np.dtype[Any],
+        t_ns: IntArray | None = None,
     ) -> NDArray[Any]:
         """Return some rows of an array; only the chunks up to the last of them are read.
 
@@ -82,12 +89,16 @@ class Store:
             end: The row after the last of them.
             width: Shape of a row.
             dtype: Type of the values.
+            t_ns: Rising times of all rows in integer [ns], where these tell the rows.
+
+        Returns:
+            In the units of its field, shape (end - first, *width).
 
         Raises:
             RecordingError: If some of them are missing, or are none of that type and shape.
         """
         found, filled = np.empty((end - first, *width), dtype), 0
-        for numbers, rows in self.parts(entity, width, dtype):
+        for numbers, rows in self.parts(entity, width, dtype, t_ns):
             filled += _copy(rows, numbers - first, found)
             if filled == len(found):
                 break
@@ -96,7 +107,7 @@ class Store:
         return found
 
     def parts(
-        self, entity: str, width: tuple[int, ...], dtype: np.dtype[Any]
+        self, entity: str, width: tuple[int, ...], dtype: np.dtype[Any], t_ns: IntArray | None = None
     ) -> Iterator[tuple[IntArray, NDArray[Any]]]:
         """Yield the numbers of some rows of an array, from 0, and the rows, in the order of the file.
 
@@ -105,7 +116,7 @@ class Store:
         """
         try:
             for chunk in self._store.stream().filter(content=entity, components=[SCALARS, PACKED]):
-                yield from _decoded(chunk.to_record_batch(), width, dtype)
+                yield from _decoded(chunk.to_record_batch(), width, dtype, t_ns)
         except (RuntimeError, ValueError, KeyError) as error:
             raise self.error(f"found damaged data in {entity}: {_one_line(error)}") from error
 
@@ -148,17 +159,18 @@ class Store:
         return None
 
 
-def document(kind: str, tree: Any) -> str:
-    """Return the metadata of a result of a kind as JSON."""
-    return json.dumps({"layout_version": LAYOUT_VERSION, "kind": kind, "result": tree})
+def document(kind: str, tree: Any, clocks: Mapping[str, str] = MappingProxyType({})) -> str:
+    """Return the metadata of a result of a kind as JSON: with its tree, and the clocks of its arrays."""
+    told = {"layout_version": LAYOUT_VERSION, "kind": kind, "clocks": dict(clocks), "result": tree}
+    return json.dumps(told)
 
 
 def _decoded(
-    batch: RecordBatch, width: tuple[int, ...], dtype: np.dtype[Any]
+    batch: RecordBatch, width: tuple[int, ...], dtype: np.dtype[Any], t_ns: IntArray | None
 ) -> Iterator[tuple[IntArray, NDArray[Any]]]:
     """Yield the numbers of rows, from 0, and the rows."""
     packed = PACKED in batch.schema.names
-    column, starts = batch.column(PACKED if packed else SCALARS), _numbers(batch.column(ROW)) - 1
+    column, starts = batch.column(PACKED if packed else SCALARS), _starts(batch, t_ns)
     offsets = _numbers(column.offsets)
     every = _numbers(column.values)[offsets[0] : offsets[-1]]
     if every.dtype != dtype:
@@ -169,6 +181,17 @@ def _decoded(
     for start, pack in zip(starts.tolist(), np.split(every, offsets[1:-1] - offsets[0]), strict=True):
         rows = pack.reshape(-1, *width)
         yield np.arange(start, start + len(rows)), rows
+
+
+def _starts(batch: RecordBatch, t_ns: IntArray | None) -> IntArray:
+    """Return the numbers of rows, from 0: as they are told, else by the rising times of all rows."""
+    if ROW in batch.schema.names or t_ns is None:
+        return _numbers(batch.column(ROW)) - 1
+    times = _numbers(batch.column(TIME)).view(np.int64)
+    found = np.searchsorted(t_ns, times)
+    if (found == len(t_ns)).any() or not np.array_equal(t_ns[found], times):
+        raise ValueError("rows at other times than were written")
+    return found
 
 
 def _numbers(array: Array) -> NDArray[Any]:

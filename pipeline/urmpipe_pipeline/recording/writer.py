@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.outputs import guarded_output
 from urmpipe_pipeline.presentation.section import Presentation
-from urmpipe_pipeline.recording.array_form import CodecError, Column
+from urmpipe_pipeline.recording.array_form import CodecError
 from urmpipe_pipeline.recording.codec import Encoded, encode
 from urmpipe_pipeline.recording.columns import column_rows
 from urmpipe_pipeline.recording.identity import APPLICATION_ID
@@ -24,7 +24,7 @@ from urmpipe_pipeline.text import encodable
 if TYPE_CHECKING:
     from rerun import RecordingStream
 
-AHEAD = 8
+AHEAD = 3
 """Slices under way at a time: there is always one to be written, and memory stays low."""
 
 SPARE = 64 * 2**20
@@ -54,11 +54,11 @@ def write_result(
     """
     with guarded_output(path, inputs, "recording") as part:
         encoded = _encoded(result, path)
-        metadata = document(kind, encoded.tree)
+        metadata = document(kind, encoded.tree, encoded.clocks)
         with _stream_into(part) as stream:
             _describe(stream, shown, encoded, metadata)
-            _send(stream, part.parent, encoded.columns, progress)
-        verify(part, path, encoded.columns, metadata)
+            _send(stream, part.parent, encoded, progress)
+        verify(part, path, encoded, metadata)
 
 
 def _encoded(result: Any, path: Path) -> Encoded:
@@ -92,25 +92,25 @@ def _stream_into(part: Path) -> Iterator[RecordingStream]:
 
 
 def _send(
-    stream: RecordingStream, folder: Path, every: Sequence[Column], progress: Callable[[float], None] | None
+    stream: RecordingStream, folder: Path, encoded: Encoded, progress: Callable[[float], None] | None
 ) -> None:
     """Send the arrays in slices, those with a row to verify first: reading back then need not read all.
 
     Args:
         stream: Where to.
         folder: Where its file stands.
-        every: The arrays.
+        encoded: The arrays.
         progress: Told the share that is sent.
     """
-    total = sum(column.rows for column in every)
+    total = sum(column.rows for column in encoded.columns)
     done = 0
-    slices = [(column, start) for column in every for start in _starts(column.rows)]
+    slices = [(column, start) for column in encoded.columns for start in _starts(column.rows)]
     for number, (column, start) in enumerate(slices):
         rows = slice(start, min(start + SLICE, column.rows))
         if number % AHEAD == 0:
             stream.flush()  # waits until all that was sent is in the file
         _refuse_full_disk(folder)
-        stream.send_columns(column.at, *column_rows(column, rows))
+        stream.send_columns(column.at, *column_rows(column, rows, numbered=column.at not in encoded.clocks))
         done += rows.stop - start
         if progress:
             progress(done / total)

@@ -68,7 +68,7 @@ def drawn_figures(figure: Figure, times: Span) -> Iterator[spec.Figure]:
         yield spec.Figure(
             figure.title if over == groups[0][0] else f"{figure.title} over {over}",
             f"{figure.caption}{_left_out(panels)}",
-            figure.alt,
+            figure.alt if isinstance(figure.alt, str) else figure.alt(),
             _spec(figure, panels, span),
             _height(panels),
             over=over,

@@ -25,9 +25,7 @@ FONT = "Arial, Helvetica, Liberation Sans, sans-serif"
 """Fonts of the same widths on every system, so that an SVG looks everywhere as it was laid out."""
 
 NO_KALEIDO = Finding(
-    parameter="figures",
-    found="no kaleido, which draws them",
-    allowed="pip install 'urmpipe[figures]'",
+    parameter="figures", found="no kaleido, which draws them", allowed="pip install 'urmpipe[figures]'"
 )
 NO_BROWSER = Finding(
     parameter="figures",

@@ -28,7 +28,19 @@ def environment() -> Environment:
     )
     engine.filters["raw"] = Markup
     engine.filters["json"] = script_json
+    engine.filters["data_address"] = data_address
+    engine.filters["kind"] = lambda block: type(block).__name__
     return engine
+
+
+def data_address(svg: str) -> str:
+    """Return a drawing as the source of an image.
+
+    Browsers run no script in an image, load nothing for it and let nobody click in it, whatever the file
+    says that it came from.
+    """
+    data = base64.b64encode(svg.encode("utf-8", "replace")).decode("ascii")
+    return f"data:image/svg+xml;base64,{data}"
 
 
 def script_json(value: Any) -> Markup:

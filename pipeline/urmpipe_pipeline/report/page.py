@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import base64
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import groupby
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure, Text
 from urmpipe_pipeline.presentation.figure import Figure as GivenFigure
@@ -24,43 +23,11 @@ from urmpipe_pipeline.report.summary import (
     banner_of,
     cards_of,
     side_by_side,
-    word_of,
     worst_first,
 )
 from urmpipe_pipeline.report.tables import Anchors, Grid, ShownFact, grid, shown_facts, warnings_table
 
-
-@dataclass(frozen=True, slots=True)
-class Image:
-    """A drawing in SVG, embedded as an image.
-
-    Browsers run no script in an image, load nothing for it and let nobody click in it, whatever the file
-    says that it came from.
-
-    Attributes:
-        title: Its heading.
-        alt: What it shows, for who does not see it.
-        source: A data address of the SVG.
-        kind: What the template draws it as.
-    """
-
-    title: str
-    alt: str
-    source: str
-    kind: Literal["drawing"] = "drawing"
-
-
-@dataclass(frozen=True, slots=True)
-class Listing:
-    """A text that is shown letter by letter; `kind` is what the template draws it as."""
-
-    title: str
-    text: str
-    folded: bool
-    kind: Literal["text"] = "text"
-
-
-Shown: TypeAlias = Grid | Figure | Image | Listing
+Shown: TypeAlias = Grid | Figure | Drawing | Text
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,9 +38,7 @@ class Part:
         title: The heading.
         ident: Its anchor.
         state: pass, fail or plain, shown at the heading; empty where there is none.
-        word: The verdict in capitals.
-        explained: Facts that need a word each, in a list of their own.
-        facts: What else it is about.
+        facts: What it is about; those that need a word each stand in a list of their own.
         notice: What must not be overseen; empty for nothing.
         blocks: Its tables, figures, drawings and texts, in order.
         parts: The parts below it.
@@ -83,8 +48,6 @@ class Part:
     title: str
     ident: str
     state: str
-    word: str
-    explained: tuple[ShownFact, ...]
     facts: tuple[ShownFact, ...]
     notice: str
     blocks: tuple[Shown, ...]
@@ -189,7 +152,6 @@ def _part(section: Section, anchors: Anchors, links: Links, which: str = "") -> 
         which: What tells a result from others of its title.
     """
     ident = anchors.ident(section)
-    facts = tuple(shown_facts(section.facts, anchors.href))
     blocks = [*section.figures(), *section.blocks()]
     figures = [block for block in blocks if isinstance(block, GivenFigure)]
     span, link = span_of(figures), links.of(figures, ident)
@@ -198,9 +160,7 @@ def _part(section: Section, anchors: Anchors, links: Links, which: str = "") -> 
         f"{section.title}{which}",
         ident,
         section.verdict or "",
-        word_of(section.verdict),
-        tuple(fact for fact in facts if fact.help),
-        tuple(fact for fact in facts if not fact.help),
+        tuple(shown_facts(section.facts, anchors.href)),
         section.notice,
         (
             *(grid(table, anchors.href, folds=False) for table in first),
@@ -220,8 +180,5 @@ def _shown(block: Block, anchors: Anchors, span: Span) -> Iterator[Shown]:
             yield from drawn_figures(block, span)
         case SpaceFigure():
             yield drawn_space(block)
-        case Drawing():
-            data = base64.b64encode(block.svg.encode("utf-8", "replace")).decode("ascii")
-            yield Image(block.title, block.alt, f"data:image/svg+xml;base64,{data}")
-        case Text():
-            yield Listing(block.title, block.text, block.folded)
+        case _:
+            yield block

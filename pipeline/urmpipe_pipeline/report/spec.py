@@ -42,7 +42,6 @@ class Figure:
         height: In [px].
         space: True for a scene in 3D.
         over: What its horizontal axis measures: figures of one part that share it move together.
-        kind: What the template draws it as.
     """
 
     title: str
@@ -52,7 +51,6 @@ class Figure:
     height: int
     space: bool = False
     over: str = "t"
-    kind: Literal["figure"] = "figure"
 
 
 @dataclass(frozen=True, slots=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Literal, TypeAlias
+from typing import TypeAlias
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.joint_log import LogWarning
@@ -92,7 +92,6 @@ class Grid:
         rows: One cell a column.
         folded: True if it is closed until someone opens it.
         note: A line under it.
-        kind: What the template draws it as.
     """
 
     title: str
@@ -100,7 +99,6 @@ class Grid:
     rows: tuple[tuple[ShownCell, ...], ...]
     folded: bool
     note: str
-    kind: Literal["table"] = "table"
 
 
 @dataclass(frozen=True, slots=True)

@@ -38,10 +38,8 @@ def exports(run: Run) -> Exports:
         "repolarizations": len(run.repolarizations),
     }
     rows = {
-        "grid": Rows(lambda units_told: grid_table(run), lambda table: _grid_fields(run)),
-        "file": Rows(
-            lambda units_told: file_table(run.log, units_told=units_told), partial(_file_fields, run)
-        ),
+        "grid": Rows(partial(grid_table, run), lambda table: _grid_fields(run)),
+        "file": Rows(partial(file_table, run.log), partial(_file_fields, run)),
     }
     poses: dict[str, Callable[[str], list[Poses]]] = {
         "fk": partial(run_poses, run),

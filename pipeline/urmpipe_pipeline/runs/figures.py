@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.continuity import continuous_euler
 from urmpipe_models.kinematics.forward import PointLog
+from urmpipe_models.row_blocks import norms
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
 from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Panel, Shape, View
@@ -33,8 +35,7 @@ def run_figures(run: Run) -> Iterator[Figure]:
     """Yield the plots of a log that stands alone: joints, speed, motion."""
     yield from joints_figure(run)
     if run.timed and run.tcp is not None:
-        velocity = np.asarray(run.tcp.velocity)
-        yield speed_figure(run.name, run.t_ns, np.sqrt(np.einsum("ij,ij->i", velocity, velocity)))
+        yield speed_figure(run.name, run.t_ns, norms(run.tcp.velocity))
     yield from motion_figure(run)
 
 
@@ -68,16 +69,13 @@ def joints_figure(run: Run, opened: int | None = None) -> Iterator[Figure]:
     marked = f"{wraps} marked{f', {doubts} doubtful' if doubts else ''}"
     before = joint_panels(run, "before", run.log.q, run.log.t_ns, _raw_marks(run))
     both = View("Joints in the file", before), View(f"Joints repolarized ({marked})", after)
-    crosses = f" A cross marks each of {text.counted(doubts, 'other finding')}." if doubts else ""
-    yield Figure(
-        "Joints before and after repolarization",
-        f"First as in the file, then repolarized. {text.counted(wraps, 'repolarization')}: a triangle marks"
-        f" each, up where a turn was added, down where one was taken away.{crosses}",
-        f"{joints} First as in the file, then after {text.counted(wraps, 'repolarization')}.",
-        both,
-        opened=opened,
-        share=JOINTS_SHARE,
-    )
+    count = text.counted(wraps, "repolarization")
+    caption = f"First as in the file, then repolarized. {count}: a triangle marks each, up where a turn was"
+    caption += " added, down where one was taken away."
+    caption += f" A cross marks each of {text.counted(doubts, 'other finding')}." if doubts else ""
+    title = "Joints before and after repolarization"
+    alt = f"{joints} First as in the file, then after {count}."
+    yield Figure(title, caption, alt, both, opened=opened, share=JOINTS_SHARE)
 
 
 def joint_panels(
@@ -127,39 +125,25 @@ def motion_figure(run: Run) -> Iterator[Figure]:
 
     By kinematics; of a log without them the position and the orientation that it recorded, if any.
     """
-    views = [*_derivatives(run), *(_recorded(run) if run.tcp is None else _point(run, run.tcp))]
+    views = (*_derivatives(run), *(_recorded(run) if run.tcp is None else _point(run, run.tcp)))
     if not views:
         return
+    title, point = "Motion", point_name(run)
+    alt: str | Callable[[], str]
+    angles = "Euler angles (moving Z-Y-X, in the colours of their axes), by forward kinematics."
     if run.tcp is None:
         caption = "As the log recorded it: without a robot there are no kinematics."
-        yield Figure(
-            "Motion",
-            caption,
-            f"Motion over time, as the log {run.name} recorded it.",
-            tuple(views),
-            share=2.2,
+        alt = f"Motion over time, as the log {run.name} recorded it."
+    elif not run.timed:
+        title, caption = "Poses of the tool centre point", f"{point} and its {angles}"
+        alt = f"Poses of {point} of {run.name} by forward kinematics."
+    else:
+        caption = (
+            f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a, and its"
         )
-        return
-    point = point_name(run)
-    if not run.timed:
-        yield Figure(
-            "Poses of the tool centre point",
-            f"{point} and its Euler angles (moving Z-Y-X, in the colours of their axes), by forward"
-            " kinematics.",
-            f"Poses of {point} of {run.name} by forward kinematics.",
-            tuple(views),
-            share=2.2,
-        )
-        return
-    yield Figure(
-        "Motion",
-        f"Rates and accelerations of the joints; {point}, its velocity v and acceleration a, and its Euler"
-        " angles (moving Z-Y-X, in the colours of their axes), by forward kinematics. The angles go on past"
-        f" ±π, so that none jumps.{_singular_words(run.tcp)}",
-        f"Motion of {point} of {run.name} over time by forward kinematics. {_extent_words(run.tcp)}",
-        tuple(views),
-        share=2.2,
-    )
+        caption += f" {angles} The angles go on past ±π, so that none jumps.{_singular_words(run.tcp)}"
+        alt = partial(_extent_words, f"Motion of {point} of {run.name}", run.tcp)
+    yield Figure(title, caption, alt, views, share=2.2)
 
 
 def point_name(run: Run) -> str:
@@ -171,7 +155,7 @@ def coordinates(values: FloatArray) -> Line:
     """Return x, y and z of something in their colours, by these names in all panels.
 
     Args:
-        values: Shape (n, 3).
+        values: In any unit, shape (n, 3).
     """
     return Line(values, tuple("xyz"), COORDINATES)
 
@@ -188,20 +172,16 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     position = replace(coordinates(tcp.position), points=points)
     yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
     if run.timed:
-        yield from _point_derivatives(run, tcp)
-    known = np.where(np.asarray(tcp.singular)[:, np.newaxis], np.nan, tcp.euler_zyx)
+        yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), t_ns),))
+        size = Line(norms(tcp.acceleration), ("‖a‖",), NORM)
+        yield View("TCP acceleration", (Panel("a", "m/s2", (coordinates(tcp.acceleration), size), t_ns),))
+    tinted = np.asarray(tcp.singular) if np.any(tcp.singular) else None
+    known = np.asarray(tcp.euler_zyx)
+    if tinted is not None:
+        known = np.where(tinted[:, np.newaxis], np.nan, known)
     angles = continuous_euler(known) if run.timed else known
     euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
-    tinted = tcp.singular if np.any(tcp.singular) else None
     yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
-
-
-def _point_derivatives(run: Run, tcp: PointLog) -> Iterator[View]:
-    """Yield the views of velocity and acceleration."""
-    yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), run.t_ns),))
-    size = Line(np.linalg.norm(tcp.acceleration, axis=1), ("‖a‖",), NORM)
-    lines = (coordinates(tcp.acceleration), size)
-    yield View("TCP acceleration", (Panel("a", "m/s2", lines, run.t_ns),))
 
 
 def _recorded(run: Run) -> Iterator[View]:
@@ -216,21 +196,19 @@ def _recorded(run: Run) -> Iterator[View]:
 
 
 def _singular_words(tcp: PointLog) -> str:
-    count = int(np.count_nonzero(tcp.singular))
-    if not count:
-        return ""
-    said = "with ry at ±π/2, where rz and rx are not separately defined"
-    return f" Tinted: {text.counted(count, 'sample')} {said}."
+    count = text.counted(int(np.count_nonzero(tcp.singular)), "sample")
+    said = f" Tinted: {count} with ry at ±π/2, where rz and rx are not separately defined."
+    return said if np.any(tcp.singular) else ""
 
 
-def _extent_words(tcp: PointLog) -> str:
+def _extent_words(motion: str, tcp: PointLog) -> str:
     """Say between which places a point moves and how fast."""
     if not np.isfinite(tcp.position).any():
-        return "It has no value."
+        return f"{motion} over time by forward kinematics. It has no value."
     low, high = (text.point(end(tcp.position, axis=0)) for end in (np.nanmin, np.nanmax))
-    said = f"It stays within ({low}) m and ({high}) m"
+    said = f"{motion} over time by forward kinematics. It stays within ({low}) m and ({high}) m"
     for values, word, unit in ((tcp.velocity, "speed", "m/s"), (tcp.acceleration, "acceleration", "m/s²")):
-        norm = np.linalg.norm(values, axis=1)
+        norm = norms(values)
         if np.isfinite(norm).any():
             said += f"; its {word} reaches {np.nanmax(norm):.4f} {unit}"
     return f"{said}."

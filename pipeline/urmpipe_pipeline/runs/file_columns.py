@@ -11,7 +11,15 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
-from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportColumn, ExportTable, Times
+from urmpipe_pipeline.presentation.exports import (
+    DATE,
+    DAY,
+    TIME_OF_DAY,
+    UNIT_UNSAID,
+    ExportColumn,
+    ExportTable,
+    Times,
+)
 from urmpipe_pipeline.runs.originals import originals
 from urmpipe_pipeline.sources.clocks.text_times import ZONED
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
@@ -27,15 +35,10 @@ ATTRIBUTES: dict[Role, str] = {
 """Where a `JointLog` keeps the columns of a role."""
 
 
-def file_table(log: JointLog, *, units_told: bool = True) -> ExportTable:
+def file_table(log: JointLog) -> ExportTable:
     """Return the columns of the file that were used: its names, its units, its rows, its numbers.
 
     Nothing is repolarized or resampled; times are those of the file's clock.
-
-    Args:
-        log: The log.
-        units_told: Whether the format keeps the units beside the names; else those that the names do not
-            tell are warned of.
 
     Raises:
         RecordingError: If the log came from no file.
@@ -53,7 +56,7 @@ def file_table(log: JointLog, *, units_told: bool = True) -> ExportTable:
         ExportColumn(name, column.unit, next(clock) if column.role == "time" else _numbers(log, column))
         for name, column in zip(names, kept, strict=True)
     ]
-    warnings = [*_lost(log, kept), *([] if units_told else _unsaid_units(kept))]
+    warnings = [*_lost(log, kept), *_unsaid_units(kept)]
     return ExportTable(tuple(columns), clock_ns if timed else None, tuple(warnings))
 
 
@@ -118,7 +121,7 @@ def _unsaid_units(columns: Sequence[LogColumn]) -> list[LogWarning]:
         if column.role != "time" and column.factor != 1.0 and not told:
             unsaid.setdefault(column.unit, []).append(column.name)
     return [
-        LogWarning("unit-not-in-name", f"{', '.join(names)}: in {unit}, which their names do not tell")
+        LogWarning(UNIT_UNSAID, f"{', '.join(names)}: in {unit}, which their names do not tell")
         for unit, names in unsaid.items()
     ]
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
@@ -71,21 +71,11 @@ def ingest_log(
     if inferred:
         robot, because = inferred
         log = replace(log, inferences=(*log.inferences, because))
-    given = {
-        "robot": robot.name if robot else None,
-        "tsp": tsp,
-        "derivative": derivative,
-        "read": _given(options),
-    }
-    return run_of(
-        log,
-        robot,
-        options,
-        tsp=tsp,
-        derivative=derivative,
-        name=name,
-        made=provenance("ingest", given, log.files),
-    )
+    usual = asdict(ReadOptions())
+    read_by = {name: value for name, value in asdict(options).items() if value != usual[name]}
+    given = {"robot": robot.name if robot else None, "tsp": tsp, "derivative": derivative}
+    made = provenance("ingest", given | {"read": read_by or None}, log.files)
+    return run_of(log, robot, options, tsp=tsp, derivative=derivative, name=name, made=made)
 
 
 def run_of(
@@ -126,21 +116,11 @@ def run_of(
     method: Method = derivative or ("savgol" if log.digits and log.digits <= QUANTISED_DIGITS else "central")
     qd, qdd = _rates(log, grid, q, method, grid.steps(found.broken), warnings)
     tcp, noticed = kinematics(robot, q, qd, qdd)
+    recorded = None if log.tcp_position is None else grid.resample(log.tcp_position)
     return Run(
-        name=name or log.name,
-        log=log,
-        robot=robot,
-        tsp=grid.tsp,
-        t_ns=grid.t_ns,
-        q=q,
-        qd=qd,
-        qdd=qdd,
-        tcp=tcp,
-        tcp_recorded=None if log.tcp_position is None else grid.resample(log.tcp_position),
-        audit=found.entries,
-        warnings=(*warnings, *noticed),
-        provenance=made,
-    )
+        name=name or log.name, log=log, robot=robot, tsp=grid.tsp, t_ns=grid.t_ns, q=q, qd=qd, qdd=qdd,
+        tcp=tcp, tcp_recorded=recorded, audit=found.entries, warnings=(*warnings, *noticed), provenance=made,
+    )  # fmt: skip
 
 
 def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
@@ -153,12 +133,6 @@ def _refuse_senseless(tsp: float | None, derivative: str | None) -> None:
         raise OptionError(Finding(parameter="derivative", found=derivative, allowed=allowed))
 
 
-def _given(options: ReadOptions) -> dict[str, Any] | None:
-    """Return the reading options that differ from the defaults."""
-    default = asdict(ReadOptions())
-    return {name: value for name, value in asdict(options).items() if value != default[name]} or None
-
-
 def _rates(
     log: JointLog, grid: Grid, q: FloatArray, method: Method, broken: IntArray, warnings: list[LogWarning]
 ) -> tuple[FloatArray, FloatArray]:
@@ -166,27 +140,23 @@ def _rates(
 
     Fewer than three samples have no differences that could contradict what was recorded.
     """
-    computed = derivatives(q, grid.tsp, method, broken)
-    recorded = (log.qd, log.qdd)
+    qd, qdd = derivatives(q, grid.tsp, method, broken)
     result = []
-    for order, values, own, word in zip((1, 2), computed, recorded, ("rates", "accelerations"), strict=True):
-        on_grid = None if own is None else grid.resample(own)
-        if on_grid is None or len(q) < 3 or recorded_agree(on_grid, values):
-            result.append(values if on_grid is None else on_grid)
+    for order, values, own, word in ((1, qd, log.qd, "rates"), (2, qdd, log.qdd, "accelerations")):
+        on_grid = values if own is None else grid.resample(own)
+        if own is None or len(q) < 3 or recorded_agree(on_grid, values):
+            result.append(on_grid)
             continue
         result.append(values)
         said = f"the recorded {word} do not agree with the differences of the joint values"
-        unit = other_unit(on_grid, values, order)
-        said += f", but would {unit.said}" if unit else ""
-        hints = _hints_of(log, unit.time) if unit else ()
-        warnings.append(LogWarning(f"recorded-{word}", f"{said}; the differences are used", hints=hints))
+        hints = []
+        if unit := other_unit(on_grid, values, order):
+            said += f", but would {unit.said}"
+            clocks = [column.name for column in log.columns if column.role == "time"]
+            hints = [Hint("unit", {name: unit.time}, "reads the time so") for name in clocks[:1] if unit.time]
+        said += "; the differences are used"
+        warnings.append(LogWarning(f"recorded-{word}", said, hints=tuple(hints)))
     return result[0], result[1]
-
-
-def _hints_of(log: JointLog, unit: str | None) -> tuple[Hint, ...]:
-    """Return what reads the clock in the unit in which the recorded rates agree, if that is one of time."""
-    name = next((column.name for column in log.columns if column.role == "time"), None)
-    return (Hint("unit", {name: unit}, "reads the time so"),) if name and unit else ()
 
 
 def kinematics(

@@ -146,7 +146,7 @@ def pace(motion: JointMotion) -> float:
 
 
 def repeated_samples(motion: JointMotion, rows: float, tsp: float) -> list[LogWarning]:
-    """Return a warning if values stay for several rows, as `pace` tells, longer than a tsp in [s]."""
+    """Return a warning if values stay for several rows, as `pace` tells, longer than tsp in [s]."""
     time = rows * motion.period
     once = float(f"{time:.4g}")
     if rows == 1.0 or tsp >= once:

@@ -7,17 +7,8 @@ from functools import partial
 
 from urmpipe_pipeline import text
 from urmpipe_pipeline.outputs import AUDIT_COLUMNS
-from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table
-from urmpipe_pipeline.presentation.section import (
-    Block,
-    Column,
-    Judged,
-    Presentation,
-    Ref,
-    Section,
-    Table,
-    Value,
-)
+from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table, rows_table
+from urmpipe_pipeline.presentation.section import Block, Judged, Presentation, Ref, Section, Table, Value
 from urmpipe_pipeline.runs.figures import run_figures
 from urmpipe_pipeline.runs.parts import (
     audit_table,
@@ -74,13 +65,7 @@ def present(run: Run) -> Presentation:
 
 def audit_rows(run: Run) -> Table:
     """Return what --audit writes: a row a finding."""
-    rows = [one.to_dict() for one in run.audit]
-    columns = (Column(key, key, [_plain(row[key]) for row in rows]) for key in AUDIT_COLUMNS)
-    return Table("Audit of the repolarizer", tuple(columns))
-
-
-def _plain(value: str | float) -> str | Value:
-    return value if isinstance(value, str) else Value(value)
+    return rows_table("Audit of the repolarizer", AUDIT_COLUMNS, (one.to_dict() for one in run.audit))
 
 
 def _page(run: Run) -> Iterator[Block]:

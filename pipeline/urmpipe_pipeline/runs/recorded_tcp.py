@@ -55,14 +55,14 @@ def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     return [LogWarning(FAR_RECORDED, f"{said}: {remedy}", hints=tuple(hints))]
 
 
-def lacking_tool(robot: Chain, log: JointLog) -> list[LogWarning]:
+def lacking_tool(robot: Chain | None, log: JointLog) -> list[LogWarning]:
     """Return a warning if kinematics and recorded tool centre point lie apart by what tool or base explain.
 
     Args:
-        robot: The arm.
-        log: The log, in SI, with a recorded position.
+        robot: The arm, or None.
+        log: The log, in SI.
     """
-    if log.tcp_position is None:
+    if robot is None or log.tcp_position is None:
         return []
     rows = spread(log.rows)
     q, recorded = log.q[rows], log.tcp_position[rows]

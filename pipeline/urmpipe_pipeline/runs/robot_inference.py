@@ -28,10 +28,7 @@ def infer_robot(log: JointLog) -> tuple[Chain, Inference] | None:
     named = [robot for robot in robots if robot.name in words]
     if len(named) == 1:
         return named[0], Inference(
-            "robot",
-            named[0].name,
-            "its name in the names of the joint columns",
-            hints=(Hint("robot"),),
+            "robot", named[0].name, "its name in the names of the joint columns", hints=(Hint("robot"),)
         )
     return _by_kinematics(log, named or robots)
 

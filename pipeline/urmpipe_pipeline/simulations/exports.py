@@ -26,7 +26,7 @@ def exports(simulation: Simulation) -> Exports:
         "verdicts": [one.to_dict() for one in simulation.verdicts],
         "system": simulation.system_text,
     }
-    rows = Rows(lambda units_told: simulation_table(simulation), partial(_fields, simulation))
+    rows = Rows(partial(simulation_table, simulation), partial(_fields, simulation))
     return Exports("simulation", about, {"simulated": rows}, {"": lambda rows: _poses(simulation)}, {})
 
 

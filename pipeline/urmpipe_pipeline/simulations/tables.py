@@ -84,7 +84,7 @@ class Scalar:
         block: Its block.
         name: Its name in the system.
         unit: Its unit; empty for none.
-        values: Shape (n,).
+        values: In its unit, shape (n,).
         t: Times in [s], shape (n,).
     """
 

@@ -8,13 +8,6 @@ from urmpipe_pipeline.tables.options import FORMATS, ExportOptions, Format, Pose
 from urmpipe_pipeline.tables.write import Exported, ExportedFile, export_result
 
 __all__ = [
-    "FORMATS",
-    "ExportOptions",
-    "Exported",
-    "ExportedFile",
-    "Format",
-    "PoseNames",
-    "RowNames",
-    "export_result",
-    "format_of",
-]
+    "FORMATS", "ExportOptions", "Exported", "ExportedFile", "Format", "PoseNames", "RowNames",
+    "export_result", "format_of",
+]  # fmt: skip

@@ -12,7 +12,7 @@ from urmpipe_models.errors import Finding, OutputError
 from urmpipe_pipeline.outputs import TARGET_ROW
 from urmpipe_pipeline.presentation.exports import Times
 from urmpipe_pipeline.sources.cells.cell import printable
-from urmpipe_pipeline.tables.lines import differences, quoted, texts, write_lines
+from urmpipe_pipeline.tables.lines import write_columns
 
 
 def write_joint_log(
@@ -54,10 +54,6 @@ def write_joint_log(
     columns = [np.ascontiguousarray(values) for values in q[solved].T]
     timed = [] if t_ns is None else [Times(t_ns[solved], "s")]
     head = [*(["t (s)"] if timed else []), *names, TARGET_ROW]
-    values = texts([*timed, *columns, row[solved]])
-    line = ",".join(map(quoted, head)) + "\n"
-    write_lines(part, line, values, ",")
-    wrong = differences(part, line, values, ",")
-    if wrong:
+    if wrong := write_columns(part, head, [*timed, *columns, row[solved]]):
         raise OutputError(Finding(f"reads back otherwise than written: {', '.join(wrong)}", str(path)))
     return int(solved.sum())

@@ -1,4 +1,4 @@
-"""Text tables: lines of shortest round-trip decimals, a slice of rows at a time, and their check."""
+"""CSV and TUM: lines of shortest round-trip decimals, a slice of rows at a time, and their check."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from urmpipe_pipeline.presentation.exports import Times
+from urmpipe_pipeline.presentation.exports import ExportTable, Poses, Times
+from urmpipe_pipeline.tables.metadata import MARK
 from urmpipe_pipeline.tables.times import text_of
 
 SLICE = 65_536
@@ -18,6 +19,39 @@ SLICE = 65_536
 
 TAIL = 1 << 16
 """The last line stands within so many bytes of the end."""
+
+
+TUM_HEAD = f"# {MARK}: t [s] x y z [m] qx qy qz qw\n"
+
+
+def write_csv(table: ExportTable, path: Path) -> list[str]:
+    """Write a table as every tool reads it, UTF-8 with commas, and return how the file differs, read back.
+
+    Numbers have the shortest decimal text that gives the same double, NaN is an empty cell; times are exact.
+    """
+    return write_columns(
+        path, [column.name for column in table.columns], [one.values for one in table.columns]
+    )
+
+
+def write_columns(path: Path, names: Sequence[str], columns: Sequence[Any]) -> list[str]:
+    """Write columns under their names as CSV, and return how the file differs from them, read back."""
+    return _written(path, ",".join(map(quoted, names)) + "\n", columns, ",")
+
+
+def write_tum(poses: Poses, path: Path) -> list[str]:
+    """Write a trajectory as evo reads it, `t x y z qx qy qz qw`, and return how the file differs, read back.
+
+    Times are those of the log's clock in [s], exact in decimals.
+    """
+    columns = [Times(poses.clock_ns, "s"), *poses.position.T, *poses.quat_xyzw.T]
+    return _written(path, TUM_HEAD, columns, " ")
+
+
+def _written(path: Path, head: str, columns: Sequence[Any], delimiter: str) -> list[str]:
+    values = texts(columns)
+    write_lines(path, head, values, delimiter)
+    return differences(path, head, values, delimiter)
 
 
 def texts(columns: Sequence[Any]) -> list[Any]:

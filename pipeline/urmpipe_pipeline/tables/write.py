@@ -15,14 +15,13 @@ from urmpipe_models.errors import Finding, OutputError
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output, know_own
-from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
-from urmpipe_pipeline.tables.csv_file import write_csv
-from urmpipe_pipeline.tables.identity import is_export
+from urmpipe_pipeline.presentation.exports import UNIT_UNSAID, Exports, ExportTable, Poses
+from urmpipe_pipeline.tables.lines import write_csv, write_tum
 from urmpipe_pipeline.tables.mat_file import write_mat
-from urmpipe_pipeline.tables.metadata import as_json, described
+from urmpipe_pipeline.tables.metadata import as_json, described, is_export
 from urmpipe_pipeline.tables.options import ExportOptions, Format
 from urmpipe_pipeline.tables.parquet_file import write_parquet
-from urmpipe_pipeline.tables.tum_file import write_tum
+from urmpipe_pipeline.text import unique
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -125,10 +124,11 @@ def export_result(
     target = output or Path(f"{name}{ending}.{options.to}")
     if options.to == "tum":
         return _export_poses(exports, exports.poses[poses](rows), target, rows, inputs)
-    table = exports.rows[rows].table(options.to != "csv")
+    table = exports.rows[rows].table()
     write_all([target], [_writer(exports, table, options.to, rows, target)], options.to, inputs)
     names = tuple((column.name, column.unit) for column in table.columns)
-    return Exported((ExportedFile(target, table.rows),), options.to, rows, names, 0, table.warnings)
+    told = tuple(one for one in table.warnings if options.to == "csv" or one.kind != UNIT_UNSAID)
+    return Exported((ExportedFile(target, table.rows),), options.to, rows, names, 0, told)
 
 
 def _writer(
@@ -147,7 +147,8 @@ def _writer(
 def _export_poses(
     exports: Exports, found: Sequence[Poses], target: Path, rows: str, inputs: Sequence[Path]
 ) -> Exported:
-    targets = list(_targets(target, found))
+    stems = [f"{target.stem}-{_file_name(one.name)}" if one.name else target.stem for one in found]
+    targets = [target.with_name(name + target.suffix) for name in unique(stems)]
     write_all(targets, [partial(write_tum, poses) for poses in found], "tum", inputs)
     files = tuple(ExportedFile(path, len(poses.clock_ns)) for path, poses in zip(targets, found, strict=True))
     left_out = sum(poses.left_out for poses in found)
@@ -159,20 +160,7 @@ def _left_out(found: Sequence[Poses]) -> Iterator[LogWarning]:
     for poses in found:
         if poses.left_out:
             said = f"{poses.left_out} of {poses.left_out + len(poses.clock_ns)} rows have no pose: left out"
-            one = LogWarning("left-out", said)
-            yield one.of(poses.name) if poses.name else one
-
-
-def _targets(target: Path, found: Sequence[Poses]) -> Iterator[Path]:
-    """Yield a file for each trajectory; names that are one without their odd signs get a number."""
-    taken: set[str] = set()
-    for poses in found:
-        stem = f"{target.stem}-{_file_name(poses.name)}" if poses.name else target.stem
-        name, number = stem, 2
-        while name in taken:
-            name, number = f"{stem}-{number}", number + 1
-        taken.add(name)
-        yield target.with_name(name + target.suffix)
+            yield LogWarning("left-out", said, about=poses.name or None)
 
 
 def write_all(

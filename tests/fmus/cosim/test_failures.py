@@ -13,6 +13,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import there
 from foreign_fmus import TROUBLE, Foreign, Scalar, fmu, gain, planned, ran, system
 from urmpipe_fmus.cosim import prepare, simulate
 from urmpipe_fmus.cosim.process import Worker
@@ -116,8 +117,7 @@ def test_an_fmu_that_prints_without_end_does_not_fill_the_disk(
 
     recorded = simulate(plan, progress=look)
     assert max(sizes) < 9_000_000  # of 18 MB; it is looked at between two of them
-    assert recorded.failed is not None
-    assert recorded.failed.endswith("no more")
+    assert there(recorded.failed).endswith("no more")
 
 
 def test_an_fmu_that_gives_no_instance_is_told() -> None:
@@ -133,8 +133,7 @@ def test_a_library_that_is_none_is_told(tmp_path: Path) -> None:
         for name in given.namelist():
             made.writestr(name, b"no library" if name.startswith("binaries") else given.read(name))
     recorded = simulate(prepare(system({"a": gain()}, None, {"a": {"u": 0.0}}), lambda block: broken))
-    assert recorded.failed is not None
-    assert recorded.failed.startswith(
+    assert there(recorded.failed).startswith(
         "block a: loading at t = 0 s: cannot be loaded: Failed to load shared library"
     )
 
@@ -176,8 +175,7 @@ def test_an_fmu_that_hangs_ends_with_who_started_it(how: signal.Signals, tmp_pat
     with subprocess.Popen(
         [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
     ) as one:
-        assert one.stdout is not None
-        while not one.stdout.readline().startswith(b"0.05"):
+        while not there(one.stdout).readline().startswith(b"0.05"):
             assert one.poll() is None
         (child,) = children(one.pid)
         one.send_signal(how)

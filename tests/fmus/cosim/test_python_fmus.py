@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_fmus.cosim import Block, Connection, Port, System, prepare, simulate
 from urmpipe_models.errors import CosimulationError
 
@@ -53,8 +54,7 @@ def system(fmus: dict[str, Path], connections: dict[str, str], **options: object
 
 
 def fmu_of(block: Block) -> Path:
-    assert block.fmu is not None
-    return block.fmu
+    return there(block.fmu)
 
 
 def test_their_loops_are_solved_by_going_back(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from asserting import there
 from loaded_fmu import Loaded
 from urmpipe_fmus.archive import content_guid
 from urmpipe_fmus.build import build_fmu
@@ -136,8 +137,7 @@ def test_every_shipped_unit_is_a_valid_python_fmu_that_starts_as_it_says(name: s
 
 
 def test_a_log_source_as_python_fmu_plays_the_table_in_its_resources(make: Make, tmp_path: Path) -> None:
-    table = make("playback").table
-    assert table is not None
+    table = there(make("playback").table)
     unit = log_source(table, [("q", "rad"), ("x", "m")], interpolate=True)
     path = build_fmu(unit, tmp_path, backend="python").path
     assert validate_fmu(str(path)) == []

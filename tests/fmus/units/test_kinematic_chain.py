@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import there
 from sliding_arm import sliding_arm
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
@@ -183,8 +184,7 @@ def test_an_arm_of_a_urdf_is_taken() -> None:
 def test_lengths_and_tilts_are_told_of_urm_arms_only() -> None:
     lengths, tilts = [0.3, 0.2, 0.1, 0.05], [0.4, 0.0, -0.5]
     arm = urm_chain("c", lengths, tilts, directions=[1, -1, -1]).placed(from_offset((1.0, 2.0, 3.0)))
-    found = urm_geometry(arm)
-    assert found is not None
+    found = there(urm_geometry(arm))
     assert (found.lengths, found.directions) == (tuple(lengths), (1.0, -1.0, -1.0))
     np.testing.assert_allclose(found.tilts, tilts, rtol=0.0, atol=1e-16)
     bent = replace(arm, tip=from_offset((0.001, 0.0, 0.05)))

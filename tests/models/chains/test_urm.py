@@ -10,6 +10,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from asserting import there
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.urm import ROUNDING, urm_chain, urm_geometry
 from urmpipe_models.transform import Transform, from_offset, rotation_x, translation
@@ -37,8 +38,7 @@ def test_an_arm_tells_what_it_was_made_from_wherever_it_stands(
     r, theta, directions = zip(*given_modules, strict=True)
     chain = urm_chain("arm", (*r, last), theta, directions=directions)
     frame = from_offset([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
-    found = urm_geometry(chain.placed(frame, frame))
-    assert found is not None
+    found = there(urm_geometry(chain.placed(frame, frame)))
     assert (found.lengths, found.directions) == ((*r, last), directions)
     turned = np.sin(np.subtract(found.tilts, theta) / 2.0)  # pi and -pi are one tilt
     np.testing.assert_allclose(turned, 0.0, rtol=0.0, atol=1e-15)  # of atan2 of a rounded sine and cosine
@@ -47,8 +47,7 @@ def test_an_arm_tells_what_it_was_made_from_wherever_it_stands(
 @pytest.mark.parametrize("tilt", [math.pi, -math.pi, np.nextafter(math.pi, 4.0)])
 def test_a_tilt_of_half_a_turn_comes_back_as_pi(tilt: float) -> None:
     made = urm_chain("two", (0.3, 0.2, 0.1), (tilt, 0.5))
-    found = urm_geometry(made)
-    assert found is not None
+    found = there(urm_geometry(made))
     assert found.tilts == (math.pi, 0.5)
     again = urm_chain("two", *found[:2])
     assert urm_geometry(again) == found

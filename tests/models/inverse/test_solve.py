@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
@@ -146,8 +147,7 @@ def test_limits_leave_out_branches_and_say_which_joint() -> None:
 def bad_targets(chain: Chain) -> Targets:
     """Seven targets of which the first and the last are good."""
     _, targets = poses(chain, 7)
-    assert targets.rotation is not None
-    position, rotation = targets.position.copy(), targets.rotation.copy()
+    position, rotation = targets.position.copy(), there(targets.rotation).copy()
     position[1, 2] = np.nan
     position[2, 0] = np.inf
     rotation[3] *= 1.01
@@ -191,9 +191,8 @@ def test_a_bad_target_has_a_reason_and_stops_no_other(name: str, every: bool) ->
 def test_a_position_beyond_all_digits_stops_no_other(name: str, far: float) -> None:
     chain = load_robot(name)
     q, targets = poses(chain, 1)
-    assert targets.rotation is not None
     position = np.vstack((targets.position, [0.1, far, 0.3]))
-    both = Targets(position, np.repeat(targets.rotation, 2, axis=0))
+    both = Targets(position, np.repeat(there(targets.rotation), 2, axis=0))
     found = solve(chain, both, start=q[0])
     assert found.reached[:, 0].tolist() == [True, False]
     assert found.reason(1) == (f"the position is 0.1, {far:g}, 0.3 m, allowed: up to 1e+09 m along each axis")
@@ -205,8 +204,7 @@ def test_a_bad_target_before_a_singular_one_leaves_the_family_where_it_is() -> N
         chain, np.array([[0.3, -1.0, 1.2, -0.5, 1.0, 0.8], [0.3, -1.0, 1.2, -0.5, 0.0, 0.8]])
     )
     position = np.vstack((np.full((1, 3), math.nan), targets.position))
-    assert targets.rotation is not None
-    found = solve(chain, Targets(position, np.vstack((np.eye(3)[None], targets.rotation))), every=True)
+    found = solve(chain, Targets(position, np.vstack((np.eye(3)[None], there(targets.rotation)))), every=True)
     assert [found.families(row) for row in range(3)] == [[], [], ["wrist aligned"]]
 
 
@@ -226,8 +224,7 @@ def test_no_targets_give_no_solutions() -> None:
 def test_a_rotation_written_with_seven_digits_is_the_nearest_rotation() -> None:
     chain = load_robot("ur5e")
     q, targets = poses(chain, 20)
-    assert targets.rotation is not None
-    written = Targets(targets.position, np.round(targets.rotation, 7))
+    written = Targets(targets.position, np.round(there(targets.rotation), 7))
     found = solve(chain, written, start=q)
     assert found.reached.all()
     position, angle = misses(chain, found.q[:, 0], targets)
@@ -239,9 +236,8 @@ def test_a_target_out_of_reach_takes_the_nearest_point_within_the_tolerance() ->
     chain = load_robot("ur5e")
     q = np.array([0.3, -math.pi / 2, 0.0, -math.pi / 2, 1.2, 0.2])  # stretched straight up
     targets = targets_of(chain, q[None])
-    assert targets.rotation is not None
     above = targets.position + np.array([[0.0, 0.0, 0.002], [0.0, 0.0, 0.2]])
-    out = Targets(above, np.repeat(targets.rotation, 2, axis=0))
+    out = Targets(above, np.repeat(there(targets.rotation), 2, axis=0))
     refused = solve(chain, out, start=q)
     assert not refused.reached.any()
     found = solve(chain, out, start=q, search=Search(tolerance=0.0035))

@@ -10,6 +10,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from asserting import there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.kinematics.forward import poses_over_log
@@ -61,8 +62,7 @@ def test_the_product_of_exponentials_is_the_tip(robot: str) -> None:
     chain = load_robot(robot).placed(
         from_offset((0.1, -0.2, 0.3, 0.4, 0.5, 0.6)), from_offset((0.0, 0.1, 0.15))
     )
-    arm = screws(chain)
-    assert arm is not None
+    arm = there(screws(chain))
     assert_kinematics(chain, arm)
 
 
@@ -73,8 +73,7 @@ def test_so_it_is_of_any_chain_without_mimics_and_of_the_chain_made_of_its_screw
 ) -> None:
     chain = data.draw(chains)
     chain = replace(chain, joints=tuple(replace(joint, mimic=None) for joint in chain.joints), start=())
-    arm = screws(chain)
-    assert arm is not None
+    arm = there(screws(chain))
     assert_kinematics(chain, arm)
     assert_kinematics(chain_of(arm, chain.coordinates), arm)
 
@@ -87,8 +86,6 @@ def test_the_size_is_the_way_from_axis_to_axis_to_the_tip_and_never_0() -> None:
     arm = screws(
         Chain("l", (Joint("a"), Joint("b", origin=translation(0.3, 0.0, 0.4))), translation(0, 2, 0))
     )
-    assert arm is not None
-    assert arm.size == 2.5
-    point = screws(Chain("point", (Joint("a"),)))
-    assert point is not None
+    assert there(arm).size == 2.5
+    point = there(screws(Chain("point", (Joint("a"),))))
     assert point.size == 1.0

@@ -10,39 +10,25 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from asserting import there
+from made_runs import path_run, run_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import LogError
-from urmpipe_models.kinematics.forward import point_over_log, poses_over_log
-from urmpipe_models.orientation import RotationForm
+from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import Transform, from_offset, from_rpy
 from urmpipe_pipeline.comparison.alignment import RESOLVED, tool_with
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import Alignment, AlignMode
-from urmpipe_pipeline.joint_log import JointLog, SourceFile
-from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.results import Run
 
 ROUNDING = 1e-12
 """Positions of some metres round at 1e-15, a fit over hundreds of them at some tens of that."""
 
-MADE = Provenance("ingest", {}, (), {}, "")
 FRAME = Rotation.from_rotvec([0.3, -0.5, 0.4])
 SHIFT = np.array([0.2, -0.1, 0.4])
 OFFSET = np.array([0.01, -0.02, 0.15])
-
-
-def pose_run(position: FloatArray, quat: FloatArray | None = None, name: str = "path") -> Run:
-    """A path of poses every 5 ms."""
-    t_ns = np.arange(len(position)) * 5_000_000
-    none = np.empty((len(position), 0))
-    form: RotationForm | None = None if quat is None else "quat_xyzw"
-    files = (SourceFile(f"{name}.csv", "0", 1),)
-    log = JointLog(
-        name, "table", files, t_ns, (), none, tcp_position=position, tcp_rotation=quat, rotation_form=form
-    )
-    return Run(name, log, None, 0.005, t_ns, none, none, none, None, position, (), (), MADE)
 
 
 def motion(count: int = 200) -> tuple[FloatArray, Rotation]:
@@ -71,11 +57,10 @@ def assert_formula(found: Alignment, before: FloatArray, turn: Rotation | None, 
 def test_a_motion_that_stands_elsewhere_is_brought_back(mode: AlignMode) -> None:
     position, turn = motion()
     before = FRAME.apply(position) + SHIFT
-    log = pose_run(before, (FRAME * turn).as_quat(), "log")
-    found = aligned(pose_run(position, turn.as_quat()), log, mode)
+    log = path_run(before, (FRAME * turn).as_quat(), name="log")
+    found = aligned(path_run(position, turn.as_quat()), log, mode)
     np.testing.assert_allclose(found.actual, position, atol=ROUNDING)
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, 0.0, atol=ROUNDING)
+    np.testing.assert_allclose(there(found.angle), 0.0, atol=ROUNDING)
     assert found.alignment.mode == mode
     assert found.alignment.angle == pytest.approx(FRAME.magnitude(), abs=ROUNDING)
     assert found.alignment.tool == (0.0, 0.0, 0.0)
@@ -84,7 +69,7 @@ def test_a_motion_that_stands_elsewhere_is_brought_back(mode: AlignMode) -> None
 
 def test_nothing_is_moved_without_being_asked() -> None:
     position, _ = motion()
-    found = aligned(pose_run(position), pose_run(position + SHIFT, name="log"), "none")
+    found = aligned(path_run(position), path_run(position + SHIFT, name="log"), "none")
     assert found.alignment == Alignment()
     assert found.alignment.angle == 0.0
     assert found.alignment.moved(found.actual).max() == 0.0
@@ -95,8 +80,8 @@ def test_nothing_is_moved_without_being_asked() -> None:
 def test_start_moves_by_the_translation_alone_where_a_side_has_no_orientation(lacking: str) -> None:
     position, turn = motion()
     quats = {name: None if name == lacking else turn.as_quat() for name in ("reference", "log")}
-    reference = pose_run(position, quats["reference"])
-    found = aligned(reference, pose_run(FRAME.apply(position) + SHIFT, quats["log"], "log"), "start")
+    reference = path_run(position, quats["reference"])
+    found = aligned(reference, path_run(FRAME.apply(position) + SHIFT, quats["log"], name="log"), "start")
     assert found.alignment.rotation == Alignment().rotation
     np.testing.assert_allclose(found.delta[0], 0.0, atol=1e-15)
     np.testing.assert_allclose(found.actual, FRAME.apply(position - position[0]) + position[0], atol=ROUNDING)
@@ -107,24 +92,25 @@ def test_start_goes_by_the_first_pose_that_both_sides_have() -> None:
     position, turn = motion()
     quat = (FRAME * turn).as_quat()
     quat[:7] = np.nan
-    found = aligned(pose_run(position, turn.as_quat()), pose_run(FRAME.apply(position), quat, "log"), "start")
+    found = aligned(
+        path_run(position, turn.as_quat()), path_run(FRAME.apply(position), quat, name="log"), "start"
+    )
     assert len(found.sample) == 200
     np.testing.assert_allclose(found.actual, position, atol=ROUNDING)
-    assert found.angle is not None
-    assert np.isnan(found.angle).tolist() == [True] * 7 + [False] * 193
+    assert np.isnan(there(found.angle)).tolist() == [True] * 7 + [False] * 193
     assert found.statistics["angle"].sample_max >= 7
 
 
 def test_a_mirrored_motion_is_turned_and_not_mirrored_back() -> None:
     position, _ = motion()
-    found = aligned(pose_run(position), pose_run(position * np.array([1.0, 1.0, -1.0]), name="log"), "rigid")
+    found = aligned(path_run(position), path_run(position * np.array([1.0, 1.0, -1.0]), name="log"), "rigid")
     assert np.linalg.det(found.alignment.rotation) == pytest.approx(1.0, abs=ROUNDING)
     assert found.statistics["norm"].max > 0.1
 
 
 def test_a_motion_in_a_plane_is_aligned() -> None:
     position = motion()[0] * np.array([1.0, 1.0, 0.0])
-    found = aligned(pose_run(position), pose_run(FRAME.apply(position) + SHIFT, name="log"), "rigid")
+    found = aligned(path_run(position), path_run(FRAME.apply(position) + SHIFT, name="log"), "rigid")
     assert found.statistics["norm"].max < ROUNDING
     assert found.alignment.angle == pytest.approx(FRAME.magnitude(), abs=ROUNDING)
 
@@ -134,7 +120,7 @@ def test_a_motion_in_a_plane_is_aligned() -> None:
 def test_no_small_motion_more_makes_a_rigid_alignment_better(seed: int) -> None:
     rng = np.random.default_rng(seed)
     wanted, done = rng.normal(size=(2, 30, 3))
-    found = aligned(pose_run(wanted), pose_run(done, name="log"), "rigid")
+    found = aligned(path_run(wanted), path_run(done, name="log"), "rigid")
     best = float((found.delta[:, 3] ** 2).sum())
     for _ in range(20):
         turn, shift = Rotation.from_rotvec(rng.normal(0, 0.01, 3)), rng.normal(0, 0.01, 3)
@@ -163,7 +149,7 @@ def test_positions_that_leave_the_rotation_open_are_refused(
     reference: FloatArray, log: FloatArray, said: str
 ) -> None:
     with pytest.raises(LogError) as error:
-        aligned(pose_run(reference), pose_run(log, name="log"), "rigid")
+        aligned(path_run(reference), path_run(log, name="log"), "rigid")
     assert str(error.value) == (
         f"log.csv: align: rigid: found {said}, which leaves the rotation open, allowed: start, tool, none"
     )
@@ -174,21 +160,21 @@ def test_motions_without_anything_in_common_leave_the_rotation_open() -> None:
     once = np.column_stack([np.cos(angle), np.sin(angle), 0 * angle])
     twice = np.column_stack([np.cos(2 * angle), np.sin(2 * angle), 0 * angle])
     with pytest.raises(LogError, match="found two motions without anything in common, which leaves"):
-        aligned(pose_run(once), pose_run(twice, name="log"), "rigid")
+        aligned(path_run(once), path_run(twice, name="log"), "rigid")
 
 
 def test_what_just_leaves_a_line_is_aligned() -> None:
     position = np.column_stack(
         [np.linspace(-1, 1, 100), np.tile([2 * RESOLVED, -2 * RESOLVED], 50), np.zeros(100)]
     )
-    found = aligned(pose_run(position), pose_run(FRAME.apply(position), name="log"), "rigid")
+    found = aligned(path_run(position), path_run(FRAME.apply(position), name="log"), "rigid")
     assert found.statistics["norm"].max < ROUNDING
 
 
 def test_a_tool_is_found_and_stored() -> None:
     position, turn = motion()
     reference = position + turn.apply(OFFSET)
-    found = aligned(pose_run(reference), pose_run(position, turn.as_quat(), "log"), "tool")
+    found = aligned(path_run(reference), path_run(position, turn.as_quat(), name="log"), "tool")
     np.testing.assert_allclose(found.alignment.tool, OFFSET, atol=ROUNDING)
     assert found.alignment.rotation == Alignment().rotation
     assert found.alignment.translation == (0.0, 0.0, 0.0)
@@ -200,7 +186,7 @@ def test_the_tool_is_the_one_of_the_least_squares() -> None:
     rng = np.random.default_rng(1)
     position, turn = motion()
     reference = position + turn.apply(OFFSET) + rng.normal(0, 0.01, position.shape)
-    found = aligned(pose_run(reference), pose_run(position, turn.as_quat(), "log"), "tool")
+    found = aligned(path_run(reference), path_run(position, turn.as_quat(), name="log"), "tool")
     rows, right = turn.as_matrix().reshape(-1, 3), (reference - position).ravel()
     np.testing.assert_allclose(found.alignment.tool, np.linalg.lstsq(rows, right)[0], atol=ROUNDING)
 
@@ -210,8 +196,8 @@ def test_samples_without_an_orientation_cannot_carry_a_tool_and_are_left_out() -
     quat = turn.as_quat()
     quat[[0, 50]] = np.nan
     result = compare_runs(
-        pose_run(position + turn.apply(OFFSET)),
-        [pose_run(position, quat, "log")],
+        path_run(position + turn.apply(OFFSET)),
+        [path_run(position, quat, name="log")],
         CompareOptions(align="tool"),
     )
     found = result.runs[0]
@@ -224,7 +210,7 @@ def test_samples_without_an_orientation_cannot_carry_a_tool_and_are_left_out() -
 def test_a_tool_without_an_orientation_is_refused(quat: FloatArray | None) -> None:
     position, turn = motion()
     with pytest.raises(LogError) as error:
-        aligned(pose_run(position, turn.as_quat()), pose_run(position, quat, "log"), "tool")
+        aligned(path_run(position, turn.as_quat()), path_run(position, quat, name="log"), "tool")
     assert str(error.value) == (
         "log.csv: align: tool: found no orientation of the log, allowed: joints with a robot, or a"
         " recorded orientation"
@@ -235,7 +221,7 @@ def test_a_tool_that_hardly_turns_is_refused_since_a_base_explains_as_much() -> 
     position, _ = motion()
     turned = Rotation.from_rotvec(np.linspace([0.0, 0.0, 0.0], [0.0, np.radians(0.9), 0.0], len(position)))
     with pytest.raises(LogError) as error:
-        aligned(pose_run(position + SHIFT), pose_run(position, turned.as_quat(), "log"), "tool")
+        aligned(path_run(position + SHIFT), path_run(position, turned.as_quat(), name="log"), "tool")
     assert str(error.value) == (
         "log.csv: align: tool: found a tool that turns by 0.9000 deg in all, which any offset of the"
         " base explains as well, allowed: a log that turns it; start, none"
@@ -248,14 +234,7 @@ def arm_run(recorded_with: Transform, tool: Transform | None = None) -> Run:
     t = np.linspace(0, 4, 300)
     q = np.column_stack([0.6 * np.sin((1 + 0.3 * k) * t) + 0.5 * k - 1.2 for k in range(6)])
     position, rotation = poses_over_log(bare.placed(tool=recorded_with), q)
-    robot = bare.placed(tool=tool)
-    t_ns, joints = np.arange(300) * 5_000_000, tuple(f"q{k}" for k in range(6))
-    log = JointLog(
-        "log", "table", (SourceFile("log.csv", "0", 1),), t_ns, joints, q, tcp_position=position,
-        tcp_rotation=rotation.reshape(-1, 9), rotation_form="matrix",
-    )  # fmt: skip
-    tcp = point_over_log(robot, q, 0 * q, 0 * q)
-    return Run("log", log, robot, 0.005, t_ns, q, 0 * q, 0 * q, tcp, position, (), (), MADE)
+    return run_of(q, bare.placed(tool=tool), position, rotation.reshape(-1, 9), "matrix")
 
 
 @pytest.mark.parametrize("own", [(), (0.0, 0.0, 0.1), (0.01, 0.0, 0.1, 0.5, -0.4, 1.0)])
@@ -264,8 +243,7 @@ def test_the_tool_that_is_advised_takes_the_deviation_away(own: tuple[float, ...
     run = arm_run(recorded_with, from_offset(own) if own else None)
     found = compare_recorded(run, CompareOptions(align="tool")).runs[0]
     assert found.statistics["norm"].max < ROUNDING
-    assert run.robot is not None
-    advised = tool_with(run.robot, found.alignment)
+    advised = tool_with(there(run.robot), found.alignment)
     np.testing.assert_allclose(advised, (0.02, -0.01, 0.17, *own[3:]), atol=ROUNDING)
     told = arm_run(recorded_with, from_offset(advised))
     assert compare_recorded(told).runs[0].statistics["norm"].max < ROUNDING
@@ -274,11 +252,9 @@ def test_the_tool_that_is_advised_takes_the_deviation_away(own: tuple[float, ...
 def test_one_log_alone_has_an_angle_between_kinematics_and_record() -> None:
     run = arm_run(from_rpy(0.0, 0.0, 0.25))
     found = compare_recorded(run).runs[0]
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, 0.25, atol=ROUNDING)
+    np.testing.assert_allclose(there(found.angle), 0.25, atol=ROUNDING)
     start = compare_recorded(run, CompareOptions(align="start")).runs[0]
-    assert start.angle is not None
-    assert (start.angle[0], start.delta[0, 3]) == pytest.approx((0.0, 0.0), abs=ROUNDING)
+    assert (there(start.angle)[0], start.delta[0, 3]) == pytest.approx((0.0, 0.0), abs=ROUNDING)
     assert start.alignment.angle == pytest.approx(0.25, abs=ROUNDING)
 
 
@@ -291,7 +267,8 @@ def test_one_log_alone_without_a_recorded_orientation_has_no_angle() -> None:
 
 def test_orientations_turn_with_the_log() -> None:
     position, turn = motion()
-    log = pose_run(FRAME.apply(position), turn.as_quat(), "log")  # turned in place only, not in orientation
-    found = aligned(pose_run(position, turn.as_quat()), log, "rigid")
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, FRAME.magnitude(), atol=ROUNDING)
+    log = path_run(
+        FRAME.apply(position), turn.as_quat(), name="log"
+    )  # turned in place only, not in orientation
+    found = aligned(path_run(position, turn.as_quat()), log, "rigid")
+    np.testing.assert_allclose(there(found.angle), FRAME.magnitude(), atol=ROUNDING)

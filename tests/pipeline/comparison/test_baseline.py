@@ -13,15 +13,12 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from asserting import there
+from made_runs import off
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import OptionError
 from urmpipe_models.transform import translation
-from urmpipe_pipeline.comparison.baseline import (
-    DEFAULT_NOISE,
-    against_baseline,
-    complete_noise,
-    parse_noise,
-)
+from urmpipe_pipeline.comparison.baseline import DEFAULT_NOISE, against_baseline, complete_noise, parse_noise
 from urmpipe_pipeline.comparison.baseline_section import worse_words
 from urmpipe_pipeline.comparison.change import Absent, Difference
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -32,11 +29,6 @@ Compared = Callable[..., Comparison]
 
 ROUNDING = 1e-15
 """Positions of 1 m round at 2e-16 m, and are taken apart twice."""
-
-
-def off(x: float, samples: int = 100) -> FloatArray:
-    """A deviation that grows from 0 to x along x."""
-    return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
 
 
 def test_the_same_comparison_did_not_change(arms: Compared) -> None:
@@ -209,8 +201,7 @@ def test_samples_left_out_between_others_are_lost_time(paths: Compared) -> None:
 def test_another_base_and_another_tool_are_told(arms: Compared) -> None:
     before = arms({"a": np.zeros((20, 6))})
     run = before.runs[0]
-    assert run.run.robot is not None
-    robot = run.run.robot.placed(base=translation(0.0, 0.0, 1.0), tool=translation(0.0, 0.0, 0.12))
+    robot = there(run.run.robot).placed(base=translation(0.0, 0.0, 1.0), tool=translation(0.0, 0.0, 0.12))
     now = replace(before, runs=(replace(run, run=replace(run.run, robot=robot)),))
     assert against_baseline(now, before).differences == (
         Difference("base of a", [0.0] * 6, [0.0, 0.0, 1.0, 0.0, 0.0, 0.0]),

@@ -8,53 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import there
+from made_runs import TSP, URM6, path_run, run_of
 from urmpipe_models.arrays import FloatArray
-from urmpipe_models.chains.chain import Chain
-from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.chains.visual import Mesh, Visual
 from urmpipe_models.errors import LogError, OptionError
-from urmpipe_models.kinematics.forward import point_over_log, positions_over_log
+from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.transform import translation
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded, compare_runs
-from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.joint_log import LogColumn, LogWarning
 from urmpipe_pipeline.meshes import missing_visuals
-from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.repolarization.audit import audit_log
-from urmpipe_pipeline.runs.derivatives import derivatives
-from urmpipe_pipeline.runs.results import Run
 
-URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
-TSP = 0.005
 COLUMNS = tuple(LogColumn(f"q{i + 1}", f"q{i + 1}", "joint", i, "rad") for i in range(6))
-PROVENANCE = Provenance("ingest", {}, (), {}, "")
-
-
-def arm_run(
-    q: FloatArray,
-    *,
-    name: str = "log",
-    robot: Chain | None = URM6,
-    start_ns: int = 0,
-    recorded: FloatArray | None = None,
-) -> Run:
-    """A run of joint values at 5 ms."""
-    t_ns = np.arange(len(q)) * 5_000_000 + start_ns
-    joints = tuple(f"q{i}" for i in range(1, 7))
-    log = JointLog(
-        name, "table", (SourceFile(f"{name}.csv", "0", 1),), t_ns, joints, q, tcp_position=recorded
-    )
-    qd, qdd = derivatives(q, TSP)
-    tcp = None if robot is None else point_over_log(robot, q, qd, qdd)
-    return Run(name, log, robot, TSP, t_ns, q, qd, qdd, tcp, recorded, (), (), PROVENANCE)
-
-
-def path_run(position: FloatArray, name: str = "path") -> Run:
-    """A path: a log without joints."""
-    t_ns = np.arange(len(position)) * 5_000_000
-    nothing = np.empty((len(position), 0))
-    file = SourceFile(f"{name}.csv", "0", 1)
-    log = JointLog(name, "table", (file,), t_ns, (), nothing, tcp_position=position)
-    return Run(name, log, None, TSP, t_ns, nothing, nothing, nothing, None, position, (), (), PROVENANCE)
 
 
 @pytest.fixture
@@ -64,7 +30,7 @@ def q() -> FloatArray:
 
 
 def test_a_path_made_by_the_arm_itself_has_no_deviation(q: FloatArray) -> None:
-    result = compare_runs(path_run(positions_over_log(URM6, q)), [arm_run(q)])
+    result = compare_runs(path_run(positions_over_log(URM6, q)), [run_of(q)])
     assert result.verdict == "pass"
     assert result.runs[0].delta.max() == 0.0
     assert result.runs[0].left_out == 0
@@ -76,7 +42,7 @@ def test_statistics_are_those_of_numpy_and_the_sign_is_reference_minus_actual(q:
     rng = np.random.default_rng(5)
     shift = rng.normal(0.001, 0.0005, (500, 3))
     wanted = positions_over_log(URM6, q) + shift
-    deviation = compare_runs(path_run(wanted), [arm_run(q)]).runs[0]
+    deviation = compare_runs(path_run(wanted), [run_of(q)]).runs[0]
     np.testing.assert_allclose(deviation.delta[:, :3], shift, atol=1e-15)  # p of 1 m rounds at 2e-16
     one = deviation.statistics["y"]
     y = deviation.delta[:, 1]
@@ -95,20 +61,20 @@ def test_statistics_are_those_of_numpy_and_the_sign_is_reference_minus_actual(q:
 def test_the_tolerance_decides_axis_by_axis(q: FloatArray) -> None:
     wanted = positions_over_log(URM6, q)
     wanted[100:110, 2] += 0.0036
-    result = compare_runs(path_run(wanted), [arm_run(q)])
+    result = compare_runs(path_run(wanted), [run_of(q)])
     deviation = result.runs[0]
     verdicts = {axis: one.verdict for axis, one in deviation.statistics.items()}
     assert verdicts == {"x": "pass", "y": "pass", "z": "fail", "norm": None, "path": None}
     assert (result.verdict, deviation.verdict) == ("fail", "fail")
     assert np.flatnonzero(deviation.outside).tolist() == list(range(100, 110))
     assert deviation.share_out == 10 / 500
-    assert compare_runs(path_run(wanted), [arm_run(q)], CompareOptions({"axis": 0.0037})).verdict == "pass"
+    assert compare_runs(path_run(wanted), [run_of(q)], CompareOptions({"axis": 0.0037})).verdict == "pass"
 
 
 def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q: FloatArray) -> None:
     broken = q.copy()
     broken[7, 3] = np.nan
-    result = compare_runs(path_run(positions_over_log(URM6, q)[:400]), [arm_run(broken)])
+    result = compare_runs(path_run(positions_over_log(URM6, q)[:400]), [run_of(broken)])
     deviation = result.runs[0]
     assert deviation.left_out == 101
     assert 7 not in deviation.sample
@@ -118,7 +84,7 @@ def test_samples_without_a_reference_or_a_value_are_left_out_and_counted(q: Floa
 
 def test_an_offset_shifts_the_log_against_the_reference(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
-    late = compare_runs(wanted, [arm_run(q[100:])], CompareOptions(sync=0.5)).runs[0]
+    late = compare_runs(wanted, [run_of(q[100:])], CompareOptions(sync=0.5)).runs[0]
     assert late.delta.max() == 0.0
     assert late.sync.offset == 0.5
     assert len(late.sample) == 400
@@ -128,7 +94,7 @@ def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: 
     wanted = path_run(positions_over_log(URM6, q)[:450])
     broken = q[100:].copy()
     broken[30, 2] = np.nan
-    result = compare_runs(wanted, [arm_run(broken)], CompareOptions(sync="auto"))
+    result = compare_runs(wanted, [run_of(broken)], CompareOptions(sync="auto"))
     late = result.runs[0]
     assert (late.sync.mode, late.sync.offset, late.sync.by) == ("auto", 0.5, "position")
     assert late.statistics["norm"].max < 1e-12  # the same samples
@@ -153,9 +119,8 @@ def test_an_offset_is_estimated_and_what_it_leaves_out_on_both_sides_is_told(q: 
 def test_an_estimate_that_is_not_certain_is_told(q: FloatArray) -> None:
     rng = np.random.default_rng(3)
     wanted = path_run(positions_over_log(URM6, q) + rng.normal(scale=0.011, size=(500, 3)))
-    result = compare_runs(wanted, [arm_run(q)], CompareOptions(sync="auto"))
-    precision = result.runs[0].sync.precision
-    assert precision is not None
+    result = compare_runs(wanted, [run_of(q)], CompareOptions(sync="auto"))
+    precision = there(result.runs[0].sync.precision)
     assert precision > 0.1 * TSP
     said = [one.message for one in result.warnings if one.kind == "sync-uncertain"]
     assert len(said) == 1
@@ -163,7 +128,7 @@ def test_an_estimate_that_is_not_certain_is_told(q: FloatArray) -> None:
 
 
 def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
-    log = arm_run(q, recorded=positions_over_log(URM6, q))
+    log = run_of(q, recorded=positions_over_log(URM6, q))
     for sync in ("auto", 0.25):
         with pytest.raises(OptionError) as error:
             compare_recorded(log, CompareOptions(sync=sync))
@@ -175,7 +140,7 @@ def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
 
 def test_logs_with_one_name_are_told_apart(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
-    assert [r.name for r in compare_runs(wanted, [arm_run(q), arm_run(q), arm_run(q, name="b")]).runs] == [
+    assert [r.name for r in compare_runs(wanted, [run_of(q), run_of(q), run_of(q, name="b")]).runs] == [
         "log", "log-2", "b",
     ]  # fmt: skip
 
@@ -183,17 +148,17 @@ def test_logs_with_one_name_are_told_apart(q: FloatArray) -> None:
 def test_one_log_is_held_against_what_it_recorded_itself(q: FloatArray) -> None:
     recorded = positions_over_log(URM6, q) + np.array([0.001, 0.0, 0.0])
     recorded[3] = np.nan
-    result = compare_recorded(arm_run(q, recorded=recorded))
+    result = compare_recorded(run_of(q, recorded=recorded))
     assert result.runs[0].statistics["x"].mean == pytest.approx(0.001, abs=1e-15)
     assert result.runs[0].left_out == 1
 
 
 def test_a_verdict_that_fails_for_want_of_a_tool_says_so(q: FloatArray) -> None:
     recorded = positions_over_log(URM6.placed(tool=translation(0.0, 0.0, 0.15)), q)
-    result = compare_recorded(arm_run(q, recorded=recorded))
+    result = compare_recorded(run_of(q, recorded=recorded))
     assert result.runs[0].verdict == "fail"
     assert [warning.kind for warning in result.warnings] == ["recorded-tcp-tool"]
-    told = arm_run(q, robot=URM6.placed(tool=translation(0.0, 0.0, 0.15)), recorded=recorded)
+    told = run_of(q, robot=URM6.placed(tool=translation(0.0, 0.0, 0.15)), recorded=recorded)
     assert compare_recorded(told).warnings == ()
 
 
@@ -201,7 +166,7 @@ def test_a_log_that_misses_a_path_for_want_of_a_tool_says_so(q: FloatArray) -> N
     tooled = URM6.placed(tool=translation(0.0, 0.0, 0.15))
     recorded = positions_over_log(tooled, q)
     wanted = path_run(recorded)
-    bare, given = arm_run(q, recorded=recorded), arm_run(q, name="given", robot=tooled, recorded=recorded)
+    bare, given = run_of(q, recorded=recorded), run_of(q, name="given", robot=tooled, recorded=recorded)
     result = compare_runs(wanted, [bare, given])
     assert [run.verdict for run in result.runs] == ["fail", "pass"]
     (warning,) = result.warnings
@@ -210,27 +175,27 @@ def test_a_log_that_misses_a_path_for_want_of_a_tool_says_so(q: FloatArray) -> N
         "the kinematics of urm6 stay 150.0 mm (rms) from the recorded TCP",
     )
     assert compare_runs(wanted, [bare], CompareOptions(tcp="recorded")).warnings == ()
-    assert compare_runs(wanted, [arm_run(q)]).warnings == ()  # nothing was recorded that could tell
+    assert compare_runs(wanted, [run_of(q)]).warnings == ()  # nothing was recorded that could tell
 
 
 def test_a_path_held_against_a_log_is_told(q: FloatArray) -> None:
     path = path_run(positions_over_log(URM6, q))
-    (warning,) = compare_runs(arm_run(q), [path]).warnings
+    (warning,) = compare_runs(run_of(q), [path]).warnings
     assert (warning.kind, warning.message) == (
         "path-as-log",
         "a path without joints, compared with log, which has joints: the reference comes first, then"
         " the logs",
     )
-    assert compare_runs(path, [arm_run(q)]).warnings == compare_runs(path, [path]).warnings == ()
+    assert compare_runs(path, [run_of(q)]).warnings == compare_runs(path, [path]).warnings == ()
 
 
 def test_what_is_lacking_is_named(q: FloatArray) -> None:
     wanted = path_run(positions_over_log(URM6, q))
     with pytest.raises(LogError) as error:
-        compare_runs(wanted, [arm_run(q, robot=None)])
+        compare_runs(wanted, [run_of(q, robot=None)])
     assert str(error.value) == ("log.csv: no robot, so no forward kinematics; robot=NAME|FILE gives one")
     with pytest.raises(LogError) as error:
-        compare_recorded(arm_run(q))
+        compare_recorded(run_of(q))
     assert str(error.value) == (
         "log.csv: one log, which recorded no tool centre point; allowed: a reference before the log"
     )
@@ -238,9 +203,9 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     with pytest.raises(
         LogError, match=r"a reference before the log\nlog\.csv: tcp_xx, tcp_yy look like a recorded TCP$"
     ):
-        compare_recorded(replace(run := arm_run(q), log=replace(run.log, warnings=(doubt,))))
+        compare_recorded(replace(run := run_of(q), log=replace(run.log, warnings=(doubt,))))
     with pytest.raises(LogError) as error:
-        compare_runs(wanted, [arm_run(q)], CompareOptions(sync=99.0))
+        compare_runs(wanted, [run_of(q)], CompareOptions(sync=99.0))
     assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
     with pytest.raises(OptionError) as option_error:
         CompareOptions({"axis": -1.0})
@@ -251,7 +216,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
 
 
 def test_the_result_is_a_table_and_json(q: FloatArray) -> None:
-    result = compare_runs(path_run(positions_over_log(URM6, q) + 0.004), [arm_run(q)])
+    result = compare_runs(path_run(positions_over_log(URM6, q) + 0.004), [run_of(q)])
     frame = result.to_frame()
     assert frame["quantity"].tolist() == ["x", "y", "z", "norm", "path"]
     assert frame["verdict"].tolist()[:3] == ["fail"] * 3
@@ -277,7 +242,7 @@ def test_an_unknown_tool_centre_point_is_refused() -> None:
 def test_what_is_wrong_with_the_reference_is_told(q: FloatArray) -> None:
     doubt = LogWarning("assumed-unit", "taken as m", 3)
     reference = replace(path_run(positions_over_log(URM6, q)), warnings=(doubt,))
-    result = compare_runs(reference, [arm_run(q)])
+    result = compare_runs(reference, [run_of(q)])
     assert result.warnings == (LogWarning("assumed-unit", "taken as m", 3, "path"),)
 
 
@@ -293,10 +258,10 @@ def test_a_log_alone_is_compared_as_it_was_repaired() -> None:
     there = (true + np.pi) % (2 * np.pi) - np.pi
     wrap = int(np.argmax(np.abs(np.diff(there[:, 0])))) + 1
     there[wrap, 0] = (there[wrap - 1, 0] + there[wrap + 1, 0]) / 2
-    log = replace(arm_run(there, recorded=positions_over_log(URM6, true)).log, columns=COLUMNS)
+    log = replace(run_of(there, recorded=positions_over_log(URM6, true)).log, columns=COLUMNS)
     found = audit_log(log, URM6, repaired=True)
     assert [entry.kind for entry in found.entries] == ["repaired", "wrap"]
-    run = replace(arm_run(found.q), log=log, audit=found.entries)
+    run = replace(run_of(found.q), log=log, audit=found.entries)
     # A straight line between samples 5 ms apart misses a sine of 1 rad/s2 by 1e-5 rad at the most.
     assert compare_recorded(run).runs[0].delta.max() < 1e-5
     assert compare_recorded(replace(run, audit=())).runs[0].delta.max() > 0.1
@@ -304,20 +269,20 @@ def test_a_log_alone_is_compared_as_it_was_repaired() -> None:
 
 def test_kinematics_of_different_robots_are_told(q: FloatArray) -> None:
     other = replace(URM6, name="urm6b")
-    result = compare_runs(arm_run(q, name="a"), [arm_run(q, name="b", robot=other)])
+    result = compare_runs(run_of(q, name="a"), [run_of(q, name="b", robot=other)])
     assert result.warnings == (
         LogWarning("robots-differ", "the kinematics are those of different robots: a as urm6, b as urm6b"),
     )
-    assert compare_runs(arm_run(q), [arm_run(q, robot=other)]).warnings  # logs of one name are two logs
+    assert compare_runs(run_of(q), [run_of(q, robot=other)]).warnings  # logs of one name are two logs
     path = path_run(positions_over_log(URM6, q))
-    assert not compare_runs(path, [arm_run(q)]).warnings
+    assert not compare_runs(path, [run_of(q)]).warnings
 
 
 def test_meshes_that_went_away_since_the_log_was_read_are_told_once(q: FloatArray, tmp_path: Path) -> None:
     mesh = tmp_path / "link.stl"
     mesh.write_bytes(b"solid")
     shown = replace(URM6, visuals=(Visual("phi1", Mesh(str(mesh))),))
-    logs = [arm_run(q, name=name, robot=shown) for name in ("one", "other")]
+    logs = [run_of(q, name=name, robot=shown) for name in ("one", "other")]
     path = path_run(positions_over_log(URM6, q))
     assert compare_runs(path, logs).warnings == ()
     mesh.unlink()

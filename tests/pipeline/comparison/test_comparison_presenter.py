@@ -9,7 +9,9 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from presented import Untouched, cells, every_section, facts, figures
+from asserting import there
+from made_runs import off
+from presented import Untouched, cells, every_section, facts, figures, scene_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.comparison.baseline import against_baseline
@@ -23,11 +25,6 @@ from urmpipe_pipeline.presentation.section import Check, Place, Ref, Section
 from urmpipe_pipeline.results import present
 
 Compared = Callable[..., Comparison]
-
-
-def off(x: float, samples: int = 100) -> FloatArray:
-    """A deviation that grows from 0 to x along x."""
-    return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
 
 
 def noisy(seed: int, size: float = 0.001, samples: int = 60) -> FloatArray:
@@ -64,8 +61,7 @@ def test_the_properties_and_rows_are_the_statistics(arms: Compared) -> None:
                 assert properties[f"{prefix}.{field}"] is value or properties[f"{prefix}.{field}"] == value
         assert properties["share_out"] == one.share_out
         assert properties["speed_correlation"] == one.speed_correlation
-    rows = present(result).rows
-    assert rows is not None
+    rows = there(present(result).rows)
     table = cells(rows())
     assert list(zip(*table.values(), strict=True)) == [tuple(row.values()) for row in result.rows()]
     assert list(table) == list(next(result.rows()))
@@ -192,20 +188,14 @@ def test_paths_have_no_joints_and_no_arm(paths: Compared) -> None:
     shown = present(result)
     units = {p.unit for f in figures(shown.body.sections[0]) for view in f.views for p in view.panels}
     assert units == {"m", "m/s"}
-    assert shown.scene is not None
-    scene = shown.scene()
-    assert scene is not None
+    scene = scene_of(shown)
     assert scene.arms == ()
     np.testing.assert_array_equal(scene.paths[0].position, result.reference.position)
 
 
 def test_the_scene_is_the_worst_arm_all_paths_and_what_decided(arms: Compared) -> None:
     result = arms({"a": noisy(1, 0.01), "b": noisy(2, 0.001)})
-    shown = present(result).scene
-    assert shown is not None
-    scene = shown()
-    assert scene is not None
-    worst = result.worst
+    scene, worst = scene_of(present(result)), result.worst
     assert scene.arms[0].q is worst.run.q
     whole, moving, a, b, larger = scene.paths
     assert whole.position is result.reference.position
@@ -213,9 +203,7 @@ def test_the_scene_is_the_worst_arm_all_paths_and_what_decided(arms: Compared) -
     assert moving.position is worst.reference
     assert [path.position for path in (a, b)] == [one.actual for one in result.runs]
     assert scene.spots[0].position == tuple(worst.actual[worst.decided_at].tolist())
-    assert scene.enlarged is not None
-    index, factor = scene.enlarged
-    assert scene.paths[index] is larger
+    factor = int(larger.name.removeprefix("deviation x"))
     np.testing.assert_array_equal(
         larger.position, worst.reference + factor * (worst.actual - worst.reference)
     )
@@ -224,11 +212,8 @@ def test_the_scene_is_the_worst_arm_all_paths_and_what_decided(arms: Compared) -
 @pytest.mark.parametrize("align", ["none", "start", "rigid", "tool"])
 def test_the_arm_stands_where_its_aligned_path_is(arms: Compared, align: str) -> None:
     result = arms({"a": noisy(1, 0.01)}, align=align)
-    one, shown = result.runs[0], present(result).scene
-    assert shown is not None
-    scene = shown()
-    assert scene is not None
-    (arm,) = scene.arms
+    one = result.runs[0]
+    (arm,) = scene_of(present(result)).arms
     # Two ways of adding up one motion: rounding of lengths below 2 m.
     np.testing.assert_allclose(
         positions_over_log(arm.chain, one.run.q[one.sample]), one.actual, rtol=0, atol=1e-12
@@ -251,11 +236,8 @@ def test_a_deviation_is_enlarged_as_far_as_it_stays_inside_the_scene(
     paths: Compared, largest: float, factor: int | None
 ) -> None:
     """`largest` is a share of the radius of the scene, which is half of the path's metre."""
-    shown = present(paths({"a": off(0.5 * largest)})).scene
-    assert shown is not None
-    scene = shown()
-    assert scene is not None
-    assert (scene.enlarged and scene.enlarged[1]) == factor
+    scene = scene_of(present(paths({"a": off(0.5 * largest)})))
+    assert [one.name for one in scene.paths[3:]] == ([f"deviation x{factor}"] if factor else [])
 
 
 def test_a_page_shows_the_paths_coloured_by_the_deviation(paths: Compared) -> None:
@@ -282,8 +264,7 @@ def test_each_warning_stands_once(arms: Compared) -> None:
 def test_events_tell_when_what_happened(paths: Compared) -> None:
     result = paths({"a": off(0.004)}, tolerance={"axis": 0.0035})
     one = result.runs[0]
-    longest = one.longest_out
-    assert longest is not None
+    longest = there(one.longest_out)
     found = {event.t_ns: event.level for event in log_section(result, "a").events()}
     assert found[round(longest.t * 1e9)] == "error"
     assert found[int(one.t_ns[one.decided_at])] == "error"
@@ -304,8 +285,7 @@ def test_no_array_of_a_motion_is_looked_into_before_it_is_shown(arms: Compared) 
 
 def test_a_log_of_one_row_is_shown(paths: Compared) -> None:
     shown = present(paths({"a": np.zeros((1, 3))}))
-    assert shown.scene is not None
-    assert shown.scene() is not None
+    scene_of(shown)
     for section in every_section(shown.body):
         assert all(figure.views for figure in figures(section))
         list(section.blocks())

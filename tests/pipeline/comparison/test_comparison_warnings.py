@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
+from asserting import there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_pipeline.comparison.baseline import complete_noise
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -68,8 +69,7 @@ def test_what_has_no_value_is_out_of_its_tolerance_and_counted(values: FloatArra
     assert (
         one.out_of_tolerance == above + len(rows) == int(np.count_nonzero(measured.outside({"angle": 1.0})))
     )
-    assert one.share_out is not None
-    assert round(one.share_out * len(values)) == one.out_of_tolerance
+    assert round(there(one.share_out) * len(values)) == one.out_of_tolerance
     assert one.verdict == ("fail" if above or rows else "pass")
     free = describe(measured, t, count, {"axis": 1.0})
     assert (free.verdict, free.out_of_tolerance, free.missing) == (None, None, len(rows))
@@ -120,10 +120,7 @@ def test_a_log_that_ends_early_is_told_and_stands_behind_whole_ones(paths: Compa
 
 def test_a_large_tolerance_without_a_unit_is_told(paths: Compared) -> None:
     assert told(paths({"log": off(50)}, tolerance={"axis": 3.5, "norm": 0.1})) == [
-        (
-            "large-tolerance",
-            "a tolerance of 3500 mm (axis) lets anything pass: 3.5 is in m",
-        )
+        ("large-tolerance", "a tolerance of 3500 mm (axis) lets anything pass: 3.5 is in m")
     ]
     assert [one.message for one in large_tolerances({"angle": 0.5, "joint": 0.17})] == [
         "a tolerance of 28.6479 deg (angle) lets anything pass: 0.5 is in rad"

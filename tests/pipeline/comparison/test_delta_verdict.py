@@ -9,6 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
+from asserting import there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.delta import delta as model_delta
 from urmpipe_models.errors import OptionError
@@ -23,8 +24,7 @@ DELTA = np.array([[1e-3, 0.0, 0.0], [0.0, -4e-3, 3e-3], [3.5e-3, 0.0, 0.0]])
 
 
 def test_the_component_that_uses_up_most_is_the_worst() -> None:
-    found = delta_verdict("meter", T_NS, DELTA, {"axis": 0.0035})
-    assert found is not None
+    found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 0.0035}))
     assert (found.quantity, found.worst, found.t, found.sample) == ("y", 4e-3, 0.005, 1)
     assert (found.samples, found.out_of_tolerance, found.verdict) == (3, 1, "fail")  # what is allowed passes
     assert (found.used, found.share_out) == (4e-3 / 0.0035, 1 / 3)
@@ -47,8 +47,7 @@ def test_a_tolerance_of_one_coordinate_or_of_the_norm_holds_for_that_alone() -> 
 def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
     lacking = DELTA.copy()
     lacking[0, 2] = np.nan
-    found = delta_verdict("meter", T_NS, lacking, {"axis": 1.0})
-    assert found is not None
+    found = there(delta_verdict("meter", T_NS, lacking, {"axis": 1.0}))
     assert (found.sample, found.out_of_tolerance, found.verdict, found.used) == (0, 1, "fail", None)
     assert math.isnan(found.worst) and found.to_dict()["worst"] is None
     assert meter_words(found) == (
@@ -57,8 +56,7 @@ def test_a_sample_without_a_value_is_out_and_the_worst() -> None:
 
 
 def test_of_nothing_allowed_no_share_is_told() -> None:
-    found = delta_verdict("meter", T_NS, DELTA, {"axis": 0.0})
-    assert found is not None
+    found = there(delta_verdict("meter", T_NS, DELTA, {"axis": 0.0}))
     assert meter_words(found) == (
         "|Δy| = 4.0000 mm of 0 mm allowed at t = 0.005 s; out of tolerance: 3 of 3 samples (100 %)"
     )
@@ -104,8 +102,7 @@ ROWS = st.lists(st.tuples(*(st.floats(-1.0, 1.0),) * 3), min_size=1, max_size=8)
 def test_it_passes_if_and_only_if_every_quantity_of_every_sample_is_allowed(
     delta: FloatArray, axis: float, norm: float
 ) -> None:
-    found = delta_verdict("meter", np.arange(len(delta)), delta, {"axis": axis, "norm": norm})
-    assert found is not None
+    found = there(delta_verdict("meter", np.arange(len(delta)), delta, {"axis": axis, "norm": norm}))
     out = (np.abs(delta) > axis).any(axis=1) | (length(delta) > norm)
     assert found.out_of_tolerance == np.count_nonzero(out)
     assert (found.verdict == "pass") == (not out.any())

@@ -13,14 +13,14 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation
 
+from asserting import there
 from exported import export_result
+from made_runs import path_run
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.trajectory import AlignMode
-from urmpipe_pipeline.joint_log import JointLog, SourceFile
-from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
@@ -33,19 +33,6 @@ RADIANS = 1e-13
 """evo turns matrices into rotation vectors: some hundreds of rounding errors of 1e-16, from 0 to pi alike."""
 
 LOGS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"
-
-
-def pose_run(name: str, position: FloatArray, quat: FloatArray) -> Run:
-    """A path of poses every 5 ms."""
-    t_ns = np.arange(len(position)) * 5_000_000
-    none = np.empty((len(position), 0))
-    files = (SourceFile(f"{name}.csv", "0", 1),)
-    log = JointLog(
-        name, "table", files, t_ns, (), none, tcp_position=position, tcp_rotation=quat,
-        rotation_form="quat_xyzw",
-    )  # fmt: skip
-    made = Provenance("ingest", {}, (), {}, "")
-    return Run(name, log, None, 0.005, t_ns, none, none, none, None, position, (), (), made)
 
 
 def evo_errors(
@@ -66,15 +53,13 @@ def evo_errors(
 
 
 def as_evo(run: Run) -> PoseTrajectory3D:
-    assert run.log.tcp_rotation is not None
-    return PoseTrajectory3D(run.log.tcp_position, run.log.tcp_rotation[:, [3, 0, 1, 2]], run.t)
+    return PoseTrajectory3D(run.log.tcp_position, there(run.log.tcp_rotation)[:, [3, 0, 1, 2]], run.t)
 
 
 def assert_agree(deviation: Deviation, reference: Run, log: Run, align: AlignMode) -> None:
     distance, angle = evo_errors(as_evo(reference), as_evo(log), align)
     np.testing.assert_allclose(deviation.delta[:, 3], distance, rtol=0, atol=METRES)
-    assert deviation.angle is not None
-    np.testing.assert_allclose(deviation.angle, angle, rtol=0, atol=RADIANS)
+    np.testing.assert_allclose(there(deviation.angle), angle, rtol=0, atol=RADIANS)
     assert deviation.statistics["norm"].rms == pytest.approx(np.sqrt(np.mean(distance**2)), abs=METRES)
 
 
@@ -84,7 +69,7 @@ def assert_agree(deviation: Deviation, reference: Run, log: Run, align: AlignMod
 def test_errors_of_random_trajectories_are_those_of_evo(align: AlignMode, seed: int, count: int) -> None:
     rng = np.random.default_rng(seed)
     runs = [
-        pose_run(name, rng.uniform(-2, 2, (count, 3)), Rotation.random(count, rng=rng).as_quat())
+        path_run(rng.uniform(-2, 2, (count, 3)), Rotation.random(count, rng=rng).as_quat(), name=name)
         for name in ("reference", "log")
     ]
     deviation = compare_runs(runs[0], runs[1:], CompareOptions(align=align)).runs[0]
@@ -101,8 +86,8 @@ def test_errors_of_a_motion_turned_and_moved_are_those_of_evo(align: AlignMode) 
     frame = Rotation.from_rotvec([0.1, -0.2, 0.15])
     noise = Rotation.from_rotvec(rng.normal(0, 1e-3, (2000, 3)))
     moved = frame.apply(position) + rng.normal((0.3, 0.1, -0.2), 1e-3, (2000, 3))
-    reference = pose_run("reference", position, turn.as_quat())
-    log = pose_run("log", moved, (frame * turn * noise).as_quat())
+    reference = path_run(position, turn.as_quat())
+    log = path_run(moved, (frame * turn * noise).as_quat(), name="log")
     deviation = compare_runs(reference, [log], CompareOptions(align=align)).runs[0]
     assert_agree(deviation, reference, log, align)
     if align == "rigid":
@@ -130,5 +115,4 @@ def test_what_is_exported_gives_evo_the_same_errors(
     first, second = (read_tum_trajectory_file(file) for file in files)
     distance, angle = evo_errors(first, second, align)
     np.testing.assert_allclose(deviation.delta[:, 3], distance, rtol=0, atol=METRES)
-    assert deviation.angle is not None
-    np.testing.assert_allclose(deviation.angle, angle, rtol=0, atol=RADIANS)
+    np.testing.assert_allclose(there(deviation.angle), angle, rtol=0, atol=RADIANS)

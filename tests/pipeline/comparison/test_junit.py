@@ -13,7 +13,8 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from urmpipe_models.arrays import FloatArray
+from asserting import there
+from made_runs import off
 from urmpipe_models.errors import Finding, LogError, OutputError
 from urmpipe_pipeline.comparison.baseline import against_baseline
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -22,11 +23,6 @@ from urmpipe_pipeline.results import present
 from urmpipe_pipeline.tables.junit import errors_in_junit, write_junit
 
 Compared = Callable[..., Comparison]
-
-
-def off(x: float, samples: int = 100) -> FloatArray:
-    """A deviation that grows from 0 to x along x."""
-    return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
 
 
 def written(result: Comparison, path: Path) -> ET.Element:
@@ -101,8 +97,7 @@ def test_the_properties_are_the_statistics_bit_for_bit(arms: Compared, tmp_path:
             assert text == "" if value is None else type(value)(text) == value, (prefix, field)
     assert float(told["share_out"]) == run.share_out
     assert float(told["speed_correlation"]) == run.speed_correlation
-    assert run.longest_out is not None
-    assert float(told["longest_out"]) == run.longest_out.duration
+    assert float(told["longest_out"]) == there(run.longest_out).duration
 
 
 def test_a_joint_that_is_called_x_is_not_the_axis(arms: Compared, tmp_path: Path) -> None:
@@ -148,9 +143,8 @@ def test_a_quantity_that_is_gone_fails_whatever_the_log_was_called(
 ) -> None:
     before, now = arms({"monday": np.zeros((100, 6))}), paths({"tuesday": off(0.0)})
     result = replace(now, baseline=against_baseline(now, before))
-    assert result.baseline is not None
     gone = ["angle", *(f"q{number}" for number in range(1, 7))]
-    assert [str(one) for one in result.baseline.gone] == [f"{name} of tuesday" for name in gone]
+    assert [str(one) for one in there(result.baseline).gone] == [f"{name} of tuesday" for name in gone]
     root = written(result, tmp_path / "verdict.xml")
     assert (result.verdict, root.get("failures")) == ("fail", "7")
     failed = [(case.get("classname"), case.get("name")) for case in root.iter("testcase") if len(case)]

@@ -11,10 +11,11 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.spatial.transform import Rotation, Slerp
 
+from asserting import there
+from made_runs import path_run, run_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import LogError
-from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_models.orientation import RotationForm
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.transform import translation
@@ -22,35 +23,14 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_runs
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
 from urmpipe_pipeline.comparison.statistics import UNCHANGING, correlation
-from urmpipe_pipeline.joint_log import JointLog, SourceFile
 from urmpipe_pipeline.operands import log_files
-from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.runs.ingest import ingest_log
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
 
-MADE = Provenance("ingest", {}, (), {}, "")
 LOGS = Path(__file__).parents[3] / "datasets" / "urmpipe_datasets" / "logs"
 TURN = 2 * np.pi
 T = np.linspace(0.0, 5.0, 300)
-
-
-def pose_run(
-    position: FloatArray,
-    rotation: FloatArray | None = None,
-    form: RotationForm | None = None,
-    *,
-    period_ns: int = 5_000_000,
-    name: str = "path",
-) -> Run:
-    """A path, with orientations if there are any."""
-    t_ns = np.arange(len(position)) * period_ns
-    none = np.empty((len(position), 0))
-    files = (SourceFile(f"{name}.csv", "0", 1),)
-    log = JointLog(
-        name, "table", files, t_ns, (), none, tcp_position=position, tcp_rotation=rotation, rotation_form=form
-    )
-    return Run(name, log, None, period_ns / 1e9, t_ns, none, none, none, None, position, (), (), MADE)
 
 
 def planar(kinds: str = "rrp") -> Chain:
@@ -61,11 +41,7 @@ def planar(kinds: str = "rrp") -> Chain:
 
 
 def arm_run(q: FloatArray, names: tuple[str, ...], kinds: str = "rrp", name: str = "log") -> Run:
-    t_ns = np.arange(len(q)) * 5_000_000
-    robot = planar(kinds)
-    log = JointLog(name, "table", (SourceFile(f"{name}.csv", "0", 1),), t_ns, names, q)
-    tcp = point_over_log(robot, q, 0 * q, 0 * q)
-    return Run(name, log, robot, 0.005, t_ns, q, 0 * q, 0 * q, tcp, None, (), (), MADE)
+    return run_of(q, planar(kinds), name=name, joints=names)
 
 
 def joints() -> FloatArray:
@@ -85,8 +61,7 @@ def held(reference: Run, log: Run, **tolerance: float) -> Deviation:
 def test_joints_are_held_against_each_other_in_their_units() -> None:
     off = np.array([0.01, -0.02, 0.003])
     found = held(arm_run(joints() + off, NAMES), arm_run(joints(), NAMES))
-    assert found.joint_delta is not None
-    np.testing.assert_allclose(found.joint_delta, np.tile(off, (300, 1)), atol=1e-15)
+    np.testing.assert_allclose(there(found.joint_delta), np.tile(off, (300, 1)), atol=1e-15)
     units = {name: one.unit for name, one in found.joint_statistics.items()}
     assert units == {"a": "rad", "b": "rad", "s": "m"}
     assert found.joint_turns == (0, 0, 0)
@@ -95,11 +70,9 @@ def test_joints_are_held_against_each_other_in_their_units() -> None:
 def test_joints_of_the_same_names_are_matched_by_name_and_others_by_place() -> None:
     q = joints()[:, [0, 1, 0]]
     by_name = held(arm_run(q[:, [1, 0, 2]], ("b", "a", "c"), "rrr"), arm_run(q, ("a", "b", "c"), "rrr"))
-    assert by_name.joint_delta is not None
-    assert np.abs(by_name.joint_delta).max() == 0.0
+    assert np.abs(there(by_name.joint_delta)).max() == 0.0
     by_place = held(arm_run(q, ("x", "y", "z"), "rrr"), arm_run(q, ("a", "b", "c"), "rrr"))
-    assert by_place.joint_delta is not None
-    assert np.abs(by_place.joint_delta).max() == 0.0
+    assert np.abs(there(by_place.joint_delta)).max() == 0.0
     assert list(by_place.joint_statistics) == ["a", "b", "c"]
 
 
@@ -107,8 +80,7 @@ def test_turns_counted_apart_at_the_start_are_no_deviation() -> None:
     off = np.array([TURN + 0.01, -3 * TURN - 0.02, 0.0])
     found = held(arm_run(joints() + off, NAMES), arm_run(joints(), NAMES))
     assert found.joint_turns == (1, -3, 0)
-    assert found.joint_delta is not None
-    np.testing.assert_allclose(found.joint_delta[:, :2], [[0.01, -0.02]] * 300, atol=1e-14)
+    np.testing.assert_allclose(there(found.joint_delta)[:, :2], [[0.01, -0.02]] * 300, atol=1e-14)
 
 
 def test_a_start_beside_half_a_turn_is_counted_to_the_near_side() -> None:
@@ -175,13 +147,13 @@ def assert_not_compared(reference: Run, reason: str) -> None:
 
 def test_all_that_cannot_be_judged_is_refused_at_once() -> None:
     with pytest.raises(LogError) as error:
-        held(pose_run(np.column_stack([T, T, T])), arm_run(joints(), NAMES), joint=0.1, angle=0.1)
+        held(path_run(np.column_stack([T, T, T])), arm_run(joints(), NAMES), joint=0.1, angle=0.1)
     assert str(error.value) == (
         "log.csv: tolerance: angle: found a side without an orientation, allowed: joints with a robot,"
         " or a recorded orientation\nlog.csv: tolerance: joint: found that a side has no joints,"
         " allowed: the same joints on both sides"
     )
-    assert compare_runs(pose_run(np.column_stack([T, T, T])), [arm_run(joints(), NAMES)]).warnings == ()
+    assert compare_runs(path_run(np.column_stack([T, T, T])), [arm_run(joints(), NAMES)]).warnings == ()
 
 
 # Orientations
@@ -214,11 +186,10 @@ def test_the_angle_is_that_between_recorded_orientations_of_any_form(form: Rotat
     position, rotation = poses(50)
     turned = rotation * Rotation.from_rotvec([0.0, 0.3, 0.4])
     found = held(
-        pose_run(position, rotation.as_quat(), "quat_xyzw"),
-        pose_run(position, recorded(turned, way), form, name="log"),
+        path_run(position, rotation.as_quat(), "quat_xyzw"),
+        path_run(position, recorded(turned, way), form, name="log"),
     )
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, 0.5, atol=1e-14)  # some tens of rounding errors
+    np.testing.assert_allclose(there(found.angle), 0.5, atol=1e-14)  # some tens of rounding errors
     assert (found.statistics["angle"].unit, found.statistics["angle"].kind) == ("rad", "angle")
 
 
@@ -229,11 +200,10 @@ def test_the_reference_turns_on_the_great_arc_between_its_samples() -> None:
         [np.interp(np.arange(0, 19.01, 0.25), np.arange(20), column) for column in position.T]
     )
     found = held(
-        pose_run(position, rotation.as_quat(), "quat_xyzw", period_ns=20_000_000),
-        pose_run(at, wanted.as_quat(), "quat_xyzw", name="log"),
+        path_run(position, rotation.as_quat(), "quat_xyzw", tsp=0.02),
+        path_run(at, wanted.as_quat(), "quat_xyzw", name="log"),
     )
-    assert found.angle is not None
-    np.testing.assert_allclose(found.angle, 0.0, atol=1e-14)
+    np.testing.assert_allclose(there(found.angle), 0.0, atol=1e-14)
     assert found.statistics["norm"].max < 1e-14
 
 
@@ -244,10 +214,9 @@ def test_missing_orientations_leave_the_angle_open_between_their_neighbours() ->
     at = np.column_stack(
         [np.interp(np.arange(0, 19.01, 0.5), np.arange(20), column) for column in position.T]
     )
-    log = pose_run(at, np.tile([0.0, 0, 0, 1], (39, 1)), "quat_xyzw", name="log")
-    found = held(pose_run(position, quat, "quat_xyzw", period_ns=10_000_000), log, angle=4.0)
-    assert found.angle is not None
-    assert np.flatnonzero(np.isnan(found.angle)).tolist() == [9, 10, 11]  # 4.5, 5 and 5.5
+    log = path_run(at, np.tile([0.0, 0, 0, 1], (39, 1)), "quat_xyzw", name="log")
+    found = held(path_run(position, quat, "quat_xyzw", tsp=0.01), log, angle=4.0)
+    assert np.flatnonzero(np.isnan(there(found.angle))).tolist() == [9, 10, 11]  # 4.5, 5 and 5.5
     assert len(found.sample) == 39
     angle = found.statistics["angle"]
     assert (angle.verdict, angle.samples, angle.missing, angle.out_of_tolerance) == ("fail", 36, 3, 3)
@@ -258,7 +227,7 @@ def test_missing_orientations_leave_the_angle_open_between_their_neighbours() ->
 def test_orientations_that_are_missing_throughout_are_none() -> None:
     position, _ = poses(20)
     nothing = np.full((20, 4), np.nan)
-    found = held(pose_run(position, nothing, "quat_xyzw"), pose_run(position, nothing, "quat_xyzw", name="b"))
+    found = held(path_run(position, nothing, "quat_xyzw"), path_run(position, nothing, "quat_xyzw", name="b"))
     assert found.angle is None
     assert "angle" not in found.statistics
 
@@ -273,7 +242,7 @@ def test_the_path_is_never_further_than_the_place_at_that_time(seed: int, share:
     wanted = np.cumsum(rng.normal(0, 0.01, (120, 3)), axis=0)
     wanted[rng.integers(0, 120, 5)] = np.nan
     done = rng.normal(0, 0.05, (150, 3))
-    found = held(pose_run(wanted), pose_run(done, period_ns=int(5_000_000 * share), name="log"))
+    found = held(path_run(wanted), path_run(done, tsp=0.005 * share, name="log"))
     assert (found.path <= found.delta[:, 3]).all()
 
 
@@ -282,10 +251,8 @@ def test_the_path_is_never_further_than_the_place_at_that_time(seed: int, share:
 
 def test_the_speed_of_positions_is_that_of_the_parabola_through_the_neighbours() -> None:
     position = np.column_stack([T**2, 2 * T, np.zeros(300)])
-    step = T[1] * 1e9
-    found = held(
-        pose_run(position, period_ns=round(step)), pose_run(position, period_ns=round(step), name="b")
-    )
+    step = round(T[1], 9)
+    found = held(path_run(position, tsp=step), path_run(position, tsp=step, name="b"))
     expected = np.hypot(2 * T, 2.0)
     np.testing.assert_allclose(found.speed[1:-1], expected[1:-1], rtol=1e-7)  # the period rounds to 1 ns
     np.testing.assert_allclose(
@@ -298,17 +265,17 @@ def test_no_speed_is_taken_across_samples_left_out_and_gaps() -> None:
     log = position.copy()
     log[[50, 52]] = np.nan  # 51 stands alone
     log[53:] += 10.0
-    found = held(pose_run(position), pose_run(log, name="log"))
+    found = held(path_run(position), path_run(log, name="log"))
     lone = int(np.flatnonzero(found.sample == 51)[0])
     assert np.flatnonzero(np.isnan(found.speed)).tolist() == [lone]
     np.testing.assert_allclose(np.delete(found.speed, lone), 1.0, rtol=1e-9)
     gap = replace(found.run, t_ns=found.run.t_ns + np.where(np.arange(300) >= 100, 10**9, 0))
-    late = held(pose_run(np.tile(position, (2, 1))), gap)
+    late = held(path_run(np.tile(position, (2, 1))), gap)
     np.testing.assert_allclose(late.speed[np.isfinite(late.speed)], 1.0, rtol=1e-9)
 
 
 def test_a_single_sample_has_no_speed() -> None:
-    found = held(pose_run(np.zeros((1, 3))), pose_run(np.zeros((1, 3)), name="log"))
+    found = held(path_run(np.zeros((1, 3))), path_run(np.zeros((1, 3)), name="log"))
     assert np.isnan(found.speed).tolist() == [True]
     assert found.speed_correlation is None
 
@@ -355,8 +322,7 @@ def demo() -> Comparison:
 def test_a_log_that_is_late_deviates_as_fast_as_it_moves(demo: Comparison) -> None:
     """Fig. 9b of [UrmArm2021]_: the norm is largest where the effector is fastest."""
     matlab = demo.runs[0]
-    assert matlab.speed_correlation is not None
-    assert matlab.speed_correlation > 0.9999
+    assert there(matlab.speed_correlation) > 0.9999
     assert matlab.speed[matlab.worst] > 0.999 * matlab.speed.max()
 
 

@@ -10,6 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
+from asserting import there
 from urmpipe_datasets import LOGS
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import LogError
@@ -21,6 +22,7 @@ from urmpipe_pipeline.comparison.sync_fine import line_at
 from urmpipe_pipeline.comparison.sync_views import views
 from urmpipe_pipeline.comparison.trajectory import AlignMode, Sync, Trajectory
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
+from urmpipe_pipeline.operands import load_runs
 
 Motion = Callable[[FloatArray], FloatArray]
 
@@ -120,8 +122,7 @@ def test_any_offset_between_two_logs_of_the_joints_is_found_or_too_little_is_in_
         return
     assert abs(sync.offset - (second - first)) < CLEAN
     assert (sync.mode, sync.by) == ("auto", "joints")
-    assert sync.similarity is not None
-    assert sync.similarity > 0.999  # lines between samples leave less than 1e-3 unlike
+    assert there(sync.similarity) > 0.999  # lines between samples leave less than 1e-3 unlike
 
 
 @settings(max_examples=12, deadline=None)
@@ -193,8 +194,7 @@ def test_the_rate_is_the_derivative_of_the_residual_by_the_offset(align: AlignMo
     log = replace(path(motion[700:9000], t[700:9000]), quat_xyzw=quat[700:9000])
     view = next(views(path(motion, t), log, align))
     assert (view.turned, view.tool_axes is not None) == (align == "start", align == "tool")
-    found = mean_rates(view)
-    assert found is not None
+    found = there(mean_rates(view))
     offset_ns, step_ns = 1_400_000_000, 1_000_000
     before, at, after = (line_at(view, found, offset_ns + k * step_ns) for k in (-1, 0, 1))
     slope = (after.residual - before.residual) / (2e-9 * step_ns)
@@ -212,8 +212,7 @@ def test_the_standard_error_is_that_of_least_squares() -> None:
     for seed in range(20):
         noise = np.random.default_rng(seed).normal(scale=0.01, size=(len(t), 6))
         sync = synchronise(joints(motion(t), t, "asked"), joints(motion(t) + noise, t), "auto")
-        assert sync.precision is not None
-        found.append(sync.precision)
+        found.append(there(sync.precision))
     # Each is of 20 blocks, known to 1 / sqrt(2 * 19) = 16 %; the mean of 20 to 4 %, three times that.
     assert np.mean(found) == pytest.approx(theory, rel=0.12)
 
@@ -372,11 +371,9 @@ def test_similarity_is_that_of_the_best_turn_where_frames_may_be_turned() -> Non
 
 @pytest.fixture(scope="module")
 def demo() -> dict[str, Trajectory]:
-    robot = load_robot("urm6")
-    from urmpipe_pipeline.operands import load_run
-
     names = ("path.csv", "coppeliasim.csv", "matlab.csv", "solidworks", "counter_rotating.csv")
-    return {name.split(".")[0]: trajectory(load_run(LOGS / name, robot=robot)) for name in names}
+    runs = load_runs([LOGS / name for name in names], robot=load_robot("urm6"))
+    return {run.name: trajectory(run) for run in runs}
 
 
 def test_the_offsets_of_the_demo_logs_are_found(demo: dict[str, Trajectory]) -> None:

@@ -10,12 +10,7 @@ from hypothesis import strategies as st
 
 from urmpipe_models.errors import OptionError
 from urmpipe_models.measure_units import DEGREE
-from urmpipe_pipeline.comparison.tolerance import (
-    UNITS,
-    allowed_for,
-    check_tolerance,
-    parse_tolerance,
-)
+from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for, check_tolerance, parse_tolerance
 
 ALLOWED = (
     "allowed: a length in m, or axis=, x=, y=, z=, norm=, path= (m, mm, um), angle=, joint= (rad, mrad, deg;"

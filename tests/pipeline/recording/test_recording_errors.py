@@ -138,6 +138,10 @@ def test_a_recording_of_another_layout_says_how_to_make_it_again(
         (document("run", None), "found damaged metadata, /: found None, allowed: Run"),
         (document("run", {"name": 1}), "found damaged metadata, /name: found 1, allowed: str"),
         (
+            document("run", {}, {"/q": "/q"}),
+            "found damaged metadata, found {'/q': '/q'}, allowed: the paths of times",
+        ),
+        (
             document("run", {"name": "a"}),
             "found damaged metadata, /: found None, allowed: the field log of Run",
         ),
@@ -242,8 +246,8 @@ def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp
     comparison = make_comparison(("coppeliasim",), rows=70_000)
     path = write_recording(comparison, tmp_path / "one.rrd")
     found = encode(comparison)
-    metadata = document("comparison", found.tree)
-    verify(path, path, found.columns, metadata)
+    metadata = document("comparison", found.tree, found.clocks)
+    verify(path, path, found, metadata)
     altered, rows = [], iter((0, 69_999, 35_000))
     for column in found.columns:
         values = column.values.copy()
@@ -253,7 +257,7 @@ def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp
             values[next(rows), 0] += 1e-12
         altered.append(replace(column, values=values))
     with pytest.raises(OutputError) as caught:
-        verify(path, Path("name.rrd"), altered, "{}")
+        verify(path, Path("name.rrd"), replace(found, columns=tuple(altered)), "{}")
     assert str(caught.value).splitlines() == [
         f"name.rrd: reads back otherwise than written: {one}"
         for one in (
@@ -272,7 +276,7 @@ def test_what_cannot_be_read_back_is_named(make_run: MakeRun, tmp_path: Path) ->
     path.write_bytes(path.read_bytes()[:-20])
     found = encode(run)
     with pytest.raises(OutputError) as caught:
-        verify(path, Path("name.rrd"), found.columns, document("run", found.tree))
+        verify(path, Path("name.rrd"), found, document("run", found.tree))
     assert str(caught.value).startswith(
         "name.rrd: could not be read back: found a recording that was cut off"
     )

@@ -26,7 +26,7 @@ from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
 from urmpipe_pipeline.presentation.scene import Arm
-from urmpipe_pipeline.recording.store import Store
+from urmpipe_pipeline.recording.store import ROW, TIME, Store
 from urmpipe_pipeline.recording.views.geometry import (
     POSES,
     ball,
@@ -303,9 +303,9 @@ def test_a_name_keeps_its_place_in_a_motion_and_leaps_between_single_poses(make_
 def test_the_viewer_opens_where_most_branches_are(make_solved: MakeSolved, tmp_path: Path) -> None:
     store = Store(write_recording(make_solved(), tmp_path / "solved.rrd"))
     # At row 2 the arm and both ghosts are there for the first time.
-    assert store.opening == ("t", 2 * STEP_NS)
+    assert store.opening == (TIME, 2 * STEP_NS)
     store = Store(write_recording(make_solved(timed=False), tmp_path / "poses.rrd"))
-    assert store.opening == ("row", 3)  # rows count from 1
+    assert store.opening == (ROW, 3)  # rows count from 1
 
 
 # --- without times ---------------------------------------------------------------------------------

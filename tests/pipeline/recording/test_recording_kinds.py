@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
@@ -16,7 +17,9 @@ from numpy.typing import NDArray
 from recorded import times_of
 from same_results import assert_same
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline import results
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation, Section
 from urmpipe_pipeline.recording.store import SLICE
 from urmpipe_pipeline.results import Kind, read_recording, write_recording
@@ -27,7 +30,7 @@ ROWS = 2 * SLICE + 3
 
 
 @dataclass(frozen=True, eq=False)
-class Accuracy:
+class Accuracy(Result):
     """A result of every type of array, some of more rows than are sent at a time."""
 
     name: str
@@ -39,6 +42,15 @@ class Accuracy:
     words: TextArray
     lone: FloatArray
     recording: Path | None = field(default=None, metadata={"stored": False})
+
+    def _headline(self) -> str:
+        return self.name
+
+    def to_frame(self) -> pd.DataFrame:
+        return pd.DataFrame(self.error)
+
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+        return {"name": self.name}
 
 
 def accuracy() -> Accuracy:
@@ -72,6 +84,15 @@ def test_a_kind_of_ones_own_comes_back_as_it_was(tmp_path: Path) -> None:
     assert_same(read_recording(path), wanted)
     assert read_recording(path).recording == path
     assert sorted(times_of(path, "/error")) == wanted.t_ns.tolist()
+
+
+@pytest.mark.usefixtures("known")
+def test_times_that_do_not_rise_come_back_as_they_were(tmp_path: Path) -> None:
+    wanted = accuracy()
+    t_ns = wanted.t_ns.copy()
+    t_ns[[3, SLICE]] = t_ns[2], t_ns[5]
+    wanted = replace(wanted, t_ns=t_ns)
+    assert_same(read_recording(write_recording(wanted, tmp_path / "toy.rrd")), wanted)
 
 
 def everything(rows: Any) -> list[Any]:

@@ -13,15 +13,15 @@ from rerun.blueprint import Container
 from rerun.chunk import RrdReader
 
 from recorded import columns, entities, views
-from toys import Toy, figure, laid_out, panel, recorded, shown, toy
+from toys import Toy, figure, laid_out, panel, recorded, root_of, shown, toy
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.figure import Drawing, Figure, Text, View
 from urmpipe_pipeline.presentation.scene import Path as Way
 from urmpipe_pipeline.presentation.scene import Scene
-from urmpipe_pipeline.presentation.section import Event, Presentation, Section
+from urmpipe_pipeline.presentation.section import Column, Event, Presentation, Section, Table
 from urmpipe_pipeline.recording.store import Opening
 from urmpipe_pipeline.recording.viewer import openings
-from urmpipe_pipeline.recording.views.blueprint import EVENTS_SHARE, SEEN_AT_ONCE
+from urmpipe_pipeline.recording.views.blueprint import EVENTS_SHARE, LINE_SHARE, PEEK, SEEN_AT_ONCE
 from urmpipe_pipeline.results import write_recording
 from urmpipe_pipeline.simulations.simulation import Simulation
 
@@ -40,7 +40,7 @@ def tree(view: Any) -> Any:
 
 def layout(one: Presentation) -> Any:
     """Return the layout of a presentation as lists of names."""
-    return tree(laid_out(one)[0].root_container)
+    return tree(root_of(one))
 
 
 def plain(*names: str, **more: Any) -> Figure:
@@ -67,8 +67,8 @@ def test_a_figure_is_a_row_of_tabs_and_events_share_the_last() -> None:
             ["Tabs", {"open": 0}, "Events, at t [s]", "e [rad]", "f [rad]"],
         ],
     ]  # fmt: skip
-    _, plots = laid_out(one)[0].root_container.contents  # type: ignore[union-attr]
-    assert plots.row_shares == [3.0, 2.0, 2.0, EVENTS_SHARE]  # type: ignore[union-attr]
+    _, plots = root_of(one).contents
+    assert plots.row_shares == [3.0, 2.0, 2.0, EVENTS_SHARE]
 
 
 def test_the_events_of_a_single_plot_stand_below_it() -> None:
@@ -87,17 +87,17 @@ def sections(count: int, views: int, opened: int) -> tuple[Section, ...]:
 
 def test_plots_of_several_sections_are_tabs_with_their_verdict_and_one_is_open() -> None:
     one = shown(scene=scene(), sections=sections(3, 4, opened=1))
-    _, plots = laid_out(one)[0].root_container.contents  # type: ignore[union-attr]
-    assert plots.active_tab == 1  # type: ignore[union-attr]
-    assert [tab.name for tab in plots.contents] == ["PASS s0", "FAIL s1", "PASS s2"]  # type: ignore[union-attr]
+    _, plots = root_of(one).contents
+    assert plots.active_tab == 1
+    assert [tab.name for tab in plots.contents] == ["PASS s0", "FAIL s1", "PASS s2"]
 
 
 def test_few_plots_of_several_sections_stand_beside_each_other_with_their_section() -> None:
     one = shown(sections=sections(SEEN_AT_ONCE, 1, opened=1))
     _, grid = layout(one)[2:]
     assert grid[:3] == ["Grid", {}, "s0: v0 [rad]"]
-    _, plots = laid_out(one)[0].root_container.contents  # type: ignore[union-attr]
-    assert plots.grid_columns == 2  # type: ignore[union-attr]
+    _, plots = root_of(one).contents
+    assert plots.grid_columns == 2
 
 
 def test_texts_and_events_without_a_plot_are_tabs_behind_the_summary(tmp_path: Path) -> None:
@@ -123,6 +123,16 @@ def test_a_long_summary_stands_beside_the_plots_where_there_is_no_scene() -> Non
     assert layout(with_arm)[2] == ["Vertical", {}, "Summary", "Paths [m]"]
 
 
+def test_tables_that_are_read_later_leave_the_room_to_the_arm() -> None:
+    table = Table("Signals", (Column("name", "Name", [f"signal {k}" for k in range(12)]),))
+    shares = []
+    for tables in ((), (table,)):
+        left, _ = root_of(shown(plain("a"), scene=scene(), tables=tables)).contents
+        shares.append(left.row_shares[0])
+    assert shares[1] - shares[0] == pytest.approx(PEEK * LINE_SHARE)
+    assert layout(shown(plain("a"), tables=(table,)))[0] == "Horizontal"
+
+
 def test_without_plots_and_scene_the_summary_stands_alone() -> None:
     assert layout(shown()) == ["Tabs", {}, "Summary"]
 
@@ -135,7 +145,7 @@ def test_it_opens_at_its_time_or_its_row(timed: bool, tmp_path: Path) -> None:
     path = recorded(told, tmp_path, one)
     wanted = Opening("t", 30_000_000) if timed else Opening("row", 7)
     assert openings([path]) == {path: wanted}
-    assert laid_out(told)[0].time_panel.timeline == wanted.timeline  # type: ignore[union-attr]
+    assert laid_out(told)[0].time_panel.timeline == wanted.timeline
     assert laid_out(replace(told, opens_at_row=None))[1].timeline == wanted.timeline
 
 

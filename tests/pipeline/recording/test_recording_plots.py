@@ -13,19 +13,11 @@ import rerun as rr
 from rerun.chunk import RrdReader
 
 from recorded import columns, entities, packed, rows_of, static, times_of, views
-from toys import COLOURS, PLOT, STEP_NS, Toy, figure, laid_out, line, panel, recorded, shown, toy
+from toys import COLOURS, PLOT, STEP_NS, Toy, figure, line, panel, recorded, root_of, shown, toy
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.figure import Figure, Mark, Over, Panel, Shape, View
-from urmpipe_pipeline.recording.views.plots import (
-    COPIED,
-    LONG,
-    LOW,
-    MARGIN,
-    ROWS,
-    SHARED_AXIS,
-    TALL,
-    span_with_numbers,
-)
+from urmpipe_pipeline.recording.views.axes import LOW, MARGIN, TALL, span_with_numbers
+from urmpipe_pipeline.recording.views.plots import COPIED, LONG, ROWS, SHARED_AXIS
 
 SCALARS = "Scalars:scalars"
 
@@ -37,9 +29,8 @@ def plots(path: Path) -> list[str]:
 
 def first_plot(one: Figure) -> Any:
     """Return the first plot of a layout of one figure and a short summary."""
-    layout, _ = laid_out(shown(one))
-    _, plots = layout.root_container.contents  # type: ignore[union-attr]
-    return next(iter(plots.contents))  # type: ignore[union-attr]
+    _, plots = root_of(shown(one)).contents
+    return next(iter(plots.contents))
 
 
 # --- lines -----------------------------------------------------------------------------------------
@@ -58,10 +49,11 @@ def test_an_array_of_the_result_is_plotted_itself_with_names_and_colours(tmp_pat
     assert "/values" in views(path)["ViewContents:query"]
 
 
-def test_times_are_exact_and_rows_count_from_one(tmp_path: Path) -> None:
+def test_times_are_exact_and_rows_count_from_one_where_times_do_not_tell_them(tmp_path: Path) -> None:
     one = toy(rows=40_000)
-    path = recorded(shown(), tmp_path, one)
-    assert list(rows_of(path, "/values", SCALARS)) == one.t_ns.tolist()
+    assert list(rows_of(recorded(shown(), tmp_path, one), "/values", SCALARS)) == one.t_ns.tolist()
+    still = replace(one, t_ns=np.zeros_like(one.t_ns))
+    path = recorded(shown(), tmp_path, still)
     assert list(rows_of(path, "/values", SCALARS, "row")) == list(range(1, 40_001))
 
 
@@ -205,6 +197,20 @@ def test_a_long_array_has_an_overview_that_keeps_every_extreme(small: bool, tmp_
     unit = "deg" if small else "rad"
     assert plots(path) == [f"Values [{unit}], every peak of 50,001 rows", "all 50,001 rows [rad]"]
     assert {f"{PLOT}/0/0", "/values"} <= set(views(path)["ViewContents:query"])
+
+
+def test_a_long_array_of_a_hidden_view_is_plotted_itself_and_seen_whole(tmp_path: Path) -> None:
+    one = toy(rows=LONG + 1)
+    values = np.array(one.values)
+    values[LONG // 2, 0], values[-1, 1], values[7, 0] = np.nan, 9.0, np.inf
+    one = Toy(one.t_ns, values)
+    views = View("opened", (panel(one, line(values[:, 0] + 1.0)),)), View("hidden", (panel(one),))
+    both = Figure("both", "caption", "alt", views, {STEP_NS: "decides"})
+    path = recorded(shown(both), tmp_path, one)
+    hidden = PLOT.replace("/0/0", "/0/1")
+    assert entities(path, hidden) == {f"{hidden}/instants/0"}
+    ends = columns(path, f"{hidden}/instants/0", SCALARS)
+    assert ends == [[np.min(values[np.isfinite(values)])], [9.0]]
 
 
 def test_what_is_plotted_over_a_quantity_is_left_to_the_report() -> None:

@@ -19,9 +19,9 @@ from same_results import assert_same
 from urmpipe_models.errors import RecordingError
 from urmpipe_pipeline.comparison.delta_verdict import DeltaVerdict
 from urmpipe_pipeline.joint_log import LogWarning, SourceFile
-from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_run
+from urmpipe_pipeline.operands import SIMULATION, load_comparison, load_runs
 from urmpipe_pipeline.provenance import Provenance
-from urmpipe_pipeline.recording.writer import SLICE
+from urmpipe_pipeline.recording.store import SLICE
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.simulations.simulation import Setting, Signal, SimulatedBlock, Simulation
 
@@ -98,7 +98,7 @@ def test_rerun_finds_nothing_wrong(make_simulation: MakeSimulation, tmp_path: Pa
 def test_a_simulation_is_nothing_to_compare(make_simulation: MakeSimulation, tmp_path: Path) -> None:
     path = write_recording(make_simulation(5), tmp_path / "a.rrd")
     with pytest.raises(RecordingError) as caught:
-        load_run(path)
+        load_runs([path])
     assert str(caught.value) == f"{path}: {SIMULATION}"
     assert load_comparison(path) is None
 

@@ -37,7 +37,7 @@ def table(rows: int, *, judged: bool, title: str = "Log") -> Table:
 
 
 def lines(one: Presentation, scene: Scene | None = None) -> list[str]:
-    return summary(one, scene).splitlines()
+    return "\n".join(summary(one, scene)).splitlines()
 
 
 def test_the_verdict_comes_first_then_what_explains_it() -> None:
@@ -115,13 +115,16 @@ def test_warnings_say_what_they_are_about_and_many_are_counted() -> None:
 
 
 def test_each_path_is_told_with_its_colour() -> None:
-    def path(name: str, colour: str, **more: bool) -> Path:
-        return Path(name, np.zeros((2, 3)), None, colour, **more)
+    def path(name: str, colour: str) -> Path:
+        return Path(name, np.zeros((2, 3)), None, colour)
 
-    asked = path("asked for", REFERENCE_COLOUR, asked=True)
+    asked = replace(path("asked for", REFERENCE_COLOUR), asked=True)
     paths = (asked, replace(asked, line=False), path("a|b", run_colour(0)), path("x50", DEVIATION_COLOUR))
     assert "Paths: asked for grey, dashed; a\\|b orange; x50 crimson." in lines(shown(), Scene(paths=paths))
     assert not [line for line in lines(shown(), Scene(paths=paths[2:3])) if line.startswith("Paths")]
+    logs = Table("Logs", (Column("log", "Log", [Ref("a|b", run_colour(0))]),))
+    judged = replace(logs, columns=(*logs.columns, Column("v", "Verdict", [Judged("pass")])))
+    assert "Paths: asked for grey, dashed; x50 crimson." in lines(shown(tables=(judged,)), Scene(paths=paths))
     many = Scene(paths=tuple(path(f"p{k}", run_colour(k)) for k in range(NAMED + 3)))
     (told,) = [line for line in lines(shown(), many) if line.startswith("Paths")]
     assert told.endswith("; and 3 more.") and told.count(";") == NAMED

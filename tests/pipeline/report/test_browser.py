@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
 from urmpipe_pipeline.presentation.section import Presentation, Section
@@ -95,10 +96,7 @@ def opened(
 ) -> Iterator[Page]:
     """A page at its top. It must have had no error and asked no one for anything when it closes."""
     context = browser.new_context(
-        viewport={"width": width, "height": 900},
-        java_script_enabled=script,
-        has_touch=phone,
-        is_mobile=phone,
+        viewport={"width": width, "height": 900}, java_script_enabled=script, has_touch=phone, is_mobile=phone
     )
     page = context.new_page()
     complaints: list[str] = []
@@ -172,8 +170,7 @@ def test_the_verdict_is_seen_first(browser: Browser, report: Path) -> None:
         assert " ".join(heading.inner_text().split()) == (
             "FAIL 1 of 2 logs (joint-off) out of tolerance against path, by the joints on both sides"
         )
-        box = heading.bounding_box()
-        assert box is not None
+        box = there(heading.bounding_box())
         assert box["y"] < 200
         assert page.locator("h1 svg.icon").count() == 1
 
@@ -223,8 +220,7 @@ def test_the_pointer_tells_the_number_that_the_table_has(
             }""",
             one.t_max,
         )
-        box = plot.bounding_box()
-        assert box is not None
+        box = there(plot.bounding_box())
         for aside in (40, 0):  # a pointer that appears from nowhere is not seen as moving
             page.mouse.move(box["x"] + where[0] + aside, box["y"] + where[1])
         plot.locator(".hoverlayer .legend, .hoverlayer .hovertext").first.wait_for()
@@ -280,8 +276,7 @@ def test_a_phone_shows_it_without_sideways_scroll(
         scroll_through(page)
         assert sideways(page) == 0
         for box in page.locator(".scroll, .card, .verdict, .facts, .plot").all():
-            found = box.bounding_box()
-            assert found is not None
+            found = there(box.bounding_box())
             assert found["x"] + found["width"] <= 390
         assert page.locator(".modebar-btn").count() == 0
 
@@ -332,8 +327,7 @@ def test_a_card_leads_to_its_part(browser: Browser, report: Path, comparison: Co
         page.locator(".card h3 a").first.click()
         part = page.locator("#r1-2")
         assert part.locator("h3").inner_text().startswith(worst)
-        box = part.bounding_box()
-        assert box is not None
+        box = there(part.bounding_box())
         assert 0 <= box["y"] < 200
 
 

@@ -26,7 +26,8 @@ from urmpipe_pipeline.presentation.scene import Path, Spot
 from urmpipe_pipeline.presentation.section import Block, Fact, Presentation, Section
 from urmpipe_pipeline.report import spec
 from urmpipe_pipeline.report.figures import drawn_figures, span_of
-from urmpipe_pipeline.report.page import Image, Listing, Page, lay_out
+from urmpipe_pipeline.report.markup import data_address
+from urmpipe_pipeline.report.page import Page, lay_out
 from urmpipe_pipeline.report.space import drawn_space
 from urmpipe_pipeline.results import present
 from urmpipe_pipeline.runs.results import Run
@@ -353,12 +354,10 @@ def test_a_slim_path_stands_in_a_box_of_equal_sides() -> None:
 
 
 def test_drawings_are_images_and_texts_stay_texts() -> None:
-    (part,) = page_of(Drawing("System", "Blocks.", "<svg/>"), Text("File", "a <b>", folded=False)).parts
-    image, listing = part.blocks
-    assert isinstance(image, Image)
-    assert base64.b64decode(image.source.removeprefix("data:image/svg+xml;base64,")) == b"<svg/>"
-    assert (image.title, image.alt) == ("System", "Blocks.")
-    assert listing == Listing("File", "a <b>", False)
+    blocks = Drawing("System", "Blocks.", "<svg/>"), Text("File", "a <b>")
+    (part,) = page_of(*blocks).parts
+    assert part.blocks == blocks
+    assert base64.b64decode(data_address("<svg/>").removeprefix("data:image/svg+xml;base64,")) == b"<svg/>"
 
 
 def test_plotly_accepts_every_figure_of_every_kind(

@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_models.errors import OptionError, OutputError
 from urmpipe_models.kinematics.forward import point_over_log
 from urmpipe_pipeline import text
@@ -279,9 +280,8 @@ def test_writing_replaces_a_report_of_ours_and_nothing_else(bare_run: Run, tmp_p
 @pytest.mark.filterwarnings("error")
 def test_a_log_of_one_sample_and_a_path_have_pages_too(comparison: Comparison) -> None:
     run = comparison.runs[0].run
-    assert run.robot is not None
     log = replace(run.log, t_ns=run.log.t_ns[:1], q=run.log.q[:1])
-    one = point_over_log(run.robot, run.q[:1], run.qd[:1] * np.nan, run.qdd[:1] * np.nan)
+    one = point_over_log(there(run.robot), run.q[:1], run.qd[:1] * np.nan, run.qdd[:1] * np.nan)
     single = replace(run, log=log, t_ns=run.t_ns[:1], q=run.q[:1], qd=run.qd[:1], tcp=one, audit=())
     nothing = np.empty((1, 0))
     path = replace(

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import pytest
 
 from urmpipe_pipeline.joint_log import LogWarning
@@ -17,6 +19,7 @@ from urmpipe_pipeline.presentation.section import (
     Table,
     Value,
 )
+from urmpipe_pipeline.report import render_report
 from urmpipe_pipeline.report.page import Page, lay_out
 from urmpipe_pipeline.report.tables import Grid, ShownCell, grid
 
@@ -102,12 +105,16 @@ def test_facts_without_a_value_are_left_out_and_explained_ones_stand_apart() -> 
         Fact("Robot", "urm6"), Fact("Recording", ""), Fact("Offset", None), Fact("Mean", Value(None, "m")),
         Fact("See", Ref("below"), brief=False), Fact("Nowhere", Ref("else")),
     )  # fmt: skip
-    (part,) = page_of(Section("toy", facts=facts, sections=(Section("below"),))).parts
-    assert [(fact.name, fact.value, fact.help) for fact in part.explained] == [
-        ("|Δx|", "2.5000 mm of 3.5 mm allowed", "71.4 % of the tolerance")
-    ]
-    assert [(fact.name, fact.value, fact.href) for fact in part.facts] == [
-        ("Robot", "urm6", ""), ("See", "below", "#r1-1"), ("Nowhere", "else", ""),
+    section = Section("toy", facts=facts, sections=(Section("below"),))
+    (part,) = page_of(section).parts
+    assert [(fact.name, fact.value, fact.help, fact.href) for fact in part.facts] == [
+        ("|Δx|", "2.5000 mm of 3.5 mm allowed", "71.4 % of the tolerance", ""),
+        ("Robot", "urm6", "", ""), ("See", "below", "", "#r1-1"), ("Nowhere", "else", "", ""),
+    ]  # fmt: skip
+    html = render_report([Presentation("toy", "it is", None, (), section)])
+    lists = re.findall(r'<dl class="facts( explained|)">(.*?)</dl>', html)[-2:]
+    assert [(style, re.findall("<dt>(.*?)</dt>", said)) for style, said in lists] == [
+        (" explained", ["|Δx|"]), ("", ["Robot", "See", "Nowhere"]),
     ]  # fmt: skip
 
 

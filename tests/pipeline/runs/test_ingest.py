@@ -12,6 +12,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as st_np
 
+from asserting import there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import LogError, OptionError
@@ -44,10 +45,9 @@ def test_a_wrapped_log_is_unwrapped_and_the_arm_does_not_notice(tmp_path: Path, 
     x = np.cumsum(steps, axis=0)
     x -= 2 * np.pi * np.round(x[0] / (2 * np.pi))
     run = ingest_log([write(tmp_path / "log.csv", wrap(x))], robot=URM6, read=RAD)
-    assert run.tcp is not None
     np.testing.assert_allclose(run.q, x, rtol=0, atol=3e-14)  # to 90 rad: two roundings of 1.4e-14
     # the arm is 1.35 m long: an angle's rounding of 3e-14 moves its tip by less than 1e-12
-    np.testing.assert_allclose(run.tcp.position, positions_over_log(URM6, wrap(x)), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(there(run.tcp).position, positions_over_log(URM6, wrap(x)), rtol=0, atol=1e-12)
 
 
 def test_every_repolarization_is_listed_with_its_place_and_turns(tmp_path: Path) -> None:
@@ -91,8 +91,7 @@ def test_a_missing_cell_is_a_missing_sample(tmp_path: Path) -> None:
     path.write_text("\n".join(lines))
     run = ingest_log([path], robot=URM6, read=RAD)
     assert np.argwhere(np.isnan(run.q)).tolist() == [[3, 2]]
-    assert run.tcp is not None
-    assert np.isnan(run.tcp.position[3]).all()
+    assert np.isnan(there(run.tcp).position[3]).all()
     assert [w.kind for w in run.warnings] == ["missing"]
 
 
@@ -133,9 +132,7 @@ def test_the_rates_that_export_writes_are_known_again(tmp_path: Path) -> None:
     np.savetxt(path, table, "%.17g", ",", header=header, comments="")
     log = ingest_log([path]).log
     assert log.joints == ("joint1",)
-    assert log.qd is not None
-    assert log.qdd is not None
-    np.testing.assert_array_equal(np.hstack((log.qd, log.qdd)), table[:, 2:])
+    np.testing.assert_array_equal(np.hstack((there(log.qd), there(log.qdd))), table[:, 2:])
 
 
 def test_the_table_has_a_row_a_grid_sample(tmp_path: Path) -> None:
@@ -143,8 +140,7 @@ def test_the_table_has_a_row_a_grid_sample(tmp_path: Path) -> None:
     frame = run.to_frame()
     assert len(frame) == 7
     assert list(frame.columns[:3]) == ["t", "q1", "q2"]
-    assert run.tcp is not None
-    np.testing.assert_array_equal(frame[["px", "py", "pz"]].to_numpy(), run.tcp.position)
+    np.testing.assert_array_equal(frame[["px", "py", "pz"]].to_numpy(), there(run.tcp).position)
 
 
 def test_a_log_with_other_joints_than_the_robot_is_refused(tmp_path: Path) -> None:

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.chains.urm import urm_chain
@@ -39,8 +40,7 @@ def log(tmp_path_factory: pytest.TempPathFactory) -> Path:
     header = ["t [s]", *(f"q{i} [rad]" for i in range(1, 7))]
     file = tmp_path_factory.mktemp("logs") / "log.csv"
     write(file, header, np.column_stack((t, q)))
-    tcp = ingest_log([file], robot=ARM).tcp
-    assert tcp is not None
+    tcp = there(ingest_log([file], robot=ARM).tcp)
     write(file, [*header, "x [m]", "y [m]", "z [m]"], np.column_stack((t, q, tcp.position)))
     return file
 
@@ -69,9 +69,7 @@ def test_warnings_and_kinematics_are_those_of_a_log_read_with_the_arm(
     assert held.warnings == read.warnings
     assert held.robot == second
     assert held.provenance.options == read.provenance.options
-    assert held.tcp is not None
-    assert read.tcp is not None
-    np.testing.assert_array_equal(held.tcp.position, read.tcp.position)
+    np.testing.assert_array_equal(there(held.tcp).position, there(read.tcp).position)
     np.testing.assert_array_equal(held.tcp_recorded, read.tcp_recorded)
 
 

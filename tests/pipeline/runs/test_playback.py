@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_datasets import LOGS
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import jacobian_over_log, positions_over_log
@@ -27,9 +28,7 @@ def run() -> Run:
 
 @pytest.fixture(scope="module")
 def played(run: Run) -> Playback:
-    result = play_back(run)
-    assert result is not None
-    return result
+    return there(play_back(run))
 
 
 def p7(phi: FloatArray) -> FloatArray:
@@ -63,17 +62,14 @@ def test_at_rows_outside_the_jumps_the_tool_is_where_the_run_has_it(run: Run, pl
 
 def test_of_a_resampled_run_the_rows_of_the_file_are_played_back(run: Run) -> None:
     coarse = ingest_log([LOGS / "coppeliasim.csv"], robot=run.robot, tsp=0.02)
-    result = play_back(coarse)
-    assert result is not None
+    result = there(play_back(coarse))
     assert result.jumps == 13
     rows = np.searchsorted(run.log.t, result.t[~result.jumping])
     np.testing.assert_array_equal(result.q[~result.jumping], run.log.q[rows])
-    assert run.tcp is not None
-    places = run.tcp.position[rows]
+    places = there(run.tcp).position[rows]
     np.testing.assert_allclose(result.position[~result.jumping], places, rtol=0, atol=1e-12)  # as above
-    assert result.worst is not None
     # Linear over 20 ms instead of 5: the true path lies up to q'' dt^2 / 8 = 1e-4 rad beside the chord.
-    assert result.off[result.worst] == pytest.approx(1.16687706595, abs=2e-4)
+    assert result.off[there(result.worst)] == pytest.approx(1.16687706595, abs=2e-4)
 
 
 def test_half_way_down_each_jump_stands_the_mean_of_its_two_rows(run: Run, played: Playback) -> None:
@@ -138,12 +134,10 @@ def test_a_missing_sample_at_a_jump_leaves_the_rest(run: Run) -> None:
     q[row - 2, :] = np.nan
     holed = replace(run, log=replace(run.log, q=q))
     before = q.copy()
-    result = play_back(holed)
-    assert result is not None
+    result = there(play_back(holed))
     np.testing.assert_array_equal(holed.log.q, before)
     assert np.isfinite(result.off).all()
-    assert result.worst is not None
-    assert result.off[result.worst] == pytest.approx(1.16687706595, abs=1e-10)
+    assert result.off[there(result.worst)] == pytest.approx(1.16687706595, abs=1e-10)
 
 
 def test_neighbouring_jumps_share_their_row_and_of_many_the_first_are_played(run: Run) -> None:
@@ -153,8 +147,7 @@ def test_neighbouring_jumps_share_their_row_and_of_many_the_first_are_played(run
         AuditEntry(run.log.joints[0], row + 1, (row - 0.5) * run.tsp, run.tsp / 2, -6.28, 0, 1)
         for row in range(1, MOST + 500)
     )
-    result = play_back(replace(run, log=replace(run.log, q=q), audit=audit))
-    assert result is not None
+    result = there(play_back(replace(run, log=replace(run.log, q=q), audit=audit)))
     assert result.jumps == MOST
     assert np.count_nonzero(result.jumping) == MOST * PARTS + 1
     assert (np.diff(result.t) > 0).all()

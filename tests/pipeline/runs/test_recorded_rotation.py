@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from asserting import there
 from exported import export_result
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.orientation import NAMES, RotationForm, width
@@ -45,22 +46,19 @@ def test_a_rotation_vector_goes_on_past_pi(tsp: float | None, tmp_path: Path) ->
     vectors = recorded()
     assert np.abs(np.diff(vectors, axis=0)).max() > 2.0  # as the file has it, it jumps
     run = ingest(tmp_path / "log.csv", ["rx [rad]", "ry [rad]", "rz [rad]"], vectors, "vector", tsp)
-    assert run.rotation_recorded is not None
     assert run.rotation_names == ("rx", "ry", "rz")
     expected = TURN[:, np.newaxis] * AXIS
     np.testing.assert_allclose(
-        run.rotation_recorded, expected if tsp is None else expected[::2], atol=PRINTED
+        there(run.rotation_recorded), expected if tsp is None else expected[::2], atol=PRINTED
     )
-    assert run.log.tcp_rotation is not None
-    np.testing.assert_allclose(run.log.tcp_rotation, vectors, atol=PRINTED)  # the file's own stay
+    np.testing.assert_allclose(there(run.log.tcp_rotation), vectors, atol=PRINTED)  # the file's own stay
 
 
 def test_a_matrix_becomes_a_quaternion_without_jumps(tmp_path: Path) -> None:
     rotation = Rotation.from_rotvec(TURN[:, np.newaxis] * AXIS)
     names = [f"r{i}{j}" for i in "123" for j in "123"]
     run = ingest(tmp_path / "log.csv", names, rotation.as_matrix().reshape(-1, 9), None, 0.0125)
-    quaternions = run.rotation_recorded
-    assert quaternions is not None
+    quaternions = there(run.rotation_recorded)
     assert run.rotation_names == NAMES["quat_xyzw"]
     np.testing.assert_allclose(np.linalg.norm(quaternions, axis=1), 1.0, atol=1e-14)
     assert np.abs(np.diff(quaternions, axis=0)).max() < 0.05  # a jump would be 2 times its size
@@ -79,8 +77,7 @@ def test_it_comes_back_from_a_recording_and_leaves_with_the_grid(tmp_path: Path)
     np.testing.assert_array_equal(back.rotation_recorded, run.rotation_recorded)
     export_result(run, tmp_path / "grid.csv", ExportOptions("csv"), [])
     table = np.genfromtxt(tmp_path / "grid.csv", delimiter=",", names=True, deletechars="")
-    assert run.rotation_recorded is not None
-    np.testing.assert_array_equal(table["recorded_rx_[rad]"], run.rotation_recorded[:, 0])
+    np.testing.assert_array_equal(table["recorded_rx_[rad]"], there(run.rotation_recorded)[:, 0])
 
 
 def test_a_log_without_an_orientation_has_none(tmp_path: Path) -> None:

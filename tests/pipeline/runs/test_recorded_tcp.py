@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.robots.catalogue import load_robot
@@ -104,10 +105,7 @@ def test_a_tool_that_was_not_told_is_found() -> None:
 
 @pytest.mark.parametrize(
     ("base", "said"),
-    [
-        ((0.0, 0.02, -0.005), "0,0.02,-0.005"),
-        ((0.0, 0.0, 0.0, 0.0, 0.0, 0.1), "0,0,0,0,0,0.1"),
-    ],
+    [((0.0, 0.02, -0.005), "0,0.02,-0.005"), ((0.0, 0.0, 0.0, 0.0, 0.0, 0.1), "0,0,0,0,0,0.1")],
 )
 def test_a_small_shift_of_the_base_is_found(base: tuple[float, ...], said: str) -> None:
     recorded = positions_over_log(UR5E.placed(base=from_offset(base)), Q)
@@ -136,8 +134,7 @@ def test_a_recorded_rotation_vector_goes_on_past_pi() -> None:
     recorded = np.array([[0.0, 0.0, 3.1], [np.nan] * 3, [0.0, 0.0, 3.2 - 2 * np.pi]])
     nothing = np.empty((3, 0))
     bare = JointLog("log", "table", (), np.arange(3), (), nothing)
-    found = replace(bare, tcp_rotation=recorded, rotation_form="vector").tcp_rotation_continuous
-    assert found is not None
+    found = there(replace(bare, tcp_rotation=recorded, rotation_form="vector").tcp_rotation_continuous)
     # 2 pi is taken away and added again: two roundings of 4e-16
     np.testing.assert_allclose(found[[0, 2]], [[0.0, 0.0, 3.1], [0.0, 0.0, 3.2]], rtol=0, atol=1e-15)
     assert np.isnan(found[1]).all()

@@ -9,7 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from presented import Untouched, cells, facts, figures
+from asserting import there
+from presented import Untouched, cells, facts, figures, scene_of
 from urmpipe_datasets import LOGS
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_pipeline.joint_log import LogWarning
@@ -45,8 +46,7 @@ def test_a_log_is_not_judged(run: Run, shown: Presentation) -> None:
 
 def test_the_audit_is_a_table_and_what_audit_writes(run: Run, shown: Presentation) -> None:
     table = cells(shown.body.tables[1])
-    assert shown.rows is not None
-    written = cells(shown.rows())
+    written = cells(there(shown.rows)())
     for key in ("kind", "joint", "row", "t", "step", "from", "to"):
         assert table[key] == [one.to_dict()[key] for one in run.audit]
         assert written[key] == table[key]
@@ -56,8 +56,7 @@ def test_the_audit_is_a_table_and_what_audit_writes(run: Run, shown: Presentatio
 def test_what_was_inferred_is_a_table(run: Run, shown: Presentation) -> None:
     table = cells(shown.body.tables[0])
     found = [(one.what, one.value, one.evidence) for one in run.log.inferences]
-    assert run.robot is not None
-    found.append(("robot", "urm6", run.robot.description))
+    found.append(("robot", "urm6", there(run.robot).description))
     assert list(zip(table["what"], table["found"], table["evidence"], strict=True)) == found
     columns = cells(next(one for one in shown.body.blocks() if one.title.startswith("Columns")))  # type: ignore[arg-type]
     assert columns["unit"] == [one.unit for one in run.log.columns]
@@ -110,27 +109,22 @@ def test_the_motion_is_that_of_the_kinematics(run: Run, shown: Presentation) -> 
 
 
 def test_a_page_shows_the_playback(run: Run, shown: Presentation) -> None:
-    played = play_back(run)
-    assert played is not None
-    assert played.worst is not None
+    played = there(play_back(run))
     blocks = {one.title: one for one in shown.body.blocks()}
     before = cast(Figure, blocks["Tool centre point before and after repolarization"]).views[0].panels
     np.testing.assert_array_equal(before[0].lines[0].values, played.position)
     np.testing.assert_array_equal(before[2].lines[0].values, np.linalg.norm(played.velocity, axis=1))
     space = cast(SpaceFigure, blocks["Path in space before and after repolarization"])
     np.testing.assert_array_equal(space.paths[0].position, played.position)
-    assert space.spots[-1].position == tuple(played.position[played.worst].tolist())
+    assert space.spots[-1].position == tuple(played.position[there(played.worst)].tolist())
     assert {"Path in space", "Input files", "How it was made"} < set(blocks)
 
 
 def test_the_scene_is_the_arm_and_its_path(run: Run, shown: Presentation) -> None:
-    assert shown.scene is not None
-    scene = shown.scene()
-    assert scene is not None
-    assert run.tcp is not None
+    scene = scene_of(shown)
     (arm,), (path,) = scene.arms, scene.paths
     assert (arm.chain, arm.q, arm.t_ns) == (run.robot, run.q, run.t_ns)
-    assert (path.position, path.t_ns, path.asked) == (run.tcp.position, run.t_ns, False)
+    assert (path.position, path.t_ns, path.asked) == (there(run.tcp).position, run.t_ns, False)
 
 
 def test_events_stand_at_the_instants_of_the_audit_and_the_rows_of_warnings(run: Run) -> None:
@@ -148,9 +142,7 @@ def test_a_path_has_no_joints_and_no_arm(tmp_path: Path) -> None:
     (motion,) = figures(shown.body)
     assert motion.views[0].panels[0].lines[0].values is path.tcp_recorded
     assert len(shown.body.tables) == 1
-    assert shown.scene is not None
-    scene = shown.scene()
-    assert scene is not None
+    scene = scene_of(shown)
     assert (scene.arms, scene.paths[0].position) == ((), path.tcp_recorded)
 
 
@@ -160,8 +152,7 @@ def test_a_log_without_a_robot_has_joints_alone() -> None:
     shown = present(run)
     assert [one.title for one in figures(shown.body)] == ["Joints before and after repolarization", "Motion"]
     assert not any(isinstance(one, (Figure, SpaceFigure)) for one in shown.body.blocks())
-    assert shown.scene is not None
-    assert shown.scene() is None
+    assert there(shown.scene)() is None
 
 
 def test_a_log_of_one_row_is_shown(tmp_path: Path) -> None:
@@ -174,9 +165,8 @@ def test_a_log_of_one_row_is_shown(tmp_path: Path) -> None:
 
 
 def test_no_array_is_looked_into_before_it_is_shown(run: Run) -> None:
-    assert run.tcp is not None
     untouched = cast(Any, Untouched(len(run.q)))
     names = ("position", "velocity", "acceleration", "euler_zyx", "singular")
-    tcp = replace(run.tcp, **dict.fromkeys(names, untouched))
+    tcp = replace(there(run.tcp), **dict.fromkeys(names, untouched))
     hidden = replace(run, q=untouched, qd=untouched, qdd=untouched, tcp=tcp)
     assert present(hidden).headline == present(run).headline

@@ -43,11 +43,7 @@ def test_a_plot_has_no_more_lines_than_colours_but_an_array_stays_whole(
     scalars = [Signal("b", f"x{k}", np.zeros(2), "V") for k in range(10)]
     wide = Signal("b", "w", np.zeros((2, 12)), "A")
     groups = groups_of(with_signals(simulation, *scalars[:5], wide, *scalars[5:]))
-    assert [(one.variables, one.unit) for one in groups] == [
-        ("x0 ... x7", "V"),
-        ("x8, x9", "V"),
-        ("w", "A"),
-    ]
+    assert [(one.variables, one.unit) for one in groups] == [("x0 ... x7", "V"), ("x8, x9", "V"), ("w", "A")]
     assert [one for colours in groups[0].colours for one in colours] == list(JOINT_COLOURS)
     assert groups[2].colours == ((*JOINT_COLOURS, *JOINT_COLOURS[:4]),)
 

@@ -9,7 +9,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from presented import cells, facts, figures
+from asserting import there
+from presented import cells, facts, figures, scene_of
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_pipeline.presentation.figure import Drawing, SpaceFigure, Text
 from urmpipe_pipeline.presentation.section import Presentation, Section, Value
@@ -107,10 +108,11 @@ def test_the_extremes_are_those_of_the_json(make_simulation: MakeSimulation) -> 
 
 def test_a_page_shows_the_system_and_the_path_of_the_tip(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation()
-    blocks = list(present(simulation).body.blocks())
-    assert next(one.svg for one in blocks if isinstance(one, Drawing)) == simulation.system_svg
-    assert list(present(simulation).body.figures()) == [Text("System file", simulation.system_text)]
-    space = next(one for one in blocks if isinstance(one, SpaceFigure))
+    body = present(simulation).body
+    drawing, file = body.figures()
+    assert isinstance(drawing, Drawing) and drawing.svg == simulation.system_svg
+    assert file == Text("System file", simulation.system_text)
+    space = next(one for one in body.blocks() if isinstance(one, SpaceFigure))
     arm = simulation.arms[0]
     np.testing.assert_array_equal(space.paths[0].position, positions_over_log(arm.chain, arm.q))
 
@@ -118,10 +120,7 @@ def test_a_page_shows_the_system_and_the_path_of_the_tip(make_simulation: MakeSi
 def test_the_scene_is_the_first_arm_and_the_tips_of_all(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation()
     other = replace(simulation.arms[0], block="other")
-    shown = present(replace(simulation, arms=(*simulation.arms, other))).scene
-    assert shown is not None
-    scene = shown()
-    assert scene is not None
+    scene = scene_of(present(replace(simulation, arms=(*simulation.arms, other))))
     (arm,) = scene.arms
     assert (arm.q, arm.kept) == (simulation.arms[0].q, (250,))
     assert [path.label for path in scene.paths] == ["chain", "other"]
@@ -142,8 +141,7 @@ def test_a_failed_simulation_tells_why_and_opens_at_its_end(
     assert list(shown.body.events())[-1].t_ns == (simulation.t_ns[-1] if samples else None)
     assert [bool(figures(section)) for section in shown.body.sections] == [bool(samples)] * 3
     list(shown.body.blocks())
-    assert shown.scene is not None
-    assert (shown.scene() is None) == (not samples)
+    assert (there(shown.scene)() is None) == (not samples)
 
 
 def test_no_signal_is_looked_into_before_it_is_shown(make_simulation: MakeSimulation) -> None:

@@ -14,6 +14,7 @@ from pyarrow.csv import read_csv
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
+from asserting import there
 from exported import export_result
 from urmpipe_models.kinematics.forward import poses_over_log
 from urmpipe_pipeline.comparison.comparison import Comparison
@@ -157,13 +158,12 @@ def test_tum_as_recorded_has_the_recorded_rotation(run: Run, tmp_path: Path) -> 
     assert (result.rows, result.left_out, result.files[0].rows) == ("file", 1, 39)
     assert [warning.message for warning in result.warnings] == ["1 of 40 rows have no pose: left out"]
     rows = np.loadtxt(tmp_path / "a.tum")
-    assert run.log.tcp_position is not None
-    np.testing.assert_array_equal(rows[:, 1:4], np.delete(run.log.tcp_position, 4, axis=0))
-    there = np.delete(vectors, 4, axis=0)
+    np.testing.assert_array_equal(rows[:, 1:4], np.delete(there(run.log.tcp_position), 4, axis=0))
+    kept = np.delete(vectors, 4, axis=0)
     # Past half a turn the vector of a rotation is another one: compared as matrices, to some 1e-16.
     np.testing.assert_allclose(
         Rotation.from_quat(rows[:, 4:]).as_matrix(),
-        Rotation.from_rotvec(there).as_matrix(),
+        Rotation.from_rotvec(kept).as_matrix(),
         rtol=0,
         atol=1e-14,
     )
@@ -172,8 +172,7 @@ def test_tum_as_recorded_has_the_recorded_rotation(run: Run, tmp_path: Path) -> 
 def test_tum_of_the_file_has_its_rows(run: Run, tmp_path: Path) -> None:
     path = write(replace(run, q=run.q[:7], t_ns=run.t_ns[:7]), tmp_path / "a.tum", "tum", "file")
     rows = np.loadtxt(path)
-    assert run.robot is not None
-    np.testing.assert_array_equal(rows[:, 1:4], poses_over_log(run.robot, run.log.q)[0])
+    np.testing.assert_array_equal(rows[:, 1:4], poses_over_log(there(run.robot), run.log.q)[0])
 
 
 def test_a_comparison_is_one_table(comparison: Comparison, tmp_path: Path) -> None:

@@ -37,6 +37,6 @@ def test_a_table_of_single_poses_counts_rows_and_has_nothing_per_second(run: Run
 
 def test_a_mat_file_of_single_poses_has_no_times_and_nothing_per_second(run: Run) -> None:
     rows = results.exports(run).rows["grid"]
-    fields = rows.fields(rows.table(True))
+    fields = rows.fields(rows.table())
     assert [name for name in ("t", "clock_ns", "qd", "qdd", "v", "a") if fields[name].size] == []
     np.testing.assert_array_equal(fields["q"], run.q)

@@ -16,8 +16,9 @@ from urmpipe_pipeline.presentation.figure import Figure, Text
 from urmpipe_pipeline.presentation.section import Event, Presentation, Section
 from urmpipe_pipeline.recording.sending import keys, shown_path
 from urmpipe_pipeline.recording.store import ROW, TIME, Opening
+from urmpipe_pipeline.recording.views.axes import LOW, TALL, whole_axis
 from urmpipe_pipeline.recording.views.events import events_view
-from urmpipe_pipeline.recording.views.plots import LOW, TALL, EntityOf, Plots, whole_axis
+from urmpipe_pipeline.recording.views.plots import EntityOf, Plots
 from urmpipe_pipeline.recording.views.scene_drawing import scene_view
 from urmpipe_pipeline.recording.views.summary import summary
 from urmpipe_pipeline.text import encodable
@@ -33,6 +34,9 @@ EVENTS_SHARE = 2.2
 
 HEAD_SHARE, LINE_SHARE, MOST_TEXT = 0.12, 0.022, 0.45
 """Shares of the height for the summary: its title, each line, and all of it at most."""
+
+PEEK = 3
+"""Lines of further tables that are seen without scrolling where an arm stands below: it needs the room."""
 
 LINE_LENGTH = 115
 """Characters that fit in a line of the summary where it has half of a usual window's width."""
@@ -60,15 +64,16 @@ def send_views(
     """
     import rerun as rr
 
+    scene = shown.scene() if shown.scene is not None else None
+    space = None if scene is None else scene_view(stream, scene, shown.opens_at_ns)
     parts = _parts(shown.body)
     whole, timed = whole_axis(figure for part in parts for figure in part.figures)
     timed = shown.opens_at_row is None if whole is None else timed
     opening = Opening(TIME, shown.opens_at_ns) if timed else Opening(ROW, (shown.opens_at_row or 0) + 1)
     plots = Plots(stream, entity_of, whole, timed)
-    scene = shown.scene() if shown.scene is not None else None
-    space = None if scene is None else scene_view(stream, scene, shown.opens_at_ns)
     words = summary(shown, scene)
-    stream.log(shown_path("summary"), rr.TextDocument(words, media_type="text/markdown"), static=True)
+    text = "\n".join(words)
+    stream.log(shown_path("summary"), rr.TextDocument(text, media_type="text/markdown"), static=True)
     layout = _blueprint(_words(plots, parts), words, space, _plots(plots, parts), opening.timeline)
     return layout, opening
 
@@ -158,7 +163,7 @@ def _rows(plots: Plots, part: _Part, about: str = "") -> list[Row]:
         root = shown_path("plots", part.key, str(number))
         most = TALL if figure.share >= HIGH * height else LOW
         sent = [
-            plots.views(view, f"{root}/{i}", part.instants, about, most)
+            plots.views(view, f"{root}/{i}", part.instants, about, most, opened=figure.opened in (None, i))
             for i, view in enumerate(figure.views)
         ]
         views = [one for some in sent for one in some]
@@ -175,7 +180,7 @@ def _rows(plots: Plots, part: _Part, about: str = "") -> list[Row]:
 
 def _blueprint(
     text: View | Container,
-    words: str,
+    words: tuple[str, str],
     space: View | None,
     plots: View | Container | None,
     timeline: str,
@@ -187,7 +192,8 @@ def _blueprint(
     import rerun.blueprint as rrb
 
     length = LINE_LENGTH if space is not None else 2 * LINE_LENGTH
-    lines = sum(math.ceil(len(line) / length) for line in words.splitlines())
+    first, below = (sum(math.ceil(len(line) / length) for line in part.splitlines()) for part in words)
+    lines = first + (below if space is None else min(below, PEEK))
     share = min(MOST_TEXT, HEAD_SHARE + LINE_SHARE * lines)
     root = text
     if space is not None:

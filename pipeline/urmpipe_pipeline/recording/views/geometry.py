@@ -45,7 +45,7 @@ class Moving:
     """When something is drawn.
 
     Attributes:
-        t_ns: Times of all rows in [ns]; None without times.
+        t_ns: Times of all rows in [ns], shape (n,); None without times.
         rows: The rows at which it is drawn, shape (m,).
         gone: The rows from which on it is not there, shape (g,).
     """

@@ -77,7 +77,8 @@ def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spati
     centre, size = ball(points)
     stream.log(ROOT, rr.ViewCoordinates.RIGHT_HAND_Z_UP, static=True)
     labelled = [one for one in scene.arms if one.label]
-    labels = drawn_labels(labelled, 2.0 * size, opens_row(scene, opens_at_ns))
+    row = opens_row(scene, opens_at_ns) if labelled else 0
+    labels = drawn_labels(labelled, 2.0 * size, row)
     for key, path in zip(keys([one.path.name for one in paths]), paths, strict=True):
         _draw_path(stream, path, key, size)
     for number, spot in enumerate(spot for spot in scene.spots if spot.always):

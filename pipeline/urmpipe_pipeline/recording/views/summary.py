@@ -23,8 +23,8 @@ NAMED = 12
 """Paths whose colours are told; the others are counted."""
 
 
-def summary(shown: Presentation, scene: Scene | None = None) -> str:
-    """Return a presentation in a few lines of Markdown.
+def summary(shown: Presentation, scene: Scene | None = None) -> tuple[str, str]:
+    """Return a presentation in a few lines of Markdown: what is to be seen at once, and further tables below.
 
     Args:
         shown: The presentation.
@@ -40,11 +40,11 @@ def summary(shown: Presentation, scene: Scene | None = None) -> str:
         lines += ["", f"**{plain(section.notice)}**"] if section.notice else []
     tables = list(_tables(sections))
     lines += [line for one in tables if _has_verdicts(one) for line in _table(one)]
-    lines += _colours(scene.paths if scene is not None else ())
+    lines += _colours(scene.paths if scene is not None else (), "\n".join(lines))
     lines += _warnings(list(_all_warnings(shown.body)))
     lines += ["", _where_to_go(shown)]
-    lines += [line for one in tables if not _has_verdicts(one) for line in _table(one)]
-    return "\n".join(lines)
+    below = (line for one in tables if not _has_verdicts(one) for line in _table(one))
+    return "\n".join(lines), "\n".join(below)
 
 
 def _where_to_go(shown: Presentation) -> str:
@@ -97,12 +97,12 @@ def _row(cells: Iterable[str]) -> str:
     return f"| {' | '.join(map(plain, cells))} |"
 
 
-def _colours(paths: Sequence[Path]) -> Iterator[str]:
-    """Yield which path has which colour, where there are several."""
-    words = ((one, colour_word(one.colour)) for one in paths)
-    looks = (f"{plain(one.name)} {word}{', dashed' if one.asked else ''}" for one, word in words if word)
-    named = list(dict.fromkeys(looks))
-    if len(named) > 1:
+def _colours(paths: Sequence[Path], told: str) -> Iterator[str]:
+    """Yield which path has which colour, where there are several, but for those that are told already."""
+    words = ((plain(one.name), colour_word(one.colour), ", dashed" if one.asked else "") for one in paths)
+    looks = dict.fromkeys(look for look in words if look[1])
+    named = [f"{name} {word}{dashed}" for name, word, dashed in looks if f"{name} ({word})" not in told]
+    if len(looks) > 1 and named:
         more = [f"and {len(named) - NAMED} more"] if len(named) > NAMED else []
         yield from ("", f"Paths: {'; '.join([*named[:NAMED], *more])}.")
 

@@ -59,7 +59,7 @@ def drawn_rows(
 
 
 def whole_rows(values: FloatArray) -> BoolArray:
-    """Return which rows have all their values, of shape (n, k), shape (n,)."""
+    """Return which rows of an array in any unit, shape (n, k), have all their values, shape (n,)."""
     return np.asarray(np.isfinite(values).all(axis=1))
 
 

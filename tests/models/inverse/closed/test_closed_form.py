@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
@@ -50,8 +51,7 @@ def name_of(chain: Chain) -> str | None:
 
 
 def solutions_of(chain: Chain, q: FloatArray) -> FloatArray:
-    form = closed_form(chain)
-    assert form is not None
+    form = there(closed_form(chain))
     return form.solve(targets_of(chain, q)).q
 
 
@@ -182,8 +182,7 @@ def test_one_arm_has_its_form_made_once() -> None:
 def test_forms_say_what_they_are() -> None:
     for name in ("ur5e", "arm6"):
         form: ClosedForm | None = closed_form(load_robot(name))
-        assert form is not None
-        assert sorted(form.branches) == sorted(
+        assert sorted(there(form).branches) == sorted(
             f"{side}, {elbow}, {flip}"
             for side in ("right", "left")
             for elbow in ("elbow up", "elbow down")

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import there
 from spherical_arms import KINDS, assert_reached, away_from, random_arm, random_joints
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
@@ -228,8 +229,7 @@ def test_arms_that_are_truly_different_are_not_taken(name: str) -> None:
 
 
 def test_frames_far_along_their_axes_change_nothing() -> None:
-    found = screws(as_built(load_robot("ur5e"), 1e-4))
-    assert found is not None
+    found = there(screws(as_built(load_robot("ur5e"), 1e-4)))
     far = replace(found, point=found.point + found.direction * np.array([[3, -50, 20, 70, 9, 1]]).T)
     one, other = compact(found), compact(far)
     np.testing.assert_allclose(one.point, other.point, atol=1e-9)  # feet on lines 1e-4 from parallel
@@ -238,8 +238,7 @@ def test_frames_far_along_their_axes_change_nothing() -> None:
 
 def test_a_chain_of_screws_has_these_screws() -> None:
     chain = random_arm(np.random.default_rng(4), kinds="RPR")
-    found = screws(chain)
-    assert found is not None
+    found = there(screws(chain))
     q = random_joints(np.random.default_rng(1), chain, 20)
     other = chain_of(found, chain.coordinates)
     assert other.coordinates == chain.coordinates

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from asserting import there
 from parallel_arms import (
     WRISTS,
     form_of,
@@ -39,8 +40,7 @@ def test_reasons_say_what_was_found_and_what_is_allowed() -> None:
 
 def turned_range(chain: Chain) -> tuple[float, float]:
     """Return the least and the largest angle between axes 4 and 6 in [rad], over a turn of joint 5."""
-    of_chain = screws(chain)
-    assert of_chain is not None
+    of_chain = there(screws(chain))
     k4, k5, k6 = of_chain.direction[3:]
     axis6 = Rotation.from_rotvec(np.linspace(-math.pi, math.pi, 20_001)[:, None] * k5).apply(k6)
     angles = np.arccos(axis6 @ k4 * np.sign(k4 @ of_chain.direction[1]))
@@ -53,8 +53,7 @@ def test_the_limits_that_reasons_tell_are_those_of_the_arm() -> None:
     told: set[str] = set()
     for number in range(10):
         chain = random_arm(rng, "meet", ((1, 1), (-1, 1), (1, -1), (-1, -1))[number % 4])
-        of_chain = screws(chain)
-        assert of_chain is not None
+        of_chain = there(screws(chain))
         z, p = of_chain.direction[1], of_chain.point
         upper, fore = (float(np.linalg.norm(np.cross(z, p[k + 1] - p[k]))) for k in (1, 2))
         bounds = {

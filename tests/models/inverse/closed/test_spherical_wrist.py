@@ -11,6 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from numpy.typing import NDArray
 
+from asserting import there
 from spherical_arms import (
     SPECIAL,
     assert_explained,
@@ -36,9 +37,7 @@ FOUR = "right, elbow down", "right, elbow up", "left, elbow up", "left, elbow do
 
 
 def screws_of(chain: Chain) -> Screws:
-    found = screws(chain)
-    assert found is not None
-    return found
+    return there(screws(chain))
 
 
 def kr3() -> Chain:
@@ -254,11 +253,10 @@ def test_a_bad_row_gives_its_reason_and_touches_no_other(special: str) -> None:
     chain = random_arm(generator, special)
     form = inverse_of(chain)
     targets = targets_of(chain, random_joints(generator, chain, 6))
-    assert targets.rotation is not None
     good = form.solve(targets)
     targets.position[1] = np.nan
     targets.position[2] = np.inf
-    targets.rotation[3] = np.nan
+    there(targets.rotation)[3] = np.nan
     solutions = form.solve(targets)
     for row in (1, 2, 3):
         assert not solutions.reached[row].any()
@@ -319,8 +317,7 @@ def test_unreachable_tilt_of_a_wrist_that_is_not_square_is_told_with_figures() -
     chain = random_arm(np.random.default_rng(8), "like a PUMA", alpha4=0.5, alpha5=-0.8)
     generator = np.random.default_rng(9)
     targets = targets_of(chain, random_joints(generator, chain, 200))
-    assert targets.rotation is not None
-    turned = Targets(targets.position, targets.rotation[::-1].copy())
+    turned = Targets(targets.position, there(targets.rotation)[::-1].copy())
     solutions = inverse_of(chain).solve(turned)
     assert_reached(chain, turned, solutions)
     assert_explained(solutions)

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from asserting import there
 from spherical_arms import SPECIAL, inverse_of, random_arm, random_joints
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
@@ -31,13 +32,11 @@ def clear_poses(chain: Chain, generator: np.random.Generator, count: int) -> Flo
 def assert_agreement(chain: Chain, q: FloatArray) -> None:
     """Hold our solutions of the poses at q against those of EAIK, both ways."""
     hp = pytest.importorskip("eaik.IK_HP", reason="needs eaik")
-    found = screws(chain)
-    assert found is not None
+    found = there(screws(chain))
     links = np.vstack((found.point[:1], np.diff(found.point, axis=0), found.position - found.point[-1]))
     peer = hp.HPRobot(found.direction, links)
     assert peer.hasSphericalWrist()
     targets = targets_of(chain, q)
-    assert targets.rotation is not None
     solutions = inverse_of(chain).solve(targets)
     for row in range(len(q)):
         ours = solutions.q[row][solutions.reached[row]]
@@ -45,7 +44,7 @@ def assert_agreement(chain: Chain, q: FloatArray) -> None:
             continue  # another solution of the pose is singular
         pose = np.eye(4)
         pose[:3, 3] = targets.position[row]
-        pose[:3, :3] = targets.rotation[row] @ found.rotation.T
+        pose[:3, :3] = there(targets.rotation)[row] @ found.rotation.T
         answer = peer.IK(pose)
         theirs = np.array(answer.Q)[~np.array(answer.is_LS, dtype=bool)]
         away = ours[:, None] - theirs[None]

@@ -7,6 +7,7 @@ import math
 import numpy as np
 import pytest
 
+from asserting import there
 from spherical_arms import assert_explained, assert_reached, away_from, inverse_of, random_arm
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
@@ -215,8 +216,7 @@ def test_beside_where_right_and_left_meet(distance: float) -> None:
 def test_a_wrist_nearer_to_axis_1_than_the_offset_is_told_with_figures() -> None:
     chain = with_offset_shoulder()
     targets = targets_of(chain, np.zeros((1, 6)))
-    assert targets.rotation is not None
-    targets.position[0] = targets.rotation[0] @ np.array([0.0, 0.0, 0.1]) + np.array([0.03, 0.04, 0.6])
+    targets.position[0] = there(targets.rotation)[0] @ np.array([0.0, 0.0, 0.1]) + np.array([0.03, 0.04, 0.6])
     solutions = inverse_of(chain).solve(targets)
     assert solutions.reason(0) == "the wrist centre is 0.050 m from axis 1, allowed: 0.150 m or more"
 

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from asserting import there
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.inverse.closed.closed_form import closed_form
 from urmpipe_models.inverse.iterative.refine import refine
@@ -137,8 +138,7 @@ def test_every_solution_of_a_closed_form_is_found() -> None:
     """Of the UR5e: as many as the three parallel axes have, the same values."""
     chain = load_robot("ur5e")
     targets = random_targets(chain, 12)
-    form = closed_form(chain)
-    assert form is not None
+    form = there(closed_form(chain))
     start = np.array(chain.start)
     peer = within_limits(chain, form.solve(targets), start)
     found = solve_iteratively(chain, targets, every=True, search=Search(restarts=150))

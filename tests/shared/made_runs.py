@@ -1,0 +1,62 @@
+"""Runs made of arrays, as `ingest` returns those of files: paths of poses, and arms, a row each 5 ms."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from urmpipe_models.arrays import FloatArray
+from urmpipe_models.chains.chain import Chain
+from urmpipe_models.chains.urm import urm_chain
+from urmpipe_models.kinematics.forward import point_over_log
+from urmpipe_models.orientation import RotationForm
+from urmpipe_pipeline.joint_log import JointLog, SourceFile
+from urmpipe_pipeline.provenance import Provenance
+from urmpipe_pipeline.runs.derivatives import derivatives
+from urmpipe_pipeline.runs.results import Run
+
+TSP = 0.005
+URM6 = urm_chain("urm6", [0.243215, *[0.21243] * 5, 0.042215], [np.radians(52)] * 6)
+
+
+def path_run(
+    position: FloatArray,
+    rotation: FloatArray | None = None,
+    form: RotationForm = "quat_xyzw",
+    *,
+    name: str = "path",
+    tsp: float = TSP,
+) -> Run:
+    """A path: a log without joints, with orientations if there are any."""
+    return run_of(np.empty((len(position), 0)), None, position, rotation, form, name=name, tsp=tsp)
+
+
+def run_of(
+    q: FloatArray,
+    robot: Chain | None = URM6,
+    recorded: FloatArray | None = None,
+    rotation: FloatArray | None = None,
+    form: RotationForm = "quat_xyzw",
+    *,
+    name: str = "log",
+    joints: tuple[str, ...] = (),
+    tsp: float = TSP,
+) -> Run:
+    """A run of joint values, by default q1, q2, ..., with the poses that it recorded, if any."""
+    t_ns = np.arange(len(q)) * round(tsp * 1e9)
+    log = JointLog(
+        name, "table", (SourceFile(f"{Path(name).name}.csv", "0" * 64, 1),), t_ns,
+        joints or tuple(f"q{k + 1}" for k in range(q.shape[1])), q, tcp_position=recorded,
+        tcp_rotation=rotation, rotation_form=None if rotation is None else form,
+    )  # fmt: skip
+    qd, qdd = derivatives(q, tsp)
+    tcp = None if robot is None else point_over_log(robot, q, qd, qdd)
+    return Run(
+        name, log, robot, tsp, t_ns, q, qd, qdd, tcp, recorded, (), (), Provenance("ingest", {}, (), {}, "")
+    )
+
+
+def off(x: float, samples: int = 100) -> FloatArray:
+    """A deviation that grows from 0 to x along x."""
+    return np.column_stack([np.linspace(0.0, x, samples), np.zeros((samples, 2))])
