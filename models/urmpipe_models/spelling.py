@@ -43,6 +43,7 @@ _OWN: Mapping[str, Any] = {
     "tool": [Own("X"), Own("Y"), Own("Z")],
     "tsp": Own("SECONDS"),
     "write_map": Own("FILE.toml"),
+    "write_system": Own("FILE.toml"),
 }
 """What stands for a value that is the reader's own; another parameter shows its name in capitals."""
 

@@ -8,6 +8,7 @@ import pytest
 
 from urmpipe_fmus.cosim import LogInput, Port, System, load_system, system_names, system_text
 from urmpipe_models.errors import CosimulationError
+from urmpipe_models.messages import Hint
 
 WHOLE = """
 [system]
@@ -65,7 +66,7 @@ def said(path: Path, text: str, **arguments: str) -> list[str]:
     path.write_text(text)
     with pytest.raises(CosimulationError) as caught:
         load_system(path, arguments)
-    return [finding.message for finding in caught.value.findings]
+    return [f"{finding.about}: {finding.message}" for finding in caught.value.findings]
 
 
 def test_a_whole_file_is_read(folder: Path) -> None:
@@ -187,8 +188,10 @@ def test_arguments_must_be_of_their_defaults_type(folder: Path) -> None:
 def test_an_argument_that_a_shipped_system_lacks_is_told_with_how_to_change_its_file() -> None:
     with pytest.raises(CosimulationError) as caught:
         load_system("one-drive", {"u": "3"})
-    copied = ", of which urmpipe simulate --write-system FILE.toml one-drive makes a copy"
-    assert str(caught.value) == f"one-drive: argument u: found 'u', allowed: none{ELSE}{copied}"
+    (found,) = caught.value.findings
+    assert (found.file, found.about) == ("one-drive", "argument u")
+    assert found.hints == (Hint("write_system", None, "makes a copy of it"),)
+    assert found.words("command line").endswith(f"{ELSE}; --write-system FILE.toml makes a copy of it")
 
 
 def test_words_of_a_system_and_of_its_units_are_joined_by_either_sign(tmp_path: Path) -> None:
@@ -221,7 +224,7 @@ def places_of_faults(path: Path, text: str) -> list[tuple[str, int | None]]:
     with pytest.raises(CosimulationError) as caught:
         load_system(path)
     assert {one.file for one in caught.value.findings} == {str(path)}
-    return [(one.message.partition(": ")[0], one.line) for one in caught.value.findings]
+    return [(one.about, one.line) for one in caught.value.findings]
 
 
 def test_what_is_wrong_is_told_with_its_line(tmp_path: Path) -> None:

@@ -314,8 +314,8 @@ def test_everything_wrong_with_the_options_is_told_at_once() -> None:
         solve(chain, targets, start=np.array([0, 0, 0, 0, 0, math.nan]), method="closed")
     assert [str(one) for one in caught.value.findings] == [
         "start: found a value that is not finite, allowed: finite numbers in rad and m",
-        "method closed: robot urm6 has no closed form, allowed: six joints whose last three axes meet in a"
-        " point or whose axes 2, 3 and 4 are parallel, exactly or nearly; use method iterative",
+        "method: robot urm6 has no closed form, allowed: closed for six joints whose last three axes meet in"
+        ' a point or whose axes 2, 3 and 4 are parallel, exactly or nearly; method="iterative" searches',
     ]
 
 
@@ -323,7 +323,8 @@ def test_a_closed_form_needs_poses() -> None:
     with pytest.raises(OptionError) as caught:
         solve(load_robot("ur5e"), Targets(np.zeros((1, 3))), method="closed")
     assert str(caught.value) == (
-        "method closed: found positions with any orientation, allowed: poses; use method iterative"
+        "method: positions with any orientation have no closed form, allowed: closed for poses;"
+        ' method="iterative" searches'
     )
 
 
