@@ -12,7 +12,7 @@ from urmpipe_fmus.description import Backend, model_description
 from urmpipe_fmus.documentation import documentation
 from urmpipe_fmus.unit import Unit
 from urmpipe_models.display import Shown, line_of
-from urmpipe_models.errors import FmuError
+from urmpipe_models.errors import Finding, FmuError
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -119,7 +119,8 @@ def chosen_backend(backend: Backend | None, platforms: Sequence[str] = ()) -> tu
 
     missing = None if backend == "python" else native_missing(platforms)
     if missing and backend == "native":
-        raise FmuError(f"backend: found native, which cannot be built here: {missing}; allowed: python")
+        found = f"native, which cannot be built here: {missing}"
+        raise FmuError(Finding(parameter="backend", found=found, allowed="python"))
     return backend or ("python" if missing else "native"), missing or ""
 
 

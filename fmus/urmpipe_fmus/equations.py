@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import traceback
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from itertools import islice
 from typing import Any
 
@@ -69,12 +70,11 @@ def _told(where: str, function: Function, error: Exception) -> Iterator[Finding]
     frames = traceback.extract_tb(error.__traceback__)
     lines = [frame.lineno for frame in frames if code and frame.filename == code.co_filename]
     place = {"file": code.co_filename, "line": [code.co_firstlineno, *lines][-1]} if code else {}
-    said = (
-        [one.message for one in error.findings]
-        if isinstance(error, UrmpipeError)
-        else [f"{type(error).__name__}: {error}"]
-    )
-    return (Finding(f"{where}: {one}", **place) for one in said)
+    if isinstance(error, UrmpipeError):
+        said = error.findings
+    else:
+        said = (Finding(f"{type(error).__name__}: {error}"),)
+    return (replace(one, message=": ".join(filter(None, (where, one.message))), **place) for one in said)
 
 
 def named(variables: Sequence[Variable], elements: Sequence[Element]) -> dict[str, Any]:

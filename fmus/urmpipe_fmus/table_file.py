@@ -7,6 +7,7 @@ rows n and of columns; the n times in [ns] as int64; n rows of float64.
 from __future__ import annotations
 
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -54,4 +55,4 @@ def read_table(path: Path) -> Table:
     try:
         return Table(times.astype(np.int64), values.reshape(rows, columns).astype(np.float64))
     except UnitError as error:
-        raise FmuError(*(Finding(one.message, file=str(path)) for one in error.findings)) from error
+        raise FmuError(*(replace(one, file=str(path)) for one in error.findings)) from error

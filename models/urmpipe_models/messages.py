@@ -110,7 +110,7 @@ class Finding(Message):
         row: Data row of the file, counted from 1 (header lines do not count).
         column: Name of the column or joint.
         kind: A short word to filter by, such as "missing"; empty where none is known.
-        about: The log or block that it is about, where no file tells.
+        about: The log, block or table of a system file that it is about.
         parameter: Keyword that it is about.
         found: What was found.
         allowed: What is allowed.
@@ -130,11 +130,12 @@ class Finding(Message):
     hints: tuple[Hint, ...] = ()
 
     def place(self) -> str:
-        """Return file, line (or row) and column: "log.csv:12, column q1"."""
+        """Return file, line (or row) and column, and what it is about: "log.csv:12, column q1"."""
         file = (self.file or "") + ("" if self.line is None else f":{self.line}")
         row = None if self.row is None or self.line is not None else f"row {self.row}"
         column = None if self.column is None else f"column {self.column}"
-        return ": ".join(filter(None, (self.about, ", ".join(filter(None, (file, row, column))))))
+        place = ", ".join(filter(None, (file, row, column)))
+        return ": ".join(filter(None, (place, self.about) if self.file else (self.about, place)))
 
 
 def hint_words(hints: Sequence[Hint], voice: Voice) -> Iterator[str]:

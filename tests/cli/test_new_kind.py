@@ -120,7 +120,7 @@ def export_swing(one: Swing) -> Exports:
         (ExportColumn("t [s]", "s", Times(one.t_ns, "s")), ExportColumn("angle [rad]", "rad", one.angle)),
         one.t_ns,
     )
-    rows = {"swung": Rows(lambda kept: table, lambda made: {"angle": one.angle})}
+    rows = {"swung": Rows(lambda: table, lambda made: {"angle": one.angle})}
     return Exports("swing", {"name": one.name}, rows, {}, {})
 
 

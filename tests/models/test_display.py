@@ -16,6 +16,9 @@ class Doubt:
 
     message: str
 
+    def __str__(self) -> str:
+        return self.message
+
 
 @dataclass(repr=False)
 class Shelf(Shown):

@@ -48,12 +48,12 @@ def entities(path: Path, root: str = "/") -> set[str]:
 
 
 def views(path: Path) -> dict[str, list[Any]]:
-    """Return what the layout says, by component."""
+    """Return what the layout says, by component, in the order in which it was written."""
     reader = RrdReader(path)
     (entry,) = reader.blueprints()
     found: dict[str, list[Any]] = {}
-    for chunk in reader.stream(store=entry):
-        batch = chunk.to_record_batch()
+    batches = [chunk.to_record_batch() for chunk in reader.stream(store=entry)]
+    for batch in sorted(batches, key=lambda one: one.column("rerun.controls.RowId")[0].as_py()):
         for name in batch.schema.names:
             if ":" in name:
                 values = batch.column(name).to_pylist()

@@ -6,7 +6,8 @@ from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
-from urmpipe_models.errors import shown
+from urmpipe_models.errors import Finding, shown
+from urmpipe_models.messages import Hint
 from urmpipe_models.names import not_among
 
 NAMES = ("unit", "column")
@@ -30,10 +31,12 @@ def replaced(value: Any, arguments: Mapping[str, Any]) -> Any:
     return _mapped(lambda one: replaced(one, arguments), value)
 
 
-def unknown(value: Any, arguments: Mapping[str, Any], where: str = "") -> Iterator[str]:
+def unknown(value: Any, arguments: Mapping[str, Any], where: str = "") -> Iterator[Finding]:
     """Yield what is wrong with the `$name`s of a value: no such argument."""
     if isinstance(value, str) and value[:1] == "$" and value[1:] not in arguments:
-        yield f"{where}: {not_among(value, (f'${name}' for name in arguments))} ([arguments] names them)"
+        yield Finding(
+            f"{not_among(value, (f'${name}' for name in arguments))} ([arguments] names them)", about=where
+        )
     elif isinstance(value, Mapping):
         for key, one in value.items():
             yield from unknown(one, arguments, f"{where}.{key}" if where else str(key))
@@ -43,7 +46,7 @@ def unknown(value: Any, arguments: Mapping[str, Any], where: str = "") -> Iterat
 
 
 def given(
-    defaults: Mapping[str, Any], arguments: Mapping[str, str], faults: list[str], shipped: str = ""
+    defaults: Mapping[str, Any], arguments: Mapping[str, str], faults: list[Finding], shipped: bool = False
 ) -> dict[str, Any]:
     """Return the arguments of a system: those given, each of its default's type, and the other defaults.
 
@@ -51,21 +54,24 @@ def given(
         defaults: What the file's `[arguments]` says.
         arguments: What is given instead, as texts.
         faults: What is wrong is noted here.
-        shipped: Name of the system if it came along.
+        shipped: Whether the system came along.
     """
-    copied = f", of which urmpipe simulate --write-system FILE.toml {shipped} makes a copy" if shipped else ""
     values = dict(defaults)
     for name, text in arguments.items():
         if name not in defaults:
-            others = f"all else is changed in the system's file{copied}"
-            faults.append(f"argument {name}: {not_among(name, defaults)}; {others}")
+            said = f"{not_among(name, defaults)}; all else is changed in the system's file"
+            hints = (Hint("write_system", None, "makes a copy of it"),) if shipped else ()
+            faults.append(Finding(said, about=f"argument {name}", hints=hints))
             continue
         try:
             values[name] = _like(defaults[name], text)
         except ValueError:
             allowed = "true, false" if isinstance(defaults[name], bool) else "a number"
             faults.append(
-                f"argument {name}: found {shown(text)}, allowed: {allowed}, like {shown(defaults[name])}"
+                Finding(
+                    f"found {shown(text)}, allowed: {allowed}, like {shown(defaults[name])}",
+                    about=f"argument {name}",
+                )
             )
     return values
 

@@ -8,6 +8,7 @@ from typing import Any
 
 from urmpipe_fmus.cosim.interface import Interface, Variable, si_base, unit_fault
 from urmpipe_fmus.cosim.system import Block, Connection, Port, System
+from urmpipe_models.errors import Finding
 from urmpipe_models.names import not_among
 
 
@@ -62,7 +63,7 @@ class Wiring:
         self, system: System, interfaces: Mapping[str, Interface], units: Mapping[Port, str]
     ) -> None:
         self.system, self.interfaces = system, interfaces
-        self.faults: list[str] = []
+        self.faults: list[Finding] = []
         self.notes: list[str] = []
         self._fed: dict[Port, str] = {}
         self._named: set[Port] = set()  # inputs that are told a source, if only a wrong one
@@ -74,6 +75,10 @@ class Wiring:
         self.starts = {block.name: tuple(self._starts(block)) for block in known}
         self._unconnected()
 
+    def _fault(self, where: str, said: str) -> None:
+        """Note what is wrong with a table or key of the system's file."""
+        self.faults.append(Finding(said, about=where))
+
     def _link(self, connection: Connection) -> Link | None:
         """Return a connection by scalars, if both ends are there and fit."""
         where = f"connections.{connection.destination}"
@@ -84,7 +89,7 @@ class Wiring:
             return None
         if len(inputs) != len(outputs):
             found = f"found {connection.source} of size {len(outputs)}, allowed: {len(inputs)}"
-            self.faults.append(f"{where}: {found}, as many as {connection.destination}")
+            self._fault(where, f"{found}, as many as {connection.destination}")
             return None
         pairs = list(zip(inputs, outputs, strict=True))
         self._compare(where, connection.source, pairs)
@@ -104,13 +109,14 @@ class Wiring:
         found = shown.elements(port.variable)
         if not found:
             allowed = not_among(port.variable, shown.names(causality))
-            self.faults.append(f"{where}: {causality} of {port.block}: {allowed}")
+            self._fault(where, f"{causality} of {port.block}: {allowed}")
         for one in found:
             if one.causality != causality:
                 allowed = ", ".join(shown.names(causality)) or "none"
-                self.faults.append(
-                    f"{where}: found {port.block}.{one.name}, causality {one.causality}, allowed: an"
-                    f" {causality} of {port.block}: {allowed}"
+                self._fault(
+                    where,
+                    f"found {port.block}.{one.name}, causality {one.causality}, allowed: an"
+                    f" {causality} of {port.block}: {allowed}",
                 )
                 return ()
         return found
@@ -120,11 +126,11 @@ class Wiring:
         for one, output in pairs:
             kinds = (_kind(output), _kind(one))
             if kinds[0] != kinds[1] or one.type == "String":
-                self.faults.append(f"{where}: found {source}, {kinds[0]}, allowed: {kinds[1]} (numbers only)")
+                self._fault(where, f"found {source}, {kinds[0]}, allowed: {kinds[1]} (numbers only)")
                 return
             fault = unit_fault(output.unit, output.base, one)
             if fault:
-                self.faults.append(f"{where}: {source}: {fault}")
+                self._fault(where, f"{source}: {fault}")
                 return
             if fault is not None:
                 note = f"{where}: {source} has {_unit(output)}, the input {_unit(one)}: not compared"
@@ -133,7 +139,7 @@ class Wiring:
     def _feed(self, port: Port, source: str) -> None:
         """Note where an input comes from; tell if it already came from elsewhere."""
         if port in self._fed:
-            self.faults.append(f"{port}: found two sources, {self._fed[port]} and {source}, allowed: one")
+            self._fault(str(port), f"found two sources, {self._fed[port]} and {source}, allowed: one")
         self._fed[port] = source
 
     def _from_log(self, port: Port, unit: str | None) -> bool:
@@ -144,17 +150,17 @@ class Wiring:
             return False
         one = found[0]
         if one.name != port.variable:
-            self.faults.append(f"{where}: found an array, allowed: one of {', '.join(v.name for v in found)}")
+            self._fault(where, f"found an array, allowed: one of {', '.join(v.name for v in found)}")
             return False
         if one.type == "String":
-            self.faults.append(f"{where}: found a String, allowed: a number")
+            self._fault(where, "found a String, allowed: a number")
             return False
         self._named.add(port)
         if unit is None:
             return False
         fault = unit_fault(unit, si_base(unit), one)
         if fault:
-            self.faults.append(f"{where}: {fault}")
+            self._fault(where, fault)
         elif fault is not None:
             self.notes.append(
                 f"{where}: the log has {unit or 'no unit'}, the input {_unit(one)}: not compared"
@@ -171,19 +177,17 @@ class Wiring:
             found = shown.elements(name)
             if not found:
                 names = [n for kind in ("parameter", "input", "output", "local") for n in shown.names(kind)]
-                self.faults.append(f"{where}: {not_among(name, names)}")
+                self._fault(where, not_among(name, names))
                 continue
             values = value if isinstance(value, list) else [value] * len(found)
             if len(values) != len(found):
-                self.faults.append(
-                    f"{where}: found {len(values)} values, allowed: {len(found)}, or one for all"
-                )
+                self._fault(where, f"found {len(values)} values, allowed: {len(found)}, or one for all")
                 continue
             for one, each in zip(found, values, strict=True):
                 fault = _start_fault(one, each) or ("set twice" if one.name in seen else "")
                 seen.add(one.name)
                 if fault:
-                    self.faults.append(f"{where}: {fault}")
+                    self._fault(where, fault)
                     break
                 yield Start(one, each if isinstance(each, str) else float(each))
 
@@ -195,9 +199,10 @@ class Wiring:
                 v.name for v in shown.inputs if Port(name, v.name) not in self._named and v.name not in given
             ]
             if left:
-                self.faults.append(
-                    f"blocks.{name}: found inputs without a source: {', '.join(left)}; allowed: each in"
-                    " [connections], in [inputs], or with a value in start"
+                self._fault(
+                    f"blocks.{name}",
+                    f"found inputs without a source: {', '.join(left)}; allowed: each in"
+                    " [connections], in [inputs], or with a value in start",
                 )
 
 

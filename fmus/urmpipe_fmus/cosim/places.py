@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from urmpipe_models.errors import Finding
@@ -12,19 +13,19 @@ HEADER = re.compile(r"\s*\[([^\[\]]+)\]")
 KEY = re.compile(r"\s*((?:\"[^\"]*\"|'[^']*'|[\w-]+)(?:\s*\.\s*(?:\"[^\"]*\"|'[^']*'|[\w-]+))*)\s*=")
 
 
-def placed(path: Path, name: str, faults: Iterable[Finding | str]) -> tuple[Finding, ...]:
-    """Return faults as findings of a system file, each with its line and each once.
+def placed(path: Path, name: str, faults: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return faults with file and line, each once.
 
     Args:
         path: The file.
         name: What the user called it.
-        faults: A text begins with the name of what is wrong, such as `blocks.load: `; findings stay.
+        faults: Those without a file are about a table or key of this one, such as `blocks.load`.
     """
     lines: dict[str, int] = {}
     for full, number in _named_lines(path.read_text(encoding="utf-8-sig").splitlines()):
         lines.setdefault(full, number)
     return tuple(
-        one if isinstance(one, Finding) else Finding(one, file=name, line=_line_of(lines, one))
+        one if one.file else replace(one, file=name, line=_line_of(lines, one.about or ""))
         for one in dict.fromkeys(faults)
     )
 
@@ -48,9 +49,8 @@ def _plain(name: str) -> str:
     return ".".join(part.strip().strip("\"'") for part in name.split("."))
 
 
-def _line_of(lines: dict[str, int], fault: str) -> int | None:
-    """Return the line of what a fault names, else that of the table that it stands in."""
-    name = fault.partition(": ")[0]
+def _line_of(lines: dict[str, int], name: str) -> int | None:
+    """Return the line of a table or key, else that of the table that it stands in."""
     while name not in lines and "." in name:
         name = name.rpartition(".")[0]
     return lines.get(name)

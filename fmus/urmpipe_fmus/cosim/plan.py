@@ -121,7 +121,7 @@ def prepare(
             that differ, inputs without a source, start values that are refused, algebraic loops that may not
             be iterated.
     """
-    faults: list[Finding | str] = [*system.faults]
+    faults: list[Finding] = [*system.faults]
     step = system.step or period or STEP
     system = replace(system, step=step)
     columns: dict[Port, LogColumn] = {}
@@ -130,7 +130,7 @@ def prepare(
         try:
             columns[one.destination] = _column(one, column)
         except UrmpipeError as error:
-            faults += [f"inputs.{one.destination}: {finding}" for finding in error.findings]
+            faults += _quoted(f"inputs.{one.destination}", error)
     complete = not faults
     wiring = Wiring(system, interfaces, {port: one.unit for port, one in columns.items()})
     ends += [float(one.t_ns[-1]) * 1e-9 for one in columns.values() if len(one.t_ns)]
@@ -146,7 +146,7 @@ def prepare(
     return Plan(system, interfaces, wiring.links, wiring.starts, logged, order, count, notes)
 
 
-def _refuse(system: System, faults: list[Finding | str]) -> None:
+def _refuse(system: System, faults: list[Finding]) -> None:
     """Raise a `CosimulationError` if there are faults, by line if the system has a file."""
     if faults and system.path.is_file():
         shipped = system.path.parent == SYSTEMS
@@ -157,7 +157,7 @@ def _refuse(system: System, faults: list[Finding | str]) -> None:
 
 
 def _interfaces(
-    system: System, make: Make, faults: list[Finding | str]
+    system: System, make: Make, faults: list[Finding]
 ) -> tuple[dict[str, Interface], list[float]]:
     """Return what each block's FMU shows, and where the tables of units end in [s]."""
     interfaces: dict[str, Interface] = {}
@@ -172,11 +172,18 @@ def _interfaces(
             if made not in read:
                 read[made] = read_interface(made)
             elif read[made].alone:
-                faults.append(f"blocks.{block.name}: {made} can be instantiated only once in a system")
+                faults.append(
+                    Finding(f"{made} can be instantiated only once in a system", about=f"blocks.{block.name}")
+                )
             interfaces[block.name] = read[made]
         except UrmpipeError as error:
-            faults += [f"blocks.{block.name}: {finding}" for finding in error.findings]
+            faults += _quoted(f"blocks.{block.name}", error)
     return interfaces, ends
+
+
+def _quoted(where: str, error: UrmpipeError) -> list[Finding]:
+    """Return what is wrong with what a table or key of the system's file asks for."""
+    return [Finding(one.words("system file"), about=where) for one in error.findings]
 
 
 def _fmu_of(unit: Unit) -> Path:
@@ -191,22 +198,29 @@ def _column(one: LogInput, column: Callable[[LogInput], LogColumn] | None) -> Lo
     return column(one)
 
 
-def _count(step: float, length: float, faults: list[Finding | str]) -> int:
+def _count(step: float, length: float, faults: list[Finding]) -> int:
     """Return the number of communication steps of a length in [s]."""
     if not (length > 0.0 and math.isfinite(length)):
         faults.append(
             Finding(
-                "system.duration: not found, and no log tells it, allowed: a number above 0, in s",
+                "not found, and no log tells it, allowed: a number above 0, in s",
+                about="system.duration",
                 hints=(Hint("duration", None, "sets it"),),
             )
         )
         return 0
     if step < NANOSECOND:
-        faults.append(f"system.step: found {step:g} s, allowed: from 1e-09 s, as times are in ns")
+        faults.append(
+            Finding(f"found {step:g} s, allowed: from 1e-09 s, as times are in ns", about="system.step")
+        )
         return 0
     count = math.floor((length + NANOSECOND) / step)
     if count < 1:
-        faults.append(f"system.step: found {step:g} s, allowed: no more than the duration, {length:g} s")
+        faults.append(
+            Finding(
+                f"found {step:g} s, allowed: no more than the duration, {length:g} s", about="system.step"
+            )
+        )
     return count
 
 
@@ -226,28 +240,30 @@ def _logged(
     columns: Mapping[Port, LogColumn],
     wiring: Wiring,
     times: NDArray[np.float64],
-    faults: list[Finding | str],
+    faults: list[Finding],
 ) -> Logged:
     """Return the values of a log at the communication points, at times in [s]."""
     variable = wiring.interfaces[port.block].variables[port.variable]
     asked = next(one for one in system.inputs if one.destination == port)
     if asked.interpolate and variable.type != "Real":
-        faults.append(f"inputs.{port}: interpolate: found for an {variable.type}, allowed: for a Real")
+        faults.append(
+            Finding(f"interpolate: found for an {variable.type}, allowed: for a Real", about=f"inputs.{port}")
+        )
     try:
         table = Table(columns[port].t_ns, np.asarray(columns[port].values)[:, None])
     except UrmpipeError as error:
-        faults += [f"inputs.{port}: {finding}" for finding in error.findings]
+        faults += _quoted(f"inputs.{port}", error)
         return Logged(port, np.zeros(len(times)))
     refused = map(variable.refusal, np.unique(table.values).tolist())
     if fault := next(filter(None, refused), ""):
-        faults.append(f"inputs.{port}: {asked.log}, column {asked.column}: {fault}")
+        faults.append(Finding(f"{asked.log}, column {asked.column}: {fault}", about=f"inputs.{port}"))
     before, after, fraction = table.rows_at(times)
     values = before[0] + fraction * (after[0] - before[0]) if asked.interpolate else before[0]
     return Logged(port, np.ascontiguousarray(values))
 
 
 def _order(
-    system: System, interfaces: Mapping[str, Interface], wiring: Wiring, faults: list[Finding | str]
+    system: System, interfaces: Mapping[str, Interface], wiring: Wiring, faults: list[Finding]
 ) -> tuple[Exchange | Loop, ...]:
     """Return the order of the exchanges, and tell the loops that may not be."""
     outputs = [Port(name, one.name) for name, shown in interfaces.items() for one in shown.outputs]
@@ -262,13 +278,20 @@ def _order(
             continue
         if not system.iterate:
             faults.append(
-                f"algebraic loop: {loop.ring}: each depends on the one before at the same instant"
-                f"{_assumed(loop, interfaces)}; allowed: none, or [loops] iterate = true"
+                Finding(
+                    f"{loop.ring}: each depends on the one before at the same instant"
+                    f"{_assumed(loop, interfaces)}; allowed: none, or [loops] iterate = true",
+                    about="algebraic loop",
+                )
             )
         for port in loop.torn:
             kind = interfaces[port.block].variables[port.variable].type
             if kind != "Real":
-                faults.append(f"algebraic loop: {loop.ring}: found {port}, an {kind}; allowed: Reals alone")
+                faults.append(
+                    Finding(
+                        f"{loop.ring}: found {port}, an {kind}; allowed: Reals alone", about="algebraic loop"
+                    )
+                )
     return tuple(found)
 
 

@@ -89,11 +89,12 @@ def read_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
     """
     path = _path_of(name_or_path)
     table = _parsed(path)
-    faults: list[str] = []
+    faults: list[Finding] = []
     defaults = _table(table, "arguments", faults)
     here = {key: beside(path.parent, table.get(key, {})) for key in ("arguments", "blocks", "inputs")}
-    shipped = path.stem if path.parent == SYSTEMS else ""
-    values = given(here["arguments"] if defaults else {}, arguments or {}, faults, shipped)
+    values = given(
+        here["arguments"] if defaults else {}, arguments or {}, faults, shipped=path.parent == SYSTEMS
+    )
     rest = {key: value for key, value in {**table, **here}.items() if key != "arguments"}
     faults += unknown(rest, values)
     system = _System(path, replaced(rest, values), values, faults).read()
@@ -102,9 +103,9 @@ def read_system(name_or_path: str | Path, arguments: Mapping[str, str] | None = 
     return replace(system, faults=found, unread=frozenset(unread))
 
 
-def _is_of(table: str, fault: str) -> bool:
-    """Return whether a fault is one of a table, such as `blocks.drive`."""
-    return fault.startswith((f"{table}.", f"{table}: "))
+def _is_of(table: str, fault: Finding) -> bool:
+    """Return whether a fault is one of a table, such as `blocks.drive`, or of a key in it."""
+    return f"{fault.about}.".startswith(f"{table}.")
 
 
 def _path_of(name_or_path: str | Path) -> Path:
@@ -127,12 +128,12 @@ def _parsed(path: Path) -> dict[str, Any]:
     return parse_toml(path, CosimulationError)
 
 
-def _table(table: Mapping[str, Any], key: str, faults: list[str]) -> dict[str, Any]:
+def _table(table: Mapping[str, Any], key: str, faults: list[Finding]) -> dict[str, Any]:
     """Return a table of a table; an empty one where it is none."""
     value = table.get(key, {})
     if isinstance(value, dict):
         return value
-    faults.append(f"{key}: found {shown(value)}, allowed: a table")
+    faults.append(Finding(f"found {shown(value)}, allowed: a table", about=key))
     return {}
 
 
@@ -140,17 +141,21 @@ class _System:
     """A system file whose arguments are replaced, on its way to a System."""
 
     def __init__(
-        self, path: Path, table: Mapping[str, Any], arguments: Mapping[str, Any], faults: list[str]
+        self, path: Path, table: Mapping[str, Any], arguments: Mapping[str, Any], faults: list[Finding]
     ) -> None:
         self.path, self.table, self.arguments, self.faults = path, table, arguments, faults
 
+    def _fault(self, where: str, said: str) -> None:
+        """Note what is wrong with a table or key."""
+        self.faults.append(Finding(said, about=where))
+
     def read(self) -> System:
         """Return the system; what is wrong is in `faults`."""
-        self.faults += [f"{key}: {not_among(key, TABLES)}" for key in self.table if key not in TABLES]
+        self.faults += [Finding(not_among(key, TABLES), about=key) for key in self.table if key not in TABLES]
         head, loops = self._keys("system"), self._keys("loops")
         blocks = tuple(self._block(name, value) for name, value in self._rows("blocks"))
         if not blocks:
-            self.faults.append("blocks: found none, allowed: at least one [blocks.NAME]")
+            self._fault("blocks", "found none, allowed: at least one [blocks.NAME]")
         self.names = [block.name for block in blocks]
         connections = (self._connection(*row) for row in _leaves(self._dict("connections"), str))
         inputs = (self._input(*row) for row in _leaves(self._dict("inputs"), dict))
@@ -175,7 +180,9 @@ class _System:
     def _keys(self, name: str) -> dict[str, Any]:
         """Return a table whose keys are known."""
         table, allowed = self._dict(name), TABLES[name] or ()
-        self.faults += [f"{name}.{key}: {not_among(key, allowed)}" for key in table if key not in allowed]
+        self.faults += [
+            Finding(not_among(key, allowed), about=f"{name}.{key}") for key in table if key not in allowed
+        ]
         return table
 
     def _rows(self, name: str) -> Iterator[tuple[str, dict[str, Any]]]:
@@ -184,25 +191,27 @@ class _System:
             if isinstance(value, dict):
                 yield key, value
             else:
-                self.faults.append(f"{name}.{key}: found {shown(value)}, allowed: a table [{name}.{key}]")
+                self._fault(f"{name}.{key}", f"found {shown(value)}, allowed: a table [{name}.{key}]")
 
     def _block(self, name: str, table: dict[str, Any]) -> Block:
         """Return a block."""
         where = f"blocks.{name}"
         if not BLOCK_NAME.fullmatch(name):
-            self.faults.append(
-                f"{where}: found {shown(name)} as a name, allowed: a letter, then letters, digits, _, -"
+            self._fault(
+                where, f"found {shown(name)} as a name, allowed: a letter, then letters, digits, _, -"
             )
         kinds = [key for key in ("unit", "file", "fmu") if key in table]
         if len(kinds) != 1:
             found = " and ".join(kinds) or "none of them"
-            self.faults.append(f"{where}: found {found}, allowed: one of unit, file, fmu")
+            self._fault(where, f"found {found}, allowed: one of unit, file, fmu")
         options = {k: v for k, v in table.items() if k not in ("unit", "file", "fmu", "start")}
         if "fmu" in kinds:
-            self.faults += [f"{where}.{key}: {not_among(key, ('fmu', 'start'))}" for key in options]
+            self.faults += [
+                Finding(not_among(key, ("fmu", "start")), about=f"{where}.{key}") for key in options
+            ]
         start = table.get("start", {})
         if not isinstance(start, dict):
-            self.faults.append(f"{where}.start: found {shown(start)}, allowed: a table of names and values")
+            self._fault(f"{where}.start", f"found {shown(start)}, allowed: a table of names and values")
             start = {}
         return Block(
             name=name,
@@ -218,21 +227,23 @@ class _System:
         where = f"connections.{destination}"
         if isinstance(source, str):
             return Connection(self._port(where, destination), self._port(where, source))
-        self.faults.append(f"{where}: found {shown(source)}, allowed: its source as 'block.variable'")
+        self._fault(where, f"found {shown(source)}, allowed: its source as 'block.variable'")
         return Connection(self._port(where, destination), NOWHERE)
 
     def _input(self, destination: str, table: Any) -> LogInput:
         """Return an input from a log."""
         where = f"inputs.{destination}"
         if not isinstance(table, dict):
-            self.faults.append(f"{where}: found {shown(table)}, allowed: {{ log = FILE, column = NAME }}")
+            self._fault(where, f"found {shown(table)}, allowed: {{ log = FILE, column = NAME }}")
             return LogInput(destination=self._port(where, destination), log="", column="")
         allowed = ("log", "column", "interpolate")
-        self.faults += [f"{where}.{key}: {not_among(key, allowed)}" for key in table if key not in allowed]
+        self.faults += [
+            Finding(not_among(key, allowed), about=f"{where}.{key}") for key in table if key not in allowed
+        ]
         port = self._port(where, destination)
         for key in ("log", "column"):
             if not table.get(key):
-                self.faults.append(f"{where}.{key}: not found, allowed: a text")
+                self._fault(f"{where}.{key}", "not found, allowed: a text")
         log, column = self._text(table, where, "log", ""), self._text(table, where, "column", "")
         interpolate = self._flag(table, where, "interpolate")
         wrong = any(_is_of(where, fault) for fault in self.faults)
@@ -242,10 +253,10 @@ class _System:
         """Return the port that a text `block.variable` names, `NOWHERE` if there is no such block."""
         block, dot, variable = text.partition(".")
         if not (block and dot and variable):
-            self.faults.append(f"{where}: found {shown(text)}, allowed: block.variable")
+            self._fault(where, f"found {shown(text)}, allowed: block.variable")
             return NOWHERE
         if block not in self.names:
-            self.faults.append(f"{where}: block {not_among(block, self.names)}")
+            self._fault(where, f"block {not_among(block, self.names)}")
             return NOWHERE
         return Port(block, variable)
 
@@ -253,7 +264,7 @@ class _System:
         value = table.get(key, default)
         if isinstance(value, str):
             return value
-        self.faults.append(f"{where}.{key}: found {shown(value)}, allowed: a text")
+        self._fault(f"{where}.{key}", f"found {shown(value)}, allowed: a text")
         return default
 
     def _file(self, table: Mapping[str, Any], where: str, key: str) -> Path | None:
@@ -262,19 +273,19 @@ class _System:
         if not text:
             return None
         if "\0" in text or not Path(text).is_file():
-            self.faults.append(f"{where}.{key}: found {shown(text)}, allowed: a file that is there")
+            self._fault(f"{where}.{key}", f"found {shown(text)}, allowed: a file that is there")
         return Path(text)
 
     def _flag(self, table: Mapping[str, Any], where: str, key: str) -> bool:
         value = table.get(key, False)
         if not isinstance(value, bool):
-            self.faults.append(f"{where}.{key}: found {shown(value)}, allowed: true, false")
+            self._fault(f"{where}.{key}", f"found {shown(value)}, allowed: true, false")
         return value is True
 
     def _positive(self, table: Mapping[str, Any], where: str, key: str, default: float) -> float:
         value = table.get(key, default)
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
-            self.faults.append(f"{where}.{key}: found {shown(value)}, allowed: a number above 0")
+            self._fault(f"{where}.{key}", f"found {shown(value)}, allowed: a number above 0")
             return default
         return float(value)
 
@@ -287,14 +298,14 @@ class _System:
             value = float(told[1]) * TIME_UNITS[told[2]]
         if isinstance(value, bool) or not isinstance(value, (int, float)) or not 0.0 < value < math.inf:
             allowed = 'a time above 0 in s, or with its unit as in "1ms"'
-            self.faults.append(f"system.{key}: found {shown(value)}, allowed: {allowed}")
+            self._fault(f"system.{key}", f"found {shown(value)}, allowed: {allowed}")
             return None
         return float(value)
 
     def _count(self, table: Mapping[str, Any], key: str) -> int:
         value = table.get(key, 1)
         if isinstance(value, bool) or not isinstance(value, int) or value < 1:
-            self.faults.append(f"system.{key}: found {shown(value)}, allowed: an integer from 1")
+            self._fault(f"system.{key}", f"found {shown(value)}, allowed: an integer from 1")
             return 1
         return value
 

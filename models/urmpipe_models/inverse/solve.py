@@ -18,6 +18,7 @@ from urmpipe_models.inverse.limits import periods
 from urmpipe_models.inverse.search import USUAL_SEARCH, Search
 from urmpipe_models.inverse.solutions import NEAREST_POINT, NO_BRANCH, Singular, Solutions, no_solutions
 from urmpipe_models.inverse.targets import Targets
+from urmpipe_models.messages import Hint
 
 Method = Literal["auto", "closed", "iterative"]
 METHODS: tuple[Method, ...] = ("auto", "closed", "iterative")
@@ -59,9 +60,9 @@ def solve(
     position_only = targets.rotation is None
     targets, reasons = checked(targets)
     form = None if position_only or method == "iterative" else closed_form(chain)
-    faults: list[Finding | str] = [*_start_faults(chain, len(targets), start), *search.faults()]
+    faults = [*_start_faults(chain, len(targets), start), *search.faults()]
     if method not in METHODS:
-        faults.append(f"method: found {shown(method)}, allowed: {', '.join(METHODS)}")
+        faults.append(Finding(parameter="method", found=shown(method), allowed=", ".join(METHODS)))
     if method == "closed" and form is None:
         faults.append(_no_closed_form(chain, position_only))
     if faults:
@@ -150,25 +151,31 @@ def _starts(chain: Chain, count: int, start: FloatArray | None) -> FloatArray:
     return np.broadcast_to(begin, (count, begin.shape[1]))
 
 
-def _start_faults(chain: Chain, count: int, start: FloatArray | None) -> Iterator[str]:
+def _start_faults(chain: Chain, count: int, start: FloatArray | None) -> Iterator[Finding]:
     """Yield what is wrong with a start."""
     if start is None:
         return
     joints, begin = len(chain.coordinates), np.asarray(start, dtype=float)
     if begin.shape not in {(joints,), (count, joints)}:
-        yield (
-            f"start: found values of shape {begin.shape}, allowed: ({joints},), one each of"
-            f" {', '.join(chain.coordinates)}, or ({count}, {joints}), as many for each target"
+        allowed = (
+            f"({joints},), one each of {', '.join(chain.coordinates)},"
+            f" or ({count}, {joints}), as many for each target"
         )
+        yield Finding(parameter="start", found=f"values of shape {begin.shape}", allowed=allowed)
     elif not np.isfinite(begin).all():
-        yield "start: found a value that is not finite, allowed: finite numbers in rad and m"
+        allowed = "finite numbers in rad and m"
+        yield Finding(parameter="start", found="a value that is not finite", allowed=allowed)
 
 
-def _no_closed_form(chain: Chain, position_only: bool) -> str:
+def _no_closed_form(chain: Chain, position_only: bool) -> Finding:
     """Say what a closed form would need."""
+    searched = (Hint("method", "iterative", "searches"),)
     if position_only:
-        return "method closed: found positions with any orientation, allowed: poses; use method iterative"
-    return (
-        f"method closed: robot {chain.name} has no closed form, allowed: six joints whose last three axes"
-        " meet in a point or whose axes 2, 3 and 4 are parallel, exactly or nearly; use method iterative"
+        said = "positions with any orientation have no closed form"
+        return Finding(said, parameter="method", allowed="closed for poses", hints=searched)
+    allowed = (
+        "closed for six joints whose last three axes meet in a point or whose axes 2, 3 and 4 are parallel,"
+        " exactly or nearly"
     )
+    said = f"robot {chain.name} has no closed form"
+    return Finding(said, parameter="method", allowed=allowed, hints=searched)

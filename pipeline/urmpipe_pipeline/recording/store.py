@@ -89,7 +89,7 @@ class Store:
             end: The row after the last of them.
             width: Shape of a row.
             dtype: Type of the values.
-            t_ns: Rising times of all rows in integer [ns], where these tell the rows.
+            t_ns: Rising times of all rows in integer [ns], shape (n,), where these tell the rows.
 
         Returns:
             In the units of its field, shape (end - first, *width).

@@ -29,7 +29,7 @@ def verify(part: Path, path: Path, encoded: Encoded, metadata: str) -> None:
         store = Store(part)
     except RecordingError as error:
         raise OutputError(
-            Finding(f"could not be read back: {error.findings[0].message}", str(path))
+            Finding(f"could not be read back: {error.findings[0].sentence()}", str(path))
         ) from error
     found = list(_differences(store, encoded, metadata))
     if found:

@@ -67,8 +67,10 @@ def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
     )  # fmt: skip
     shown = sorted(numbers.unread.items())[:SHOWN_FINDINGS]
     warnings = [
-        LogWarning(SKIPPED, f"data row {row + 1} of the file is left out: {said}", row - k + 1)
-        for k, (row, said) in enumerate(shown)
+        LogWarning(
+            SKIPPED, f"data row {row + 1} of the file is left out: {'; '.join(map(str, faults))}", row - k + 1
+        )
+        for k, (row, faults) in enumerate(shown)
     ]
     if len(numbers.unread) > len(shown):
         more = len(numbers.unread) - len(shown)

@@ -188,7 +188,8 @@ def test_the_duration_is_told_by_the_system_or_by_the_caller_or_by_the_longest_l
     assert prepare(blocks, fmu_of, column=lambda one: column).count == 7382
     assert prepare(blocks, fmu_of, column=lambda one: column, duration=1.0).count == 200
     assert told({"a": TROUBLE}, duration=None) == [
-        "system.duration: not found, and no log tells it; allowed: a number above 0, in s, or --duration"
+        "system.duration: not found, and no log tells it, allowed: a number above 0, in s;"
+        " duration=SECONDS sets it"
     ]
     assert told({"a": TROUBLE}, step=1e-10) == [
         "system.step: found 1e-10 s, allowed: from 1e-09 s, as times are in ns"

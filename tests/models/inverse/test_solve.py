@@ -307,7 +307,7 @@ def test_everything_wrong_with_the_options_is_told_at_once() -> None:
     assert [str(one) for one in caught.value.findings] == [
         f"start: found values of shape (5,), allowed: (6,), one each of {', '.join(chain.coordinates)},"
         " or (2, 6), as many for each target",
-        *search.faults(),
+        *map(str, search.faults()),
         "method: found 'exact', allowed: auto, closed, iterative",
     ]
     with pytest.raises(OptionError) as caught:

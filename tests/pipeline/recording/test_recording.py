@@ -21,16 +21,16 @@ from urmpipe_pipeline.comparison.compare import CompareOptions, compare_recorded
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.trajectory import AlignMode
 from urmpipe_pipeline.joint_log import Inference, LogColumn, LogWarning, SourceFile
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.provenance import Provenance
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
-from urmpipe_pipeline.simulations.simulation import Result
 
 MakeRun = Callable[..., Run]
 MakeComparison = Callable[..., Comparison]
 
 
-def round_trip(result: Result, folder: Path) -> Result:
+def round_trip(result: Result, folder: Path) -> Any:
     path = folder / "result.rrd"
     assert write_recording(result, path) == path
     back = read_recording(path)

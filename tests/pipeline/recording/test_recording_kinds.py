@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd
 import pytest
 from hypothesis import HealthCheck, example, given, settings
 from hypothesis import strategies as st
@@ -16,7 +17,9 @@ from numpy.typing import NDArray
 from recorded import times_of
 from same_results import assert_same
 from urmpipe_models.arrays import BoolArray, FloatArray, IntArray, TextArray
+from urmpipe_models.spelling import Voice
 from urmpipe_pipeline import results
+from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Presentation, Section
 from urmpipe_pipeline.recording.store import SLICE
 from urmpipe_pipeline.results import Kind, read_recording, write_recording
@@ -27,7 +30,7 @@ ROWS = 2 * SLICE + 3
 
 
 @dataclass(frozen=True, eq=False)
-class Accuracy:
+class Accuracy(Result):
     """A result of every type of array, some of more rows than are sent at a time."""
 
     name: str
@@ -39,6 +42,15 @@ class Accuracy:
     words: TextArray
     lone: FloatArray
     recording: Path | None = field(default=None, metadata={"stored": False})
+
+    def _headline(self) -> str:
+        return self.name
+
+    def to_frame(self) -> pd.DataFrame:
+        return pd.DataFrame(self.error)
+
+    def to_dict(self, voice: Voice = "python") -> dict[str, Any]:
+        return {"name": self.name}
 
 
 def accuracy() -> Accuracy:

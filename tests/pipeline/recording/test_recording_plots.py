@@ -16,23 +16,15 @@ from recorded import columns, entities, packed, rows_of, static, times_of, views
 from toys import COLOURS, PLOT, STEP_NS, Toy, figure, line, panel, recorded, root_of, shown, toy
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR
 from urmpipe_pipeline.presentation.figure import Figure, Mark, Over, Panel, Shape, View
-from urmpipe_pipeline.recording.views.plots import (
-    COPIED,
-    LONG,
-    LOW,
-    MARGIN,
-    ROWS,
-    SHARED_AXIS,
-    TALL,
-    span_with_numbers,
-)
+from urmpipe_pipeline.recording.views.axes import LOW, MARGIN, TALL, span_with_numbers
+from urmpipe_pipeline.recording.views.plots import COPIED, LONG, ROWS, SHARED_AXIS
 
 SCALARS = "Scalars:scalars"
 
 
-def plots(path: Path) -> list[str]:
+def plots(path: Path) -> set[str]:
     """Return the names of the plots of a recording."""
-    return [name for name in views(path)["ViewBlueprint:display_name"] if name.endswith(("]", "rows"))]
+    return {name for name in views(path)["ViewBlueprint:display_name"] if name.endswith(("]", "rows"))}
 
 
 def first_plot(one: Figure) -> Any:
@@ -79,7 +71,7 @@ def test_deviations_are_plotted_with_all_their_rows_in_the_units_that_people_rea
         path = recorded(shown(figure(panel(one, unit=unit, small=True))), tmp_path, one)
         found = np.array(columns(path, f"{PLOT}/0/0", SCALARS))
         np.testing.assert_allclose(found, factor * one.values, rtol=1e-15)  # a rounding of pi / 180
-        assert plots(path) == [f"Values [{'mm' if unit == 'm' else 'deg'}]"]
+        assert plots(path) == {f"Values [{'mm' if unit == 'm' else 'deg'}]"}
 
 
 def test_what_is_no_array_of_the_result_is_thinned_out(tmp_path: Path) -> None:
@@ -203,7 +195,7 @@ def test_a_long_array_has_an_overview_that_keeps_every_extreme(small: bool, tmp_
     np.testing.assert_allclose(few.max(axis=0), values.max(axis=0), rtol=1e-15)
     assert LONG // 2 + 1 in rows
     unit = "deg" if small else "rad"
-    assert plots(path) == [f"Values [{unit}], every peak of 50,001 rows", "all 50,001 rows [rad]"]
+    assert plots(path) == {f"Values [{unit}], every peak of 50,001 rows", "all 50,001 rows [rad]"}
     assert {f"{PLOT}/0/0", "/values"} <= set(views(path)["ViewContents:query"])
 
 
@@ -241,7 +233,7 @@ def test_every_plot_has_its_unit(tmp_path: Path) -> None:
     both = figure(panel(one, unit="rad", small=True), panel(one, unit="m", small=True), name="both")
     path = recorded(shown(*figures, both), tmp_path, one)
     wanted = {f"{number} [{unit}]" for number, unit in enumerate(units.values())} | {"both [deg or mm]"}
-    assert set(plots(path)) == wanted
+    assert plots(path) == wanted
 
 
 def test_an_axis_shows_more_numbers_than_0() -> None:

@@ -24,7 +24,7 @@ import numpy as np
 
 from urmpipe_models.arrays import BoolArray, FloatArray, IndexArray
 from urmpipe_models.chains.chain import Chain
-from urmpipe_models.errors import OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.inverse.iterative.descent import (
     METHODS,
     STATIONARY,
@@ -124,9 +124,10 @@ def _starts(chain: Chain, targets: Targets, q: FloatArray, method: str) -> Float
     shape = (len(targets), len(chain.coordinates))
     faults = []
     if method not in METHODS:
-        faults.append(f"method: found {shown(method)}, allowed: {', '.join(METHODS)}")
+        faults.append(Finding(parameter="method", found=shown(method), allowed=", ".join(METHODS)))
     if np.shape(q) not in {shape, shape[1:]}:
-        faults.append(f"starts: found an array of shape {np.shape(q)}, allowed: {shape[1:]} or {shape}")
+        found, allowed = f"an array of shape {np.shape(q)}", f"{shape[1:]} or {shape}"
+        faults.append(Finding(parameter="starts", found=found, allowed=allowed))
     if faults:
         raise OptionError(*faults)
     return np.broadcast_to(np.asarray(q, dtype=float), shape)

@@ -16,8 +16,9 @@ from urmpipe_pipeline.presentation.figure import Figure, Text
 from urmpipe_pipeline.presentation.section import Event, Presentation, Section
 from urmpipe_pipeline.recording.sending import keys, shown_path
 from urmpipe_pipeline.recording.store import ROW, TIME, Opening
+from urmpipe_pipeline.recording.views.axes import LOW, TALL, whole_axis
 from urmpipe_pipeline.recording.views.events import events_view
-from urmpipe_pipeline.recording.views.plots import LOW, TALL, EntityOf, Plots, whole_axis
+from urmpipe_pipeline.recording.views.plots import EntityOf, Plots
 from urmpipe_pipeline.recording.views.scene_drawing import scene_view
 from urmpipe_pipeline.recording.views.summary import summary
 from urmpipe_pipeline.text import encodable

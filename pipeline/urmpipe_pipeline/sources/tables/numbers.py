@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -36,6 +36,24 @@ class ClockColumn:
     forms: tuple[Form, ...] = ()
 
 
+@dataclass(frozen=True, slots=True)
+class RowFault:
+    """What is wrong with a row that cannot be used.
+
+    Attributes:
+        said: What was found, and what is allowed.
+        columns: The columns in which it was found; none for the row as a whole.
+    """
+
+    said: str
+    columns: tuple[str, ...] = ()
+
+    def __str__(self) -> str:
+        if not self.columns:
+            return self.said
+        return f"column{'s' * (len(self.columns) > 1)} {', '.join(self.columns)}: {self.said}"
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Numbers:
     """What was read of a table.
@@ -47,7 +65,7 @@ class Numbers:
         findings: What is wrong with rows and cells, the first of them.
         wrong: How many such findings there are.
         lasting: Those of the findings that leaving out rows does not mend.
-        unread: Rows that could not be read, by their index, with what is wrong with each.
+        unread: Rows that could not be read, by their index, with all that is wrong with each.
         left_out: Lines among labelled rows that are none.
         rows: Data row of the file of each row, from 1, shape (n,), where some were left out.
         texts: The cells of the clock's columns, if they are text.
@@ -60,7 +78,7 @@ class Numbers:
     findings: tuple[Finding, ...] = ()
     wrong: int = 0
     lasting: tuple[Finding, ...] = ()
-    unread: Mapping[int, str] = field(default_factory=dict)
+    unread: Mapping[int, Sequence[RowFault]] = field(default_factory=dict)
     left_out: int = 0
     rows: IntArray | None = None
     texts: tuple[TextCells, ...] = ()

@@ -20,7 +20,7 @@ from urmpipe_pipeline.sources.cells.cell import (
 )
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables.form import CONFLICT_MARK, RowError, Value
-from urmpipe_pipeline.sources.tables.numbers import NO_TIME, REPORTED, ClockColumn, Numbers
+from urmpipe_pipeline.sources.tables.numbers import NO_TIME, REPORTED, ClockColumn, Numbers, RowFault
 from urmpipe_pipeline.sources.tables.sniff import COMMENTS, Layout
 
 SHOWN_FINDINGS = 20
@@ -100,7 +100,7 @@ class RowReader:
         self._lasting: list[_Fault] = []
         self._wrong = 0
         self._last: _Fault | None = None
-        self._unread: dict[int, str] = {}
+        self._unread: dict[int, list[RowFault]] = {}
         self._left_out = 0
         self._next_line = layout.first_line
         self._line = 0
@@ -257,9 +257,8 @@ class RowReader:
             lasting: Whether it stays wrong if the row is left out.
         """
         if not lasting:
-            earlier = self._unread.get(self._row - 1)
-            said = f"column {column}: {message}" if column else message
-            self._unread[self._row - 1] = f"{earlier}; {said}" if earlier else said
+            fault = RowFault(message, (column,) if column else ())
+            self._unread.setdefault(self._row - 1, []).append(fault)
         last = self._last
         if last and (last.message, last.column, last.row + last.more + 1) == (message, column, self._row):
             last.more += 1

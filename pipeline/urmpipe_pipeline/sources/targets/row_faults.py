@@ -22,7 +22,7 @@ from urmpipe_pipeline.sources.clocks.clock import PAPER_PERIOD, Clock
 from urmpipe_pipeline.sources.clocks.text_times import timed
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.plan import Plan
-from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers
+from urmpipe_pipeline.sources.tables.numbers import UNREADABLE, Numbers, RowFault
 from urmpipe_pipeline.sources.tables.row_reader import data_lines
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.table import read_table
@@ -82,27 +82,27 @@ def read_rows(plan: Plan) -> Rows:
 
 def _faults(numbers: Numbers, columns: Sequence[Column], clock: Clock) -> dict[int, str]:
     """Return what is wrong with rows, in their order: all of it, each in one line."""
-    faults: dict[int, list[str]] = {row + 1: [said] for row, said in numbers.unread.items()}
+    faults = {row + 1: list(of_row) for row, of_row in numbers.unread.items()}
     for one in unknown_times(numbers, clock):
-        faults.setdefault(one.row or 0, []).append(f"column {one.column}: {one.message}")
+        faults.setdefault(one.row or 0, []).append(RowFault(one.message, (one.column or "",)))
     for row in np.flatnonzero(~np.isfinite(numbers.values).all(axis=1)).tolist():
         told = faults.setdefault(row + 1, [])
-        if row in numbers.unread and not told[0].startswith("column "):
+        if not all(fault.columns for fault in told):
             continue  # the row as a whole
-        reported = " ".join(told)
+        reported = {name for fault in told for name in fault.columns}
         cells = zip(columns, numbers.values[row].tolist(), strict=True)
-        told += _not_finite((c, value) for c, value in cells if f"column {c.header}: " not in reported)
-    return {row: "; ".join(faults[row]) for row in sorted(faults)}
+        told += _not_finite((c, value) for c, value in cells if c.header not in reported)
+    return {row: "; ".join(map(str, faults[row])) for row in sorted(faults)}
 
 
-def _not_finite(cells: Iterable[tuple[Column, float]]) -> Iterator[str]:
+def _not_finite(cells: Iterable[tuple[Column, float]]) -> Iterator[RowFault]:
     """Yield what is wrong with the numbers of a row, columns in which the same is found together."""
     names: dict[str, list[str]] = {}
     for column, value in cells:
         if not math.isfinite(value):
             names.setdefault("no number" if math.isnan(value) else str(value), []).append(column.header)
     for found, of in names.items():
-        yield f"column{'s' * (len(of) > 1)} {', '.join(of)}: found {found}, allowed: {ALLOWED}"
+        yield RowFault(f"found {found}, allowed: {ALLOWED}", tuple(of))
 
 
 def _without_blank_end(layout: Layout, numbers: Numbers) -> Numbers:
