@@ -12,6 +12,7 @@ from urmpipe.keyword_checks import PathLike
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.outputs import OutputKind, guarded_output, refuse_output
 from urmpipe_pipeline.presentation.result import Result
+from urmpipe_pipeline.recording import import_ahead
 from urmpipe_pipeline.results import write_recording
 
 Made = TypeVar("Made", bound=Result)
@@ -35,6 +36,7 @@ def guarded_outputs(
     _refuse_shared(targets)
     if "recording" in targets:
         refuse_output(targets["recording"], inputs, "recording")
+        import_ahead()
     with ExitStack() as stack:
         yield {
             kind: stack.enter_context(guarded_output(path, inputs, kind))

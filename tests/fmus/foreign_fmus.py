@@ -161,11 +161,7 @@ def gain(name: str = "gain", *, fresh: bool = True, formula: str = "k * u + c", 
 
 INTEGRATOR = Foreign(
     name="integrator",
-    scalars=(
-        Scalar("u", 0, "input"),
-        Scalar("y", 1),
-        Scalar("x", 2, "local", start="0", initial="exact"),
-    ),
+    scalars=(Scalar("u", 0, "input"), Scalar("y", 1), Scalar("x", 2, "local", start="0", initial="exact")),
     compute="v->r[1] = v->r[2];",
     step="v->r[2] += h * v->r[0];",
 )

@@ -96,10 +96,7 @@ Quadric: TypeAlias = Callable[[FloatArray, FloatArray], FloatArray]
 
 @pytest.mark.parametrize(
     ("of", "derivative"),
-    [
-        (trigonometric._value, trigonometric._slope),
-        (trigonometric._slope, trigonometric._curvature),
-    ],
+    [(trigonometric._value, trigonometric._slope), (trigonometric._slope, trigonometric._curvature)],
     ids=["slope", "curvature"],
 )
 def test_slope_and_curvature_of_a_quadric_are_its_derivatives(of: Quadric, derivative: Quadric) -> None:

@@ -74,10 +74,7 @@ def tcp_kuka_abc() -> Made:
     truth, p = _arm()
     names = [*(f"{a} [mm]" for a in "XYZ"), *(f"{a} [deg]" for a in "ABC")]
     return beside(
-        "tcp_kuka_abc",
-        names,
-        np.column_stack((1000 * p, truth.turn.as_euler("ZYX", degrees=True))),
-        truth,
+        "tcp_kuka_abc", names, np.column_stack((1000 * p, truth.turn.as_euler("ZYX", degrees=True))), truth
     )
 
 
@@ -95,10 +92,7 @@ def tcp_yaw_pitch_roll_deg() -> Made:
     truth, p = _arm()
     names = ["ee_x", "ee_y", "ee_z", "yaw [deg]", "pitch [deg]", "roll [deg]"]
     return beside(
-        "tcp_yaw_pitch_roll_deg",
-        names,
-        np.column_stack((p, truth.turn.as_euler("ZYX", degrees=True))),
-        truth,
+        "tcp_yaw_pitch_roll_deg", names, np.column_stack((p, truth.turn.as_euler("ZYX", degrees=True))), truth
     )
 
 

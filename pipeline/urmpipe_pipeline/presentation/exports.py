@@ -15,9 +15,6 @@ from urmpipe_pipeline.joint_log import LogWarning
 DATE, TIME_OF_DAY = "date", "time of day"
 """Units of clocks that are text."""
 
-UNIT_UNSAID = "unit-not-in-name"
-"""The kind of a warning that is about formats which do not keep the units beside the names: CSV."""
-
 DAY = 24 * 3_600 * 10**9
 """A day in [ns]."""
 
@@ -72,11 +69,13 @@ class ExportTable:
         columns: Its columns, at least one.
         clock_ns: The file's own clock at every row in integer [ns], shape (n,); None if it has none.
         warnings: What could not leave.
+        unsaid: Units that the names do not tell: a warning where the format does not keep them beside these.
     """
 
     columns: tuple[ExportColumn, ...]
     clock_ns: IntArray | None
     warnings: tuple[LogWarning, ...] = ()
+    unsaid: tuple[LogWarning, ...] = ()
 
     @property
     def rows(self) -> int:

@@ -12,6 +12,25 @@ from urmpipe_pipeline.presentation.scene import BoolArray, Path, Spot
 Shape: TypeAlias = Literal["up", "down", "cross", "diamond"]
 
 
+class Computed:
+    """In place of an array, one that is computed where it is drawn and not kept: a long log has many.
+
+    Attributes:
+        rows: How many rows it has.
+        compute: Returns it in the panel's unit, shape (rows,) or (rows, k).
+    """
+
+    def __init__(self, rows: int, compute: Callable[[], FloatArray]) -> None:
+        """Stand for what `compute` returns."""
+        self.rows, self.compute = rows, compute
+
+    def __len__(self) -> int:
+        return self.rows
+
+    def __getitem__(self, key: slice) -> FloatArray:
+        return self.compute()[key]
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class Line:
     """An array as lines, a line a column. Whoever thins it out keeps every peak.
@@ -26,7 +45,7 @@ class Line:
         t_ns: Time of each row in [ns], shape (n,), where it is not the panel's.
     """
 
-    values: FloatArray
+    values: FloatArray | Computed
     names: tuple[str, ...]
     colours: tuple[str, ...]
     dashed: bool = False

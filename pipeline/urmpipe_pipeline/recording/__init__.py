@@ -4,6 +4,6 @@ The only part of urmpipe that knows Rerun. Data goes one way: result -> `codec` 
 of its fields) -> `writer` -> .rrd -> `reader` -> `codec` -> result; what is shown comes from `views`.
 """
 
-from urmpipe_pipeline.recording.identity import is_ours, is_recording
+from urmpipe_pipeline.recording.identity import import_ahead, is_ours, is_recording
 
-__all__ = ["is_ours", "is_recording"]
+__all__ = ["import_ahead", "is_ours", "is_recording"]

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 import warnings
+from importlib import import_module
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING
 
 from urmpipe_pipeline.outputs import know_own
@@ -26,6 +28,14 @@ message, SetStoreInfo (1), and in it the store's kind, a recording (1), its iden
 
 WHOLE = b"RRF2FOOT\x01\0\0\0"
 """How a whole .rrd ends that has one footer."""
+
+
+def import_ahead() -> None:
+    """Import what writes recordings in a thread of its own: most of a second, while a log is read.
+
+    pandas is imported by pyarrow with the first array that it is given.
+    """
+    Thread(target=lambda: [import_module(name) for name in ("rerun.blueprint", "pandas")]).start()
 
 
 def is_recording(path: Path) -> bool:

@@ -29,7 +29,7 @@ PACKED = "urmpipe:packed"
 TIME, ROW = "t", "row"
 """The timelines: times, and the rows of every array, from 1; of what is packed the first row of each pack."""
 
-SLICE = 65_536
+SLICE = 32_768
 """Rows sent at a time: few enough to keep memory low, many enough to keep the overhead low."""
 
 LAYOUT_VERSION = 6

@@ -8,13 +8,13 @@ from functools import partial
 
 import numpy as np
 
-from urmpipe_models.arrays import FloatArray, IntArray
+from urmpipe_models.arrays import BoolArray, FloatArray, IntArray
 from urmpipe_models.continuity import continuous_euler
 from urmpipe_models.kinematics.forward import PointLog
 from urmpipe_models.row_blocks import norms
 from urmpipe_pipeline import text
 from urmpipe_pipeline.palette import AXIS_COLOURS, joint_colour
-from urmpipe_pipeline.presentation.figure import Figure, Line, Mark, Panel, Shape, View
+from urmpipe_pipeline.presentation.figure import Computed, Figure, Line, Mark, Panel, Shape, View
 from urmpipe_pipeline.repolarization.audit_entry import AuditEntry
 from urmpipe_pipeline.runs.results import Run
 
@@ -35,7 +35,7 @@ def run_figures(run: Run) -> Iterator[Figure]:
     """Yield the plots of a log that stands alone: joints, speed, motion."""
     yield from joints_figure(run)
     if run.timed and run.tcp is not None:
-        yield speed_figure(run.name, run.t_ns, norms(run.tcp.velocity))
+        yield speed_figure(run.name, run.t_ns, _lengths(run.tcp.velocity))
     yield from motion_figure(run)
 
 
@@ -106,7 +106,7 @@ def joint_panels(
     return tuple(panels)
 
 
-def speed_figure(name: str, t_ns: IntArray, speed: FloatArray) -> Figure:
+def speed_figure(name: str, t_ns: IntArray, speed: FloatArray | Computed) -> Figure:
     """Return the speed of a tool centre point over time.
 
     Args:
@@ -173,15 +173,24 @@ def _point(run: Run, tcp: PointLog) -> Iterator[View]:
     yield View("TCP", (Panel(point_name(run), "m", (position,), t_ns),))
     if run.timed:
         yield View("TCP velocity", (Panel("v", "m/s", (coordinates(tcp.velocity),), t_ns),))
-        size = Line(norms(tcp.acceleration), ("‖a‖",), NORM)
+        size = Line(_lengths(tcp.acceleration), ("‖a‖",), NORM)
         yield View("TCP acceleration", (Panel("a", "m/s2", (coordinates(tcp.acceleration), size), t_ns),))
     tinted = np.asarray(tcp.singular) if np.any(tcp.singular) else None
-    known = np.asarray(tcp.euler_zyx)
-    if tinted is not None:
-        known = np.where(tinted[:, np.newaxis], np.nan, known)
-    angles = continuous_euler(known) if run.timed else known
+    angles = Computed(len(tcp.euler_zyx), partial(_angles, tcp, tinted, follows=run.timed))
     euler = Line(angles, tuple(EULER), tuple(EULER.values()), points=points)
     yield View("TCP rz, ry, rx", (Panel("rz, ry, rx", "rad", (euler,), t_ns, tinted=tinted),))
+
+
+def _lengths(vectors: FloatArray) -> Computed:
+    return Computed(len(vectors), lambda: norms(vectors))
+
+
+def _angles(tcp: PointLog, singular: BoolArray | None, *, follows: bool) -> FloatArray:
+    """Return the Euler angles in [rad] without those of singular samples, continuous in time."""
+    known = np.asarray(tcp.euler_zyx)
+    if singular is not None:
+        known = np.where(singular[:, np.newaxis], np.nan, known)
+    return continuous_euler(known) if follows else known
 
 
 def _recorded(run: Run) -> Iterator[View]:

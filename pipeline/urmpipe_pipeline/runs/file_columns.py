@@ -11,15 +11,7 @@ from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, RecordingError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning, Role
-from urmpipe_pipeline.presentation.exports import (
-    DATE,
-    DAY,
-    TIME_OF_DAY,
-    UNIT_UNSAID,
-    ExportColumn,
-    ExportTable,
-    Times,
-)
+from urmpipe_pipeline.presentation.exports import DATE, DAY, TIME_OF_DAY, ExportColumn, ExportTable, Times
 from urmpipe_pipeline.runs.originals import originals
 from urmpipe_pipeline.sources.clocks.text_times import ZONED
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
@@ -56,8 +48,8 @@ def file_table(log: JointLog) -> ExportTable:
         ExportColumn(name, column.unit, next(clock) if column.role == "time" else _numbers(log, column))
         for name, column in zip(names, kept, strict=True)
     ]
-    warnings = [*_lost(log, kept), *_unsaid_units(kept)]
-    return ExportTable(tuple(columns), clock_ns if timed else None, tuple(warnings))
+    lost, unsaid = tuple(_lost(log, kept)), tuple(_unsaid_units(kept))
+    return ExportTable(tuple(columns), clock_ns if timed else None, lost, unsaid)
 
 
 def _as_told(log: JointLog, clock_ns: IntArray, timed: Sequence[str]) -> IntArray:
@@ -121,7 +113,7 @@ def _unsaid_units(columns: Sequence[LogColumn]) -> list[LogWarning]:
         if column.role != "time" and column.factor != 1.0 and not told:
             unsaid.setdefault(column.unit, []).append(column.name)
     return [
-        LogWarning(UNIT_UNSAID, f"{', '.join(names)}: in {unit}, which their names do not tell")
+        LogWarning("unit-not-in-name", f"{', '.join(names)}: in {unit}, which their names do not tell")
         for unit, names in unsaid.items()
     ]
 

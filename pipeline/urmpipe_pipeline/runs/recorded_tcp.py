@@ -13,9 +13,9 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.kinematics.forward import positions_over_log
 from urmpipe_models.messages import Hint
 from urmpipe_models.transform import Transform, rpy_of
-from urmpipe_pipeline.joint_log import JointLog, LogWarning
-from urmpipe_pipeline.sources.columns.joint_names import joint_names
+from urmpipe_pipeline.joint_log import JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.sources.units.evidence import CLEARLY, CLOSE_WITH_TOOL, fit, spread
+from urmpipe_pipeline.sources.vocabulary import split_unit
 
 LACKING_TOOL = "recorded-tcp-tool"
 """The kind of a hint beside a verdict of fail: it says nothing against the log."""
@@ -100,7 +100,7 @@ def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) 
         order[first], order[second] = second, first
         found = fit(robot, q[:, order], recorded)
         if found is not None and min(found.distance, found.with_tool) <= CLOSE_WITH_TOOL:
-            names = joint_names([columns[j] for j in order]) if columns else [log.joints[j] for j in order]
+            names = _called([columns[j] for j in order]) if columns else [log.joints[j] for j in order]
             said = f"with {log.joints[first]} and {log.joints[second]} exchanged they agree"
             yield said, Hint("joints", names, "exchanges them")
     for j, name in enumerate(log.joints):
@@ -112,6 +112,13 @@ def _remedies(robot: Chain, log: JointLog, q: FloatArray, recorded: FloatArray) 
     if distance <= CLOSE_WITH_TOOL:
         said = f"on another base they agree within {distance * 1e3:.2f} mm"
         yield said, Hint("base", base, "puts the arm there")
+
+
+def _called(columns: Sequence[LogColumn]) -> list[str]:
+    """Return what `joints` calls some columns, in order: their names, or numbers where names do not tell."""
+    names = [split_unit(column.header)[0] if column.header else "" for column in columns]
+    told = [name if name and "," not in name and names.count(name) == 1 else "" for name in names]
+    return [name or str(column.number) for name, column in zip(told, columns, strict=True)]
 
 
 def _base(robot: Chain, q: FloatArray, recorded: FloatArray) -> tuple[list[float], float]:

@@ -10,15 +10,7 @@ from urmpipe_models.inverse.closed.closed_form import method_words
 from urmpipe_pipeline.presentation.exports import Exports
 from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.parts import inputs_table, provenance_table
-from urmpipe_pipeline.presentation.section import (
-    Block,
-    Check,
-    Judged,
-    Presentation,
-    Ref,
-    Section,
-    Value,
-)
+from urmpipe_pipeline.presentation.section import Block, Check, Judged, Presentation, Ref, Section, Value
 from urmpipe_pipeline.runs import exports as run_exports
 from urmpipe_pipeline.runs.figures import run_figures
 from urmpipe_pipeline.runs.scene import path_figure

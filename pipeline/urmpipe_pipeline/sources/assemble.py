@@ -88,7 +88,7 @@ def assemble(
     signs, offsets = _corrections(options, len(roles.joints))
     measured = _measured(plan, content, robot, t_ns, signs, offsets)
     joints, rates, seconds, position, rotation = measured.groups
-    digits = _digits(plan, roles.joints)
+    digits, coarse = _digits(plan, roles.joints), "every joint value is written with as many"
     return JointLog(
         name=name,
         source=PATH if not roles.joints and plan.tables.source == TABLE else plan.tables.source,
@@ -109,7 +109,7 @@ def assemble(
             *(one for found in (plan.tables, layout, clock) for one in found.inferences),
             *timed,
             *(one for found in (roles, content, measured) for one in found.inferences),
-            *_about_digits(digits),
+            *([Inference("significant digits", str(digits), coarse)] if digits else []),
         ),
         warnings=(
             *_not_used(plan, options, by_source=clock.by_source or measured.by_source),
@@ -118,14 +118,10 @@ def assemble(
             *noticed,
             *roles.warnings,
             *measured.warnings,
-            *_lacking(t_ns, measured),
+            *missing_samples(measured.named),
+            *gaps(t_ns),
         ),
     )
-
-
-def _lacking(t_ns: IntArray, measured: _Measured) -> list[LogWarning]:
-    """Return what is missing in rows, and between them at times t_ns in [ns], shape (n,)."""
-    return [*missing_samples(measured.named), *gaps(t_ns)]
 
 
 def _not_used(plan: Plan, options: ReadOptions, *, by_source: bool) -> Iterator[LogWarning]:
@@ -157,7 +153,7 @@ def _measured(
     Raises:
         LogError: If a column has no value, or a unit cannot be told or contradicts the data.
     """
-    roles, file = content.roles, str(plan.tables.layouts[plan.main].segment.path)
+    roles, file = content.roles, plan.tables.layouts[plan.main].file
     q, qd, qdd, tcp, rotation = (content.values(group) for group in roles.groups)
     refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], file)
     q, qd, qdd = _corrected(q, signs, offsets), _corrected(qd, signs), _corrected(qdd, signs)
@@ -250,10 +246,7 @@ def _time_columns(plan: Plan) -> Iterator[LogColumn]:
 
 
 def _used_columns(
-    plan: Plan,
-    groups: Sequence[_Group],
-    signs: Sequence[int],
-    offsets: Sequence[float],
+    plan: Plan, groups: Sequence[_Group], signs: Sequence[int], offsets: Sequence[float]
 ) -> Iterator[LogColumn]:
     """Yield the columns of each group with their units; signs and offsets are those of the joints."""
     for role, group in zip(ROLES[1:], groups, strict=True):
@@ -279,9 +272,3 @@ def _digits(plan: Plan, joints: Sequence[Column]) -> int | None:
         numbers = (cell for cell in layout.cells(column.index) if is_number(cell, layout.decimal))
         cells += [plain(cell, layout.decimal) for cell in numbers]
     return significant_digits(cells)
-
-
-def _about_digits(digits: int | None) -> tuple[Inference, ...]:
-    if digits is None:
-        return ()
-    return (Inference("significant digits", str(digits), "every joint value is written with as many"),)

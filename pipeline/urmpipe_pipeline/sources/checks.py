@@ -60,15 +60,11 @@ def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
         return numbers, []
     rows = np.delete(np.arange(len(numbers.values)), sorted(numbers.unread))
     clock = None if numbers.clock is None else numbers.clock[rows]
+    texts, lasting = tuple(cells.at(rows) for cells in numbers.texts), numbers.lasting
     read = replace(
-        numbers,
-        values=numbers.values[rows],
-        clock=clock,
-        texts=tuple(cells.at(rows) for cells in numbers.texts),
-        findings=numbers.lasting,
-        wrong=len(numbers.lasting),
+        numbers, values=numbers.values[rows], clock=clock, texts=texts, findings=lasting, wrong=len(lasting),
         rows=rows + 1,
-    )
+    )  # fmt: skip
     shown = sorted(numbers.unread.items())[:SHOWN_FINDINGS]
     warnings = [
         LogWarning(
@@ -106,12 +102,8 @@ def rebuilt(numbers: Numbers) -> Numbers:
     seen = f"times in steps of {resolution} stand in {clock.resolution / clock.period:.4g} rows each"
     found = Inference("clock", f"rebuilt with a period of {period}", seen, hints=EVEN)
     warning = LogWarning("clock-rebuilt", f"{seen}: a regular clock of {period} is taken in their place")
-    return replace(
-        numbers,
-        clock=clock.t_ns,
-        inferences=(*numbers.inferences, found),
-        warnings=(*numbers.warnings, warning),
-    )
+    found_out, warned = (*numbers.inferences, found), (*numbers.warnings, warning)
+    return replace(numbers, clock=clock.t_ns, inferences=found_out, warnings=warned)
 
 
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
@@ -126,22 +118,15 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
     Returns:
         The first findings, and one that counts the others.
     """
-    wrong: list[Finding] = []
-    total = numbers.wrong
-    for found in (_clock_errors(numbers, clock), _infinities(numbers, names)):
-        rows = list(found)
-        total += len(rows)
-        wrong += rows
+    wrong = [*_clock_errors(numbers, clock), *_infinities(numbers, names)]
+    total = numbers.wrong + len(wrong)
     wrong = sorted(wrong, key=lambda one: (one.row or 0, one.column or "", one.message))[:SHOWN_FINDINGS]
     rows_in_file = [numbers.file_row(one.row or 0) for one in wrong]
     lines = lines_of_rows(layout, rows_in_file) if wrong else {}
-    file = str(layout.segment.path)
+    file = layout.file
     placed = zip(wrong, rows_in_file, strict=True)
-    findings = [
-        *numbers.findings,
-        *(replace(one, file=file, line=lines.get(row), row=row) for one, row in placed),
-    ]
-    findings = sorted(findings, key=lambda finding: finding.line or 0)[:SHOWN_FINDINGS]
+    here = (replace(one, file=file, line=lines.get(row), row=row) for one, row in placed)
+    findings = sorted((*numbers.findings, *here), key=lambda one: one.line or 0)[:SHOWN_FINDINGS]
     if total > len(findings):
         findings.append(Finding(f"{total - len(findings)} more findings", file=file))
     return findings
@@ -288,23 +273,19 @@ def gaps(t_ns: IntArray) -> list[LogWarning]:
     Args:
         t_ns: Times in [ns], shape (n,).
     """
-    steps = np.diff(t_ns)
-    if len(steps) < 2:
-        return []
-    period = float(np.median(steps))
     places = np.flatnonzero(gaps_behind(t_ns)).tolist()
     if not places:
         return []
-    found = [f"{_passed(steps, k)} before row {k + 2}" for k in places[1:SHOWN_GAPS]]
+    steps = np.diff(t_ns)
+
+    def passed(k: int) -> str:
+        return f"{steps[k] / 1e9:.6g} s"
+
+    found = [f"{passed(k)} before row {k + 2}" for k in places[1:SHOWN_GAPS]]
     if len(places) > SHOWN_GAPS:
         longest = max(places, key=lambda k: steps[k])
         more = f"{len(places) - SHOWN_GAPS} more"
-        found.append(f"{more}, the longest of all of {_passed(steps, longest)} before row {longest + 2}")
-    said = ", ".join([f"{_passed(steps, places[0])} pass before this row", *found])
-    counted = f"{len(places)} gaps: " if found else ""
+        found.append(f"{more}, the longest of all of {passed(longest)} before row {longest + 2}")
+    said = ", ".join([f"{passed(places[0])} pass before this row", *found])
+    counted, period = f"{len(places)} gaps: " if found else "", float(np.median(steps))
     return [LogWarning("gap", f"{counted}{said}; the median period is {period / 1e9:.6g} s", places[0] + 2)]
-
-
-def _passed(steps: IntArray, k: int) -> str:
-    """Return a step in [s] as text."""
-    return f"{steps[k] / 1e9:.6g} s"

@@ -25,7 +25,6 @@ from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.numbers import Numbers
 from urmpipe_pipeline.sources.tables.row_reader import lines_of_rows
-from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.tables.table import read_table
 
 
@@ -101,8 +100,10 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     places = [column.index for column in columns]
     numbers = read_table(layout, places, clock.parts)
     unread = f"{len(numbers.unread)} of {len(numbers.values)} rows cannot be read"
-    too_many, warnings = None, _about_other_lines(layout, numbers)
-    file = str(layout.segment.path)
+    too_many, warnings, file = None, [], layout.file
+    if numbers.left_out and layout.form is not None:
+        said = f"{numbers.left_out} lines without the labels of the rows are left out"
+        warnings.append(LogWarning("other-lines", said))
     if skip_bad and may_skip(numbers):
         numbers, skipped = without_unread(numbers)
         warnings += skipped
@@ -120,14 +121,6 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
     return replace(numbers, warnings=(*warnings, *numbers.warnings))
 
 
-def _about_other_lines(layout: Layout, numbers: Numbers) -> list[LogWarning]:
-    """Return a warning about lines among labelled rows that are none."""
-    if not numbers.left_out or layout.form is None:
-        return []
-    said = f"{numbers.left_out} lines without the labels of the rows are left out"
-    return [LogWarning("other-lines", said)]
-
-
 def _with_times(plan: Plan, main: Numbers, skip_bad: bool) -> Numbers:
     """Return the numbers of the main table with the times of the other file.
 
@@ -137,8 +130,10 @@ def _with_times(plan: Plan, main: Numbers, skip_bad: bool) -> Numbers:
     assert plan.time_file is not None
     times = _numbers(plan, plan.time_file, (), skip_bad)
     if len(times.values) != len(main.values):
-        file = str(plan.tables.layouts[plan.time_file].segment.path)
-        title = plan.tables.layouts[plan.main].segment.path.name
+        file, title = (
+            plan.tables.layouts[plan.time_file].file,
+            plan.tables.layouts[plan.main].segment.path.name,
+        )
         message = f"found {len(times.values)} times, allowed: {len(main.values)}, as {title} has rows"
         raise LogError(Finding(message, file))
     warnings = (*main.warnings, *times.warnings)
@@ -172,20 +167,15 @@ def _without(roles: Roles, table: int) -> Roles:
         """Return a group, or none of it: half a group has no meaning."""
         return () if any(column.table == table for column in group) else group
 
-    return replace(
-        roles,
-        rates=kept(roles.rates),
-        accelerations=kept(roles.accelerations),
-        position=kept(roles.position),
-        rotation=kept(roles.rotation),
-    )
+    names = ("rates", "accelerations", "position", "rotation")
+    return replace(roles, **{name: kept(getattr(roles, name)) for name in names})  # type: ignore[arg-type]
 
 
 def _difference(plan: Plan, numbers: Mapping[int, Numbers], table: int) -> Finding | None:
     """Return where the times of a table differ from those of the main one."""
     main, other = numbers[plan.main], numbers[table]
     layout = plan.tables.layouts[table]
-    file, title = str(layout.segment.path), plan.tables.titles[plan.main]
+    file, title = layout.file, plan.tables.titles[plan.main]
     if (main.clock is None) != (other.clock is None):
         here, there = ("no time column", "with one") if other.clock is None else ("a time column", "without")
         return Finding(f"found {here}, allowed: {there}, as in {title}: one log has one clock", file)
@@ -196,13 +186,10 @@ def _difference(plan: Plan, numbers: Mapping[int, Numbers], table: int) -> Findi
             row = int(different[0])
             times = f"{other.clock[row] / 1e9:.9g} s, allowed: {main.clock[row] / 1e9:.9g} s"
             message = f"found {times}, as in {title}: the tables of one log share their times"
-            return _at_row(message, layout, other.file_row(row + 1), plan.clocks[table].columns[0].header)
+            at = other.file_row(row + 1)
+            line = lines_of_rows(layout, [at]).get(at)
+            return Finding(message, file, line, at, plan.clocks[table].columns[0].header)
     if len(main.values) != len(other.values):
         message = f"found {len(other.values)} rows, allowed: {len(main.values)}, as in {title}"
         return Finding(f"{message}: the tables of one log share their times", file)
     return None
-
-
-def _at_row(message: str, layout: Layout, row: int, column: str) -> Finding:
-    line = lines_of_rows(layout, [row]).get(row)
-    return Finding(message, str(layout.segment.path), line, row, column)

@@ -84,16 +84,8 @@ class ReadOptions:
         object.__setattr__(self, "unit", {str(column): unit for column, unit in self.unit.items()})
 
 
-def _is_text(value: Any) -> bool:
-    return isinstance(value, str)
-
-
 def _is_word(value: Any) -> bool:
-    return _is_text(value) and value != ""
-
-
-def _is_flag(value: Any) -> bool:
-    return isinstance(value, bool)
+    return isinstance(value, str) and value != ""
 
 
 def _is_number(value: Any) -> bool:
@@ -101,33 +93,30 @@ def _is_number(value: Any) -> bool:
 
 
 def _is_column(value: Any) -> bool:
-    return _is_text(value) or _is_number(value)
+    return isinstance(value, str) or _is_number(value)
 
 
 def _are(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
     """Return what tells whether a value is a list of such; a text and a table are none."""
 
     def fit(value: Any) -> bool:
-        """Return whether a value is a list of which each item fits."""
         alone = isinstance(value, (str, Mapping)) or hasattr(value, "columns")
         return not alone and isinstance(value, Iterable) and all(map(fits, value))
 
     return fit
 
 
-def _are_units(value: Any) -> bool:
-    return isinstance(value, Mapping) and all(map(_is_word, value.values()))
+def _are_named(fits: Callable[[Any], bool]) -> Callable[[Any], bool]:
+    return lambda value: isinstance(value, Mapping) and all(map(fits, value.values()))
 
 
-def _are_intervals(value: Any) -> bool:
-    return isinstance(value, Mapping) and all(
-        _are(_is_number)(limits) and len(limits) == 2 for limits in value.values()
-    )
+def _is_interval(value: Any) -> bool:
+    return _are(_is_number)(value) and len(value) == 2
 
 
 _TEXT = (_is_word, "a text, not empty")
 _COLUMNS = (_are(_is_column), COLUMNS)
-_FLAG = (_is_flag, "True or False")
+_FLAG = (lambda value: isinstance(value, bool), "True or False")
 
 _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "source": _TEXT,
@@ -140,11 +129,11 @@ _KINDS: Mapping[str, tuple[Callable[[Any], bool], str]] = {
     "offsets": (_are(_is_number), "a list of numbers, such as [0.0, 90.0]"),
     "position": _COLUMNS,
     "orientation": _COLUMNS,
-    "rotation": (lambda value: _is_text(value) and value in FORMS, ", ".join(FORMS)),
-    "unit": (_are_units, UNITS),
+    "rotation": (lambda value: isinstance(value, str) and value in FORMS, ", ".join(FORMS)),
+    "unit": (_are_named(_is_word), UNITS),
     "period": (_is_number, "a number, in s"),
     "skip_bad": _FLAG,
-    "interval": (_are_intervals, INTERVALS),
+    "interval": (_are_named(_is_interval), INTERVALS),
     "repair": _FLAG,
 }
 """What each field takes, and what to say of anything else."""

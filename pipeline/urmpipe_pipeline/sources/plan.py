@@ -11,12 +11,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock import Clock, find_clock
 from urmpipe_pipeline.sources.clocks.time_file import clock_of_file, time_file
-from urmpipe_pipeline.sources.columns.columns import (
-    Column,
-    columns_of,
-    given_units,
-    refuse_twins,
-)
+from urmpipe_pipeline.sources.columns.columns import Column, columns_of, given_units, refuse_twins
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
 from urmpipe_pipeline.sources.columns.roles import Roles, assign, joint_inference
 from urmpipe_pipeline.sources.options import ReadOptions

@@ -17,7 +17,7 @@ from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.content import read_content
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.plan import Plan
-from urmpipe_pipeline.sources.tables.opening import Tables, open_tables
+from urmpipe_pipeline.sources.tables.opening import open_tables
 from urmpipe_pipeline.sources.vocabulary import Unit
 from urmpipe_pipeline.text import counted
 
@@ -63,40 +63,24 @@ def read_series(file: Path, names: Sequence[str], options: ReadOptions | None = 
     columns = columns_of(tables.layouts, tables.titles)
     chosen = for_each(lambda name: find_column(columns, name, file=str(file)), names)
     units = given_units(columns, options)
-    plan = _plan(tables, columns, chosen, options, units)
+    clocks = tuple(
+        find_clock([one for one in columns if one.table == i], layout, options, tables.known, units)
+        for i, layout in enumerate(tables.layouts)
+    )
+    plan = Plan(tables, clocks, Roles(joints=tuple(chosen)), units)
     content = read_content(plan, skip_bad=options.skip_bad)
     values = content.values(plan.roles.joints).copy()
     _refuse_missing(file, chosen, values)
-    t_ns, noticed = _times(content.clock, content.rows, options)
+    if content.clock is not None:
+        t_ns, noticed = content.clock - content.clock[0], list[LogWarning]()
+    else:
+        t_ns, _, noticed = even_clock(content.rows, options.period)
     known = [units.get(column.number) or column.unit for column in chosen]
     for place, unit in enumerate(known):
         values[:, place] *= unit.factor if unit else 1.0
     spelled = tuple(_spelled(column, unit) for column, unit in zip(chosen, known, strict=True))
     warnings = (*content.warnings, *plan.clock.warnings, *noticed)
     return Series(file, tuple(one.name for one in chosen), t_ns, values, spelled, warnings)
-
-
-def _plan(
-    tables: Tables,
-    columns: Sequence[Column],
-    chosen: Sequence[Column],
-    options: ReadOptions,
-    units: dict[int, Unit],
-) -> Plan:
-    """Return the plan that reads the chosen columns with the clock of each table."""
-    clocks = tuple(
-        find_clock([one for one in columns if one.table == i], layout, options, tables.known, units)
-        for i, layout in enumerate(tables.layouts)
-    )
-    return Plan(tables, clocks, Roles(joints=tuple(chosen)), units)
-
-
-def _times(clock: IntArray | None, rows: int, options: ReadOptions) -> tuple[IntArray, Sequence[LogWarning]]:
-    """Return the rows' times in [ns] from the first, and what there is to say."""
-    if clock is not None:
-        return clock - clock[0], ()
-    t_ns, _, noticed = even_clock(rows, options.period)
-    return t_ns, noticed
 
 
 def _refuse_missing(file: Path, columns: Sequence[Column], values: FloatArray) -> None:

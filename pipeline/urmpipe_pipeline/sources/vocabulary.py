@@ -158,8 +158,24 @@ def vocabulary() -> Vocabulary:
         ),
         units=units,
         missing=frozenset(data["missing"]["words"]),
-        sources=tuple(_source(entry, units) for entry in data["source"]),
-        containers=tuple(_container(entry) for entry in data["container"]),
+        sources=tuple(
+            KnownSource(
+                entry["name"],
+                _compiled(entry["columns"]),
+                {quantity: units[word] for quantity, word in entry["units"].items()},
+            )
+            for entry in data["source"]
+        ),
+        containers=tuple(
+            Container(
+                entry["what"],
+                tuple(entry["suffixes"]),
+                tuple(magic.encode("latin-1") for magic in entry["magic"]),
+                entry["advice"],
+                entry.get("parameters", {}),
+            )
+            for entry in data["container"]
+        ),
     )
 
 
@@ -194,21 +210,3 @@ def _units(data: Mapping[Quantity, Mapping[str, Any]]) -> Iterator[tuple[str, Un
         for name, entry in of_quantity.items():
             for word in entry["words"]:
                 yield word, Unit(name, quantity, entry["factor"])
-
-
-def _source(entry: Mapping[str, Any], units: Mapping[str, Unit]) -> KnownSource:
-    return KnownSource(
-        entry["name"],
-        _compiled(entry["columns"]),
-        {quantity: units[word] for quantity, word in entry["units"].items()},
-    )
-
-
-def _container(entry: Mapping[str, Any]) -> Container:
-    return Container(
-        entry["what"],
-        tuple(entry["suffixes"]),
-        tuple(magic.encode("latin-1") for magic in entry["magic"]),
-        entry["advice"],
-        entry.get("parameters", {}),
-    )

@@ -15,7 +15,7 @@ from urmpipe_models.errors import Finding, OutputError
 from urmpipe_models.spelling import Voice
 from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.outputs import guarded_output, know_own
-from urmpipe_pipeline.presentation.exports import UNIT_UNSAID, Exports, ExportTable, Poses
+from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.lines import write_csv, write_tum
 from urmpipe_pipeline.tables.mat_file import write_mat
 from urmpipe_pipeline.tables.metadata import as_json, described, is_export
@@ -127,7 +127,7 @@ def export_result(
     table = exports.rows[rows].table()
     write_all([target], [_writer(exports, table, options.to, rows, target)], options.to, inputs)
     names = tuple((column.name, column.unit) for column in table.columns)
-    told = tuple(one for one in table.warnings if options.to == "csv" or one.kind != UNIT_UNSAID)
+    told = (*table.warnings, *(table.unsaid if options.to == "csv" else ()))
     return Exported((ExportedFile(target, table.rows),), options.to, rows, names, 0, told)
 
 

@@ -72,9 +72,7 @@ def test_only_the_last_lines_are_kept_of_a_long_log() -> None:
 
 def test_what_a_process_prints_is_among_its_last_words() -> None:
     printer = Foreign(
-        name="printer",
-        scalars=(Scalar("y", 0),),
-        step='write(2, "assertion failed: x > 0\\n", 24); abort();',
+        name="printer", scalars=(Scalar("y", 0),), step='write(2, "assertion failed: x > 0\\n", 24); abort();'
     )
     assert ran({"p": printer}).failed == (
         "block p: fmi2DoStep at t = 0 s: ended the process: Aborted (SIGABRT); its last lines: assertion"

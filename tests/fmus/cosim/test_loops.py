@@ -108,9 +108,7 @@ def test_a_ring_with_a_state_is_the_implicit_equation_at_every_instant() -> None
         compute="v->r[2] = v->r[0] - 3 * v->r[1];",
     )
     recorded = solved(
-        {"s": sum_of, "i": INTEGRATOR},
-        {"s.y_in": "s.y", "s.x": "i.y", "i.u": "s.y"},
-        {"i": {"x": 1.0}},
+        {"s": sum_of, "i": INTEGRATOR}, {"s.y_in": "s.y", "s.x": "i.y", "i.u": "s.y"}, {"i": {"x": 1.0}}
     )
     x = recorded.column("i", "y")
     assert np.allclose(recorded.column("s", "y"), x / 4.0, rtol=0.0, atol=1e-11)  # tolerance times Jacobian

@@ -98,10 +98,7 @@ def test_arrays_and_elements_are_connected_one_by_one(order: tuple[int, int, int
     if order == (1, 2, 3):
         whole = ran({"sum": SUM, "ramp": RAMP}, {"sum.u": "ramp.y"})
         assert np.array_equal(whole.values, recorded.values)
-    assert recorded.names == (
-        Port("sum", "y"),
-        *(Port("ramp", f"y[{i}]") for i in (1, 2, 3)),
-    )
+    assert recorded.names == (Port("sum", "y"), *(Port("ramp", f"y[{i}]") for i in (1, 2, 3)))
     assert recorded.units == ("m",) * 4
 
 

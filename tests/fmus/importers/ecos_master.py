@@ -13,10 +13,7 @@ def run_ecos(system: System, step: float, steps: int) -> Trace:
 
     EcosLib.set_log_level("warn")
     trace = empty_trace(system, steps)
-    with (
-        structure_of(system) as structure,
-        EcosSimulation(structure=structure, step_size=step) as simulation,
-    ):
+    with structure_of(system) as structure, EcosSimulation(structure=structure, step_size=step) as simulation:
         assert simulation.init(parameter_set="start"), EcosLib.get_last_error()
         read(simulation, system, trace, 0)
         for k in range(steps):

@@ -160,10 +160,7 @@ def player() -> Unit:
     def outputs(v: Any) -> dict[str, Any]:
         before, after = v.table.before, v.table.after
         pairs = zip(before, after, strict=True)
-        return {
-            "held": before[0],
-            "between": tuple(a + v.table.fraction * (b - a) for a, b in pairs),
-        }
+        return {"held": before[0], "between": tuple(a + v.table.fraction * (b - a) for a, b in pairs)}
 
     return Unit(
         name="player",

@@ -236,16 +236,8 @@ CO_SIMULATION = "FMI 2.0 for co-simulation, as most tools export it, too"
 @pytest.mark.parametrize(
     ("old", "new", "said"),
     [
-        (
-            'fmiVersion="2.0"',
-            'fmiVersion="3.0"',
-            f"found FMI 3.0, allowed: {CO_SIMULATION}",
-        ),
-        (
-            "CoSimulation",
-            "ModelExchange",
-            f"found no FMU for co-simulation, allowed: {CO_SIMULATION}",
-        ),
+        ('fmiVersion="2.0"', 'fmiVersion="3.0"', f"found FMI 3.0, allowed: {CO_SIMULATION}"),
+        ("CoSimulation", "ModelExchange", f"found no FMU for co-simulation, allowed: {CO_SIMULATION}"),
     ],
 )
 def test_fmus_of_other_kinds_are_refused_with_what_is_allowed(

@@ -91,10 +91,7 @@ def assert_runs_alone(unit: Unit, tmp_path: Path) -> None:
     path, instance = built(unit, tmp_path), Instance(unit)
     instance.do_step(0.0, 0.01)
     said = subprocess.run(
-        [sys.executable, "-c", ALONE, HELPERS, str(path)],
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, "-c", ALONE, HELPERS, str(path)], capture_output=True, text=True, check=False
     )
     assert said.returncode == 0, said.stderr
     values = [float(one) for one in instance.get(range(len(unit.scalars)))]
@@ -141,10 +138,7 @@ def test_a_thousand_instances_leave_no_memory_behind_but_what_pythonfmu_loses(
     """pythonfmu 0.7 loses the strings and lists by which it finds the class: about 0.8 KB an instance."""
     path = built(make("spring"), tmp_path)
     said = subprocess.run(
-        [sys.executable, "-c", CYCLES, HELPERS, str(path)],
-        capture_output=True,
-        text=True,
-        check=False,
+        [sys.executable, "-c", CYCLES, HELPERS, str(path)], capture_output=True, text=True, check=False
     )
     assert said.returncode == 0, said.stderr
     grown, alive = map(int, said.stdout.split())

@@ -15,8 +15,7 @@ from urmpipe_fmus.units.log_source import Column, log_source
 from urmpipe_models.errors import UnitError
 
 LOG = Table(
-    np.array([0, 5_000_000, 20_000_000]),
-    np.array([[1.0, -1.0, 10.0], [3.0, -2.0, 20.0], [0.0, 4.0, 50.0]]),
+    np.array([0, 5_000_000, 20_000_000]), np.array([[1.0, -1.0, 10.0], [3.0, -2.0, 20.0], [0.0, 4.0, 50.0]])
 )
 COLUMNS = (Column("q", "rad", 2, "Angles"), Column("d", "m"))
 
@@ -58,10 +57,7 @@ def test_the_columns_are_outputs_by_the_callers_names_that_depend_on_time() -> N
             [["q", "rad", 3, "Angles", 5]],
             "option columns: found ['q', 'rad', 3, 'Angles', 5], allowed: name, unit, size and description",
         ),
-        (
-            [["q", 2]],
-            "option columns: found ['q', 2], allowed: name, unit, size and description",
-        ),
+        ([["q", 2]], "option columns: found ['q', 2], allowed: name, unit, size and description"),
         ([7], "option columns: found 7, allowed: name, unit, size and description"),
         ("qd", "found no table and columns, allowed: a Table, a list of columns"),
         ([["q", "rad", 2], ["q", "m"]], "q: found twice, allowed: each name once"),

@@ -139,9 +139,7 @@ def test_a_file_may_hold_dataclasses_and_private_units(tmp_path: Path) -> None:
         ),
         (
             UNIT.replace("OUT", "v.u") + UNIT.replace("OUT", "v.u").replace("unit = ", "other = "),
-            [
-                "own.py: found 2 units: unit, other; allowed: one (a name with _ before it does not count)",
-            ],
+            ["own.py: found 2 units: unit, other; allowed: one (a name with _ before it does not count)"],
         ),
         (
             UNIT.replace('"own"', '"my own"').replace('name="u"', 'name="1u"'),

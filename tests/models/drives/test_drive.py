@@ -19,13 +19,7 @@ from urmpipe_models.drives.drive import (
 )
 
 DRIVE = Drive(
-    stiffness=2500.0,
-    damping=5.0,
-    ratio=100.0,
-    constant=0.05,
-    resistance=0.5,
-    inductance=1e-3,
-    inertia=0.5,
+    stiffness=2500.0, damping=5.0, ratio=100.0, constant=0.05, resistance=0.5, inductance=1e-3, inertia=0.5
 )
 LOAD = 1.0
 

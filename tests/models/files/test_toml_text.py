@@ -48,11 +48,7 @@ def test_each_kind_of_value_is_written_as_toml_has_it() -> None:
     ],
 )
 def test_what_is_no_toml_is_told_with_its_line(
-    tmp_path: Path,
-    monkeypatch: pytest.MonkeyPatch,
-    written: str,
-    place: tuple[int, int] | None,
-    hint: str,
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, written: str, place: tuple[int, int] | None, hint: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
     Path("a.toml").write_bytes(written.encode())

@@ -73,9 +73,7 @@ def test_a_joint_is_shifted_by_turns_into_its_limits_and_then_as_near_as_may_be(
 
 def test_what_cannot_be_brought_into_its_limits_has_a_reason_with_figures() -> None:
     chain = arm(
-        Joint("q1"),
-        Joint("q3", lower=-2.7, upper=2.7),
-        Joint("rail", kind="prismatic", lower=0.0, upper=0.5),
+        Joint("q1"), Joint("q3", lower=-2.7, upper=2.7), Joint("rail", kind="prismatic", lower=0.0, upper=0.5)
     )
     q = np.array([[[0.0, -2.9, 0.25], [0.0, 1.0, 0.75], [0.0, 3.0, -0.1], [0.0, 1.0, 0.25]]])
     reasons = np.array([["", "", "", ""]], dtype=np.object_)
@@ -108,12 +106,7 @@ def test_what_there_was_no_solution_for_keeps_its_reason() -> None:
 
 
 @settings(deadline=None)
-@given(
-    st.floats(-math.pi, math.pi),
-    st.floats(-20.0, 20.0),
-    st.floats(0.0, 20.0),
-    st.floats(-30.0, 30.0),
-)
+@given(st.floats(-math.pi, math.pi), st.floats(-20.0, 20.0), st.floats(0.0, 20.0), st.floats(-30.0, 30.0))
 def test_of_all_turns_within_the_limits_the_nearest_is_taken(
     value: float, lower: float, width: float, near: float
 ) -> None:

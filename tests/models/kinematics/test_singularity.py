@@ -18,11 +18,7 @@ from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.dh import DHRow, dh_chain
 from urmpipe_models.chains.geometric_model import GeometricRow, geometric_chain
 from urmpipe_models.kinematics.forward import jacobian_over_log
-from urmpipe_models.kinematics.singularity import (
-    PARALLEL,
-    characteristic_length,
-    singularity_over_log,
-)
+from urmpipe_models.kinematics.singularity import PARALLEL, characteristic_length, singularity_over_log
 from urmpipe_models.robots.catalogue import load_robot, robot_names
 from urmpipe_models.transform import Transform, from_offset, rotation_z, translation
 

@@ -79,8 +79,7 @@ def test_a_family_of_singular_poses_is_told_once_with_its_rows() -> None:
     row, every = np.array([1, 4, 5]), np.ones((3, 2), dtype=bool)
     assert list(singular_warnings(found, row, every)) == [
         LogWarning(
-            "singular",
-            "rows 1, 4: wrist aligned: q4 and q6: only their sum is determined; chosen: q4 = 0",
+            "singular", "rows 1, 4: wrist aligned: q4 and q6: only their sum is determined; chosen: q4 = 0"
         ),
         LogWarning("singular", "row 4: arm stretched: a direction of motion is lost there"),
     ]

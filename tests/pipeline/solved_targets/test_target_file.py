@@ -185,10 +185,7 @@ def test_rx_ry_rz_may_be_a_rotation_vector_and_the_option_is_named(read: Read) -
     targets = read(text)
     assert_turned(targets, [R])
     assert said(targets) == [
-        (
-            "assumed-rotation",
-            "rx, ry, rz are taken as angles about the moving axes Z, Y, X (rz, ry, rx)",
-        )
+        ("assumed-rotation", "rx, ry, rz are taken as angles about the moving axes Z, Y, X (rz, ry, rx)")
     ]
     vector = read(text, rotation="vector")
     turned = Rotation.from_rotvec([0.1, -0.2, 0.3]).as_matrix()

@@ -150,9 +150,7 @@ def damaged(draw: st.DrawFn) -> tuple[Written, list[list[str]], dict[int, str]]:
 
 
 @given(case=damaged())
-def test_damage_to_a_row_is_its_fault_alone(
-    case: tuple[Written, list[list[str]], dict[int, str]],
-) -> None:
+def test_damage_to_a_row_is_its_fault_alone(case: tuple[Written, list[list[str]], dict[int, str]]) -> None:
     written, rows, reasons = case
     targets = written.read(rows)
     assert targets.faults == reasons

@@ -13,7 +13,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_pipeline.decimate import decimate
 from urmpipe_pipeline.palette import NEUTRAL_COLOUR, REFERENCE_COLOUR, rgb
-from urmpipe_pipeline.presentation.figure import Line, Mark, Panel, Shape, View
+from urmpipe_pipeline.presentation.figure import Computed, Line, Mark, Panel, Shape, View
 from urmpipe_pipeline.recording.sending import scalar_column, times_at
 from urmpipe_pipeline.recording.views.axes import TALL, UNITLESS, factor_of, shown_unit, span_with_numbers
 from urmpipe_pipeline.text import encodable
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from rerun.blueprint import TimeSeriesView
     from rerun.encodings import TimeRange
 
-EntityOf: TypeAlias = Callable[[FloatArray, "IntArray | None"], str | None]
+EntityOf: TypeAlias = Callable[["FloatArray | Computed", "IntArray | None"], str | None]
 """Returns where an array of the result stands on its times, as scalars in SI; None if it is drawn only."""
 
 LONG = 50_000
@@ -161,15 +161,16 @@ class Plots:
         drawn.rows = max(drawn.rows, rows)
         if stored is not None and factor == 1.0 and (rows <= LONG or not drawn.opened):
             drawn.entities.append(stored)
-            drawn.reach(line.values)
+            drawn.reach(line.values[:])
             if self._looks.setdefault(stored, look) != look:
                 drawn.overrides[stored] = look
             elif self._looks[stored] is look:
                 self.stream.log(stored, look.style(), static=True)
             return
         most = ROWS if rows > LONG else rows if panel.small else COPIED
-        chosen = np.union1d(overview(line.values, most), np.array(panel.peaks, dtype=np.int64))
-        values = factor * np.asarray(line.values)[chosen].reshape(len(chosen), -1)
+        every = line.values[:]
+        chosen = np.union1d(overview(every, most), np.array(panel.peaks, dtype=np.int64))
+        values = factor * every[chosen].reshape(len(chosen), -1)
         self._send(drawn, root, look, t_ns, chosen, values)
         if stored is not None and rows > LONG:
             drawn.whole.append(stored)

@@ -110,8 +110,7 @@ def find_clock(
         LogError: If the time is text in no form that is known, or its unit cannot be told.
         OptionError: If its unit is given as one that is no time.
     """
-    chosen, why = time_columns(columns, layout, options, joints)
-    return clock_of(chosen, why, layout, source, units)
+    return clock_of(*time_columns(columns, layout, options, joints), layout, source, units)
 
 
 def clock_of(
@@ -161,7 +160,7 @@ def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> Clo
     forms = known_forms(cells)
     if not forms:
         message = f"found {shown(cells[0])}, allowed: {FORMS_TOLD}"
-        raise LogError(Finding(message, str(layout.segment.path), layout.first_line, 1, column.header))
+        raise LogError(Finding(message, layout.file, layout.first_line, 1, column.header))
     wanted = given or column.unit
     asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
     if given is not None and not asked:
@@ -175,7 +174,7 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
     """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
     for value in times_of(layout.cells(time.index), layout)[:1]:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
-            place = (str(layout.segment.path), layout.first_line, 1, time.header)
+            place = (layout.file, layout.first_line, 1, time.header)
             hint = Hint("unit", {called(time): "ns"}, "reads them so")
             if unit == "s" and _DATES[0] <= value < _DATES[1]:
                 hint = Hint("", does="a date is read if it is written as 2021-04-11 22:27:21.5")

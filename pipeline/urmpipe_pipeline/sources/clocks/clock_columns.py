@@ -128,9 +128,7 @@ def _without_header(
     columns: Sequence[Column], layout: Layout, joints: int | None
 ) -> tuple[tuple[Column, ...], str] | None:
     """Return the first column if it alone runs in even steps, unless the robot's joints take all columns."""
-    even = [
-        column for column in columns if not column.text and runs_evenly(layout.cells(column.index), layout)
-    ]
+    even = [one for one in columns if not one.text and runs_evenly(layout.cells(one.index), layout)]
     counts = count_up(layout.cells(0))
     if even == [columns[0]] and not counts and len(columns) > 1 and len(columns) != joints:
         return (columns[0],), "the first column alone increases in even steps"
@@ -144,14 +142,9 @@ def _before_pose(
     pose = 3 + (width(options.rotation) if options.rotation else 0)
     if len(columns) == pose:
         return (), f"the {pose} columns are a pose" if options.rotation else "three columns are x, y, z"
-    first = columns[0]
-    if (
-        options.rotation
-        and len(columns) == pose + 1
-        and not first.text
-        and _increases(layout.cells(0), layout)
-    ):
-        return (first,), f"the {pose} columns behind it are a pose, and it increases"
+    one_more = options.rotation and len(columns) == pose + 1 and not columns[0].text
+    if one_more and _increases(layout.cells(0), layout):
+        return (columns[0],), f"the {pose} columns behind it are a pose, and it increases"
     return None
 
 
@@ -171,7 +164,7 @@ def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | Non
     message = f"found a first column that increases from row to row, which may be {what}"
     hints = [Hint("time", "1", "says which"), Hint("time", "none", "says which")]
     hints += [] if path else [Hint("joints", None, "names the joint columns")]
-    place = (str(layout.segment.path), layout.first_line, 1)
+    place = (layout.file, layout.first_line, 1)
     raise LogError(Finding(message, *place, hints=tuple(hints)))
 
 

@@ -118,5 +118,5 @@ def _question(time: Column, layout: Layout, found: str, units: list[str]) -> Log
 
 def _error(message: str, time: Column, layout: Layout, *hints: Hint) -> LogError:
     """Return an error about a time column."""
-    place = (str(layout.segment.path), layout.first_line, 1, time.header)
+    place = (layout.file, layout.first_line, 1, time.header)
     return LogError(Finding(message, *place, hints=hints))

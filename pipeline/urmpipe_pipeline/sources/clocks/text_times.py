@@ -169,4 +169,4 @@ def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[R
     cell = layout.cells(parts[place].column)[0]
     hints = tuple(Hint("unit", {column: key}, "says which") for key in keys)
     message = f"found {shown(cell)}, which may be {names}"
-    return Finding(message, str(layout.segment.path), layout.first_line, 1, column, hints=hints)
+    return Finding(message, layout.file, layout.first_line, 1, column, hints=hints)

@@ -180,18 +180,12 @@ def refuse_twins(
     """
     findings = []
     for column in used:
-        twins = [
-            other
-            for other in columns
-            if other.key == column.key != ""
-            and other is not column
-            and not other.text
-            and _alike(other, column)
-        ]
+        named = [one for one in columns if one.key == column.key != "" and one is not column]
+        twins = [one for one in named if not one.text and _alike(one, column)]
         if twins:
             numbers = ", ".join(str(n) for n in sorted(c.number for c in (column, *twins)))
             message, layout = f"found as columns {numbers}, allowed: once", layouts[column.table]
-            place = (str(layout.segment.path), layout.header, None, column.header)
+            place = (layout.file, layout.header, None, column.header)
             findings.append(Finding(message, *place, hints=(remedy,)))
     if findings:
         raise LogError(*findings)

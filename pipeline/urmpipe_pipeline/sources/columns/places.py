@@ -55,7 +55,7 @@ def without_header(
     Raises:
         LogError: If there are too few columns, or one of them holds text.
     """
-    file = str(layout.segment.path)
+    file = layout.file
     columns = [column for column in columns if column.header]
     pose = chosen_pose(columns, options)
     if options.joints:
@@ -87,9 +87,7 @@ def _path_by_place(
 ) -> Roles:
     """Return x, y, z and the orientation behind them: of the form told, or by what its numbers are."""
     if pose is None and len(columns) < 3:
-        raise LogError(
-            Finding(f"found {len(columns)} columns, allowed: x, y, z", file=str(layout.segment.path))
-        )
+        raise LogError(Finding(f"found {len(columns)} columns, allowed: x, y, z", file=layout.file))
     form = options.rotation
     if pose is None and form is not None and len(columns) == 3 + width(form):
         pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), "given as an option")
@@ -175,11 +173,7 @@ def _only_numbers_differ(names: Sequence[str]) -> list[int] | None:
 
 
 def _by_place(
-    joints: Sequence[Column],
-    columns: Sequence[Column],
-    robot: Chain | None,
-    evidence: str,
-    pose: Pose | None,
+    joints: Sequence[Column], columns: Sequence[Column], robot: Chain | None, evidence: str, pose: Pose | None
 ) -> Roles:
     """Return joints that are named by the robot, or q1, q2, ..., and the pose beside them."""
     pose = pose or Pose()
@@ -191,14 +185,7 @@ def _by_place(
     warnings = (_about_rest(robot, joints, rest),) if robot and rest and evidence != GIVEN else ()
     names = robot.coordinates if robot else [f"q{k + 1}" for k in range(len(joints))]
     named = tuple(replace(column, name=name) for column, name in zip(joints, names, strict=True))
-    return Roles(
-        joints=named,
-        position=pose.position,
-        rotation=pose.rotation,
-        forms=pose.forms,
-        inferences=tuple(said),
-        warnings=warnings,
-    )
+    return Roles(named, (), (), pose.position, pose.rotation, pose.forms, tuple(said), warnings)
 
 
 def _about_rest(robot: Chain, joints: Sequence[Column], rest: Sequence[Column]) -> LogWarning:

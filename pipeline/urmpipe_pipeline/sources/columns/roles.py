@@ -83,7 +83,7 @@ def assign(
     Raises:
         LogError: If the joints cannot be told, or are too few or too many for the robot.
     """
-    file = str(layouts[0].segment.path)
+    file = layouts[0].file
     numeric = [column for column in columns if (path or not column.text) and not column.counts_rows]
     if options.joints:
         joints = tuple(find_column(columns, text, parameter="joints") for text in options.joints)
@@ -151,14 +151,9 @@ def _find_joints(free: Sequence[Column], file: str, robot: Chain | None, *, half
     for names in orders:
         by_name = named_after(free, names, "position")
         if by_name and count in (None, len(by_name)):
-            evidence = (
-                "the robot's joint names" if robot and names == robot.coordinates else "known joint names"
-            )
-            return _Joints(by_name, evidence, names=tuple(names))
-    by_number = _numbered(free, file, count)
-    if by_number:
-        return by_number
-    return _without_number(free, count, half_pose=half_pose)
+            whose = "the robot's" if robot and names == robot.coordinates else "known"
+            return _Joints(by_name, f"{whose} joint names", names=tuple(names))
+    return _numbered(free, file, count) or _without_number(free, count, half_pose=half_pose)
 
 
 def _without_number(free: Sequence[Column], count: int | None, *, half_pose: bool) -> _Joints:
@@ -213,10 +208,9 @@ def _role_beside(column: Column, name: str) -> str | None:
     words = vocabulary().joint_words
     if beside & vocabulary().other:
         return None
-    for role in ("acceleration", "rate"):
-        if beside & words[role] or (
-            column.unit and column.unit.order == ("rate", "acceleration").index(role) + 1
-        ):
+    order = column.unit.order if column.unit else 0
+    for role, its_order in (("acceleration", 2), ("rate", 1)):
+        if beside & words[role] or order == its_order:
             return role
     return "position"
 
@@ -249,9 +243,8 @@ def _numbered(free: Sequence[Column], file: str, count: int | None) -> _Joints |
         spare = [c for c in still if c not in family.columns.values() and not c.words & words.other]
         hints = _cure(len(gaps), spare, count)
         raise LogError(Finding(f"{said}, allowed: {allowed}", file=file, hints=hints))
-    return _Joints(
-        family.ordered(), "their names, in the order of their numbers", tuple(sorted(family.columns))
-    )
+    evidence = "their names, in the order of their numbers"
+    return _Joints(family.ordered(), evidence, tuple(sorted(family.columns)))
 
 
 def _cure(missing: int, spare: Sequence[Column], count: int | None) -> tuple[Hint, Hint]:
@@ -310,21 +303,18 @@ def path_inference(names: str, evidence: str) -> Inference:
 
 def about_pose(pose: Pose) -> list[Inference]:
     """Say which columns hold the recorded tool centre point."""
-    groups = (
-        ("recorded TCP", pose.position, "position"),
-        ("recorded orientation", pose.rotation, "orientation"),
-    )
-    return [
-        Inference(
-            what,
-            ", ".join(column.name for column in group),
-            pose.evidence,
-            columns=tuple(column.name for column in group),
-            hints=(Hint("log_map", None, f"with tcp.{key} in it"),),
-        )
-        for what, group, key in groups
-        if group
-    ]
+    said = []
+    for what, group, where in (
+        ("TCP", pose.position, "position"),
+        ("orientation", pose.rotation, "orientation"),
+    ):
+        names, hint = tuple(column.name for column in group), Hint("log_map", None, f"with tcp.{where} in it")
+        if names:
+            found = Inference(
+                f"recorded {what}", ", ".join(names), pose.evidence, columns=names, hints=(hint,)
+            )
+            said.append(found)
+    return said
 
 
 def _path(
@@ -337,7 +327,7 @@ def _path(
     path: bool,
 ) -> Roles:
     """Return the roles of a path; raise if it is none either."""
-    file = str(layouts[0].segment.path)
+    file = layouts[0].file
     pose = pose if pose.position else find_pose(numeric, layouts, file)
     if pose.position:
         names = ", ".join(column.name for column in pose.position)

@@ -25,10 +25,7 @@ _PLAIN = "7"
 """Stands for an array where the layout of the other cells is found out."""
 
 _STARTS = {
-    opening: re.compile(
-        rf'(?:^|[,;|\t ])"?{re.escape(opening)}+\s*(?:[-+.\d]|nan|\w+\.)',
-        re.IGNORECASE,
-    )
+    opening: re.compile(rf'(?:^|[,;|\t ])"?{re.escape(opening)}+\s*(?:[-+.\d]|nan|\w+\.)', re.IGNORECASE)
     for opening in CLOSING
 }
 _COMMAS = re.compile(r"\d,\d")

@@ -29,10 +29,7 @@ def graphs(segment: Segment) -> list[tuple[str, Segment]]:
         segment: The whole file.
     """
     result = []
-    with (
-        segment.path.open("rb") as file,
-        mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content,
-    ):
+    with segment.path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
         starts = _starts(content, segment.start)
         line, counted = segment.first_line, segment.start
         for start, end in zip(starts, [*starts[1:], segment.end], strict=False):

@@ -36,7 +36,6 @@ class Tables:
         known: What is known of it, if anything.
         layouts: How each table is written.
         titles: Title of each table: the file's stem, or the graph's path.
-        paths: The file of each table.
         inferences: What was found out.
         foreign: Whether its source was given, and has columns or graphs of its own, which are not there.
     """
@@ -90,20 +89,16 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
         layouts = [across(layout) for layout in layouts]
     known, said = _known(layouts, options) if not forced else (None, _coppeliasim(titled, options))
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
-    encoding = Inference(
-        "encoding",
-        segments[0].encoding,
+    why, hint = (
         "byte order mark" if segments[0].start else "its bytes",
-        hints=(Hint("", does="save the file as UTF-8"),),
+        Hint("", does="save the file as UTF-8"),
     )
-    return Tables(
-        source=name,
-        known=known,
-        layouts=tuple(layouts),
-        titles=tuple(title for title, _ in titled),
-        inferences=(encoding, said),
-        foreign=_is_foreign(options.source, bool(graphs), _names(layouts)),
-    )
+    encoding = Inference("encoding", segments[0].encoding, why, hints=(hint,))
+    titles = tuple(title for title, _ in titled)
+    given = vocabulary().source(options.source)
+    foreign = given is not None and given.is_foreign(_names(layouts))
+    foreign = not graphs if options.source == COPPELIASIM else foreign
+    return Tables(name, known, tuple(layouts), titles, (encoding, said), foreign)
 
 
 def _layout(segment: Segment, options: ReadOptions, sniff_plain: Sniff) -> Layout:
@@ -116,20 +111,13 @@ def _layout(segment: Segment, options: ReadOptions, sniff_plain: Sniff) -> Layou
 def _known(layouts: Sequence[Layout], options: ReadOptions) -> tuple[KnownSource | None, Inference]:
     """Return the source that the columns give away."""
     if options.source is not None:
-        return vocabulary().source(options.source), Inference(
-            "source", options.source, "given as an option", hints=_OTHER
-        )
+        said = Inference("source", options.source, "given as an option", hints=_OTHER)
+        return vocabulary().source(options.source), said
     names = _names(layouts)
     for source in vocabulary().sources:
         if source.wrote(names):
             return source, Inference("source", source.name, "the names of its columns", hints=_OTHER)
     return None, Inference("source", TABLE, "no source is known by these columns", hints=_OTHER)
-
-
-def _is_foreign(given: str | None, graphs: bool, names: Sequence[str]) -> bool:
-    """Return whether a source was given that would have written other columns, or graphs."""
-    known = vocabulary().source(given)
-    return not graphs if given == COPPELIASIM else known is not None and known.is_foreign(names)
 
 
 def _names(layouts: Sequence[Layout]) -> list[str]:

@@ -70,4 +70,4 @@ def _refuse_other_publishers(layout: Layout) -> None:
         if first and names and names != first:
             listed, wanted = (", ".join(map(printable, group)) for group in (names, first))
             message = f"found rows with the joints {listed} among rows with {wanted}, allowed: one publisher"
-            raise LogError(Finding(f"{message}; keep the rows of one of them", str(layout.segment.path)))
+            raise LogError(Finding(f"{message}; keep the rows of one of them", layout.file))

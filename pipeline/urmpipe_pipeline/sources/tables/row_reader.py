@@ -132,16 +132,18 @@ class RowReader:
             times.append(time)
             values.extend(row)
             rows += 1
+        form = self.layout.form
+        others = sum(bool(line.strip()) and not form.is_row(line) for _, line in numbered) if form else 0
         return Numbers(
             np.array(values).reshape(rows, len(self.columns)),
             np.array(times, dtype=np.int64) if self.clock else None,
-            left_out=self._others(numbered),
+            left_out=others,
             texts=tuple(TextCells.of(texts) for texts in self._texts),
         )
 
     def verdict(self) -> Numbers:
         """Return what was found to be wrong, without numbers."""
-        file = str(self.layout.segment.path)
+        file = self.layout.file
         return Numbers(
             np.empty((0, len(self.columns))),
             None,
@@ -150,11 +152,6 @@ class RowReader:
             lasting=tuple(fault.finding(file) for fault in self._lasting),
             unread=self._unread,
         )
-
-    def _others(self, lines: Iterable[tuple[int, str]]) -> int:
-        """Return how many lines among labelled rows are none."""
-        form = self.layout.form
-        return sum(bool(line.strip()) and not form.is_row(line) for _, line in lines) if form else 0
 
     def _rows(self, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, list[float]]]:
         """Yield time in [ns] and values of each row."""

@@ -81,6 +81,11 @@ class Layout:
     form: Form | None = None
     across: bool = False
 
+    @property
+    def file(self) -> str:
+        """The path of the file that it stands in."""
+        return str(self.segment.path)
+
     def cells(self, column: int) -> list[str]:
         """Return the sampled cells of a column."""
         return [row[column] for row in self.sample if column < len(row)]
@@ -227,16 +232,12 @@ def _credit(style: _Style) -> tuple[bool, float]:
 def _style_inferences(
     style: _Style, delimiter: str | None, decimal: str | None, told: str | None
 ) -> list[Inference]:
-    parts, reads = f"it makes rows of {style.width} cells", "with it most cells are numbers"
-    parts = "the first line says so" if told else parts
     given = "given as an option"
+    parts = "the first line says so" if told else f"it makes rows of {style.width} cells"
+    parts, reads = given if delimiter else parts, given if decimal else "with it most cells are numbers"
     return [
-        Inference(
-            "delimiter", _NAMES[style.delimiter], given if delimiter else parts, hints=(Hint("delimiter"),)
-        ),
-        Inference(
-            "decimal sign", _NAMES[style.decimal], given if decimal else reads, hints=(Hint("decimal"),)
-        ),
+        Inference("delimiter", _NAMES[style.delimiter], parts, hints=(Hint("delimiter"),)),
+        Inference("decimal sign", _NAMES[style.decimal], reads, hints=(Hint("decimal"),)),
     ]
 
 
@@ -251,13 +252,9 @@ def _common_width(rows: Sequence[Row], decimal: str) -> int:
 def _numeric_columns(rows: Sequence[Row], width: int, decimal: str) -> list[int]:
     """Return the columns in which at least half of the cells with content are numbers."""
     full = [row for row in rows if len(row) == width]
-    result = []
-    for column in range(width):
-        cells = [row[column] for row in full if not is_missing(row[column])]
-        numbers = sum(is_number(cell, decimal) for cell in cells)
-        if numbers and 2 * numbers >= len(cells):
-            result.append(column)
-    return result
+    columns = ([row[column] for row in full if not is_missing(row[column])] for column in range(width))
+    numbers = [(sum(is_number(cell, decimal) for cell in cells), len(cells)) for cells in columns]
+    return [column for column, (count, of) in enumerate(numbers) if count and 2 * count >= of]
 
 
 def _is_data(rows: Sequence[Row], i: int, numeric: Sequence[int], decimal: str) -> bool:
@@ -334,9 +331,9 @@ def _names(
         return ("", *cells), Inference("header", f"line {line}", "the first column is an unnamed index")
     number = abs(len(cells) - width)
     remedy = f"{'add' if len(cells) < width else 'take out'} {number} name{'s' if number > 1 else ''}"
-    found_text = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column; {remedy}"
-    without = f"or delete line {line}: without names the columns are taken as joints in order"
-    raise LogError(Finding(f"{found_text}, {without}", file=str(segment.path), line=line))
+    wrong = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column; {remedy}"
+    wrong += f", or delete line {line}: without names the columns are taken as joints in order"
+    raise LogError(Finding(wrong, file=str(segment.path), line=line))
 
 
 def _refuse_prose(segment: Segment, lines: Sequence[HeadLine], widths: Sequence[int], width: int) -> None:
@@ -357,9 +354,5 @@ def _no_rows(segment: Segment, body: Sequence[HeadLine], given: Mapping[str, str
         return Finding("found a header and no rows, allowed: a row a sample", file=file, line=body[0].number)
     text = body[0].text.strip()[:60]
     named = [f"{what} {_NAMES[_SIGNS.get(sign.lower(), sign)]}" for what, sign in given.items()]
-    return Finding(
-        file=file,
-        line=body[0].number,
-        found=f"{text!r} and no row of numbers below it" + (f" with {' and '.join(named)}" if named else ""),
-        allowed="a table with a row a sample",
-    )
+    found = f"{text!r} and no row of numbers below it" + (f" with {' and '.join(named)}" if named else "")
+    return Finding(file=file, line=body[0].number, found=found, allowed="a table with a row a sample")

@@ -74,7 +74,7 @@ def read_rows(plan: Plan) -> Rows:
         raise LogError(*read.lasting)
     numbers = _without_blank_end(layout, timed(layout, clock.parts, read))
     if not len(numbers.values):
-        raise LogError(Finding("found no row with a number, allowed: at least one", str(layout.segment.path)))
+        raise LogError(Finding("found no row with a number, allowed: at least one", layout.file))
     faults = _faults(numbers, columns, clock)
     times, about = _whole_clock(layout, numbers, clock)
     return Rows(numbers.values, times, faults, about.inferences, about.warnings)
@@ -134,17 +134,13 @@ def _whole_clock(layout: Layout, numbers: Numbers, clock: Clock) -> tuple[IntArr
     if not len(known):
         said = f"found no time in any of {len(numbers.clock)} rows, allowed: at least one"
         hints = (Hint("time", "none", "leaves the column out"),)
-        place = (str(layout.segment.path), None, None, clock.columns[0].header)
+        place = (layout.file, None, None, clock.columns[0].header)
         raise LogError(Finding(said, *place, hints=hints))
+    texts = tuple(cells.at(known) for cells in numbers.texts)
     told = replace(
-        numbers,
-        values=np.empty((len(known), 0)),
-        clock=numbers.clock[known],
-        texts=tuple(cells.at(known) for cells in numbers.texts),
-        findings=(),
-        wrong=0,
-        rows=known + 1,
-    )
+        numbers, values=np.empty((len(known), 0)), clock=numbers.clock[known], texts=texts, findings=(),
+        wrong=0, rows=known + 1,
+    )  # fmt: skip
     told = rebuilt(told)
     findings = find_errors(layout, told, (), clock)
     if findings:

@@ -112,9 +112,8 @@ def _position(cells: Sequence[str], named: Sequence[str]) -> tuple[int, ...]:
         return told
     keys = [key(label) for label in labels]
     for pattern in vocabulary().tcp_position:
-        matches = {
-            k: match.groupdict().get("axis") for k, one in enumerate(keys) if (match := pattern.search(one))
-        }
+        found = ((k, pattern.search(one)) for k, one in enumerate(keys))
+        matches = {k: match.groupdict().get("axis") for k, match in found if match}
         if {"x", "y", "z"} <= set(matches.values()):
             return tuple(k for k, axis in matches.items() if axis)
     entries = next(pattern for pattern in vocabulary().tcp_matrix if "i" in pattern.groupindex)
@@ -151,12 +150,11 @@ def _fitting(below: Sequence[HeadLine], headers: Sequence[_Header]) -> _Header |
         return [len(split_line(line.text, header.delimiter)) for line in below]
 
     found = max(headers, key=lambda header: widths(header).count(header.width), default=None)
-    if (
-        found is None
-        or not below
-        or (len(below) == 1 and _are_units(split_line(below[0].text, found.delimiter)))
-    ):
+    if found is None or not below:
         return None
-    first = [split_line(line.text, found.delimiter)[0] for line in below]
+    rows = [split_line(line.text, found.delimiter) for line in below]
+    if len(rows) == 1 and _are_units(rows[0]):
+        return None
+    first = [cells[0] for cells in rows]
     indexed = set(widths(found)) == {found.width + 1} and len(below) > 1 and count_up(first)
     return None if indexed else found

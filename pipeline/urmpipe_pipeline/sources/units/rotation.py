@@ -166,9 +166,7 @@ def _in_other_units(choices: Sequence[Choice]) -> list[Choice]:
 
 
 def _by_kinematics(
-    choices: Sequence[Choice],
-    values: FloatArray,
-    arm: tuple[Chain, FloatArray],
+    choices: Sequence[Choice], values: FloatArray, arm: tuple[Chain, FloatArray]
 ) -> tuple[Choice, str] | None:
     """Return the choice with which the kinematics agree, and by how much; None if none stands out."""
     robot, q = arm
@@ -187,7 +185,6 @@ def _by_kinematics(
         if best <= CLOSE and second >= CLEARLY * best and second >= best + CLOSE:
             form, units = choices[order[1]]
             said = f"with it the arm's orientation agrees within {np.degrees(best):.2f} deg"
-            return choices[
-                order[0]
-            ], f"{said}, as {form} in {units[0].name} within {np.degrees(second):.2f} deg"
+            said += f", as {form} in {units[0].name} within {np.degrees(second):.2f} deg"
+            return choices[order[0]], said
     return None

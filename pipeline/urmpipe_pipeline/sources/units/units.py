@@ -309,7 +309,6 @@ class UnitFinder:
         said = f"no unit is given for {names}: the {what} are taken as {unit}"
         other, does = OTHER_UNIT[unit], "reads them otherwise"
         turning = (Hint("unit", {"": other}, does),)  # of all joints that turn
-        hints = (
-            turning if unit == "rad" else unit_hints(columns if what == JOINTS else columns[:1], other, does)
-        )
+        some = columns if what == JOINTS else columns[:1]
+        hints = turning if unit == "rad" else unit_hints(some, other, does)
         self._assumed.append(LogWarning("assumed-unit", said, hints=hints))

@@ -11,16 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from asserting import there
-from parallel_arms import (
-    EXACT,
-    UR,
-    WRISTS,
-    apart,
-    assert_every_solution_meets,
-    form_of,
-    poses,
-    random_arm,
-)
+from parallel_arms import EXACT, UR, WRISTS, apart, assert_every_solution_meets, form_of, poses, random_arm
 from urmpipe_models.errors import OptionError
 from urmpipe_models.inverse.closed.parallel_axes import parallel_axes
 from urmpipe_models.inverse.targets import Targets

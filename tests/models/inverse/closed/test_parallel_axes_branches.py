@@ -11,12 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from asserting import there
-from parallel_arms import (
-    WRISTS,
-    form_of,
-    poses,
-    random_arm,
-)
+from parallel_arms import WRISTS, form_of, poses, random_arm
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.targets import Targets, targets_of
@@ -56,10 +51,7 @@ def test_the_limits_that_reasons_tell_are_those_of_the_arm() -> None:
         of_chain = there(screws(chain))
         z, p = of_chain.direction[1], of_chain.point
         upper, fore = (float(np.linalg.norm(np.cross(z, p[k + 1] - p[k]))) for k in (1, 2))
-        bounds = {
-            "from axis 2": (abs(upper - fore), upper + fore),
-            "to axis 4": turned_range(chain),
-        }
+        bounds = {"from axis 2": (abs(upper - fore), upper + fore), "to axis 4": turned_range(chain)}
         _, targets = poses(chain, 100, number)
         texts = set(form_of(chain).solve(targets).reasons.ravel().tolist())
         for text in texts:

@@ -8,13 +8,7 @@ import numpy as np
 import pytest
 from eaik.IK_HP import HPRobot
 
-from parallel_arms import (
-    UR,
-    WRISTS,
-    form_of,
-    poses,
-    random_arm,
-)
+from parallel_arms import UR, WRISTS, form_of, poses, random_arm
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.inverse.targets import Targets
