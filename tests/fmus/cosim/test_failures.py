@@ -151,7 +151,7 @@ def test_a_refused_value_is_told() -> None:
 
 SCRIPT = """
 import sys
-sys.path[:0] = [{fmus!r}, {tests!r}]
+sys.path[:0] = [{fmus!r}, {tests!r}, {shared!r}]
 from foreign_fmus import TROUBLE, planned
 from urmpipe_fmus.cosim import simulate
 plan = planned({{"bad": TROUBLE}}, None, {{"bad": {{"kind": 9}}}}, step=0.01)
@@ -168,7 +168,8 @@ def children(pid: int) -> list[int]:
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_an_fmu_that_hangs_ends_with_who_started_it(how: signal.Signals, tmp_path: Path) -> None:
     tests = Path(__file__).parents[1]
-    script = SCRIPT.format(fmus=str(tests.parents[1] / "fmus"), tests=str(tests))
+    shared = tests.parent / "shared"
+    script = SCRIPT.format(fmus=str(tests.parents[1] / "fmus"), tests=str(tests), shared=str(shared))
     environment = {**os.environ, "TMPDIR": str(tmp_path)}
     with subprocess.Popen(
         [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
