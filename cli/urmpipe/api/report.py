@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING, Any
 from urmpipe.keyword_checks import PathLike, one_or_many, paths, public, refuse_foreign, refuse_others
 from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
-from urmpipe_pipeline import results as registry
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Cell, Value
+from urmpipe_pipeline.results import present, read_recording
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -44,7 +44,7 @@ class Report(Shown):
         """Return one row a compared log and quantity, as `Comparison.to_frame`, for all comparisons in it."""
         import pandas as pd
 
-        shown = (registry.present(one) for one in self.results)
+        shown = (present(one) for one in self.results)
         tables = [one.rows() for one in shown if one.verdict is not None and one.rows is not None]
         frames = [
             pd.DataFrame({one.key: [*map(_plain, one.cells)] for one in table.columns}) for table in tables
@@ -56,9 +56,7 @@ class Report(Shown):
         return {
             "schema": 1,
             "report": str(self.path),
-            "recordings": [
-                {"name": one.name, "verdict": registry.present(one).verdict} for one in self.results
-            ],
+            "recordings": [{"name": one.name, "verdict": present(one).verdict} for one in self.results],
             "figures": [figure.to_dict() for figure in self.figures],
         }
 
@@ -98,7 +96,7 @@ def report(
 
     wanted = None if figures is None else FigureOptions(Path(figures), tuple(one_or_many(formats)))
     given = one_or_many(results)
-    refuse_others("results", given, tuple(kind.cls for kind in registry.KINDS), SHOWN)
+    refuse_others("results", given, (Result,), SHOWN)
     files = [Path(one) for one in given if isinstance(one, (str, Path))]
     refuse_foreign(files)
     reading, writing = _halves(progress)
@@ -106,12 +104,12 @@ def report(
     def read(numbered: tuple[int, PathLike | Result]) -> Result:
         """Return a result, read if it is a recording, and tell how far it is."""
         number, one = numbered
-        found = registry.read_recording(Path(one), lazy=True) if isinstance(one, (str, Path)) else one
+        found = read_recording(Path(one), lazy=True) if isinstance(one, (str, Path)) else one
         reading(number / len(given))
         return found
 
     found = for_each(read, enumerate(given, start=1))
-    shown = [registry.present(one) for one in found]
+    shown = [present(one) for one in found]
     written = write_report(shown, Path(output), [*files, *paths(inputs)], wanted, writing)
     return Report(written.path, tuple(found), written.figures)
 
