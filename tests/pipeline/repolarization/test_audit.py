@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import refusal
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import LogError, OptionError
@@ -152,9 +153,7 @@ def test_a_joint_limited_to_two_turns_is_seen_by_its_jumps() -> None:
 def test_jumps_of_one_and_of_two_turns_in_one_joint_are_asked_for() -> None:
     q = wrap(np.linspace(0.0, 30.0, 600), 2 * FULL_TURN)
     q[300:310] -= FULL_TURN * np.sign(q[300])
-    with pytest.raises(LogError) as error:
-        audit_log(log_of(q))
-    assert str(error.value) == (
+    assert refusal(LogError, audit_log, log_of(q)) == (
         "log, column q1: found 2 steps of about 4 pi and 2 of about 2 pi, allowed: wraps of one"
         ' interval; interval={"q1": (LOW, HIGH)} says which'
     )
@@ -205,9 +204,7 @@ def test_an_interval_holds_for_one_joint_or_for_all_in_the_unit_of_the_file() ->
 def test_intervals_that_make_no_sense_are_refused(
     interval: dict[str, tuple[float, float]], said: str
 ) -> None:
-    with pytest.raises(OptionError) as error:
-        audit_log(log_of(np.zeros(4)), interval=interval)
-    assert str(error.value) == said
+    assert refusal(OptionError, audit_log, log_of(np.zeros(4)), interval=interval) == said
 
 
 def test_a_joint_that_slides_has_no_interval() -> None:
@@ -234,7 +231,7 @@ def odd_log(path: Path) -> Path:
 def test_the_audit_comes_back_from_a_recording(tmp_path: Path) -> None:
     run = ingest_log([odd_log(tmp_path / "a.csv")], read=ReadOptions(unit={"": "rad"}))
     assert [(one.kind, one.row) for one in run.audit] == [("wrap", 21), ("unexplained", 31)]
-    assert read_recording(write_recording(run, tmp_path / "a.rrd")).audit == run.audit  # type: ignore[union-attr]
+    assert read_recording(write_recording(run, tmp_path / "a.rrd")).audit == run.audit  # type: ignore[attr-defined]
 
 
 def test_rates_across_an_unexplained_step_are_left_out(tmp_path: Path) -> None:
