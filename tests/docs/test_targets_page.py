@@ -56,10 +56,7 @@ def test_wrong_rows_have_the_reasons_of_the_page(tmp_path: Path) -> None:
     assert np.isfinite(targets.position).all(axis=1).tolist() == [True, False, False, False, False, True]
 
 
-@pytest.mark.parametrize(
-    "names",
-    ["X_act", "tcp_x", "pos_x", "/pose/position/x"],
-)
+@pytest.mark.parametrize("names", ["X_act", "tcp_x", "pos_x", "/pose/position/x"])
 def test_the_names_of_positions_are_known(tmp_path: Path, names: str) -> None:
     assert names in NAMES
     header = ",".join(f"{names[:-1]}{axis}" if names != "X_act" else f"{axis}_act" for axis in "xyz")

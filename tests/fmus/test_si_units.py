@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from asserting import refusal
 from urmpipe_fmus.si_units import BaseUnit, base_unit, coherent, display_conversion, same_unit
 from urmpipe_fmus.unit import Unit
 from urmpipe_fmus.variable import Input, Output, Parameter
@@ -96,9 +97,7 @@ def test_derived_units_are_the_products_of_which_they_are_made(coherent: str, pr
     ],
 )
 def test_what_is_no_spelling_is_refused_with_what_is_allowed(spelling: str) -> None:
-    with pytest.raises(UnitError) as caught:
-        base_unit(spelling)
-    assert str(caught.value) == str(UnitError(f"unit {spelling!r}: found, {ALLOWED}"))
+    assert refusal(UnitError, base_unit, spelling) == str(UnitError(f"unit {spelling!r}: found, {ALLOWED}"))
 
 
 @pytest.mark.parametrize(
@@ -112,9 +111,7 @@ def test_what_is_no_spelling_is_refused_with_what_is_allowed(spelling: str) -> N
     ],
 )
 def test_what_people_write_is_refused_with_what_it_may_mean(written: str, meant: str) -> None:
-    with pytest.raises(UnitError) as caught:
-        base_unit(written)
-    assert str(caught.value) == (
+    assert refusal(UnitError, base_unit, written) == (
         f"unit {written!r}: found (did you mean {meant}?), allowed: FMI's spelling, a dot between factors and"
         " powers as digits, such as N.m, kg.m2, rad/s2"
     )

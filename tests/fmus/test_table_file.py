@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from asserting import refusal
 from urmpipe_fmus.table import Table
 from urmpipe_fmus.table_file import read_table, table_bytes
 from urmpipe_models.errors import FmuError
@@ -37,9 +38,7 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
 
     def said_of(changed: bytes) -> str:
         path.write_bytes(changed)
-        with pytest.raises(FmuError) as error:
-            read_table(path)
-        return str(error.value).removeprefix(f"{path}: ")
+        return refusal(FmuError, read_table, path).removeprefix(f"{path}: ")
 
     assert said_of(b"t,q\n1,2\n") == "found another kind of file, allowed: a table of urmpipe"
     assert said_of(content[:-1]) == "found version 1, 63 bytes, allowed: version 1, 64 bytes"
@@ -51,6 +50,4 @@ def test_other_files_are_refused(tmp_path: Path) -> None:
         "table: the time of row 2 is not after the one before; allowed: rising times"
     )
     path.unlink()
-    with pytest.raises(FmuError) as error:
-        read_table(path)
-    assert str(error.value) == f"{path}: cannot be read: No such file or directory"
+    assert refusal(FmuError, read_table, path) == f"{path}: cannot be read: No such file or directory"

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import refusal
 from urmpipe_models.chains.urm import urm_chain
 from urmpipe_models.errors import UrmpipeError
 from urmpipe_models.kinematics.forward import positions_over_log
@@ -34,9 +35,7 @@ def wrong(read: Callable[..., object], tmp_path: Path) -> Callable[..., list[str
     """Read a file that must be refused, and return what is said, one line a finding."""
 
     def wrong(*args: object, **options: object) -> list[str]:
-        with pytest.raises(UrmpipeError) as caught:
-            read(*args, **options)
-        return str(caught.value).replace(f"{tmp_path}/", "").split("\n")
+        return refusal(UrmpipeError, read, *args, **options).replace(f"{tmp_path}/", "").split("\n")
 
     return wrong
 

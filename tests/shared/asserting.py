@@ -2,12 +2,25 @@
 
 from __future__ import annotations
 
-from typing import TypeVar
+from collections.abc import Callable
+from typing import ParamSpec, TypeVar
+
+import pytest
 
 Item = TypeVar("Item")
+Given = ParamSpec("Given")
 
 
 def there(value: Item | None) -> Item:
     """A value that must be there."""
     assert value is not None
     return value
+
+
+def refusal(
+    kind: type[Exception], work: Callable[Given, object], *args: Given.args, **options: Given.kwargs
+) -> str:
+    """What a call says that must be refused."""
+    with pytest.raises(kind) as error:
+        work(*args, **options)
+    return str(error.value)

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from asserting import refusal
 from random_units import PATIENT, random_columns, random_starts, random_units
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
@@ -74,9 +75,7 @@ def test_outputs_are_columns_and_inputs_that_are_not_given_stay_at_their_start()
     ],
 )
 def test_what_does_not_fit_is_refused(t: Any, inputs: Any, start: Any, said: str) -> None:
-    with pytest.raises(UnitError) as error:
-        run(gain(), np.array(t), inputs, start)
-    assert str(error.value) == f"unit gain: {said}"
+    assert refusal(UnitError, run, gain(), np.array(t), inputs, start) == f"unit gain: {said}"
 
 
 def test_a_memory_makes_each_sample_wait_for_the_one_before() -> None:

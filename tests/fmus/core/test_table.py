@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from asserting import refusal
 from urmpipe_fmus.table import Table
 from urmpipe_models.errors import UnitError
 
@@ -123,16 +124,12 @@ def test_a_table_keeps_its_own_rows() -> None:
     ],
 )
 def test_what_is_no_table_is_refused(t_ns: list[object], values: list[object], said: list[str]) -> None:
-    with pytest.raises(UnitError) as error:
-        Table(np.array(t_ns), np.array(values, dtype=np.float64))
-    assert str(error.value).splitlines() == said
+    assert refusal(UnitError, Table, np.array(t_ns), np.array(values, dtype=np.float64)).splitlines() == said
 
 
 def test_times_may_go_from_the_first_to_the_last_of_64_bits_and_not_beyond() -> None:
     ends = [-(2**63), 2**63 - 1]
     assert Table(np.array(ends), np.zeros((2, 1))).t_ns.tolist() == ends
-    with pytest.raises(UnitError) as error:
-        Table(np.array([2**63], dtype=np.uint64), np.zeros((1, 1)))
-    assert str(error.value) == (
+    assert refusal(UnitError, Table, np.array([2**63], dtype=np.uint64), np.zeros((1, 1))) == (
         "table: found a time of 9223372036854775808 ns, allowed: 9223372036854775807 ns"
     )

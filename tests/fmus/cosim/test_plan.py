@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asserting import refusal
 from foreign_fmus import COUNTER, INTEGRATOR, TROUBLE, Foreign, Scalar, fmu, fmu_of, gain, planned, system
 from urmpipe_fmus.cosim import LogColumn, LogInput, Port, prepare
 from urmpipe_fmus.cosim.interface import read_interface
@@ -260,9 +261,9 @@ def test_what_is_no_fmu_for_cosimulation_is_told(tmp_path: Path) -> None:
     broken = tmp_path / "broken.fmu"
     broken.write_bytes(b"PK")
     blocks = system({"a": gain(), "b": gain()})
-    with pytest.raises(CosimulationError) as caught:
-        prepare(blocks, lambda block: broken if block.name == "a" else fmu(gain()))
-    assert str(caught.value).splitlines() == [
+    assert refusal(
+        CosimulationError, prepare, blocks, lambda block: broken if block.name == "a" else fmu(gain())
+    ).splitlines() == [
         f"blocks.a: {broken}: cannot be read as an FMU: File is not a zip file",
         f"blocks.b: found inputs without a source: u; {ALLOWED}",
     ]
@@ -308,9 +309,7 @@ def test_an_fmu_of_fmi_3_is_told(tmp_path: Path) -> None:
             ' causality="independent" variability="continuous"/></ModelVariables><ModelStructure/>'
             "</fmiModelDescription>",
         )
-    with pytest.raises(CosimulationError) as caught:
-        prepare(system({"a": gain()}), lambda block: other)
-    assert str(caught.value) == (
+    assert refusal(CosimulationError, prepare, system({"a": gain()}), lambda block: other) == (
         f"blocks.a: {other}: found FMI 3.0 for coSimulation, allowed: FMI 2.0 for coSimulation"
     )
 

@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
+from asserting import refusal
 from urmpipe_fmus.archive import content_guid, write_fmu
 from urmpipe_models.errors import FmuError
 
@@ -50,9 +51,7 @@ def test_where_nothing_can_be_written_an_error_names_the_file_and_the_cause(
 ) -> None:
     (tmp_path / "file").write_text("")
     path = tmp_path / place
-    with pytest.raises(FmuError) as caught:
-        write_fmu(path, FILES)
-    assert str(caught.value) == f"{path}: cannot be written: {why}"
+    assert refusal(FmuError, write_fmu, path, FILES) == f"{path}: cannot be written: {why}"
     assert [one.name for one in tmp_path.iterdir()] == ["file"]
 
 

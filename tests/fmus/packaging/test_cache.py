@@ -12,6 +12,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import refusal
 from loaded_fmu import Loaded
 from urmpipe_fmus.cache import _key, cache_folder, cached_fmu
 from urmpipe_fmus.table import Table
@@ -155,9 +156,7 @@ def test_a_user_without_a_home_is_told_to_name_a_folder(
     for name in ("URMPIPE_CACHE", "XDG_CACHE_HOME", "HOME"):
         monkeypatch.delenv(name, raising=False)
     monkeypatch.setattr(pwd, "getpwuid", {}.__getitem__)  # raises KeyError, as for a user of no entry
-    with pytest.raises(FmuError) as caught:
-        cached_fmu(make("arm"), "python")
-    assert str(caught.value) == (
+    assert refusal(FmuError, cached_fmu, make("arm"), "python") == (
         "cache of FMUs: found no home folder, allowed: a folder that the variable URMPIPE_CACHE names"
     )
 
@@ -167,9 +166,7 @@ def test_a_cache_that_cannot_be_written_is_an_error_that_names_the_variable(
 ) -> None:
     (tmp_path / "file").write_text("")
     monkeypatch.setenv("URMPIPE_CACHE", str(tmp_path / "file"))
-    with pytest.raises(FmuError) as caught:
-        cached_fmu(make("arm"), "python")
-    assert str(caught.value) == (
+    assert refusal(FmuError, cached_fmu, make("arm"), "python") == (
         f"{tmp_path / 'file' / 'fmus'}: cannot be written: Not a directory; the variable URMPIPE_CACHE names"
         " another place"
     )

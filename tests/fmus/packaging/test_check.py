@@ -14,6 +14,7 @@ from pathlib import Path
 
 import pytest
 
+from asserting import refusal
 from urmpipe_fmus import check
 from urmpipe_fmus.archive import write_fmu
 from urmpipe_fmus.build import build_fmu
@@ -244,9 +245,7 @@ def test_fmus_of_other_kinds_are_refused_with_what_is_allowed(
     make: Make, tmp_path: Path, old: str, new: str, said: str
 ) -> None:
     path = changed(built(make("arm"), tmp_path), old, new)
-    with pytest.raises(FmuError) as caught:
-        check_fmu(path)
-    assert str(caught.value) == f"{path}: {said}"
+    assert refusal(FmuError, check_fmu, path) == f"{path}: {said}"
 
 
 def test_files_that_are_no_fmus_are_refused_with_their_name(make: Make, tmp_path: Path) -> None:
@@ -262,12 +261,8 @@ def test_files_that_are_no_fmus_are_refused_with_their_name(make: Make, tmp_path
         (text, f"found no zip, as an FMU is one{allowed}"),
         (empty, f"found a zip without modelDescription.xml{allowed}"),
     ):
-        with pytest.raises(FmuError) as caught:
-            check_fmu(path)
-        assert str(caught.value) == f"{path}: {said}"
-    with pytest.raises(FmuError) as caught:
-        check_fmu(broken)
-    first, _, last = str(caught.value).rpartition("; ")
+        assert refusal(FmuError, check_fmu, path) == f"{path}: {said}"
+    first, _, last = refusal(FmuError, check_fmu, broken).rpartition("; ")
     assert first.startswith(f"{broken}: modelDescription.xml cannot be read: no element found: line")
     assert last == "allowed: XML as FMI 2.0 has it"
 
@@ -277,6 +272,4 @@ def test_a_damaged_fmu_is_refused_with_its_name(make: Make, tmp_path: Path) -> N
     content = bytearray(path.read_bytes())
     content[2000:60000] = bytes(58000)  # in the first entry, a binary
     path.write_bytes(content)
-    with pytest.raises(FmuError) as caught:
-        check_fmu(path)
-    assert str(caught.value).startswith(f"{path}: cannot be extracted: ")
+    assert refusal(FmuError, check_fmu, path).startswith(f"{path}: cannot be extracted: ")

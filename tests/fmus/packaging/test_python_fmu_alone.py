@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from asserting import refusal
 from loaded_fmu import Loaded
 from urmpipe_fmus.build import build_fmu
 from urmpipe_fmus.instance import Instance
@@ -147,9 +148,7 @@ def test_a_thousand_instances_leave_no_memory_behind_but_what_pythonfmu_loses(
 
 
 def test_a_unit_without_a_recipe_is_refused(make: Make, tmp_path: Path) -> None:
-    with pytest.raises(UnitError) as caught:
-        built(replace(make("spring"), recipe=Recipe()), tmp_path)
-    assert str(caught.value) == (
+    assert refusal(UnitError, built, replace(make("spring"), recipe=Recipe()), tmp_path) == (
         "unit spring: found no recipe to make it again, allowed for a Python FMU: a unit of urmpipe's or of a"
         " file of its own; a native FMU needs none"
     )
@@ -166,9 +165,7 @@ def test_a_recipe_that_makes_another_unit_is_refused(make: Make, tmp_path: Path)
 def test_a_file_that_imports_what_an_fmu_does_not_bring_is_refused(make: Make, tmp_path: Path) -> None:
     unit = make("spring")
     source = f"import scipy.signal\nfrom helper import x\n{unit.recipe.source}"
-    with pytest.raises(UnitError) as caught:
-        built(replace(unit, recipe=replace(unit.recipe, source=source)), tmp_path)
-    assert str(caught.value) == (
+    assert refusal(UnitError, built, replace(unit, recipe=replace(unit.recipe, source=source)), tmp_path) == (
         "unit spring: found imports of helper, helper.x, scipy.signal in spring.py, allowed in a Python FMU:"
         " the standard library, numpy, urmpipe_datasets, urmpipe_fmus, urmpipe_models"
     )
@@ -182,9 +179,7 @@ def test_a_file_that_reads_another_beside_it_is_refused(
     (tmp_path / "gain.txt").write_text("2.0", encoding="ascii")
     (tmp_path / "spring.py").write_text(text, encoding="utf-8")
     monkeypatch.chdir(tmp_path)
-    with pytest.raises(UnitError) as caught:
-        built(load_unit_file("spring.py"), tmp_path)
-    assert str(caught.value) == (
+    assert refusal(UnitError, built, load_unit_file("spring.py"), tmp_path) == (
         "unit spring: found FileNotFoundError: [Errno 2] No such file or directory: '<FMU>/gain.txt' when"
         " made again from its recipe, allowed in a Python FMU: a recipe that needs nothing else; a native FMU"
         " holds what was read"

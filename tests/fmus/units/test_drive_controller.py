@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from asserting import refusal
 from urmpipe_fmus.instance import Instance
 from urmpipe_fmus.run import run
 from urmpipe_fmus.units import make_unit
@@ -114,8 +115,6 @@ def test_the_period_is_fixed_once_it_runs_and_cannot_be_0() -> None:
         "unit drive_controller: period: found 0, allowed: 9.9999999999999995e-07 to inf"
     )
     instance.do_step(0.0, 5e-3)
-    with pytest.raises(UnitError) as error:
-        put(instance, "period", 1e-3)
-    assert str(error.value) == (
+    assert refusal(UnitError, put, instance, "period", 1e-3) == (
         "unit drive_controller: period: set while it runs, allowed: a fixed parameter before the first step"
     )

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from asserting import refusal
 from urmpipe_fmus.dependencies import TIME, Dependencies
 from urmpipe_fmus.run import run
 from urmpipe_fmus.table import Table
@@ -64,9 +65,7 @@ def test_the_columns_are_outputs_by_the_callers_names_that_depend_on_time() -> N
     ],
 )
 def test_columns_that_do_not_fit_are_refused(columns: Any, said: str) -> None:
-    with pytest.raises(UnitError) as error:
-        log_source(LOG, columns)
-    assert str(error.value) == f"unit log_source: {said}"
+    assert refusal(UnitError, log_source, LOG, columns) == f"unit log_source: {said}"
 
 
 def test_the_deviation_is_reference_less_actual_and_its_flag_is_of_each_axis() -> None:

@@ -13,6 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import DrawFn, SearchStrategy
 
+from asserting import refusal
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.chains.visual import Box, Capsule, Cylinder, Mesh, Shape, Sphere, Visual, mesh_file
 from urmpipe_models.errors import RobotError
@@ -122,9 +123,7 @@ def test_what_is_wrong_with_a_visual_is_said_with_its_line(tmp_path: Path) -> No
         ["<robot name='r'><link name='b'>", *wrong, "</link><link name='e'/>", joint, "</robot>"]
     )
     path = arm(tmp_path, text)
-    with pytest.raises(RobotError) as caught:
-        read_urdf(path)
-    assert str(caught.value).replace(str(path), "arm.urdf").splitlines() == [
+    assert refusal(RobotError, read_urdf, path).replace(str(path), "arm.urdf").splitlines() == [
         "arm.urdf:2: link b: visual: found no shape; allowed: one of box, cylinder, capsule, sphere, mesh",
         "arm.urdf:3: link b: visual: box size: found '1 1', expected three numbers",
         "arm.urdf:4: link b: visual: found plane; allowed: one of box, cylinder, capsule, sphere, mesh",
@@ -299,6 +298,4 @@ def test_a_mesh_of_a_robot_file_is_looked_up_from_it(tmp_path: Path) -> None:
     ],
 )
 def test_what_no_shape_can_have_is_refused(visual: Visual, said: str) -> None:
-    with pytest.raises(RobotError) as error:
-        Chain("arm", (Joint("j"),), visuals=(visual,))
-    assert str(error.value) == f"robot arm: {said}"
+    assert refusal(RobotError, Chain, "arm", (Joint("j"),), visuals=(visual,)) == f"robot arm: {said}"

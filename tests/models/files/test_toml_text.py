@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from asserting import refusal
 from urmpipe_models.errors import OptionError
 from urmpipe_models.files.toml_text import parse_toml, toml_lines, toml_text
 
@@ -68,8 +69,6 @@ def test_what_cannot_be_read_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyP
         ("a.toml", "a.toml: byte 5 is no UTF-8; allowed: TOML in UTF-8"),
         ("b.toml", "b.toml: cannot be read: No such file or directory"),
     ):
-        with pytest.raises(OptionError) as caught:
-            parse_toml(Path(name), OptionError)
-        assert str(caught.value) == said
+        assert refusal(OptionError, parse_toml, Path(name), OptionError) == said
     Path("a.toml").write_bytes(b"\xef\xbb\xbfa = 1")  # with a byte order mark, as Windows writes it
     assert parse_toml(Path("a.toml"), OptionError) == {"a": 1}

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from asserting import there
+from asserting import refusal, there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
@@ -320,9 +320,7 @@ def test_everything_wrong_with_the_options_is_told_at_once() -> None:
 
 
 def test_a_closed_form_needs_poses() -> None:
-    with pytest.raises(OptionError) as caught:
-        solve(load_robot("ur5e"), Targets(np.zeros((1, 3))), method="closed")
-    assert str(caught.value) == (
+    assert refusal(OptionError, solve, load_robot("ur5e"), Targets(np.zeros((1, 3))), method="closed") == (
         "method: positions with any orientation have no closed form, allowed: closed for poses;"
         ' method="iterative" searches'
     )
@@ -340,6 +338,4 @@ def test_a_closed_form_needs_poses() -> None:
     ],
 )
 def test_targets_of_another_shape_are_refused(targets: Targets, text: str) -> None:
-    with pytest.raises(OptionError) as caught:
-        solve(load_robot("ur5e"), targets)
-    assert str(caught.value) == text
+    assert refusal(OptionError, solve, load_robot("ur5e"), targets) == text

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from asserting import refusal
 from urmpipe_models.chains.articulated_6r import articulated_6r
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.chains.dh import DHRow, dh_chain, modified_dh_chain
@@ -31,9 +32,7 @@ def robot(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def complaint(read: Any, text: str) -> list[str]:
-    with pytest.raises(RobotError) as caught:
-        read(text)
-    return str(caught.value).splitlines()
+    return refusal(RobotError, read, text).splitlines()
 
 
 # --- what a file means -----------------------------------------------------------------------------
@@ -323,6 +322,4 @@ def test_other_bytes_and_missing_files_are_one_line(tmp_path: Path) -> None:
         read_robot_file(path)
     assert str(caught.value) == f"{path}: cannot be read: No such file or directory"
     path.write_bytes("name = 'Ärm'".encode("latin-1"))
-    with pytest.raises(RobotError) as caught:
-        read_robot_file(path)
-    assert str(caught.value) == f"{path}: byte 8 is no UTF-8; allowed: TOML in UTF-8"
+    assert refusal(RobotError, read_robot_file, path) == f"{path}: byte 8 is no UTF-8; allowed: TOML in UTF-8"

@@ -11,6 +11,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.strategies import SearchStrategy
 
+from asserting import refusal
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.errors import RobotError
 from urmpipe_models.robots.robot_file import chain_from_dict, chain_to_dict, read_robot_file, robot_toml
@@ -75,9 +76,7 @@ def test_a_file_with_a_byte_order_mark_is_read(tmp_path: Path) -> None:
 def test_a_dictionary_that_is_wrong_names_its_origin() -> None:
     data = chain_to_dict(Chain("a", (Joint("j"),)))
     data["joints"][0]["kind"] = "helical"
-    with pytest.raises(RobotError) as caught:
-        chain_from_dict(data, file="run.rrd")
-    assert str(caught.value) == (
+    assert refusal(RobotError, chain_from_dict, data, file="run.rrd") == (
         "run.rrd: key joints[0].kind: found 'helical', allowed: one of revolute, prismatic, fixed"
     )
 

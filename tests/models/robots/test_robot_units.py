@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+from asserting import refusal
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import RobotError
 from urmpipe_models.robots.robot_file import read_robot_file
@@ -89,9 +90,7 @@ def test_every_value_of_a_file_is_in_the_units_of_the_file(robot: Read, kind: st
 
 def test_rows_that_make_no_arm_in_metres_and_radians_must_tell_their_units(robot: Read) -> None:
     rows = 'kind = "dh"\njoints = [{ d = 118, alpha = 90 }, { a = 612 }]'
-    with pytest.raises(RobotError) as caught:
-        robot(rows)
-    assert str(caught.value).splitlines() == [
+    assert refusal(RobotError, robot, rows).splitlines() == [
         'arm.toml: key length_unit: found none, and links of 730 m, allowed: "mm", or "m" if so meant',
         'arm.toml: key angle_unit: found none, and 90 rad, allowed: "deg", or "rad" if so meant',
     ]
@@ -115,7 +114,5 @@ def test_units_are_asked_for_beyond_a_hundred_metres_and_beyond_a_turn(
     if told is None:
         assert len(robot(rows).coordinates) == 1
     else:
-        with pytest.raises(RobotError) as caught:
-            robot(rows)
-        (said,) = str(caught.value).splitlines()
+        (said,) = refusal(RobotError, robot, rows).splitlines()
         assert said.startswith(f"arm.toml: {told}, allowed: ")

@@ -8,6 +8,7 @@ from typing import Any
 
 import pytest
 
+from asserting import refusal
 from urmpipe_models.chains.chain import Chain, Joint, Mimic
 from urmpipe_models.errors import RobotError
 from urmpipe_models.kinematics.frames import joint_values
@@ -46,9 +47,7 @@ def urdf(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Any:
 
 
 def complaint(read: Any, text: str, **options: str) -> list[str]:
-    with pytest.raises(RobotError) as caught:
-        read(text, **options)
-    return str(caught.value).splitlines()
+    return refusal(RobotError, read, text, **options).splitlines()
 
 
 def test_every_kind_of_joint_is_read(urdf: Any) -> None:

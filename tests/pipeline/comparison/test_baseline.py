@@ -13,7 +13,7 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 
-from asserting import there
+from asserting import refusal, there
 from made_runs import off
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import OptionError
@@ -263,9 +263,7 @@ def test_a_noise_is_of_all_lengths_or_of_kinds() -> None:
     with pytest.raises(OptionError) as error:
         parse_noise("lots,angle=-1")
     assert str(error.value) == (f"noise: found 'lots', {allowed}\nnoise: found 'angle=-1', {allowed}")
-    with pytest.raises(OptionError) as error:
-        complete_noise({"axis": -1.0})
-    assert str(error.value) == (
+    assert refusal(OptionError, complete_noise, {"axis": -1.0}) == (
         "noise: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in rad"
         " (m of a joint that slides); 0 or positive"
     )

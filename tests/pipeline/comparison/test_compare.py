@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asserting import there
+from asserting import refusal, there
 from made_runs import TSP, URM6, path_run, run_of
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.chains.visual import Mesh, Visual
@@ -130,9 +130,7 @@ def test_an_estimate_that_is_not_certain_is_told(q: FloatArray) -> None:
 def test_one_log_alone_has_one_clock(q: FloatArray) -> None:
     log = run_of(q, recorded=positions_over_log(URM6, q))
     for sync in ("auto", 0.25):
-        with pytest.raises(OptionError) as error:
-            compare_recorded(log, CompareOptions(sync=sync))
-        assert str(error.value) == (
+        assert refusal(OptionError, compare_recorded, log, CompareOptions(sync=sync)) == (
             f"sync: found {sync} for one log, allowed: start, since its joints and its recorded tool centre"
             " point stand in the same rows"
         )
@@ -207,9 +205,7 @@ def test_what_is_lacking_is_named(q: FloatArray) -> None:
     with pytest.raises(LogError) as error:
         compare_runs(wanted, [run_of(q)], CompareOptions(sync=99.0))
     assert str(error.value) == "log.csv: no sample in common with path (time offset 99.0 s)"
-    with pytest.raises(OptionError) as option_error:
-        CompareOptions({"axis": -1.0})
-    assert str(option_error.value) == (
+    assert refusal(OptionError, CompareOptions, {"axis": -1.0}) == (
         "tolerance: found axis=-1.0, allowed: numbers of axis, x, y, z, norm, path in m, of angle, joint in"
         " rad (m of a joint that slides); positive"
     )

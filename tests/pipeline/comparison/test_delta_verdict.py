@@ -9,7 +9,7 @@ import pytest
 from hypothesis import assume, given
 from hypothesis import strategies as st
 
-from asserting import there
+from asserting import refusal, there
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.delta import delta as model_delta
 from urmpipe_models.errors import OptionError
@@ -85,9 +85,7 @@ def test_without_a_sample_there_is_no_verdict() -> None:
     ],
 )
 def test_what_is_no_tolerance_is_refused(tolerance: dict[str, float], message: str) -> None:
-    with pytest.raises(OptionError) as caught:
-        delta_verdict("meter", T_NS, DELTA, tolerance)
-    assert str(caught.value) == message
+    assert refusal(OptionError, delta_verdict, "meter", T_NS, DELTA, tolerance) == message
 
 
 def length(delta: FloatArray) -> FloatArray:

@@ -13,7 +13,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from asserting import there
+from asserting import refusal, there
 from made_runs import off
 from urmpipe_models.errors import Finding, LogError, OutputError
 from urmpipe_pipeline.comparison.baseline import against_baseline
@@ -219,9 +219,7 @@ def test_a_junit_file_of_ours_is_replaced_and_no_other(paths: Compared, tmp_path
     for _ in range(2):
         written(paths({"a": off(0.0, 5)}), path)
     path.write_text('<?xml version="1.0" encoding="UTF-8"?>\n<testsuites/>\n')
-    with pytest.raises(OutputError) as error:
-        written(paths({"a": off(0.0, 5)}), path)
-    assert str(error.value) == (
+    assert refusal(OutputError, written, paths({"a": off(0.0, 5)}), path) == (
         f"{path}: found a file that is no JUnit file of urmpipe's, allowed: a new name,"
         " or such a JUnit file to replace"
     )

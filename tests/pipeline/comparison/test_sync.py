@@ -10,7 +10,7 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from asserting import there
+from asserting import refusal, there
 from urmpipe_datasets import LOGS
 from urmpipe_models.arrays import FloatArray
 from urmpipe_models.errors import LogError
@@ -82,9 +82,7 @@ def rotation(seed: int) -> FloatArray:
 
 
 def refused(reference: Trajectory, log: Trajectory, align: AlignMode = "none") -> str:
-    with pytest.raises(LogError) as error:
-        synchronise(reference, log, "auto", align)
-    return str(error.value)
+    return refusal(LogError, synchronise, reference, log, "auto", align)
 
 
 def shared(q: Motion, wanted: FloatArray, done: FloatArray) -> float:

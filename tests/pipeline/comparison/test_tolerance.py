@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from asserting import refusal
 from urmpipe_models.errors import OptionError
 from urmpipe_models.measure_units import DEGREE
 from urmpipe_pipeline.comparison.tolerance import UNITS, allowed_for, check_tolerance, parse_tolerance
@@ -84,9 +85,7 @@ def test_a_degree_is_that_of_pi() -> None:
     ],
 )
 def test_what_is_no_tolerance_is_one_line(part: str, said: str) -> None:
-    with pytest.raises(OptionError) as error:
-        parse_tolerance(part)
-    assert str(error.value) == f"tolerance: found {said}, {ALLOWED}"
+    assert refusal(OptionError, parse_tolerance, part) == f"tolerance: found {said}, {ALLOWED}"
 
 
 def test_an_angle_alone_and_a_decimal_comma_are_told_how_to_be_written() -> None:
@@ -126,9 +125,7 @@ def test_a_tolerance_in_numbers_is_checked_whole() -> None:
         f"tolerance: found {found}, {NUMBERS}; positive"
         for found in ("foo=1.0", "axis=0.0", "norm=nan", "path=1mm")
     ]
-    with pytest.raises(OptionError) as error:
-        check_tolerance({})
-    assert str(error.value) == f"tolerance: found nothing, {NUMBERS}"
+    assert refusal(OptionError, check_tolerance, {}) == f"tolerance: found nothing, {NUMBERS}"
 
 
 def test_a_coordinate_goes_before_the_axes_and_a_joint_of_that_name_does_not() -> None:

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from asserting import refusal
 from urmpipe_models.errors import CosimulationError
 from urmpipe_pipeline.simulations.simulation import Arm, Signal, Simulation, extremes
 
@@ -72,9 +73,7 @@ def test_one_that_failed_at_once_has_no_sample(make_simulation: MakeSimulation) 
 def test_a_signal_is_found_by_its_name(make_simulation: MakeSimulation) -> None:
     simulation = make_simulation(3)
     assert simulation.signal("chain.p7") is simulation.signals[1]
-    with pytest.raises(CosimulationError) as caught:
-        simulation.signal("chain.p8")
-    assert str(caught.value) == (
+    assert refusal(CosimulationError, simulation.signal, "chain.p8") == (
         "chain.p8: found as a signal, allowed: log.q, chain.p7, meter.delta, meter.norm,"
         " meter.out_of_tolerance"
     )

@@ -176,11 +176,7 @@ def test_gaps(read: Read) -> None:
     times = np.cumsum([0, *[0.01] * 10, 0.031, *[0.01] * 5, 5.0, *[0.01] * 3])
     log = read(clocked("t", *(f"{time:.3f}" for time in times)))
     assert [(w.kind, w.row, w.message) for w in log.warnings if w.kind == "gap"] == [
-        (
-            "gap",
-            12,
-            "2 gaps: 0.031 s pass before this row, 5 s before row 18; the median period is 0.01 s",
-        ),
+        ("gap", 12, "2 gaps: 0.031 s pass before this row, 5 s before row 18; the median period is 0.01 s")
     ]
     one = next(w for w in read(clocked("t", "0", "0.1", "0.2", "0.9", "1.0")).warnings if w.kind == "gap")
     assert (one.row, one.message) == (4, "0.7 s pass before this row; the median period is 0.1 s")

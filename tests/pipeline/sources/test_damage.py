@@ -60,11 +60,7 @@ OPTIONS = [
         ReadOptions(source="coppeliasim"),
         ReadOptions(time="1"),
     ),
-    *(
-        ReadOptions(joints=("2", "3")),
-        ReadOptions(unit={"": "deg"}),
-        ReadOptions(delimiter=";", decimal=","),
-    ),
+    *(ReadOptions(joints=("2", "3")), ReadOptions(unit={"": "deg"}), ReadOptions(delimiter=";", decimal=",")),
 ]
 ROBOTS = [None, *(Chain("arm", tuple(Joint(f"j{k}") for k in range(count))) for count in (1, 2))]
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import refusal
 from urmpipe_models.errors import OptionError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import LogMap, ReadOptions, map_of, read_log, read_map
@@ -135,9 +136,7 @@ sign = 2
 form = "zyy"
 position = "x"
 """
-    with pytest.raises(OptionError) as caught:
-        read_map(write(text, "lab.toml"))
-    said = str(caught.value).replace(f"{tmp_path}/", "")
+    said = refusal(OptionError, read_map, write(text, "lab.toml")).replace(f"{tmp_path}/", "")
     assert said.split("\n") == [
         "lab.toml: key joints[0].column: found nothing, allowed: a text",
         "lab.toml: key joints[0].sign: found 2, allowed: 1 or -1",

@@ -123,10 +123,7 @@ def test_rx_ry_rz_without_a_robot_are_not_guessed(read: Read) -> None:
     log = read(text([*JOINTS_RAD, *XYZ, "rx", "ry", "rz"], Q, POSITION * 1e3, ROTATION.as_rotvec()))
     assert (log.tcp_rotation, log.rotation_form) == (None, None)
     assert [(w.kind, w.message) for w in log.warnings] == [
-        (
-            "orientation",
-            "rx, ry, rz may be of several forms: the recorded orientation is not used",
-        )
+        ("orientation", "rx, ry, rz may be of several forms: the recorded orientation is not used")
     ]
     assert "rx" not in log.units
 

@@ -102,8 +102,7 @@ def test_epoch_in_seconds(arm: Arm) -> None:
     assert log.q[0].tolist() == [0.7116998434066772, 0.006745942402631044]
     assert kinds(log.warnings) == ["assumed-unit"]
     with pytest.raises(
-        LogError,
-        match=r"found 2 joint columns \(joint1, joint2\) and none with number 3, 4, 5, 6, ",
+        LogError, match=r"found 2 joint columns \(joint1, joint2\) and none with number 3, 4, 5, 6, "
     ):
         read_log([path], robot=arm(6))
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import refusal
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.sources import ReadOptions, read_log
@@ -61,9 +62,7 @@ def test_numbers_of_the_columns_come_before_those_of_the_files(write: Write) -> 
 
 def test_a_plot_that_is_missing_between_others_is_an_error(write: Write, arm: Arm, tmp_path: Path) -> None:
     files = [write(plot(VALUES[1], n=n), f"joint{n}.csv") for n in (1, 2, 4)]
-    with pytest.raises(LogError) as caught:
-        read_log(files)
-    assert str(caught.value) == (
+    assert refusal(LogError, read_log, files) == (
         f"{tmp_path}: found plots with the numbers 1, 2, 4 and none with 3, allowed: a plot for each joint;"
         " add the missing one; joints=[A, B, C] names the joint columns, in the robot's order"
     )
@@ -84,9 +83,7 @@ def test_a_folder_of_several_logs_is_told_as_such(
     texts: tuple[str, str], joints: int | None, write: Write, arm: Arm, tmp_path: Path
 ) -> None:
     files = [write(text, f"{day}.csv") for day, text in zip(("monday", "tuesday"), texts, strict=True)]
-    with pytest.raises(LogError) as caught:
-        read_log(files, robot=arm(joints) if joints else None)
-    assert str(caught.value) == (
+    assert refusal(LogError, read_log, files, robot=arm(joints) if joints else None) == (
         f"{tmp_path}: found 2 logs, each with joints of its own (monday.csv, tuesday.csv),"
         " allowed: one log, or its plots with one joint a file; name the logs one by one"
     )
@@ -132,9 +129,7 @@ def test_degrees_are_the_default_of_the_source(write: Write) -> None:
 def test_differing_times_are_an_error(files: list[Path], write: Write, tmp_path: Path) -> None:
     write(files[2].read_text().replace("0,01;", "0,015;"), "joint2.csv")
     write("\n".join(files[1].read_text().split("\n")[:-2]), "joint10.csv")
-    with pytest.raises(LogError) as caught:
-        read_log(files)
-    assert str(caught.value).replace(f"{tmp_path}/", "").split("\n") == [
+    assert refusal(LogError, read_log, files).replace(f"{tmp_path}/", "").split("\n") == [
         "joint2.csv:3, column Time (sec): found 0.015 s, allowed: 0.01 s, as in joint1: the tables of one log"
         " share their times",
         "joint10.csv: found 2 rows, allowed: 3, as in joint1: the tables of one log share their times",

@@ -190,9 +190,7 @@ WRONG = [
     # the samples
     Wrong("repeated_samples", [r"(?=.*(repeat|same|held))(?=.*(40 ms|0\.04 s|\b4\b|\b36\b))"], stops=False),
     Wrong(
-        "outlier_first_sample",
-        [r"(?=.*q1)(?=.*(row 1\b|first))(?=.*(outlier|0\.7117|jump))"],
-        stops=False,
+        "outlier_first_sample", [r"(?=.*q1)(?=.*(row 1\b|first))(?=.*(outlier|0\.7117|jump))"], stops=False
     ),
     Wrong("impossible_speed", [r"(?=.*q2)(?=.*(row 1[45]))(?=.*rad/s)"], "ur5e", stops=False),
     Wrong("beyond_limits", [r"(?=.*q3)(?=.*limit)(?=.*(6\.28|360))"], "ur5e", stops=False),
@@ -208,8 +206,7 @@ WRONG = [
     Wrong("header_with_a_name_twice", [r"^log:1, column q3: found as columns 4, 5, allowed: once"]),
     Wrong("header_with_all_names_twice", [r"^log:1, column q1: found as columns 2, 8, allowed: once"]),
     Wrong(
-        "header_without_a_number",
-        [r"^log: found joint columns .* none with number 3, allowed: .*joints="],
+        "header_without_a_number", [r"^log: found joint columns .* none with number 3, allowed: .*joints="]
     ),
     Wrong("header_of_unknown_unit", [r"^log, column q1 \[gon\]: found the unit 'gon', allowed: rad, deg"]),
     Wrong("rows_too_short", [r"^log:8: found 6 cells, allowed: 7", r"^log:20: found 6 cells"]),
@@ -233,10 +230,7 @@ WRONG = [
     Wrong("header_says_mm", [r"(?=.*\bx\b)(?=.*\bmm\b)(?=.*\bm\b)"], "ur5e", None),
     Wrong("tcp_of_another_order", [r"(?=.*(TCP|tool))(?=.*\d (mm|m)\b)"], "ur5e", None),
     Wrong(
-        "quaternion_of_no_length",
-        [r"(?=.*\bqw?\b|.*quaternion)(?=.*(length|norm))(?=.*0\.5)"],
-        "ur5e",
-        None,
+        "quaternion_of_no_length", [r"(?=.*\bqw?\b|.*quaternion)(?=.*(length|norm))(?=.*0\.5)"], "ur5e", None
     ),
 ]
 

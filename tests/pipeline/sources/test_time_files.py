@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from asserting import refusal
 from urmpipe_models.errors import LogError
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import ReadOptions, read_log
@@ -86,9 +87,7 @@ def test_what_is_wrong_with_the_times_is_told(write: Write) -> None:
 
 def test_two_clocks_are_one_too_many(write: Write) -> None:
     joints, clock = write("t,q1,q2\n0,1,2\n1,2,3\n", "q.csv"), write("0\n0.005\n", "time.csv")
-    with pytest.raises(LogError) as caught:
-        read(joints, clock)
-    assert str(caught.value) == (
+    assert refusal(LogError, read, joints, clock) == (
         f"{joints}:1, column t: found a time here and in time.csv, allowed: one clock;"
         " time=COLUMN says which column"
     )

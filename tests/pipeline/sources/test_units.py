@@ -92,9 +92,7 @@ def test_rates_follow_their_joints_unless_they_say_their_own_unit(read: Read) ->
 def test_units_given_by_the_user(read: Read, wrong: Wrong, arm: Arm) -> None:
     text = "t,q1,q2,q3\n0,30,0.5,5\n600,31,0.5,5\n"
     log = read(
-        text,
-        arm(3, "revolute", "revolute", "prismatic"),
-        unit={"": "deg", "t": "ms", "2": "rad", "q3": "mm"},
+        text, arm(3, "revolute", "revolute", "prismatic"), unit={"": "deg", "t": "ms", "2": "rad", "q3": "mm"}
     )
     assert log.q[0].tolist() == [30.0, 0.5 * DEG, 0.005]
     assert log.period == 0.6

@@ -15,6 +15,7 @@ from pyarrow.csv import read_csv
 from scipy.io import loadmat
 from scipy.spatial.transform import Rotation
 
+from asserting import refusal
 from exported import export_result
 from urmpipe_models.errors import OptionError, RecordingError
 from urmpipe_models.kinematics.forward import poses_over_log
@@ -122,9 +123,7 @@ def test_each_of_two_arms_leaves_in_its_own_file(make_simulation: MakeSimulation
 
 def test_without_an_arm_there_is_no_trajectory(make_simulation: MakeSimulation, tmp_path: Path) -> None:
     simulation = replace(make_simulation(5), arms=())
-    with pytest.raises(RecordingError) as caught:
-        export_result(simulation, tmp_path / "a.tum", ExportOptions("tum"))
-    assert str(caught.value) == (
+    assert refusal(RecordingError, export_result, simulation, tmp_path / "a.tum", ExportOptions("tum")) == (
         'log-to-delta: no block of kinematics, so no pose; to="csv" writes its signals'
     )
     assert list(tmp_path.iterdir()) == []
@@ -140,6 +139,4 @@ def test_without_an_arm_there_is_no_trajectory(make_simulation: MakeSimulation, 
 def test_what_only_a_run_has_is_refused(
     make_simulation: MakeSimulation, tmp_path: Path, options: ExportOptions, message: str
 ) -> None:
-    with pytest.raises(OptionError) as caught:
-        export_result(make_simulation(5), tmp_path / "a", options)
-    assert str(caught.value) == message
+    assert refusal(OptionError, export_result, make_simulation(5), tmp_path / "a", options) == message
