@@ -179,7 +179,7 @@ def test_a_window_opens_at_the_worst_sample_for_this_computer_only_and_closes_by
     state = state_of(port, views=5)
     (shown,) = state.recordings
     assert (shown.current_timeline, shown.current_time) == ("t", round(decided["t_max"] * 1e9))
-    assert "delta = path - matlab [mm]" in {found.name for found in state.views}
+    assert "delta = reference - log [mm]" in {found.name for found in state.views}
     view.send_signal(signal.SIGINT)
     assert view.communicate(timeout=PATIENCE) == ("", "Closed.\n")
     assert view.returncode == 0
