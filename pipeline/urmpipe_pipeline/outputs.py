@@ -49,7 +49,7 @@ AUDIT_COLUMNS = ("joint", "row", "t", "kind", "step", "from", "to")
 GENERATOR = re.compile(rb"<meta\s+name=\"generator\"\s+content=\"urmpipe\b", re.IGNORECASE)
 """How a report of ours tells where it comes from."""
 
-MAP_HEADER = "# How urmpipe reads these logs: urmpipe ingest LOG --map THIS"
+MAP_HEADER = "# How urmpipe reads these logs: urmpipe ingest LOG --log-map THIS"
 """The first line of a map of ours."""
 
 STATISTICS_HEADER = "run,sync_offset,quantity,kind,unit,max,"

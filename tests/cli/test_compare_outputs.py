@@ -184,8 +184,8 @@ def test_a_quiet_failure_says_why_in_one_place(capsys: Captured, flags: tuple[st
     out, err = capsys.readouterr()
     assert bool(out) == ("--json" in flags)
     said = "FAIL  bad out of tolerance against wanted, by the joints on both sides"
-    assert err.startswith(f"{said}\n      |Δ")
-    assert err.count("\n") == 2
+    assert err.startswith(f"{said}\n      Furthest out: bad\n      Decided by: |Δ")
+    assert all(line.startswith("      ") for line in err.splitlines()[1:])
 
 
 def test_a_path_held_against_a_log_is_not_said_to_have_joints(capsys: Captured) -> None:

@@ -174,7 +174,8 @@ def test_no_row_that_is_a_target(capsys: Captured, folder: Path) -> None:
 def test_a_closed_form_that_there_is_not(capsys: Captured) -> None:
     assert refused(capsys, "targets.csv", "--robot", "urm6", "--method", "closed") == [
         "error: --method: robot urm6 has no closed form, allowed: closed for six joints whose last three"
-        " axes meet in a point or whose axes 2, 3 and 4 are parallel, exactly or nearly; --method iterative searches"
+        " axes meet in a point or whose axes 2, 3 and 4 are parallel, exactly or nearly;"
+        " --method iterative searches"
     ]
     assert refused(capsys, "targets.csv", "--robot", "urm6", "--method", "closed", "--tsp", "1") == [
         "error: --method: found closed with a path of urm6 that has no closed form, allowed: auto"

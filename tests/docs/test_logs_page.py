@@ -54,6 +54,13 @@ def kinds(path: Path) -> Iterator[str]:
         for target in node.targets
         if isinstance(target, ast.Name)
     }
+    for line in tree.body:
+        if isinstance(line, ast.ImportFrom) and (line.module or "").startswith("urmpipe"):
+            module = import_module(line.module or "")
+            taken = {one.asname or one.name: getattr(module, one.name, None) for one in line.names}
+            constants |= {
+                name: ast.Constant(value) for name, value in taken.items() if isinstance(value, str)
+            }
     for node in ast.walk(tree):
         if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "LogWarning":
             named = [keyword.value for keyword in node.keywords if keyword.arg == "kind"]

@@ -12,7 +12,7 @@ from urmpipe_models.display import Shown, line_of, number_of
 from urmpipe_models.errors import for_each
 from urmpipe_pipeline.presentation.result import Result
 from urmpipe_pipeline.presentation.section import Cell, Value
-from urmpipe_pipeline.results import KINDS, present, read_recording
+from urmpipe_pipeline.results import present, read_recording
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -96,7 +96,7 @@ def report(
 
     wanted = None if figures is None else FigureOptions(Path(figures), tuple(one_or_many(formats)))
     given = one_or_many(results)
-    refuse_others("results", given, tuple(kind.cls for kind in KINDS), SHOWN)
+    refuse_others("results", given, (Result,), SHOWN)
     files = [Path(one) for one in given if isinstance(one, (str, Path))]
     refuse_foreign(files)
     reading, writing = _halves(progress)

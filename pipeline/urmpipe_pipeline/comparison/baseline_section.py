@@ -92,11 +92,16 @@ def _pair(one: Change, name: Worse) -> tuple[Value, Value]:
     return Value(before, unit, now if told else None), Value(now, unit, before if told else None)
 
 
-def _facts(found: BaselineComparison) -> Iterator[Fact]:
-    yield Fact("Since then", since_words(found))
+def worse_facts(found: BaselineComparison) -> Iterator[Fact]:
+    """Yield what decides against a baseline: how much is worse, and what."""
+    yield Fact("Since the baseline", since_words(found))
     worse = [f"{symbol(one.now)} of {one.run} ({_words(one.worse)})" for one in found.worse]
     yield Fact("Worse", _listed(worse))
     yield Fact("Gone", _listed(list(map(str, found.gone))))
+
+
+def _facts(found: BaselineComparison) -> Iterator[Fact]:
+    yield from worse_facts(found)
     yield Fact("New", _listed(list(map(str, found.new))))
     units = {"angle": "rad", "joint": "rad"}
     noise = (f"{kind} {text.allowed(value, units.get(kind, 'm'))}" for kind, value in found.noise.items())

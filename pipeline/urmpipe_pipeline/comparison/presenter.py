@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from functools import partial
 
 from urmpipe_pipeline import text
-from urmpipe_pipeline.comparison.baseline_section import baseline_section
+from urmpipe_pipeline.comparison.baseline_section import baseline_section, worse_facts
 from urmpipe_pipeline.comparison.checks import log_checks, log_properties
 from urmpipe_pipeline.comparison.comparison import Comparison
 from urmpipe_pipeline.comparison.deviation import Deviation
@@ -46,9 +46,14 @@ def present(result: Comparison) -> Presentation:
 
 
 def _against(result: Comparison) -> tuple[Fact, ...]:
-    """Return what was the reference and what is allowed, of joints in the units of those compared."""
+    """Return what is worse than a baseline, what the reference was and what is allowed.
+
+    That of joints is in the units of those compared.
+    """
     units = {held.unit for one in result.runs for held in one.joint_statistics.values()}
+    since = result.baseline
     return (
+        *(worse_facts(since) if since is not None and since.verdict == "fail" else ()),
         Fact("Reference", result.reference.name, brief=False),
         Fact("Tolerance", tolerance_words(result.tolerance, units or {"rad"}), brief=False),
     )

@@ -1,33 +1,15 @@
-"""What every export tells about itself, as far as its format can hold it, and which files tell it."""
+"""What every export tells about itself, as far as its format can hold it."""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from pathlib import Path
 from typing import Any
 
 from urmpipe_pipeline.json_values import json_ready
 
 MARK = "urmpipe export"
 """Stands in every file that can hold it; only such a file is replaced."""
-
-HEAD = 128
-"""The mark of a MAT or TUM file stands within so many bytes of its start."""
-
-PARQUET = b"PAR1"
-"""Every Parquet file starts so."""
-
-
-def is_export(path: Path) -> bool:
-    """Tell whether a file is a MAT, TUM or Parquet file that urmpipe exported."""
-    with path.open("rb") as file:
-        head = file.read(HEAD)
-    if head.startswith(PARQUET):
-        from urmpipe_pipeline.tables.parquet_file import is_ours
-
-        return is_ours(path)
-    return MARK.encode() in head and head.startswith((b"# ", b"MATLAB 5.0"))
 
 
 def described(about: Mapping[str, Any], rows: str) -> dict[str, Any]:

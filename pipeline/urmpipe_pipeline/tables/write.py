@@ -18,13 +18,29 @@ from urmpipe_pipeline.outputs import guarded_output, know_own
 from urmpipe_pipeline.presentation.exports import Exports, ExportTable, Poses
 from urmpipe_pipeline.tables.lines import write_csv, write_tum
 from urmpipe_pipeline.tables.mat_file import write_mat
-from urmpipe_pipeline.tables.metadata import as_json, described, is_export
+from urmpipe_pipeline.tables.metadata import MARK, as_json, described
 from urmpipe_pipeline.tables.options import ExportOptions, Format
-from urmpipe_pipeline.tables.parquet_file import write_parquet
+from urmpipe_pipeline.tables.parquet_file import is_ours, write_parquet
 from urmpipe_pipeline.text import unique
 
 if TYPE_CHECKING:
     import pandas as pd
+
+HEAD = 128
+"""The mark of a MAT or TUM file stands within so many bytes of its start."""
+
+PARQUET = b"PAR1"
+"""Every Parquet file starts so."""
+
+
+def is_export(path: Path) -> bool:
+    """Tell whether a file is a MAT, TUM or Parquet file that urmpipe exported."""
+    with path.open("rb") as file:
+        head = file.read(HEAD)
+    if head.startswith(PARQUET):
+        return is_ours(path)
+    return MARK.encode() in head and head.startswith((b"# ", b"MATLAB 5.0"))
+
 
 know_own("export", is_export)
 

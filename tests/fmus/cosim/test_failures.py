@@ -150,11 +150,9 @@ def test_a_refused_value_is_told() -> None:
 
 
 SCRIPT = """
-import sys
-sys.path[:0] = [{fmus!r}, {tests!r}]
 from foreign_fmus import TROUBLE, planned
 from urmpipe_fmus.cosim import simulate
-plan = planned({{"bad": TROUBLE}}, None, {{"bad": {{"kind": 9}}}}, step=0.01)
+plan = planned({"bad": TROUBLE}, None, {"bad": {"kind": 9}}, step=0.01)
 simulate(plan, progress=lambda share: print(share, flush=True))
 """
 
@@ -167,11 +165,9 @@ def children(pid: int) -> list[int]:
 @pytest.mark.skipif(sys.platform != "linux", reason="looks for the child in /proc")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_an_fmu_that_hangs_ends_with_who_started_it(how: signal.Signals, tmp_path: Path) -> None:
-    tests = Path(__file__).parents[1]
-    script = SCRIPT.format(fmus=str(tests.parents[1] / "fmus"), tests=str(tests))
-    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    environment = {**os.environ, "TMPDIR": str(tmp_path), "PYTHONPATH": os.pathsep.join(sys.path)}
     with subprocess.Popen(
-        [sys.executable, "-c", script], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
+        [sys.executable, "-c", SCRIPT], stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, env=environment
     ) as one:
         while not there(one.stdout).readline().startswith(b"0.05"):
             assert one.poll() is None

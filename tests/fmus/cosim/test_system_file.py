@@ -225,7 +225,7 @@ def places_of_faults(path: Path, text: str) -> list[tuple[str | None, int | None
     with pytest.raises(CosimulationError) as caught:
         load_system(path)
     assert {one.file for one in caught.value.findings} == {str(path)}
-    return [(one.about, one.line) for one in caught.value.findings]
+    return [(one.about or "", one.line) for one in caught.value.findings]
 
 
 def test_what_is_wrong_is_told_with_its_line(tmp_path: Path) -> None:

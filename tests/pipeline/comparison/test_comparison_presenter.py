@@ -169,7 +169,7 @@ def test_the_plots_are_the_deviation_with_what_is_allowed(arms: Compared) -> Non
         held = one.statistics[axis]
         np.testing.assert_array_equal(panel.lines[0].values, one.delta[:, i])
         assert (panel.limit, panel.unit, panel.signed) == (held.tolerance, "m", axis != "norm")
-        assert abs(panel.lines[0].values[panel.peaks[0]]) == held.max
+        assert abs(panel.lines[0].values[:][panel.peaks[0]]) == held.max
     assert path.panels[0].lines[0].values is one.path
     assert angle.panels[0].lines[0].values is one.angle
     np.testing.assert_array_equal(joints.views[0].panels[0].lines[0].values, np.asarray(one.joint_delta))

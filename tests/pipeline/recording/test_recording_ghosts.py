@@ -25,6 +25,7 @@ from urmpipe_models.orientation import matrices
 from urmpipe_models.robots.catalogue import load_robot
 from urmpipe_models.robots.urdf_reader import read_urdf
 from urmpipe_pipeline.palette import GHOST_COLOURS, rgb, run_colour
+from urmpipe_pipeline.presentation.figure import Figure
 from urmpipe_pipeline.presentation.scene import Arm
 from urmpipe_pipeline.recording.store import ROW, TIME, Store
 from urmpipe_pipeline.recording.views.geometry import (
@@ -324,7 +325,8 @@ def test_single_poses_stand_on_rows_alone(make_solved: MakeSolved, tmp_path: Pat
 def test_what_is_shown_of_targets_without_times_has_no_line_and_no_speed(make_solved: MakeSolved) -> None:
     """A line from one pose to the next would look like a motion."""
     for timed, speeds in ((True, 5), (False, 0)):
-        views = [view for figure in present(make_solved(timed=timed)).body.figures() for view in figure.views]
+        figures = present(make_solved(timed=timed)).body.figures()
+        views = [view for figure in figures if isinstance(figure, Figure) for view in figure.views]
         units = [panel.unit for view in views for panel in view.panels]
         assert sum("/s" in unit for unit in units) == speeds
         lines = [line for view in views for panel in view.panels for line in panel.lines]

@@ -19,6 +19,7 @@ from urmpipe_pipeline.repolarization.audit import LISTED, Audited, audit_log
 from urmpipe_pipeline.results import read_recording, write_recording
 from urmpipe_pipeline.runs.derivatives import Method, derivatives
 from urmpipe_pipeline.runs.ingest import ingest_log
+from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.sources import ReadOptions
 
 MS = 1_000_000
@@ -231,7 +232,9 @@ def odd_log(path: Path) -> Path:
 def test_the_audit_comes_back_from_a_recording(tmp_path: Path) -> None:
     run = ingest_log([odd_log(tmp_path / "a.csv")], read=ReadOptions(unit={"": "rad"}))
     assert [(one.kind, one.row) for one in run.audit] == [("wrap", 21), ("unexplained", 31)]
-    assert read_recording(write_recording(run, tmp_path / "a.rrd")).audit == run.audit  # type: ignore[attr-defined]
+    read = read_recording(write_recording(run, tmp_path / "a.rrd"))
+    assert isinstance(read, Run)
+    assert read.audit == run.audit
 
 
 def test_rates_across_an_unexplained_step_are_left_out(tmp_path: Path) -> None:

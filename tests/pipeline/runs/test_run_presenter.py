@@ -94,7 +94,7 @@ def test_what_is_doubtful_is_a_cross(run: Run) -> None:
 def test_the_motion_is_that_of_the_kinematics(run: Run, shown: Presentation) -> None:
     assert run.tcp is not None
     (speed,) = (
-        view.panels[0].lines[0].values for view in figure(shown, "Speed of the tool centre point").views
+        view.panels[0].lines[0].values[:] for view in figure(shown, "Speed of the tool centre point").views
     )
     # Summed in another order than the norm: one rounding of each square.
     np.testing.assert_allclose(speed, np.linalg.norm(run.tcp.velocity, axis=1), rtol=1e-15, atol=0)
@@ -104,7 +104,7 @@ def test_the_motion_is_that_of_the_kinematics(run: Run, shown: Presentation) -> 
         ("TCP velocity", run.tcp.velocity), ("TCP acceleration", run.tcp.acceleration),
     ):  # fmt: skip
         assert panels[name].lines[0].values is values
-    angles = panels["TCP rz, ry, rx"].lines[0].values
+    angles = panels["TCP rz, ry, rx"].lines[0].values[:]
     assert np.abs(np.diff(angles, axis=0)).max() < np.pi  # none jumps
 
 

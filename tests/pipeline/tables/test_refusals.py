@@ -20,8 +20,7 @@ from urmpipe_pipeline.presentation.exports import Times
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.tables import FORMATS, ExportOptions, Format, format_of, lines, mat_file, parquet_file
 from urmpipe_pipeline.tables.lines import differences, texts, write_lines
-from urmpipe_pipeline.tables.metadata import is_export
-from urmpipe_pipeline.tables.write import write_all
+from urmpipe_pipeline.tables.write import is_export, write_all
 
 
 def said(kind: type[UrmpipeError], work: Callable[[], Any]) -> str:
