@@ -144,13 +144,7 @@ def know_own(kind: OutputKind, is_ours: Callable[[Path], bool]) -> None:
 
 
 def refuse_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
-    """Raise an `OutputError` if an output may not be written there: for who works long before it writes.
-
-    Args:
-        path: Where the output should stand.
-        inputs: The files it is made from; those that are no files are passed over.
-        kind: What it is: only another one of the same kind is replaced.
-    """
+    """Raise an `OutputError` if an output may not be written there: for who works long before it writes."""
     if kind == "recording" and not _is_text(path):
         said = "found a name that is no UTF-8 text, which Rerun cannot open, allowed: one that is"
         raise OutputError(Finding(said, str(path)))

@@ -76,9 +76,6 @@ def mean_rates(view: View) -> Rates | None:
 
     Revolute and prismatic joints count alike at 1 rad/s and 1 m/s: an arm is about 1 m long.
 
-    Args:
-        view: The channels.
-
     Returns:
         The rates; None if a side has fewer than three samples, or is too short for a period of the other.
     """

@@ -72,11 +72,6 @@ def refine(view: View, found: Rates, peak: Peak) -> Estimate:
     In each step reference(t_log + offset) = log(t_log) + constant + rate * step is solved for the step by
     least squares, with one constant a channel, a turn where frames may be turned, and a tool where one is
     not known. The rates are those of the coarse stage, whose noise has little to do with that of a sample.
-
-    Args:
-        view: The channels.
-        found: Their rates.
-        peak: Where to begin.
     """
     offset_ns = float(peak.offset_ns)
     for _ in range(STEPS):

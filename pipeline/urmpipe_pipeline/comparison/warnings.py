@@ -46,10 +46,6 @@ def left_out_warnings(one: Deviation, reference: Trajectory) -> Iterator[LogWarn
     Samples that an offset moves beyond the reference's time are what `sync` asks for; they are told apart
     from those that lack a value, lie in a gap, or come after a reference that started together with the log.
     A part of the reference that was not judged is told however the clocks were put together.
-
-    Args:
-        one: The deviation of the log.
-        reference: What was asked for, whole.
     """
     samples, whole = one.left_out + len(one.sample), len(reference.t_ns)
     beyond = _beyond(one, reference) if one.sync.offset else 0
@@ -84,11 +80,7 @@ def _beyond(one: Deviation, reference: Trajectory) -> int:
 
 
 def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
-    """Yield what a verdict on a log rests on, where that is little: missing values, or one pose.
-
-    Args:
-        one: The deviation of the log.
-    """
+    """Yield what a verdict on a log rests on, where that is little: missing values, or one pose."""
     for found in one.all_statistics:
         if found.tolerance is not None and found.missing:
             said = f"{found.quantity}: judged at {found.samples} of {len(one.sample)} compared samples"

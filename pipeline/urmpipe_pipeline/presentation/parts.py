@@ -62,16 +62,7 @@ def table_of(
     brief: bool = False,
     folded: bool = False,
 ) -> Table:
-    """Return a table of rows.
-
-    Args:
-        title: Its heading.
-        heads: Title of each column by its key.
-        rows: One cell a column.
-        note: A line under it.
-        brief: Whether it is shown where there is little room.
-        folded: Whether a page opens it only on request.
-    """
+    """Return a table of rows, a cell a column; the titles of the columns stand by their keys."""
     cells = list(rows)
     columns = (Column(key, head, [row[i] for row in cells]) for i, (key, head) in enumerate(heads.items()))
     return Table(title, tuple(columns), note, brief, folded)

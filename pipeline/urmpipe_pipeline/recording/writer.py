@@ -94,14 +94,7 @@ def _stream_into(part: Path) -> Iterator[RecordingStream]:
 def _send(
     stream: RecordingStream, folder: Path, encoded: Encoded, progress: Callable[[float], None] | None
 ) -> None:
-    """Send the arrays in slices, those with a row to verify first: reading back then need not read all.
-
-    Args:
-        stream: Where to.
-        folder: Where its file stands.
-        encoded: The arrays.
-        progress: Told the share that is sent.
-    """
+    """Send the arrays in slices, those with a row to verify first: reading back then need not read all."""
     total = sum(column.rows for column in encoded.columns)
     done = 0
     slices = [(column, start) for column in encoded.columns for start in _starts(column.rows)]

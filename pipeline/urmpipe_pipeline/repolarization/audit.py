@@ -140,10 +140,6 @@ def _repolarized(
 def turning(log: JointLog, robot: Chain | None) -> NDArray[np.bool_]:
     """Tell which joints turn, by the robot or else by the unit of their columns; the others slide.
 
-    Args:
-        log: The log.
-        robot: The arm, or None.
-
     Returns:
         Shape (joints,).
     """

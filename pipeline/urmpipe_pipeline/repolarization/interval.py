@@ -36,11 +36,6 @@ SHOWN_SLACK = 0.01
 def check_interval(name: str, low: float, high: float) -> Interval:
     """Return an interval that makes sense.
 
-    Args:
-        name: The joint, or empty for all.
-        low: Its low end.
-        high: Its high end.
-
     Raises:
         OptionError: If it has no positive, finite width.
     """

@@ -71,12 +71,7 @@ class FigureFile:
 
 
 def figure_stem(title: str, part: str) -> str:
-    """Return the name of a figure's file: its part's and its own, in a-z, 0-9 and hyphens.
-
-    Args:
-        title: The figure's heading.
-        part: The heading of its part.
-    """
+    """Return the name of a figure's file: its part's and its own, in a-z, 0-9 and hyphens."""
     return "-".join(name for name in map(_plain_name, (part, title)) if name) or "figure"
 
 

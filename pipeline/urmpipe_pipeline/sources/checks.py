@@ -51,11 +51,7 @@ def trimmed(numbers: Numbers) -> Numbers:
 
 
 def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
-    """Return the numbers without the rows that could not be read, and a warning for each of these.
-
-    Args:
-        numbers: What was read, `may_skip` it.
-    """
+    """Return the numbers without the rows that could not be read, and a warning for each of these."""
     if not numbers.unread:
         return numbers, []
     rows = np.delete(np.arange(len(numbers.values)), sorted(numbers.unread))
@@ -84,11 +80,7 @@ def may_skip(numbers: Numbers) -> bool:
 
 
 def rebuilt(numbers: Numbers) -> Numbers:
-    """Return the numbers, with a regular clock where the file's is too coarse for its rows.
-
-    Args:
-        numbers: What was read of a table, its times that of the file.
-    """
+    """Return the numbers, with a regular clock where the file's is too coarse for its rows."""
     times = numbers.clock
     if times is None or times.min(initial=0) <= UNREADABLE:
         return numbers
@@ -108,12 +100,6 @@ def rebuilt(numbers: Numbers) -> Numbers:
 
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
     """Return everything that is wrong with the rows of a table, in the order of its lines.
-
-    Args:
-        layout: The table.
-        numbers: What was read of it.
-        names: Names of the columns of numbers.values, as the file has them.
-        clock: Its clock.
 
     Returns:
         The first findings, and one that counts the others.
@@ -203,12 +189,7 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
 
 
 def unknown_times(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
-    """Yield row and column where a row has no time, or one that cannot be read.
-
-    Args:
-        numbers: What was read of a table, its times that of the file.
-        clock: Its clock.
-    """
+    """Yield row and column where a row has no time, or one that cannot be read."""
     if numbers.clock is None or not clock.columns:
         return
     name = clock.columns[0].header

@@ -52,11 +52,6 @@ def span_with_numbers(low: float, high: float, most: int = TALL) -> tuple[float,
 
     The viewer writes powers of ten: the multiples of the largest one in the range where they are few, else
     those of the next. So the longer side of a range whose multiples are many is drawn out to that.
-
-    Args:
-        low: Least value.
-        high: Largest value.
-        most: Multiples that the height has room for.
     """
     low, high = min(low, 0.0), max(high, 0.0)
     longest = max(-low, high)

@@ -149,13 +149,7 @@ def _plots(plots: Plots, parts: Sequence[_Part]) -> View | Container | None:
 
 
 def _rows(plots: Plots, part: _Part, about: str = "") -> list[Row]:
-    """Return the figures of a section from top to bottom; the events share the row of the last.
-
-    Args:
-        plots: Sends them.
-        part: The section, with at least one figure.
-        about: What stands before the names of the plots.
-    """
+    """Return the figures of a section from top to bottom; the events share the row of the last."""
     rows: list[Row] = []
     last: list[View | Container] = [_events(plots, part)] if part.events else []
     height = sum(one.share * (len(one.views) if one.opened is None else 1) for one in part.figures)

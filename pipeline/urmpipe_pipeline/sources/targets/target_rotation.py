@@ -43,12 +43,6 @@ def target_form(
     rz, ry, rx are angles about the moving axes Z, Y, X; a header in the order rx, ry, rz may also mean a
     rotation vector, as UR writes: it is taken as the angles, with a warning.
 
-    Args:
-        roles: The columns of the poses.
-        columns: All columns of the file without its clock.
-        file: The file, for errors.
-        options: What the user says: the columns of the position, the form.
-
     Raises:
         LogError: If only a part of an orientation is there, its form cannot be told, or it is told of none.
     """

@@ -85,11 +85,7 @@ def fit(robot: Chain, q: FloatArray, recorded: FloatArray) -> Fit | None:
 
 
 def single_out(fits: Mapping[Key, Fit]) -> tuple[Key, bool] | None:
-    """Return the only explanation that agrees with the recorded points, and whether it needs a tool.
-
-    Args:
-        fits: How near each explanation comes.
-    """
+    """Return the only explanation that agrees with the recorded points, and whether it needs a tool."""
     for needs_tool, close in ((False, CLOSE), (True, CLOSE_WITH_TOOL)):
         ranked = sorted(
             (one.with_tool if needs_tool else one.distance, k) for k, one in enumerate(fits.values())

@@ -127,10 +127,6 @@ class UnitFinder:
     def rotations(self, columns: Sequence[Column], forms: Sequence[RotationForm]) -> list[Unit | None]:
         """Return the units that the columns of a recorded orientation tell, None where they do not.
 
-        Args:
-            columns: The columns.
-            forms: The forms that it may have: only angles have a unit.
-
         Raises:
             LogError: If a unit is not known or is none of an angle.
         """
