@@ -52,11 +52,7 @@ class Matched:
     alignment: Alignment
 
     def at(self, kept: NDArray[np.intp]) -> Matched:
-        """Return both sides at some of these samples alone; the others are left out.
-
-        Args:
-            kept: Indices of the samples [-], shape (k,).
-        """
+        """Return both sides at some of these samples alone, by their indices [-], shape (k,)."""
         values = ((one.name, getattr(self, one.name)) for one in fields(self))
         some: dict[str, Any] = {name: array[kept] for name, array in values if isinstance(array, np.ndarray)}
         return replace(self, **some, left_out=self.left_out + len(self.sample) - len(kept))

@@ -74,10 +74,8 @@ class Peak:
 def mean_rates(view: View) -> Rates | None:
     """Return the rates of both sides, over the shortest period that shows the motion and not the noise.
 
-    Revolute and prismatic joints count alike at 1 rad/s and 1 m/s: an arm is about 1 m long.
-
-    Returns:
-        The rates; None if a side has fewer than three samples, or is too short for a period of the other.
+    Revolute and prismatic joints count alike at 1 rad/s and 1 m/s: an arm is about 1 m long. None if a side
+    has fewer than three samples, or is too short for a period of the other.
     """
     sides = ((view.reference_ns, view.reference), (view.log_ns, view.log))
     if min(len(t_ns) for t_ns, _ in sides) < 3:
@@ -213,8 +211,7 @@ def _over_lags(a: FloatArray, b: FloatArray, turned: bool) -> FloatArray:
 def _turned_products(crossed: FloatArray) -> FloatArray:
     """Return the largest sum of products a . R b over all rotations R: s1 + s2 + sign(det H) s3.
 
-    Args:
-        crossed: H = sum(a b^T), shape (n, 3, 3).
+    H is sum(a b^T), shape (n, 3, 3).
 
     Source: Kabsch, W.: A solution for the best rotation to relate two sets of vectors, 1976.
     """

@@ -105,11 +105,7 @@ def _extent(values: FloatArray) -> float:
 
 
 def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
-    """Yield a warning for each tolerance that hardly anybody means.
-
-    Args:
-        tolerance: In [m] or [rad], by kind or coordinate, of numbers that were given without a unit.
-    """
+    """Yield a warning for each tolerance in [m] or [rad], given without a unit, that hardly anybody means."""
     for kind, value in tolerance.items():
         unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
         if value > most:

@@ -108,11 +108,7 @@ def minute(provenance: Provenance) -> str:
 
 
 def ends(position: FloatArray) -> tuple[Spot, ...]:
-    """Return where a path starts and ends.
-
-    Args:
-        position: In [m], shape (n, 3).
-    """
+    """Return where a path in [m], shape (n, 3), starts and ends."""
     known = np.flatnonzero(np.isfinite(position).all(axis=1))
     if not len(known):
         return ()

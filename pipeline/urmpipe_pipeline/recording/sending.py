@@ -76,10 +76,9 @@ class Values:
 
 
 def scalar_column(values: FloatArray) -> ComponentColumn:
-    """Return an array as a column of lists; `Scalars.columns` takes six times as long over it.
+    """Return an array in the unit of its plot, shape (n, k), as a column of lists.
 
-    Args:
-        values: In the unit of their plot, shape (n, k).
+    `Scalars.columns` takes six times as long over it.
     """
     import rerun as rr
 

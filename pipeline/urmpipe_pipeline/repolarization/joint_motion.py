@@ -62,13 +62,9 @@ class JointMotion:
 
 
 def largest_steps(q: FloatArray) -> FloatArray:
-    """Return the largest step of each column from row to row; NaN if a value is missing.
+    """Return the largest step of each column from row to row, shape (joints,); NaN if a value is missing.
 
-    Args:
-        q: In [rad] or [m], shape (n, joints), n > 1.
-
-    Returns:
-        In [rad] or [m], shape (joints,).
+    Steps and q, shape (n, joints), n > 1, are in [rad] or [m].
     """
     blocks = row_blocks(len(q) - 1)
     steps = [over_rows(np.maximum, np.abs(q[1:][block] - q[:-1][block])) for block in blocks]

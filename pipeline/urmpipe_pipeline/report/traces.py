@@ -88,8 +88,7 @@ def line(
 def points_for(t_ns: IntArray | None) -> int:
     """Return how many points a line may have: twice as many where it leaves its course within a few rows.
 
-    Args:
-        t_ns: Times of its rows in [ns], shape (n,); None without times.
+    Its rows are at times in [ns], shape (n,); None without times.
     """
     if t_ns is None or len(t_ns) < 3:
         return POINTS

@@ -152,11 +152,7 @@ def point_name(run: Run) -> str:
 
 
 def coordinates(values: FloatArray) -> Line:
-    """Return x, y and z of something in their colours, by these names in all panels.
-
-    Args:
-        values: In any unit, shape (n, 3).
-    """
+    """Return x, y and z in any unit, shape (n, 3), in their colours, by these names in all panels."""
     return Line(values, tuple("xyz"), COORDINATES)
 
 

@@ -49,11 +49,7 @@ class Grid:
     warnings: tuple[LogWarning, ...]
 
     def resample(self, values: FloatArray) -> FloatArray:
-        """Return values of the rows on the grid, in their unit, shape (g, k): linear, NaN inside gaps.
-
-        Args:
-            values: In any unit, shape (n, k).
-        """
+        """Return values in any unit, shape (n, k), on the grid, shape (g, k): linear, NaN inside gaps."""
         if self.own:
             return values
         return interpolate(self.t_ns, self.source_ns, values)

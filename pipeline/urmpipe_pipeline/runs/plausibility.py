@@ -198,14 +198,9 @@ def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
 
 
 def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
-    """Return the largest speed of each joint: the robot's, else `FASTEST` for one that turns, else inf.
+    """Return the largest speed of each joint in [rad/s] or [m/s], shape (joints,).
 
-    Args:
-        robot: The arm, or None.
-        turning: Which joints turn, shape (joints,).
-
-    Returns:
-        In [rad/s] or [m/s], shape (joints,).
+    It is the robot's, else `FASTEST` for one that turns, shape (joints,), else inf.
     """
     fallback = np.where(turning, FASTEST, np.inf)
     if robot is None:

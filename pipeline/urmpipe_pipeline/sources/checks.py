@@ -101,8 +101,7 @@ def rebuilt(numbers: Numbers) -> Numbers:
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
     """Return everything that is wrong with the rows of a table, in the order of its lines.
 
-    Returns:
-        The first findings, and one that counts the others.
+    These are the first findings, and one that counts the others.
     """
     wrong = [*_clock_errors(numbers, clock), *_infinities(numbers, names)]
     total = numbers.wrong + len(wrong)
@@ -121,8 +120,7 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
 def missing_samples(groups: Iterable[tuple[FloatArray, Sequence[str]]]) -> list[LogWarning]:
     """Return a warning for the columns in which samples are missing, those that lack the same rows together.
 
-    Args:
-        groups: Values of some columns, in any unit, shape (n, columns), and their names.
+    The columns come in groups with their names: values in any unit, shape (n, columns).
     """
     alike: dict[bytes, tuple[BoolArray, list[str]]] = {}
     for values, names in groups:
@@ -249,11 +247,7 @@ def _unusual(values: FloatArray) -> list[int]:
 
 
 def gaps(t_ns: IntArray) -> list[LogWarning]:
-    """Return a warning with each gap between two rows.
-
-    Args:
-        t_ns: Times in [ns], shape (n,).
-    """
+    """Return a warning with each gap between two rows at times in [ns], shape (n,)."""
     places = np.flatnonzero(gaps_behind(t_ns)).tolist()
     if not places:
         return []

@@ -40,11 +40,7 @@ def write_mat(name: str, fields: Mapping[str, Any], path: Path, target: Path) ->
 
 
 def cells(items: Sequence[Any]) -> np.ndarray[tuple[int, int], np.dtype[np.object_]]:
-    """Return items as a row of MATLAB's cells [-], shape (1, n).
-
-    Args:
-        items: n texts, numbers or structs.
-    """
+    """Return n texts, numbers or structs as a row of MATLAB's cells [-], shape (1, n)."""
     row = np.empty((1, len(items)), dtype=object)
     for k, item in enumerate(items):
         row[0, k] = item

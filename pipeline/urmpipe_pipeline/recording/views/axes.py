@@ -32,8 +32,7 @@ def shown_unit(panels: Iterable[Panel]) -> str:
 def whole_axis(figures: Iterable[Figure]) -> tuple[tuple[int, int] | None, bool]:
     """Return the first and the last time of all panels in [ns], without times their first and last row.
 
-    Returns:
-        Both ends, None where nothing is plotted; and whether they are times.
+    None where nothing is plotted; and whether they are times.
     """
     times: list[int] = []
     rows = 0

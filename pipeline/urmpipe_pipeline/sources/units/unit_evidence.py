@@ -74,11 +74,8 @@ def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds |
 def radians_evidence(values: FloatArray) -> str | None:
     """Return why joint values cannot be in deg, or None if they can.
 
-    They cannot if they stay within a turn in rad and wrap by about 2 pi: in deg all these jumps would be of
-    the same six degrees.
-
-    Args:
-        values: Joint values in the file's own units, shape (n, joints).
+    They are in the file's own units, shape (n, joints). They cannot if they stay within a turn in rad and wrap
+    by about 2 pi: in deg all these jumps would be of the same six degrees.
     """
     if peak(values) > math.tau:
         return None
@@ -90,11 +87,7 @@ def radians_evidence(values: FloatArray) -> str | None:
 
 
 def peak(values: FloatArray) -> float:
-    """Return the largest absolute value, missing samples left out; NaN if there is none.
-
-    Args:
-        values: In any unit, which the result has, too, shape (n, columns), n > 0.
-    """
+    """Return the largest absolute value in any unit, shape (n, columns), n > 0; NaN if there is none."""
     largest = max(values.max(), -values.min())
     if np.isnan(largest):  # slower, but deaf to NaN
         largest = max(np.fmax.reduce(values, axis=None), -np.fmin.reduce(values, axis=None))
