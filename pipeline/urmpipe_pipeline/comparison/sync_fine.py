@@ -98,10 +98,7 @@ def _lost(peak: Peak) -> Estimate:
 def line_at(view: View, found: Rates, offset_ns: int) -> Line:
     """Return the equation for a step from an offset, at the samples of the log that both sides have.
 
-    Args:
-        view: The channels.
-        found: Their rates in [rad/s] or [m/s].
-        offset_ns: t_reference - t_log in integer [ns].
+    The rates are in [rad/s] or [m/s], the offset is t_reference - t_log in integer [ns].
     """
     thinned = slice(None, None, -(-len(view.log_ns) // MOST))
     at_ns = view.log_ns[thinned] + offset_ns

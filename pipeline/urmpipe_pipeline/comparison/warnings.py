@@ -123,9 +123,7 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
 def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
     """Yield a warning for each noise that reaches its tolerance: nothing within that can then be worse.
 
-    Args:
-        noise: Changes in [m] or [rad] that mean nothing, of every kind, perhaps of a coordinate.
-        tolerance: In [m] or [rad], by kind or coordinate.
+    The noise is in [m] or [rad], of every kind, perhaps of a coordinate; so is the tolerance.
     """
     for kind, allowed in tolerance.items():
         level = allowed_for(kind, "axis" if kind in AXES else kind, noise)
@@ -147,9 +145,7 @@ def exchanged(reference: Run, runs: Iterable[Run]) -> Iterator[LogWarning]:
 def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
     """Yield a warning if a log that is compared by its joints recorded a tool centre point elsewhere.
 
-    Args:
-        run: The log.
-        allowed: Distance in [m] that is not told.
+    The distance that is allowed is in [m].
     """
     if run.tcp is None or run.tcp_recorded is None:
         return

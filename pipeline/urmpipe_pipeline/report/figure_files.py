@@ -81,13 +81,9 @@ def write_figures(
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[FigureFile, ...]:
-    """Write every figure in every format, all files or none; only figures that urmpipe wrote are replaced.
+    """Write figures, each behind the heading of its part, in every format: all files or none.
 
-    Args:
-        figures: Each behind the heading of its part.
-        options: Where to, and in which formats.
-        inputs: Files that must not be overwritten.
-        progress: Told the share of the files that are drawn, 0..1.
+    Only figures that urmpipe wrote are replaced, never an input. Progress is the share of the files, 0..1.
 
     Raises:
         OutputError: If they may not be written there, or there is nothing to draw them with.

@@ -53,9 +53,7 @@ class Links:
 def drawn_figures(figure: Figure, times: Span) -> Iterator[spec.Figure]:
     """Yield a figure, one for each kind of horizontal axis that its panels have.
 
-    Args:
-        figure: What is drawn.
-        times: From where to where axes of time go, the same for all figures that stand together.
+    Axes of time span the same times in all figures that stand together.
     """
     groups = [(over, list(panels)) for over, panels in groupby(_panels(figure), axis_of)]
     for over, panels in groups:

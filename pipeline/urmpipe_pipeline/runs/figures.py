@@ -107,13 +107,7 @@ def joint_panels(
 
 
 def speed_figure(name: str, t_ns: IntArray, speed: FloatArray | Computed) -> Figure:
-    """Return the speed of a tool centre point over time.
-
-    Args:
-        name: Whose it is.
-        t_ns: Times in [ns], shape (n,).
-        speed: In [m/s], shape (n,).
-    """
+    """Return the speed of a tool centre point in [m/s], shape (n,), over times in [ns], shape (n,)."""
     title = "Speed of the tool centre point"
     panel = Panel("‖v‖", "m/s", (Line(speed, ("speed",), NORM),), t_ns, signed=False)
     alt = f"{title} of {name} over time: the norm of its velocity."

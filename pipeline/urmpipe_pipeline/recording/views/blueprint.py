@@ -57,10 +57,7 @@ def send_views(
 ) -> tuple[Blueprint, Opening]:
     """Send what is there to be looked at of a presentation, and return the layout and where it opens.
 
-    Args:
-        stream: Where to.
-        shown: The presentation.
-        entity_of: Where arrays of the result stand as scalars in their own unit.
+    Where arrays of the result stand as scalars in their own unit, their entities are drawn.
     """
     import rerun as rr
 

@@ -35,8 +35,8 @@ def eye_distance(points: FloatArray) -> float:
 def in_the_picture(points: FloatArray) -> FloatArray:
     """Return where points are in the picture that the eye sees of them: what is nearer is larger.
 
-    Points are in [m], shape (..., 3), NaN where there is none; to the right and upwards of the middle they are
-    in [m], shape (..., 2), as long as in the plane through the middle.
+    Points are in [m], shape (..., 3), NaN where there is none; to the right and upwards of the middle they
+    are in [m], shape (..., 2), as long as in the plane through the middle.
     """
     found = seen(points)
     flat = found.reshape(-1, 3)

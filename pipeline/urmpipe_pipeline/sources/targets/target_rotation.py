@@ -74,14 +74,9 @@ def rotation_units(
 ) -> tuple[list[Unit], list[LogWarning]]:
     """Return the unit of each column of an orientation, rad where none is told, and what was assumed.
 
-    That angles are in rad is the form of targets, and no assumption, unless most of them are beyond a turn
-    or they are called A, B, C as KUKA's, which are in degrees.
-
-    Args:
-        columns: The columns.
-        form: Their form.
-        values: Their finite rows in the file's own units, shape (n, columns).
-        told: The unit that each tells, if it does.
+    That angles are in rad is the form of targets, and no assumption, unless most of them are beyond a turn or
+    they are called A, B, C as KUKA's, which are in degrees. Values are those of finite rows in the file's own
+    units, shape (n, columns).
     """
     if not angles(form):
         return [PURE] * len(columns), []
@@ -100,15 +95,9 @@ def rotation_units(
 def target_rotations(
     columns: Sequence[Column], form: RotationForm, values: FloatArray
 ) -> tuple[FloatArray, dict[int, str]]:
-    """Return the rotation matrices, and what is wrong with rows that hold none.
+    """Return the rotation matrices [-], shape (n, 3, 3), and by index what is wrong with rows that hold none.
 
-    Args:
-        columns: The columns, for messages.
-        form: Their form.
-        values: In [rad] or [-], shape (n, columns); a row with NaN stays NaN and is not told of.
-
-    Returns:
-        [-], shape (n, 3, 3), NaN where there is none, and the reasons by index.
+    Values are in [rad] or [-], shape (n, columns); a row with NaN stays NaN and is not told of.
     """
     names = f"columns {listed(columns)}"
     faults = {row: f"{names}: {said}" for row, said in _no_rotations(values, form)}
