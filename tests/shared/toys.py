@@ -81,7 +81,8 @@ def laid_out(one: Presentation) -> tuple[Blueprint, Opening]:
     """Return the layout of a presentation and where it opens."""
     import rerun as rr
 
-    return send_views(rr.RecordingStream("toy"), one, lambda values, t_ns: None)
+    layout, opening, _ = send_views(rr.RecordingStream("toy"), one, lambda values, t_ns: None)
+    return layout, opening
 
 
 def root_of(one: Presentation) -> Any:

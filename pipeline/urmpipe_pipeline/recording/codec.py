@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,6 +31,15 @@ class Encoded:
     def entity_of(self, array: Any, t_ns: Any = None) -> str:
         """Return the path of an array on some times; empty for one that has no values, which is not kept."""
         return self.entities.get((id(array), id(t_ns)), "")
+
+    def packed(self, rows: int, kept: Container[str]) -> Encoded:
+        """Return it with arrays of more rows packed, but those of some paths: they are not plotted."""
+        columns = tuple(
+            replace(one, plotted=one.plotted and (one.rows <= rows or one.at in kept)) for one in self.columns
+        )
+        plotted = {one.at for one in columns if one.plotted}
+        clocks = {own: clock for own, clock in self.clocks.items() if own in plotted}
+        return replace(self, columns=columns, clocks=clocks)
 
 
 def encode(result: Any) -> Encoded:

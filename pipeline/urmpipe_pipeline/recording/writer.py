@@ -18,7 +18,7 @@ from urmpipe_pipeline.recording.identity import APPLICATION_ID
 from urmpipe_pipeline.recording.store import PROPERTY, SLICE, document
 from urmpipe_pipeline.recording.verify import verified, verify
 from urmpipe_pipeline.recording.views.blueprint import send_views
-from urmpipe_pipeline.recording.views.plots import EntityOf
+from urmpipe_pipeline.recording.views.plots import LONG, EntityOf
 from urmpipe_pipeline.text import encodable
 
 if TYPE_CHECKING:
@@ -48,9 +48,8 @@ def write_result(
     """
     with guarded_output(path, inputs, "recording") as part:
         encoded = _encoded(result, path)
-        metadata = document(kind, encoded.tree, encoded.clocks)
         with _stream_into(part) as stream:
-            _describe(stream, shown, encoded, metadata)
+            encoded, metadata = _described(stream, kind, shown, encoded)
             _send(stream, part.parent, encoded, progress)
         verify(part, path, encoded, metadata)
 
@@ -115,14 +114,23 @@ def _refuse_full_disk(folder: Path) -> None:
         raise OutputError(Finding(f"found less than {SPARE >> 20} MB free on the disk", str(folder)))
 
 
-def _describe(stream: RecordingStream, shown: Presentation, encoded: Encoded, metadata: str) -> None:
-    """Send what is no array: the metadata, and what is there to be looked at with its layout."""
+def _described(
+    stream: RecordingStream, kind: str, shown: Presentation, encoded: Encoded
+) -> tuple[Encoded, str]:
+    """Send what is no array: what is there to be looked at with its layout, and the metadata.
+
+    Returns:
+        The arrays, long ones packed but those that the viewer plots whole; and the metadata.
+    """
     import rerun as rr
 
     stream.send_recording_name(encodable(shown.name))
-    blueprint, opening = send_views(stream, shown, _entities(encoded))
+    blueprint, opening, plotted = send_views(stream, shown, _entities(encoded))
+    packed = encoded.packed(LONG, plotted)
+    metadata = document(kind, packed.tree, packed.clocks)
     stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, **opening._asdict()))
     stream.send_blueprint(blueprint)
+    return packed, metadata
 
 
 def _entities(encoded: Encoded) -> EntityOf:

@@ -243,12 +243,12 @@ def test_rerun_is_not_imported_before_it_is_needed(tmp_path: Path) -> None:
 
 def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp_path: Path) -> None:
     """The first, the middle and the last row of each array, the number of rows, and the metadata."""
-    comparison = make_comparison(("coppeliasim",), rows=70_000)
+    comparison = make_comparison(("coppeliasim",), rows=40_000)
     path = write_recording(comparison, tmp_path / "one.rrd")
     found = encode(comparison)
     metadata = document("comparison", found.tree, found.clocks)
     verify(path, path, found, metadata)
-    altered, rows = [], iter((0, 69_999, 35_000))
+    altered, rows = [], iter((0, 39_999, 20_000))
     for column in found.columns:
         values = column.values.copy()
         if column.at == "/runs/coppeliasim/run/log/q":
@@ -262,10 +262,10 @@ def test_what_reads_back_otherwise_is_named(make_comparison: MakeComparison, tmp
         f"name.rrd: reads back otherwise than written: {one}"
         for one in (
             "the metadata",
-            "/runs/coppeliasim/run/log/q has 70000 rows of 69999",
+            "/runs/coppeliasim/run/log/q has 40000 rows of 39999",
             "/runs/coppeliasim/run/qd in row 1",
-            "/runs/coppeliasim/run/tcp/position in row 70000",
-            "/runs/coppeliasim/delta in row 35001",
+            "/runs/coppeliasim/run/tcp/position in row 40000",
+            "/runs/coppeliasim/delta in row 20001",
         )
     ]
 

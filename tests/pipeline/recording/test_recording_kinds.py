@@ -26,7 +26,7 @@ from urmpipe_pipeline.results import Kind, read_recording, write_recording
 from urmpipe_pipeline.runs.results import Run
 from urmpipe_pipeline.simulations.simulation import Simulation
 
-ROWS = 2 * SLICE + 3
+ROWS = SLICE + 3
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,7 +19,7 @@ from urmpipe_pipeline.presentation.figure import Figure, Mark, Over, Panel, Shap
 from urmpipe_pipeline.recording.views.axes import LOW, MARGIN, TALL, span_with_numbers
 from urmpipe_pipeline.recording.views.plots import COPIED, LONG, ROWS, SHARED_AXIS
 
-SCALARS = "Scalars:scalars"
+SCALARS, PACKED = "Scalars:scalars", "urmpipe:packed"
 
 
 def plots(path: Path) -> set[str]:
@@ -199,7 +199,7 @@ def test_a_long_array_has_an_overview_that_keeps_every_extreme(small: bool, tmp_
     assert {f"{PLOT}/0/0", "/values"} <= set(views(path)["ViewContents:query"])
 
 
-def test_a_long_array_of_a_hidden_view_is_plotted_itself_and_seen_whole(tmp_path: Path) -> None:
+def test_a_long_array_of_a_hidden_view_is_shown_by_its_overview_and_packed(tmp_path: Path) -> None:
     one = toy(rows=LONG + 1)
     values = np.array(one.values)
     values[LONG // 2, 0], values[-1, 1], values[7, 0] = np.nan, 9.0, np.inf
@@ -208,9 +208,11 @@ def test_a_long_array_of_a_hidden_view_is_plotted_itself_and_seen_whole(tmp_path
     both = Figure("both", "caption", "alt", views, {STEP_NS: "decides"})
     path = recorded(shown(both), tmp_path, one)
     hidden = PLOT.replace("/0/0", "/0/1")
-    assert entities(path, hidden) == {f"{hidden}/instants/0"}
+    assert entities(path, hidden) == {f"{hidden}/0/0", f"{hidden}/instants/0"}
+    assert not any("all" in name for name in plots(path))
     ends = columns(path, f"{hidden}/instants/0", SCALARS)
     assert ends == [[np.min(values[np.isfinite(values)])], [9.0]]
+    assert len(columns(path, "/values", PACKED)) < 10  # many rows stand as one
 
 
 def test_what_is_plotted_over_a_quantity_is_left_to_the_report() -> None:

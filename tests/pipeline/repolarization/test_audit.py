@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from asserting import refusal
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain, Joint
 from urmpipe_models.errors import LogError, OptionError
@@ -154,7 +153,9 @@ def test_a_joint_limited_to_two_turns_is_seen_by_its_jumps() -> None:
 def test_jumps_of_one_and_of_two_turns_in_one_joint_are_asked_for() -> None:
     q = wrap(np.linspace(0.0, 30.0, 600), 2 * FULL_TURN)
     q[300:310] -= FULL_TURN * np.sign(q[300])
-    assert refusal(LogError, audit_log, log_of(q)) == (
+    with pytest.raises(LogError) as error:
+        audit_log(log_of(q))
+    assert str(error.value) == (
         "log, column q1: found 2 steps of about 4 pi and 2 of about 2 pi, allowed: wraps of one"
         ' interval; interval={"q1": (LOW, HIGH)} says which'
     )
@@ -205,7 +206,9 @@ def test_an_interval_holds_for_one_joint_or_for_all_in_the_unit_of_the_file() ->
 def test_intervals_that_make_no_sense_are_refused(
     interval: dict[str, tuple[float, float]], said: str
 ) -> None:
-    assert refusal(OptionError, audit_log, log_of(np.zeros(4)), interval=interval) == said
+    with pytest.raises(OptionError) as error:
+        audit_log(log_of(np.zeros(4)), interval=interval)
+    assert str(error.value) == said
 
 
 def test_a_joint_that_slides_has_no_interval() -> None:

@@ -54,10 +54,13 @@ tab."""
 
 def send_views(
     stream: RecordingStream, shown: Presentation, entity_of: EntityOf
-) -> tuple[Blueprint, Opening]:
+) -> tuple[Blueprint, Opening, set[str]]:
     """Send what is there to be looked at of a presentation, and return the layout and where it opens.
 
     Where arrays of the result stand as scalars in their own unit, their entities are drawn.
+
+    Returns:
+        The layout, where it opens, and the entities of the arrays of the result that it plots.
     """
     import rerun as rr
 
@@ -72,7 +75,7 @@ def send_views(
     text = "\n".join(words)
     stream.log(shown_path("summary"), rr.TextDocument(text, media_type="text/markdown"), static=True)
     layout = _blueprint(_words(plots, parts), words, space, _plots(plots, parts), opening.timeline)
-    return layout, opening
+    return layout, opening, plots.plotted
 
 
 @dataclass(frozen=True, eq=False)

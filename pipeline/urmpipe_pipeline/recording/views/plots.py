@@ -59,12 +59,14 @@ class Plots:
         whole: From the first to the last time in [ns], without times from the first to the last row; None
             where nothing is plotted.
         timed: Whether there are times.
+        plotted: The arrays of the result that views show, by where they stand.
     """
 
     stream: RecordingStream
     entity_of: EntityOf
     whole: tuple[int, int] | None
     timed: bool
+    plotted: set[str] = field(default_factory=set)
     _looks: dict[str, _Look] = field(default_factory=dict)
     _shares_axis: bool = True
 
@@ -86,7 +88,7 @@ class Plots:
             instants: Times in [ns] at which a line goes through it, with a word each.
             about: What it is of, where plots of several things stand beside each other.
             most: Multiples of a power of ten that its height has room for.
-            opened: Whether it is seen first; else arrays of the result need no overview.
+            opened: Whether it is seen first; else long arrays are shown by their overview alone.
         """
         panels = [panel for panel in view.panels if panel.over is None]
         if not panels:
@@ -159,7 +161,11 @@ class Plots:
         stored = self.entity_of(line.values, t_ns)
         drawn.names.update(line.names)
         drawn.rows = max(drawn.rows, rows)
-        if stored is not None and factor == 1.0 and (rows <= LONG or not drawn.opened):
+        if rows > LONG and not drawn.opened:
+            stored = None
+        if stored is not None:
+            self.plotted.add(stored)
+        if stored is not None and factor == 1.0 and rows <= LONG:
             drawn.entities.append(stored)
             drawn.reach(line.values[:])
             if self._looks.setdefault(stored, look) != look:
