@@ -15,27 +15,15 @@ unseen there."""
 
 
 def gaps_behind(t_ns: IntArray) -> BoolArray:
-    """Return which rows have a gap behind them.
-
-    Args:
-        t_ns: Times in integer [ns], shape (n,).
-
-    Returns:
-        One entry a step from row to row, shape (n - 1,).
-    """
+    """Return which rows at integer times in [ns], shape (n,), have a gap behind them, shape (n - 1,)."""
     step = np.diff(t_ns)
     return np.asarray(step > GAP * np.median(step)) if len(step) else np.empty(0, dtype=np.bool_)
 
 
 def inside_gaps(at_ns: IntArray, known_ns: IntArray) -> BoolArray:
-    """Return which times lie strictly inside a gap between two known ones.
+    """Return which times lie strictly inside a gap between two known ones, shape (n,).
 
-    Args:
-        at_ns: Times in integer [ns], shape (n,).
-        known_ns: Rising times in integer [ns], shape (k,).
-
-    Returns:
-        Shape (n,).
+    Both are integer times in [ns], of shape (n,) and, rising, (k,).
     """
     if len(known_ns) < 2:
         return np.zeros(len(at_ns), dtype=np.bool_)

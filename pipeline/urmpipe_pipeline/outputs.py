@@ -93,16 +93,9 @@ HEAD = 4096
 def guarded_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> Iterator[Path]:
     """Give a place to write an output to, and put it in its own place once it is written.
 
-    The place is a new name with the suffix .part in the same folder. It is renamed to `path` if the
-    body succeeds, and removed if it fails; an existing output is untouched until the rename.
-
-    Args:
-        path: Where the output should stand.
-        inputs: The files it is made from; those that are no files are passed over.
-        kind: What it is: only another one of the same kind is replaced.
-
-    Yields:
-        The path to write to; nothing is there yet.
+    The place is a new name with the suffix .part in the same folder, and nothing is there yet. It is renamed
+    to `path` if the body succeeds, and removed if it fails; an existing output is untouched until the rename.
+    Only another one of the same kind is replaced, never an input; inputs that are no files are passed over.
 
     Raises:
         OutputError: If it may not be written there, or could not be.
@@ -144,13 +137,7 @@ def know_own(kind: OutputKind, is_ours: Callable[[Path], bool]) -> None:
 
 
 def refuse_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
-    """Raise an `OutputError` if an output may not be written there: for who works long before it writes.
-
-    Args:
-        path: Where the output should stand.
-        inputs: The files it is made from; those that are no files are passed over.
-        kind: What it is: only another one of the same kind is replaced.
-    """
+    """Raise an `OutputError` if an output may not be written there: for who works long before it writes."""
     if kind == "recording" and not _is_text(path):
         said = "found a name that is no UTF-8 text, which Rerun cannot open, allowed: one that is"
         raise OutputError(Finding(said, str(path)))

@@ -68,16 +68,13 @@ def kind_of(result: Result) -> Kind:
 def write_recording(
     result: Result, path: Path, inputs: Sequence[Path] = (), progress: Callable[[float], None] | None = None
 ) -> Path:
-    """Write the recording of a result, read it back, and put it in its place.
+    """Write the recording of a result, read it back, put it in its place, and return its path.
 
     Args:
         result: What to record.
         path: The file (.rrd); replaced if it is a recording of urmpipe's.
         inputs: The files the result was made from: none of them is replaced.
         progress: Told the share of the data that is written, 0..1.
-
-    Returns:
-        The path.
 
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.

@@ -58,14 +58,9 @@ def align(matched: Matched, mode: AlignMode, run: Run) -> Matched:
 
 
 def tool_with(robot: Chain, alignment: Alignment) -> tuple[float, ...]:
-    """Return the tool of a robot moved by the offset of an alignment, as `tool` takes it.
+    """Return the tool of a robot moved by the offset of an alignment of the mode tool, as `tool` takes it.
 
-    Args:
-        robot: The arm of the log, with the tool that it has.
-        alignment: That of the mode tool.
-
-    Returns:
-        X, Y, Z in [m]; with RX, RY, RZ in [rad] behind them if the robot's tool is turned.
+    X, Y, Z in [m]; with RX, RY, RZ in [rad] behind them if the robot's tool is turned.
     """
     tool = robot.tool @ translation(*alignment.tool)
     x, y, z = (float(value) for value in tool.translation)

@@ -102,10 +102,6 @@ def _absent(result: Comparison, pairs: Mapping[str, Pair]) -> Iterator[Absent]:
     """Yield the logs of a comparison that the other lacks, and the quantities that the log of a pair lacks.
 
     A quantity is that of the log now, whatever the log was called before.
-
-    Args:
-        result: The comparison.
-        pairs: Its logs that the other has, by their names in it.
     """
     for run in result.runs:
         if run.name not in pairs:

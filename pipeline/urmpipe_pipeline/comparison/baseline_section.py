@@ -21,12 +21,7 @@ WORDS: dict[Worse, str] = {"max": "max", "rms": "rms", "share_out": "out", "samp
 
 
 def baseline_section(found: BaselineComparison, rank: int) -> Section:
-    """Return what changed since an earlier comparison.
-
-    Args:
-        found: What changed.
-        rank: The place of the section among its neighbours.
-    """
+    """Return what changed since an earlier comparison."""
     said = "a log of the baseline, not compared any more"
     gone = [
         Section(one.run, "fail", checks=(_check(one.run, "log is there", f"{one.run}: {said}"),))
@@ -44,12 +39,7 @@ def baseline_section(found: BaselineComparison, rank: int) -> Section:
 
 
 def baseline_checks(found: BaselineComparison, run: str) -> Iterator[Check]:
-    """Yield a check for each quantity of a log that was compared then.
-
-    Args:
-        found: What changed.
-        run: The log's name.
-    """
+    """Yield a check for each quantity of a log that was compared then."""
     for one in found.changes:
         if one.run == run:
             noise = text.allowed(one.noise, one.now.unit)

@@ -30,10 +30,6 @@ def causes(run: Deviation, reference: Trajectory) -> Iterator[Advice]:
     Late or early: out of a tolerance of position at the same time, but off the path by at most a tenth of
     that. The zero of a joint: its deviation is the same throughout, no joint's is larger, and it is large
     enough for what decides.
-
-    Args:
-        run: The deviation of the log.
-        reference: What it was held against.
     """
     if run.verdict == "fail":
         yield from _late(run, reference)

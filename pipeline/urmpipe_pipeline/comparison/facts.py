@@ -21,12 +21,7 @@ from urmpipe_pipeline.runs.parts import log_facts
 
 
 def decisive_facts(one: Deviation, colour: str) -> Iterator[Fact]:
-    """Yield which log and quantity decided the verdict: how much, when and where.
-
-    Args:
-        one: The log that is furthest out of its tolerance, or closest to it.
-        colour: Its colour as #rrggbb.
-    """
+    """Yield which log and quantity decided the verdict: how much, when and where."""
     held = one.decisive
     yield Fact("Furthest out" if one.verdict == "fail" else "Closest to the limit", Ref(one.name, colour))
     yield Fact("Decided by", decided_words(held))

@@ -52,11 +52,7 @@ class Matched:
     alignment: Alignment
 
     def at(self, kept: NDArray[np.intp]) -> Matched:
-        """Return both sides at some of these samples alone; the others are left out.
-
-        Args:
-            kept: Indices of the samples [-], shape (k,).
-        """
+        """Return both sides at some of these samples alone, by their indices [-], shape (k,)."""
         values = ((one.name, getattr(self, one.name)) for one in fields(self))
         some: dict[str, Any] = {name: array[kept] for name, array in values if isinstance(array, np.ndarray)}
         return replace(self, **some, left_out=self.left_out + len(self.sample) - len(kept))
@@ -105,11 +101,6 @@ def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
 
     Positions and joints are interpolated linearly, orientations on the great arc. Samples outside the time of
     the reference, inside a gap of it, or without a position of their own are left out and counted.
-
-    Args:
-        reference: What was asked for.
-        log: What was done.
-        sync: How their clocks are put together.
     """
     shift = round(sync.offset * 1e9)
     at_ns = log.t_ns + shift
@@ -136,13 +127,7 @@ def match(reference: Trajectory, log: Trajectory, sync: Sync) -> Matched:
 
 
 def joints_apart(reference: Trajectory, joints: tuple[str, ...], units: tuple[str, ...]) -> str:
-    """Return why the joints of a log cannot be held against those of the reference; empty if they can.
-
-    Args:
-        reference: What was asked for.
-        joints: Names of the log's joints.
-        units: Theirs: rad or m.
-    """
+    """Return why the joints of a log cannot be held against those of the reference; empty if they can."""
     if not reference.joints or not joints:
         return "a side has no joints"
     order = joint_order(reference.joints, joints)
@@ -164,12 +149,7 @@ def file_of(run: Run) -> str:
 
 
 def joint_order(reference: tuple[str, ...], log: tuple[str, ...]) -> list[int] | None:
-    """Return where the reference has the log's joints: by name, else by place; None if it has others.
-
-    Args:
-        reference: Names of the reference's joints.
-        log: Names of the log's.
-    """
+    """Return where the reference has the log's joints: by name, else by place; None if it has others."""
     if not log or len(reference) != len(log):
         return None
     if set(reference) == set(log):

@@ -49,11 +49,8 @@ def describe(
 ) -> Statistics:
     """Return the statistics of one quantity over the samples that have a value, and the verdict on all.
 
-    Args:
-        measured: The quantity, with at least one value.
-        t: Times in [s], shape (m,).
-        sample: Grid samples, shape (m,).
-        tolerance: In [m] or [rad], by kind or by coordinate.
+    The quantity has a value at least at one of the grid samples, shape (m,), whose times are in [s], shape
+    (m,). The tolerance is in [m] or [rad], by kind or by coordinate.
     """
     known = np.flatnonzero(np.isfinite(measured.values))
     values = measured.values[known]
@@ -90,9 +87,7 @@ def overall(statistics: Iterable[Statistics]) -> Verdict:
 def correlation(first: FloatArray, second: FloatArray) -> float | None:
     """Return Pearson's r of two quantities where both have a value; None where one does not change.
 
-    Args:
-        first: Shape (m,), in [m] or [m/s]; NaN where there is no value.
-        second: Shape (m,), in [m] or [m/s]; NaN where there is no value.
+    Both are in [m] or [m/s], shape (m,); NaN where there is no value.
     """
     both = np.isfinite(first) & np.isfinite(second)
     if not both.any():

@@ -74,13 +74,8 @@ class Peak:
 def mean_rates(view: View) -> Rates | None:
     """Return the rates of both sides, over the shortest period that shows the motion and not the noise.
 
-    Revolute and prismatic joints count alike at 1 rad/s and 1 m/s: an arm is about 1 m long.
-
-    Args:
-        view: The channels.
-
-    Returns:
-        The rates; None if a side has fewer than three samples, or is too short for a period of the other.
+    Revolute and prismatic joints count alike at 1 rad/s and 1 m/s: an arm is about 1 m long. None if a side
+    has fewer than three samples, or is too short for a period of the other.
     """
     sides = ((view.reference_ns, view.reference), (view.log_ns, view.log))
     if min(len(t_ns) for t_ns, _ in sides) < 3:
@@ -141,14 +136,10 @@ def similarity(reference: FloatArray, log: FloatArray, turned: bool) -> float:
 
 
 def peaks(found: Rates, turned: bool) -> list[Peak]:
-    """Return the offsets at which two motions are most alike, the best first.
+    """Return the offsets at which two motions are most alike, the best first; their frames may be turned.
 
     The similarity of every offset comes from correlations by FFT; what is missing, or beyond an end, is
     masked. An offset counts where both sides together hold a good share of the motion of one.
-
-    Args:
-        found: The rates of both sides.
-        turned: Whether the frames may be turned against each other.
     """
     likeness = _over_lags(found.reference, found.log, turned)
     tops = _separate_tops(likeness, 1.0 - 2.0 * (1.0 - likeness.max()) - NEAR)
@@ -180,10 +171,7 @@ def _separate_tops(likeness: FloatArray, least: float) -> list[int]:
 def _over_lags(a: FloatArray, b: FloatArray, turned: bool) -> FloatArray:
     """Return the similarity of a[i + lag] and b[i] for every lag from -(m - 1) to n - 1; -1 where too little.
 
-    Args:
-        a: Rates, shape (n, k).
-        b: Rates, shape (m, k).
-        turned: Whether b is turned first.
+    a and b are rates of shape (n, k) and (m, k); b may be turned first.
     """
     size = 1 << (len(a) + len(b) - 1).bit_length()
     there = [np.asarray(np.isfinite(side).all(axis=1)) for side in (a, b)]
@@ -216,8 +204,7 @@ def _over_lags(a: FloatArray, b: FloatArray, turned: bool) -> FloatArray:
 def _turned_products(crossed: FloatArray) -> FloatArray:
     """Return the largest sum of products a . R b over all rotations R: s1 + s2 + sign(det H) s3.
 
-    Args:
-        crossed: H = sum(a b^T), shape (n, 3, 3).
+    H is sum(a b^T), shape (n, 3, 3).
 
     Source: Kabsch, W.: A solution for the best rotation to relate two sets of vectors, 1976.
     """

@@ -72,11 +72,6 @@ def refine(view: View, found: Rates, peak: Peak) -> Estimate:
     In each step reference(t_log + offset) = log(t_log) + constant + rate * step is solved for the step by
     least squares, with one constant a channel, a turn where frames may be turned, and a tool where one is
     not known. The rates are those of the coarse stage, whose noise has little to do with that of a sample.
-
-    Args:
-        view: The channels.
-        found: Their rates.
-        peak: Where to begin.
     """
     offset_ns = float(peak.offset_ns)
     for _ in range(STEPS):
@@ -103,10 +98,7 @@ def _lost(peak: Peak) -> Estimate:
 def line_at(view: View, found: Rates, offset_ns: int) -> Line:
     """Return the equation for a step from an offset, at the samples of the log that both sides have.
 
-    Args:
-        view: The channels.
-        found: Their rates in [rad/s] or [m/s].
-        offset_ns: t_reference - t_log in integer [ns].
+    The rates are in [rad/s] or [m/s], the offset is t_reference - t_log in integer [ns].
     """
     thinned = slice(None, None, -(-len(view.log_ns) // MOST))
     at_ns = view.log_ns[thinned] + offset_ns

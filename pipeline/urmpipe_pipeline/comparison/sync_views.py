@@ -39,13 +39,9 @@ class View:
 def views(reference: Trajectory, log: Trajectory, align: AlignMode) -> Iterator[View]:
     """Yield the views of two trajectories, the one that assumes least about their frames and tools first.
 
-    Joints do not depend on frames, structure or tools. Positions do: they are taken as they stand, unless
-    the alignment that follows would turn the log anyway, and at last as if the frames were turned.
-
-    Args:
-        reference: What was asked for.
-        log: What was done.
-        align: How the log will be moved in space: start and rigid turn it, tool finds a tool.
+    Joints do not depend on frames, structure or tools. Positions do: they are taken as they stand, unless the
+    alignment that follows would turn the log anyway (start, rigid), and at last as if the frames were turned;
+    of the alignment `tool` the tool is unknown.
     """
     order = joint_order(reference.joints, log.joints)
     if order is not None and reference.q is not None and log.q is not None:

@@ -87,12 +87,7 @@ def parse_tolerance(
 
 
 def kinds_with_unit(text: str, bare: Sequence[str] = ("axis",)) -> frozenset[str]:
-    """Return the kinds whose tolerance has its unit behind it: nobody took a metre for a millimetre there.
-
-    Args:
-        text: One length, or some kinds with theirs, as `parse_tolerance` takes it.
-        bare: The kinds that a length without a name is for.
-    """
+    """Return the kinds whose tolerance has its unit behind it: nobody took a metre for a millimetre there."""
     kinds: set[str] = set()
     for part in text.split(","):
         name, sign, value = part.rpartition("=")

@@ -95,11 +95,7 @@ class Alignment:
         return float(angle_between(quat, np.array([[0.0, 0.0, 0.0, 1.0]]))[0])
 
     def moved(self, aligned: FloatArray) -> FloatArray:
-        """Return how far the log's positions were moved, in [m], shape (m,).
-
-        Args:
-            aligned: Where they are now, in [m], shape (m, 3).
-        """
+        """Return how far the log's positions, now in [m], shape (m, 3), were moved, in [m], shape (m,)."""
         if self.mode == "tool":
             return np.full(len(aligned), np.linalg.norm(self.tool))
         before = (aligned - np.array(self.translation)) @ np.array(self.rotation)  # R^T (p' - t)

@@ -46,10 +46,6 @@ def left_out_warnings(one: Deviation, reference: Trajectory) -> Iterator[LogWarn
     Samples that an offset moves beyond the reference's time are what `sync` asks for; they are told apart
     from those that lack a value, lie in a gap, or come after a reference that started together with the log.
     A part of the reference that was not judged is told however the clocks were put together.
-
-    Args:
-        one: The deviation of the log.
-        reference: What was asked for, whole.
     """
     samples, whole = one.left_out + len(one.sample), len(reference.t_ns)
     beyond = _beyond(one, reference) if one.sync.offset else 0
@@ -84,11 +80,7 @@ def _beyond(one: Deviation, reference: Trajectory) -> int:
 
 
 def thin_evidence(one: Deviation) -> Iterator[LogWarning]:
-    """Yield what a verdict on a log rests on, where that is little: missing values, or one pose.
-
-    Args:
-        one: The deviation of the log.
-    """
+    """Yield what a verdict on a log rests on, where that is little: missing values, or one pose."""
     for found in one.all_statistics:
         if found.tolerance is not None and found.missing:
             said = f"{found.quantity}: judged at {found.samples} of {len(one.sample)} compared samples"
@@ -113,11 +105,7 @@ def _extent(values: FloatArray) -> float:
 
 
 def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
-    """Yield a warning for each tolerance that hardly anybody means.
-
-    Args:
-        tolerance: In [m] or [rad], by kind or coordinate, of numbers that were given without a unit.
-    """
+    """Yield a warning for each tolerance in [m] or [rad], given without a unit, that hardly anybody means."""
     for kind, value in tolerance.items():
         unit, other, most = ("rad", "deg", LARGE_ANGLE) if "rad" in UNITS[kind] else ("m", "mm", LARGE_LENGTH)
         if value > most:
@@ -135,9 +123,7 @@ def large_tolerances(tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
 def large_noises(noise: Mapping[str, float], tolerance: Mapping[str, float]) -> Iterator[LogWarning]:
     """Yield a warning for each noise that reaches its tolerance: nothing within that can then be worse.
 
-    Args:
-        noise: Changes in [m] or [rad] that mean nothing, of every kind, perhaps of a coordinate.
-        tolerance: In [m] or [rad], by kind or coordinate.
+    The noise is in [m] or [rad], of every kind, perhaps of a coordinate; so is the tolerance.
     """
     for kind, allowed in tolerance.items():
         level = allowed_for(kind, "axis" if kind in AXES else kind, noise)
@@ -159,9 +145,7 @@ def exchanged(reference: Run, runs: Iterable[Run]) -> Iterator[LogWarning]:
 def recorded_apart(run: Run, allowed: float) -> Iterator[LogWarning]:
     """Yield a warning if a log that is compared by its joints recorded a tool centre point elsewhere.
 
-    Args:
-        run: The log.
-        allowed: Distance in [m] that is not told.
+    The distance that is allowed is in [m].
     """
     if run.tcp is None or run.tcp_recorded is None:
         return

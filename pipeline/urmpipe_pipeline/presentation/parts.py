@@ -62,16 +62,7 @@ def table_of(
     brief: bool = False,
     folded: bool = False,
 ) -> Table:
-    """Return a table of rows.
-
-    Args:
-        title: Its heading.
-        heads: Title of each column by its key.
-        rows: One cell a column.
-        note: A line under it.
-        brief: Whether it is shown where there is little room.
-        folded: Whether a page opens it only on request.
-    """
+    """Return a table of rows, a cell a column; the titles of the columns stand by their keys."""
     cells = list(rows)
     columns = (Column(key, head, [row[i] for row in cells]) for i, (key, head) in enumerate(heads.items()))
     return Table(title, tuple(columns), note, brief, folded)
@@ -117,11 +108,7 @@ def minute(provenance: Provenance) -> str:
 
 
 def ends(position: FloatArray) -> tuple[Spot, ...]:
-    """Return where a path starts and ends.
-
-    Args:
-        position: In [m], shape (n, 3).
-    """
+    """Return where a path in [m], shape (n, 3), starts and ends."""
     known = np.flatnonzero(np.isfinite(position).all(axis=1))
     if not len(known):
         return ()

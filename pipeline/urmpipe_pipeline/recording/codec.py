@@ -63,12 +63,7 @@ def _clocks(at: Out) -> dict[str, str]:
 
 
 def decode(cls: Any, tree: Any, array: ArrayOf) -> Any:
-    """Return the object of a class that a tree tells.
-
-    Args:
-        cls: A dataclass.
-        tree: What `encode` made of one.
-        array: Returns the array of a path, given its shape and its dtype.
+    """Return the object of a dataclass that a tree made by `encode` tells, and its arrays by their paths.
 
     Raises:
         CodecError: If the tree tells what the types of its fields do not allow.

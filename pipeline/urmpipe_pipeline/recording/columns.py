@@ -19,10 +19,7 @@ def column_rows(
 ) -> tuple[list[TimeColumn], list[ComponentColumn]]:
     """Return the times and the values of some rows of an array, one by one where it is plotted.
 
-    Args:
-        column: The array.
-        rows: Which of its rows.
-        numbered: Whether plotted rows have numbers: they need none where their times tell them apart.
+    Plotted rows need no numbers where their times tell them apart.
     """
     import rerun as rr
 

@@ -19,14 +19,10 @@ from urmpipe_pipeline.recording.store import LAYOUT_VERSION, Store
 
 
 def read_result(path: Path, kinds: Mapping[str, type], *, lazy: bool = False) -> Any:
-    """Return the result that a recording holds.
+    """Return the result of one of some named kinds that a recording holds, see `urmpipe_pipeline.results`.
 
-    What stands inside a result comes back without the file that it once stood in.
-
-    Args:
-        path: A recording (.rrd) that urmpipe wrote.
-        kinds: The classes of results by the names of their kinds.
-        lazy: Whether arrays are read when they are used (`Rows`); the file must stand as long.
+    What stands inside a result comes back without the file that it once stood in. Read lazily, arrays are
+    read when they are used (`Rows`).
 
     Raises:
         RecordingError: If it is no recording, was cut off, is not of urmpipe, or of another layout.

@@ -49,11 +49,9 @@ def times_column(t_ns: IntArray) -> TimeColumn:
 
 
 def times_at(t_ns: IntArray | None, rows: IntArray) -> list[TimeColumn]:
-    """Return the times of some rows on the timeline t; on the timeline row, from 1, where there are none.
+    """Return the times of some rows on the timeline t, or where there are none on the timeline row, from 1.
 
-    Args:
-        t_ns: Times of all rows in integer [ns], shape (n,); None without times.
-        rows: The rows from 0, shape (m,).
+    Rows, from 0, shape (m,), are some of those at integer times in [ns], shape (n,).
     """
     import rerun as rr
 
@@ -76,10 +74,9 @@ class Values:
 
 
 def scalar_column(values: FloatArray) -> ComponentColumn:
-    """Return an array as a column of lists; `Scalars.columns` takes six times as long over it.
+    """Return an array in the unit of its plot, shape (n, k), as a column of lists.
 
-    Args:
-        values: In the unit of their plot, shape (n, k).
+    `Scalars.columns` takes six times as long over it.
     """
     import rerun as rr
 

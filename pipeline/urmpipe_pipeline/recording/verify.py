@@ -16,12 +16,6 @@ from urmpipe_pipeline.recording.store import SLICE, Store
 def verify(part: Path, path: Path, encoded: Encoded, metadata: str) -> None:
     """Hold what stands in the file against what was written.
 
-    Args:
-        part: The file as written.
-        path: The name it is to have, for messages.
-        encoded: What was written.
-        metadata: The metadata that was written.
-
     Raises:
         OutputError: With everything that differs.
     """

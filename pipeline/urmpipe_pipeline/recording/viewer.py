@@ -99,10 +99,7 @@ def open_window(
 ) -> Iterator[tuple[subprocess.Popen[bytes], ViewerClient]]:
     """Run the viewer with a recording open in it, paused at a time or a row; close it at the end.
 
-    Args:
-        path: The recording.
-        opening: Where it stands.
-        headless: Without a window, such as to take a picture; needs a Vulkan driver, be it in software.
+    Without a window (headless), such as to take a picture, it needs a Vulkan driver, be it in software.
 
     Yields:
         The viewer's process, and what it is controlled by.
@@ -116,14 +113,7 @@ def open_window(
 
 @contextmanager
 def run_viewer(*, headless: bool = False) -> Iterator[tuple[subprocess.Popen[bytes], str]]:
-    """Run the viewer with nothing open in it; end it at the end.
-
-    Args:
-        headless: Without a window.
-
-    Yields:
-        Its process, and the address that it will listen on.
-    """
+    """Run the viewer, maybe without a window, and yield its process and the address it will listen on."""
     port = _free_port()
     options = ["--bind", LOOPBACK, "--port", str(port), "--hide-welcome-screen"]
     command = [str(_program()), *options, *(["--headless"] if headless else [])]

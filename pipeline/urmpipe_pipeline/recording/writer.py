@@ -39,15 +39,9 @@ def write_result(
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
 ) -> None:
-    """Write the recording of a result, read it back, and put it in its place.
+    """Write the recording of a result of a kind with what the viewer shows of it, and read it back.
 
-    Args:
-        result: What to record, a dataclass.
-        kind: What the recording calls its kind.
-        shown: What the viewer shows of it.
-        path: The file (.rrd); replaced if it is a recording of urmpipe's.
-        inputs: The files the result was made from: none of them is replaced.
-        progress: Told the share of the data that is written, 0..1.
+    An input is never replaced. Progress is the share of the data that is written, 0..1.
 
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.
@@ -93,14 +87,7 @@ def _stream_into(part: Path) -> Iterator[RecordingStream]:
 def _send(
     stream: RecordingStream, folder: Path, encoded: Encoded, progress: Callable[[float], None] | None
 ) -> None:
-    """Send the arrays in slices, those with a row to verify first: reading back then need not read all.
-
-    Args:
-        stream: Where to.
-        folder: Where its file stands.
-        encoded: The arrays.
-        progress: Told the share that is sent.
-    """
+    """Send the arrays in slices, those with a row to verify first: reading back then need not read all."""
     total = sum(column.rows for column in encoded.columns)
     done = 0
     slices = [(column, start) for column in encoded.columns for start in _starts(column.rows)]

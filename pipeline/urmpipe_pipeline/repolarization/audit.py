@@ -138,15 +138,7 @@ def _repolarized(
 
 
 def turning(log: JointLog, robot: Chain | None) -> NDArray[np.bool_]:
-    """Tell which joints turn, by the robot or else by the unit of their columns; the others slide.
-
-    Args:
-        log: The log.
-        robot: The arm, or None.
-
-    Returns:
-        Shape (joints,).
-    """
+    """Tell which joints turn, by the robot or else the unit of their columns, shape (joints,)."""
     if robot is not None and log.joints:
         return np.array([joint.kind == "revolute" for joint in robot.moving])
     return np.array([log.units.get(name) in ("rad", "deg") for name in log.joints], dtype=np.bool_)

@@ -36,11 +36,6 @@ SHOWN_SLACK = 0.01
 def check_interval(name: str, low: float, high: float) -> Interval:
     """Return an interval that makes sense.
 
-    Args:
-        name: The joint, or empty for all.
-        low: Its low end.
-        high: Its high end.
-
     Raises:
         OptionError: If it has no positive, finite width.
     """
@@ -93,12 +88,8 @@ def double_turns(
 ) -> list[int]:
     """Return the joints that are limited to +-2 pi: they step by 4 pi, never by 2 pi, within +-2 pi.
 
-    Args:
-        log: The log.
-        fixed: The log, repolarized with full turns.
-        joints: Joint index of each unexplained step, shape (u,).
-        steps: These steps in [rad], shape (u,).
-        rest: By how much each may miss 4 pi in [rad], shape (u,).
+    Each unexplained step has its joint index, its size in [rad] and by how much it may miss 4 pi in [rad],
+    all of shape (u,).
 
     Raises:
         LogError: If a joint steps by both, so that the file cannot tell.
@@ -130,11 +121,7 @@ def said_intervals(
 ) -> tuple[list[Inference], list[LogWarning]]:
     """Return the interval of each joint that was given or seen to wrap, and what contradicts it.
 
-    Args:
-        log: The log.
-        fixed: Its joints, repolarized.
-        periods: P of each joint in [rad], shape (joints,).
-        given: Interval of a joint by its name, by "" that of all that turn; in the file's own unit.
+    Periods P are in [rad], shape (joints,); intervals are given as `given_periods` takes them.
     """
     groups: dict[tuple[str, bool], list[int]] = {}
     warnings = []

@@ -45,10 +45,7 @@ class JointMotion:
     def of(cls, log: JointLog, q: FloatArray, turning: NDArray[np.bool_]) -> JointMotion:
         """Return the motion of a log.
 
-        Args:
-            log: The log.
-            q: Its joints, repolarized, in [rad] or [m], shape (n, joints).
-            turning: Which joints turn, shape (joints,).
+        Its joints, repolarized, are in [rad] or [m], shape (n, joints); which turn, shape (joints,).
         """
         inner = largest_steps(q[1:-1]) if len(q) > 3 else np.zeros(q.shape[1])
         units = tuple("rad" if turns else "m" for turns in turning)
@@ -62,13 +59,9 @@ class JointMotion:
 
 
 def largest_steps(q: FloatArray) -> FloatArray:
-    """Return the largest step of each column from row to row; NaN if a value is missing.
+    """Return the largest step of each column from row to row, shape (joints,); NaN if a value is missing.
 
-    Args:
-        q: In [rad] or [m], shape (n, joints), n > 1.
-
-    Returns:
-        In [rad] or [m], shape (joints,).
+    Steps and q, shape (n, joints), n > 1, are in [rad] or [m].
     """
     blocks = row_blocks(len(q) - 1)
     steps = [over_rows(np.maximum, np.abs(q[1:][block] - q[:-1][block])) for block in blocks]
@@ -107,12 +100,7 @@ def _format_step(written: FloatArray, digits: int | None) -> float:
 def over_rows(fold: np.ufunc, values: FloatArray) -> FloatArray:
     """Fold the rows into one, many side by side: NumPy is slow over rows as short as a log's.
 
-    Args:
-        fold: Of two values the one, such as `np.maximum`.
-        values: In any unit, shape (n, columns).
-
-    Returns:
-        In the same unit, shape (columns,).
+    Values are in any unit, shape (n, columns), the row is of shape (columns,).
     """
     count, joints = values.shape
     whole = count - count % _SIDE_BY_SIDE

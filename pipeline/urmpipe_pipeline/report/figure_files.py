@@ -71,12 +71,7 @@ class FigureFile:
 
 
 def figure_stem(title: str, part: str) -> str:
-    """Return the name of a figure's file: its part's and its own, in a-z, 0-9 and hyphens.
-
-    Args:
-        title: The figure's heading.
-        part: The heading of its part.
-    """
+    """Return the name of a figure's file: its part's and its own, in a-z, 0-9 and hyphens."""
     return "-".join(name for name in map(_plain_name, (part, title)) if name) or "figure"
 
 
@@ -86,13 +81,9 @@ def write_figures(
     inputs: Sequence[Path] = (),
     progress: Callable[[float], None] | None = None,
 ) -> tuple[FigureFile, ...]:
-    """Write every figure in every format, all files or none; only figures that urmpipe wrote are replaced.
+    """Write figures, each behind the heading of its part, in every format: all files or none.
 
-    Args:
-        figures: Each behind the heading of its part.
-        options: Where to, and in which formats.
-        inputs: Files that must not be overwritten.
-        progress: Told the share of the files that are drawn, 0..1.
+    Only figures that urmpipe wrote are replaced, never an input. Progress is the share of the files, 0..1.
 
     Raises:
         OutputError: If they may not be written there, or there is nothing to draw them with.

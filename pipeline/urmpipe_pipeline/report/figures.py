@@ -43,12 +43,7 @@ class Links:
         self._known: list[tuple[IntArray, str]] = []
 
     def of(self, figures: Iterable[Figure], ident: str) -> str:
-        """Return what the figures of a section share their time axis by.
-
-        Args:
-            figures: Those of the section.
-            ident: Its anchor.
-        """
+        """Return what the figures of a section share their time axis by."""
         times = [panel.t_ns for one in figures for panel in _panels(one) if panel.t_ns is not None]
         found = next((link for known, link in self._known if any(known is t_ns for t_ns in times)), ident)
         self._known += [(t_ns, found) for t_ns in times]
@@ -58,9 +53,7 @@ class Links:
 def drawn_figures(figure: Figure, times: Span) -> Iterator[spec.Figure]:
     """Yield a figure, one for each kind of horizontal axis that its panels have.
 
-    Args:
-        figure: What is drawn.
-        times: From where to where axes of time go, the same for all figures that stand together.
+    Axes of time span the same times in all figures that stand together.
     """
     groups = [(over, list(panels)) for over, panels in groupby(_panels(figure), axis_of)]
     for over, panels in groups:

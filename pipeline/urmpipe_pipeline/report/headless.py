@@ -38,11 +38,7 @@ Draw = Sequence[tuple[Figure, FigureFormat]]
 
 
 def draw(figures: Draw, done: Callable[[int, bytes], None]) -> None:
-    """Draw figures one after the other, off the network.
-
-    Args:
-        figures: Each with the format that is wanted.
-        done: Told the number of a figure, from 0, and its bytes.
+    """Draw figures one after the other, off the network; `done` is told the number, from 0, and the bytes.
 
     Raises:
         OutputError: If there is nothing to draw with, or a figure could not be drawn.

@@ -143,14 +143,7 @@ def _ranking(body: Section) -> list[Table]:
 
 
 def _part(section: Section, anchors: Anchors, links: Links, which: str = "") -> Part:
-    """Return a section as a part of the page.
-
-    Args:
-        section: What it shows.
-        anchors: Where the sections of its result are.
-        links: Which figures of its result share their time axis.
-        which: What tells a result from others of its title.
-    """
+    """Return a section as a part of the page."""
     ident = anchors.ident(section)
     blocks = [*section.figures(), *section.blocks()]
     figures = [block for block in blocks if isinstance(block, GivenFigure)]

@@ -141,14 +141,7 @@ def _shown_unit(panel: Panel) -> tuple[str, float]:
 
 
 def drawn_panel(panel: Panel, number: int, names: Names, span: Span) -> spec.Panel:
-    """Return a panel for `stacked`.
-
-    Args:
-        panel: What is drawn.
-        number: Its number in its figure, from 0.
-        names: What the legend of the figure calls its lines.
-        span: From where to where the horizontal axis goes.
-    """
+    """Return a panel of a figure, the first of number 0, for `stacked`: its axis spans what it is given."""
     unit, factor = _shown_unit(panel)
     curves = list(_curves(panel, factor))
     title = f"{label(panel.title)} [{label(unit) if unit not in ('', '1') else '-'}]"

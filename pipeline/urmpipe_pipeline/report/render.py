@@ -29,14 +29,11 @@ class Written:
 
 
 def render_report(presentations: Sequence[Presentation]) -> str:
-    """Return the report as one HTML file that needs no network.
+    """Return the report as one HTML file that needs no network, the results in their order.
 
     The verdict stands first, then a card for each judged part, then all parts with their facts, tables and
     figures. Everything that came from a file is escaped, and a content security policy lets only the page's
     own two scripts run, known by their hashes.
-
-    Args:
-        presentations: What the results show of themselves, in the order in which they stand on the page.
 
     Raises:
         OptionError: If there is nothing to report.

@@ -73,14 +73,10 @@ class Panel:
 
 
 def typed(values: NDArray[Any], dtype: Literal["f4", "f8"] = "f4") -> Spec:
-    """Return an array as plotly.js reads it without parsing: base64 of little-endian floats.
+    """Return an array in the unit of its axis, shape (n,) or (n, k), as base64 of little-endian floats.
 
-    Single precision (7 digits) is enough for values that are drawn; times take "f8", because a long
-    log would run out of digits.
-
-    Args:
-        values: In the unit of the axis, shape (n,) or (n, k).
-        dtype: f4 or f8.
+    plotly.js reads that without parsing. Single precision (7 digits) is enough for values that are drawn;
+    times take "f8", because a long log would run out of digits.
     """
     data = base64.b64encode(np.ascontiguousarray(values, f"<{dtype}").tobytes()).decode("ascii")
     spec: Spec = {"dtype": dtype, "bdata": data}

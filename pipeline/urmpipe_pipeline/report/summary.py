@@ -95,11 +95,7 @@ def word_of(verdict: Verdict, instead: str = "") -> str:
 
 
 def banner_of(shown: Sequence[tuple[Presentation, Anchors]]) -> Banner:
-    """Return the verdict: the worst result leads, none of the others hides behind it.
-
-    Args:
-        shown: At least one result, each with where its sections are.
-    """
+    """Return the verdict: the worst result leads, none of the others hides behind it."""
     (worst, anchors), *others = worst_first(shown)
     told = [_sentence(one) for one, _ in others[:TOLD]]
     if left := Counter(word_of(one.verdict, one.word) for one, _ in others[TOLD:]):
@@ -119,12 +115,7 @@ def worst_first(shown: Sequence[tuple[Presentation, Anchors]]) -> list[tuple[Pre
 
 
 def cards_of(shown: Sequence[tuple[Presentation, Anchors]], *, plain: bool) -> tuple[Card, ...]:
-    """Return a card for each judged part that has something to tell, the worst first.
-
-    Args:
-        shown: Results, each with where its sections are.
-        plain: Whether a result without a verdict has a card, too.
-    """
+    """Return a card for each judged part that has something to tell, the worst first."""
     found = []
     for one, anchors in shown:
         sections = list(judged_sections(one.body)) or ([one.body] if plain or one.verdict else [])

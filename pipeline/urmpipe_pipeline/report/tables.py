@@ -119,13 +119,7 @@ class ShownFact:
 
 
 def grid(table: Table, href: Href, *, folds: bool = True) -> Grid:
-    """Return a table without its empty columns, cut where it is very long.
-
-    Args:
-        table: What is shown.
-        href: Where its cells lead.
-        folds: Whether it is folded if it is long.
-    """
+    """Return a table without its empty columns, cut where it is very long."""
     rows = max((len(column.cells) for column in table.columns), default=0)
     drawn = [(column, list(_cells(column, href))) for column in table.columns]
     kept = [pair for pair in drawn if any(cell.text != text.NOTHING for cell in pair[1])]

@@ -88,8 +88,7 @@ def line(
 def points_for(t_ns: IntArray | None) -> int:
     """Return how many points a line may have: twice as many where it leaves its course within a few rows.
 
-    Args:
-        t_ns: Times of its rows in [ns], shape (n,); None without times.
+    Its rows are at times in [ns], shape (n,); None without times.
     """
     if t_ns is None or len(t_ns) < 3:
         return POINTS
@@ -98,11 +97,9 @@ def points_for(t_ns: IntArray | None) -> int:
 
 
 def pointer_digits(unit: str, values: FloatArray) -> int:
-    """Return how many digits after the point values have under the pointer.
+    """Return how many digits after the point values in a unit, shape (n,), have under the pointer.
 
-    Args:
-        unit: Their unit; those in [mm] and [deg] have as many as in the tables.
-        values: In `unit`, shape (n,).
+    Those in [mm] and [deg] have as many as in the tables.
     """
     if unit in {shown for shown, _ in text.SHOWN.values()}:
         return DIGITS
@@ -111,25 +108,19 @@ def pointer_digits(unit: str, values: FloatArray) -> int:
 
 
 def told(values: FloatArray, digits: int = DIGITS) -> str:
-    """Return how values are written under the pointer: as the tables write the largest of them.
+    """Return how values, shape (n,), are written under the pointer: as the tables write the largest of them.
 
-    Args:
-        values: In the unit of the figure, shape (n,).
-        digits: Digits after the point.
+    They are in the unit of the figure.
     """
     largest = _largest(values)
     return EXPONENT if 0.0 < largest < SMALL else f".{digits}f"
 
 
 def precision(values: FloatArray, digits: int = DIGITS) -> Literal["f4", "f8"]:
-    """Return "f4" if single precision tells the same digits, else "f8".
+    """Return "f4" if single precision tells the same digits of values in any unit, shape (n,), else "f8".
 
     A tenth of the last digit may be lost, but the least and the largest value are told exactly as they are:
     they also stand in tables.
-
-    Args:
-        values: In the unit of the figure, shape (n,).
-        digits: Digits after the point under the pointer.
     """
     known = values[np.isfinite(values)]
     if not len(known):
@@ -149,14 +140,9 @@ def stroke(colour: str, dash: str = "solid") -> Spec:
 
 
 def marks(t: FloatArray, values: FloatArray, colour: str, symbols: str | list[str], **more: Any) -> Spec:
-    """Return points over time, every one of them.
+    """Return points over times in [s], every one: values in the unit of their panel, shape (n,).
 
-    Args:
-        t: Times in [s], shape (n,).
-        values: In the unit of their panel, shape (n,).
-        colour: As CSS writes it.
-        symbols: One for all, or one each, in plotly.js's words.
-        **more: Further settings of the trace.
+    There is one symbol for all, or one each, in plotly.js's words; further settings are the trace's.
     """
     return {
         "type": "scatter",
@@ -185,13 +171,9 @@ def band(low: float, high: float) -> Spec:
 
 
 def shaded(t: FloatArray, where: NDArray[np.bool_], duration: float, colour: str = FAULT) -> list[Spec]:
-    """Return the stretches of time in which something holds, tinted over the height of their panel.
+    """Return the stretches of times in [s] in which something holds, shape (n,), as high as their panel.
 
-    Args:
-        t: Times in [s], shape (n,).
-        where: Whether it holds, shape (n,).
-        duration: Of the time axis in [s]; what is nearer than a two-hundredth of it is drawn as one.
-        colour: As CSS writes it.
+    What is nearer than a two-hundredth of the time axis, its duration in [s], is drawn as one.
     """
     at = t[where]
     if not len(at):

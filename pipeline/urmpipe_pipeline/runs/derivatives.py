@@ -126,12 +126,7 @@ def _blanked(
 
 
 def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
-    """Tell whether recorded rates are those of the recorded values.
-
-    Args:
-        recorded: Rates as the file has them, in [rad/s] or [m/s], shape (g, joints).
-        computed: Rates from differences, in the same unit, same shape.
-    """
+    """Tell whether recorded and computed rates in [rad/s] or [m/s], shape (g, joints), are the same."""
     both = np.isfinite(recorded) & np.isfinite(computed)
     if not both.any():
         return False
@@ -143,10 +138,7 @@ def recorded_agree(recorded: FloatArray, computed: FloatArray) -> bool:
 def other_unit(recorded: FloatArray, computed: FloatArray, order: int) -> OtherUnit | None:
     """Return in which other unit recorded derivatives would agree with the differences; None if in none.
 
-    Args:
-        recorded: Derivatives as the file has them, in [rad/s^order] or [m/s^order], shape (g, joints).
-        computed: From differences, in [rad/s^order] or [m/s^order], same shape.
-        order: 1 for rates, 2 for accelerations.
+    Both are in [rad/s^order] or [m/s^order], shape (g, joints): rates of order 1, accelerations of order 2.
     """
     both = np.isfinite(recorded) & np.isfinite(computed)
     own, wanted = recorded[both], computed[both]

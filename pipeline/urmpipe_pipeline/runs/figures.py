@@ -107,13 +107,7 @@ def joint_panels(
 
 
 def speed_figure(name: str, t_ns: IntArray, speed: FloatArray | Computed) -> Figure:
-    """Return the speed of a tool centre point over time.
-
-    Args:
-        name: Whose it is.
-        t_ns: Times in [ns], shape (n,).
-        speed: In [m/s], shape (n,).
-    """
+    """Return the speed of a tool centre point in [m/s], shape (n,), over times in [ns], shape (n,)."""
     title = "Speed of the tool centre point"
     panel = Panel("‖v‖", "m/s", (Line(speed, ("speed",), NORM),), t_ns, signed=False)
     alt = f"{title} of {name} over time: the norm of its velocity."
@@ -152,11 +146,7 @@ def point_name(run: Run) -> str:
 
 
 def coordinates(values: FloatArray) -> Line:
-    """Return x, y and z of something in their colours, by these names in all panels.
-
-    Args:
-        values: In any unit, shape (n, 3).
-    """
+    """Return x, y and z in any unit, shape (n, 3), in their colours, by these names in all panels."""
     return Line(values, tuple("xyz"), COORDINATES)
 
 

@@ -119,13 +119,9 @@ def _unsaid_units(columns: Sequence[LogColumn]) -> list[LogWarning]:
 
 
 def shares(clock_ns: IntArray, units: Sequence[str]) -> list[Times]:
-    """Return what each column of a clock holds: all of it or, of two columns, its share.
+    """Return what each column of a clock in integer [ns], shape (n,), holds: all or, of two, its share.
 
     Two columns are seconds and nanoseconds, or date and time of day.
-
-    Args:
-        clock_ns: The clock in integer [ns], shape (n,).
-        units: The unit of each of its columns.
     """
     steps = {"s": 10**9, DATE: DAY} if len(units) > 1 else {}
     coarse = next((steps[unit] for unit in units if unit in steps), None)

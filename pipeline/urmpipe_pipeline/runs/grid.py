@@ -49,11 +49,7 @@ class Grid:
     warnings: tuple[LogWarning, ...]
 
     def resample(self, values: FloatArray) -> FloatArray:
-        """Return values of the rows on the grid, in their unit, shape (g, k): linear, NaN inside gaps.
-
-        Args:
-            values: In any unit, shape (n, k).
-        """
+        """Return values in any unit, shape (n, k), on the grid, shape (g, k): linear, NaN inside gaps."""
         if self.own:
             return values
         return interpolate(self.t_ns, self.source_ns, values)
@@ -63,12 +59,9 @@ class Grid:
     ) -> tuple[FloatArray, tuple[LogWarning, ...]]:
         """Return joint values on the grid; NaN inside gaps and between the rows of an unresolved step.
 
-        Args:
-            values: Repolarized values of the rows in [rad] or [m], shape (n, joints).
-            unresolved: Row before, row after and joint index of steps that no motion explains, shape (u, 3).
-
-        Returns:
-            The values in [rad] or [m], shape (g, joints), and a warning that counts what was left open.
+        Values, repolarized, are in [rad] or [m], shape (n, joints), on the grid (g, joints). Steps that no
+        motion explains are row before, row after and joint index, shape (u, 3): a warning counts what was
+        left open.
         """
         if self.own or not len(unresolved):
             return self.resample(values), ()
@@ -80,14 +73,10 @@ class Grid:
         return result, (LogWarning("step-left-open", said),) if left else ()
 
     def steps(self, rows: IntArray) -> IntArray:
-        """Return the steps of the grid that steps between rows reach into.
+        """Return the steps of the grid that steps between rows reach into: the first and the last one.
 
-        Args:
-            rows: Row before, row after and joint index, shape (b, 3).
-
-        Returns:
-            First and last step of the grid that each reaches into, by the sample before the step, and joint
-            index, shape (m, 3).
+        Rows are row before, row after and joint index, shape (b, 3). Grid steps are told by the sample before
+        them, and joint index, shape (m, 3).
         """
         if self.own:
             return np.column_stack((rows[:, 0], rows[:, 1] - 1, rows[:, 2]))
@@ -125,13 +114,9 @@ def interpolate(at_ns: IntArray, known_ns: IntArray, values: FloatArray) -> Floa
 def inside_spans(
     first: IntArray, end: IntArray, columns: IntArray, shape: tuple[int, ...]
 ) -> NDArray[np.bool_]:
-    """Return a mask of a table, shaped as it, that is true in some spans of rows.
+    """Return a mask of rows and columns of some shape that is true in some spans of rows.
 
-    Args:
-        first: First row of each span, shape (m,).
-        end: The row after its last one, not before `first`, shape (m,).
-        columns: The column it stands in, shape (m,).
-        shape: Rows and columns of the table.
+    Each span has its first row, the row after its last one and its column, all of shape (m,).
     """
     depth = np.zeros((shape[0] + 1, shape[1]), dtype=np.int32)
     np.add.at(depth, (first, columns), 1)

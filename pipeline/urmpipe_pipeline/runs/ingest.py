@@ -164,11 +164,8 @@ def kinematics(
 ) -> tuple[PointLog | None, list[LogWarning]]:
     """Return the motion of the tool centre point, if there is a robot, and what there is to say about it.
 
-    Args:
-        robot: The arm, or None.
-        q: Joint values in [rad] or [m], shape (g, joints).
-        qd: Their rates in [rad/s] or [m/s], shape (g, joints).
-        qdd: Their second derivatives in [rad/s2] or [m/s2], shape (g, joints).
+    Joint values are in [rad] or [m], their rates in [rad/s] or [m/s], their second derivatives in [rad/s2] or
+    [m/s2], each of shape (g, joints).
 
     Raises:
         LogError: If the log has another number of joints than the robot.

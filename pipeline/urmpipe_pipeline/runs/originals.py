@@ -21,9 +21,7 @@ roundings moves it by half a unit in the last place of a number that may be twic
 def to_si(numbers: FloatArray, column: LogColumn) -> FloatArray:
     """Return factor (sign value + offset) as the reader computes it, in SI, shape (n,).
 
-    Args:
-        numbers: In the unit of the column, shape (n,).
-        column: How they are converted.
+    Values are in the unit of the column, shape (n,).
     """
     values = numbers if column.sign == 1 else -numbers
     values = values + column.offset if column.offset else values
@@ -31,15 +29,11 @@ def to_si(numbers: FloatArray, column: LogColumn) -> FloatArray:
 
 
 def originals(values: FloatArray, column: LogColumn) -> FloatArray:
-    """Return the numbers of a column as the file has them, in its unit, shape (n,).
+    """Return the numbers of a column as the file has them, in its unit, shape (n,); NaN stays.
 
-    Of the doubles whose conversion gives the SI value bit by bit, the one with the shortest decimal text
-    is taken: of a file with up to 15 digits that is its own number, else one next to it at most. Where an
-    offset leaves no such double in reach, it is the nearest to the inverse.
-
-    Args:
-        values: In SI, shape (n,); NaN stays.
-        column: How they were converted.
+    Of the doubles whose conversion gives the value in SI, shape (n,), bit by bit, the one with the shortest
+    decimal text is taken: of a file with up to 15 digits that is its own number, else one next to it at most.
+    Where an offset leaves no such double in reach, it is the nearest to the inverse.
     """
     if column.factor == 1.0 and not column.offset:
         return values if column.sign == 1 else -values

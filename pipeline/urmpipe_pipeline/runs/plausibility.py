@@ -105,9 +105,7 @@ def outlying_ends(motion: JointMotion) -> NDArray[np.int64]:
 def outlier_warnings(motion: JointMotion, outliers: NDArray[np.int64]) -> list[LogWarning]:
     """Return a warning for each end that is an outlier: which joints are off, and by how much.
 
-    Args:
-        motion: The motion.
-        outliers: Row and joint index, shape (k, 2), as `outlying_ends` returns them.
+    Outliers are row and joint index, shape (k, 2), as `outlying_ends` returns them.
     """
     q, warnings = motion.q, []
     for row, beside in motion.ends:
@@ -198,14 +196,9 @@ def beyond_limits(motion: JointMotion, robot: Chain) -> list[LogWarning]:
 
 
 def speed_limits(robot: Chain | None, turning: NDArray[np.bool_]) -> FloatArray:
-    """Return the largest speed of each joint: the robot's, else `FASTEST` for one that turns, else inf.
+    """Return the largest speed of each joint in [rad/s] or [m/s], shape (joints,).
 
-    Args:
-        robot: The arm, or None.
-        turning: Which joints turn, shape (joints,).
-
-    Returns:
-        In [rad/s] or [m/s], shape (joints,).
+    It is the robot's, else `FASTEST` for one that turns, shape (joints,), else inf.
     """
     fallback = np.where(turning, FASTEST, np.inf)
     if robot is None:
@@ -219,13 +212,9 @@ def too_fast(
 ) -> list[LogWarning]:
     """Return a warning for each joint that steps faster than it can: how often, where first, where worst.
 
-    Rows closer in time than the usual period are taken to be that far apart: it is their clock that hurries.
-
-    Args:
-        motion: The motion.
-        limits: Largest speeds in [rad/s] or [m/s], shape (joints,).
-        told: Row and joint index of steps that a warning speaks of already, shape (u, 2).
-        period: Usual time from one value to the next in [s].
+    Rows closer in time than the usual period in [s] are taken to be that far apart: it is their clock that
+    hurries. Limits are in [rad/s] or [m/s], shape (joints,); steps that a warning speaks of already are row
+    and joint index, shape (u, 2).
     """
     q = motion.q
     largest = np.max([motion.inner, *(np.abs(q[row] - q[beside]) for row, beside in motion.ends)], axis=0)

@@ -65,9 +65,6 @@ def play_back(run: Run) -> Playback | None:
     Outside the jumps velocity and acceleration are the run's. Within a jump they are those of central
     differences of the played-back joints at the period of playback: the time between its rows by `PARTS`.
 
-    Args:
-        run: With a robot.
-
     Source: [UrmArm2021]_ section 2.3, Figure 5.
     """
     if run.robot is None or run.tcp is None or not run.repolarizations:

@@ -17,15 +17,10 @@ from urmpipe_pipeline.runs.results import Run
 def poses_by_kinematics(name: str, robot: Chain, clock_ns: IntArray, q: FloatArray, where: str) -> Poses:
     """Return the trajectory of an arm's tip by forward kinematics, without the rows that lack a joint.
 
-    Args:
-        name: Of the trajectory.
-        robot: The arm.
-        clock_ns: Times in integer [ns], shape (n,).
-        q: Joint values in [rad] or [m], shape (n, joints).
-        where: What an error names.
+    Joint values are in [rad] or [m], shape (n, joints), at integer times in [ns], shape (n,).
 
     Raises:
-        RecordingError: If no row has a pose.
+        RecordingError: If no row has a pose, naming where.
     """
     there = np.flatnonzero(np.isfinite(q).all(axis=1))
     if not len(there):

@@ -34,10 +34,6 @@ def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
 
     A constant tool is allowed for. What would bring them together is said: two joints exchanged, one that
     turns the other way, another base. A log that hardly moves tells nothing, since some tool always fits.
-
-    Args:
-        robot: The arm, or None.
-        log: The log, in SI.
     """
     if robot is None or log.tcp_position is None or log.q.shape[1] != len(robot.moving):
         return []
@@ -56,12 +52,7 @@ def far_from_recorded(robot: Chain | None, log: JointLog) -> list[LogWarning]:
 
 
 def lacking_tool(robot: Chain | None, log: JointLog) -> list[LogWarning]:
-    """Return a warning if kinematics and recorded tool centre point lie apart by what tool or base explain.
-
-    Args:
-        robot: The arm, or None.
-        log: The log, in SI.
-    """
+    """Return a warning if kinematics and recorded positions lie apart by what a tool or a base explains."""
     if robot is None or log.tcp_position is None:
         return []
     rows = spread(log.rows)

@@ -17,9 +17,6 @@ def infer_robot(log: JointLog) -> tuple[Chain, Inference] | None:
 
     A robot's name in the name of every joint column singles it out (as in /ur5e/elbow_joint/position); so
     do its kinematics, if they come out at the recorded tool centre point and those of no other robot do.
-
-    Args:
-        log: The log, in SI.
     """
     words = _shared_words(log.joints)
     if not log.joints or (log.tcp_position is None and not words & set(robot_names())):

@@ -288,12 +288,7 @@ def _scalars(signal: Signal, t: FloatArray) -> Iterator[dict[str, Any]]:
 def extremes(values: FloatArray, t: FloatArray) -> dict[str, float | None]:
     """Return the first and the last value, the least and the largest, and when these first stand.
 
-    Args:
-        values: In any unit, shape (n,); what is not finite is no value.
-        t: Times in [s], shape (n,).
-
-    Returns:
-        first, last, min, t_min, max, t_max; None where there is no value.
+    Values are in any unit, shape (n,), at times in [s], shape (n,); of none that is finite, all are None.
     """
     known = np.flatnonzero(np.isfinite(values))
     if not len(known):

@@ -125,9 +125,6 @@ class FirstSignals(Sequence[Scalar]):
 
     The blocks come first whose outputs no other block takes, which judge or end the system, with `AT_ONCE`
     scalars a turn; of the others one a turn, first what another block takes of them.
-
-    Args:
-        simulation: The simulation.
     """
 
     def __init__(self, simulation: Simulation) -> None:

@@ -66,12 +66,7 @@ class Request:
 
 
 def refuse_unsolvable(request: Request, *, recorded: bool) -> None:
-    """Raise an `OptionError` with every option that makes no sense, alone or with a path.
-
-    Args:
-        request: What is to be solved.
-        recorded: Whether a recording is to be written.
-    """
+    """Raise an `OptionError` with every option that makes no sense, alone or with a path."""
     faults = [*_bad_values(request)]
     if not faults and request.given.t_ns is not None:
         faults += [*_not_for_paths(request, recorded)]

@@ -309,11 +309,6 @@ class SolvedTargets(Result):
 def missed_by(chain: Chain, solutions: Solutions, targets: Targets) -> tuple[FloatArray, FloatArray | None]:
     """Return how far the tool is from its targets by forward kinematics: a check of whatever solved them.
 
-    Args:
-        chain: The arm.
-        solutions: k a target.
-        targets: One a row of the solutions.
-
     Returns:
         The distances in [m] and the angles in [rad], shape (n, k); no angles where any orientation will do.
         NaN where there is no solution.

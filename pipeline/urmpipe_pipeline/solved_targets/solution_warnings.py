@@ -173,11 +173,7 @@ def path_warnings(path: JointPath) -> Iterator[LogWarning]:
 
 
 def unreached_warnings(reasons: Sequence[str | None]) -> Iterator[LogWarning]:
-    """Yield how many targets have no solution, and why the first has none.
-
-    Args:
-        reasons: Why a target has none, one line; None where it has one.
-    """
+    """Yield how many targets have no solution, and why the first has none."""
     missed = [(row, reason) for row, reason in enumerate(reasons, start=1) if reason is not None]
     if missed:
         (row, reason), *others = missed

@@ -193,10 +193,6 @@ def _times(
 def _refuse_unclear(plan: Plan, *, named: bool) -> None:
     """Raise if columns without names are left over, or the orientation stands in another table.
 
-    Args:
-        plan: What is to be read.
-        named: Whether the user names the columns.
-
     Raises:
         LogError: With what may be read instead.
     """

@@ -71,14 +71,6 @@ def assemble(
 ) -> JointLog:
     """Return the log of what was read.
 
-    Args:
-        plan: What was to be read.
-        content: The numbers.
-        options: What the user says.
-        robot: The arm, or None.
-        name: What the log is called.
-        files: Its files.
-
     Raises:
         LogError: If a column has no value, or its unit cannot be told.
         OptionError: If an option does not fit the log.

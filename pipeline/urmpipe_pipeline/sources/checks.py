@@ -51,11 +51,7 @@ def trimmed(numbers: Numbers) -> Numbers:
 
 
 def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
-    """Return the numbers without the rows that could not be read, and a warning for each of these.
-
-    Args:
-        numbers: What was read, `may_skip` it.
-    """
+    """Return the numbers without the rows that could not be read, and a warning for each of these."""
     if not numbers.unread:
         return numbers, []
     rows = np.delete(np.arange(len(numbers.values)), sorted(numbers.unread))
@@ -84,11 +80,7 @@ def may_skip(numbers: Numbers) -> bool:
 
 
 def rebuilt(numbers: Numbers) -> Numbers:
-    """Return the numbers, with a regular clock where the file's is too coarse for its rows.
-
-    Args:
-        numbers: What was read of a table, its times that of the file.
-    """
+    """Return the numbers, with a regular clock where the file's is too coarse for its rows."""
     times = numbers.clock
     if times is None or times.min(initial=0) <= UNREADABLE:
         return numbers
@@ -109,14 +101,7 @@ def rebuilt(numbers: Numbers) -> Numbers:
 def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: Clock) -> list[Finding]:
     """Return everything that is wrong with the rows of a table, in the order of its lines.
 
-    Args:
-        layout: The table.
-        numbers: What was read of it.
-        names: Names of the columns of numbers.values, as the file has them.
-        clock: Its clock.
-
-    Returns:
-        The first findings, and one that counts the others.
+    These are the first findings, and one that counts the others.
     """
     wrong = [*_clock_errors(numbers, clock), *_infinities(numbers, names)]
     total = numbers.wrong + len(wrong)
@@ -135,8 +120,7 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
 def missing_samples(groups: Iterable[tuple[FloatArray, Sequence[str]]]) -> list[LogWarning]:
     """Return a warning for the columns in which samples are missing, those that lack the same rows together.
 
-    Args:
-        groups: Values of some columns, in any unit, shape (n, columns), and their names.
+    The columns come in groups with their names: values in any unit, shape (n, columns).
     """
     alike: dict[bytes, tuple[BoolArray, list[str]]] = {}
     for values, names in groups:
@@ -203,12 +187,7 @@ def _clock_errors(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
 
 
 def unknown_times(numbers: Numbers, clock: Clock) -> Iterable[Finding]:
-    """Yield row and column where a row has no time, or one that cannot be read.
-
-    Args:
-        numbers: What was read of a table, its times that of the file.
-        clock: Its clock.
-    """
+    """Yield row and column where a row has no time, or one that cannot be read."""
     if numbers.clock is None or not clock.columns:
         return
     name = clock.columns[0].header
@@ -268,11 +247,7 @@ def _unusual(values: FloatArray) -> list[int]:
 
 
 def gaps(t_ns: IntArray) -> list[LogWarning]:
-    """Return a warning with each gap between two rows.
-
-    Args:
-        t_ns: Times in [ns], shape (n,).
-    """
+    """Return a warning with each gap between two rows at times in [ns], shape (n,)."""
     places = np.flatnonzero(gaps_behind(t_ns)).tolist()
     if not places:
         return []

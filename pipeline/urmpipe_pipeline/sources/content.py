@@ -74,10 +74,6 @@ class Content:
 def read_content(plan: Plan, *, skip_bad: bool = False) -> Content:
     """Return the numbers that a plan asks for.
 
-    Args:
-        plan: What is to be read.
-        skip_bad: Leave out rows that cannot be read, if they are few.
-
     Raises:
         LogError: With everything that is wrong with rows, cells and times of all tables, or if the files
             of one log differ in their times.

@@ -77,9 +77,6 @@ class LogMap:
 def read_map(path: Path) -> LogMap:
     """Return what a map says.
 
-    Args:
-        path: The TOML file.
-
     Raises:
         OptionError: With everything that is wrong with it.
     """

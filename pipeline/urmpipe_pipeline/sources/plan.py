@@ -60,11 +60,6 @@ class Plan:
 def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan:
     """Return what is to be read of a log's tables.
 
-    Args:
-        tables: The tables.
-        options: What the user says.
-        robot: The arm, or None.
-
     Raises:
         LogError: If clock or joints cannot be told.
         OptionError: If an option's value makes no sense.

@@ -184,9 +184,6 @@ def split_unit(name: str) -> tuple[str, str | None]:
 
     An index such as in state.q[0] and joint(1) stays part of the name. A unit as the last word
     (c_arm_wigwag_deg) is told, and stays part of the name as well.
-
-    Args:
-        name: The name as the header has it.
     """
     match = _BRACKETS.match(name)
     if match and not match["inside"].strip().isdigit():

@@ -40,12 +40,6 @@ UNHOLDABLE = re.compile("[^\x20-\x7e\xa0-\ud7ff\ue000-\ufffd\U00010000-\U0010fff
 def write_junit(shown: Presentation, part: Path, path: Path, voice: Voice = "python") -> None:
     """Write the checks of a presentation as JUnit XML and read it back.
 
-    Args:
-        shown: The presentation.
-        part: Where to write it, as `guarded_output` gives it.
-        path: The name it is to have, for messages.
-        voice: In whose words it tells warnings.
-
     Raises:
         OutputError: If it did not read back as it was written.
     """
@@ -56,13 +50,7 @@ def write_junit(shown: Presentation, part: Path, path: Path, voice: Voice = "pyt
 
 @contextmanager
 def errors_in_junit(path: Path | None, inputs: Sequence[Path], voice: Voice = "python") -> Iterator[None]:
-    """Write an error of the body to a JUnit file, too, as `write_errors` does, and raise it on.
-
-    Args:
-        path: The JUnit file; None for none.
-        inputs: The files that it may not replace.
-        voice: In whose words it is told.
-    """
+    """Write an error of the body to a JUnit file, too, as `write_errors` does, and raise it on."""
     try:
         yield
     except UrmpipeError as error:
@@ -75,12 +63,6 @@ def write_errors(path: Path, inputs: Sequence[Path], findings: Sequence[Finding]
     """Write why there is no verdict to a JUnit file, one test case a finding: no earlier verdict stays.
 
     A file that is no JUnit file of urmpipe's, or an input, is left as it is.
-
-    Args:
-        path: The JUnit file.
-        inputs: The files that it may not replace.
-        findings: What was wrong, at least one.
-        voice: In whose words it is told.
     """
     root = ET.Element("testsuites", name="urmpipe compare")
     suite = ET.SubElement(root, "testsuite", name="urmpipe compare")

@@ -22,12 +22,6 @@ LARGEST = 2**31 - 1
 def write_mat(name: str, fields: Mapping[str, Any], path: Path, target: Path) -> list[str]:
     """Write one struct and return how the file differs from it, read back.
 
-    Args:
-        name: Name of the variable.
-        fields: Its fields: numbers, arrays, texts, structs, and lists, which become cells.
-        path: Where to write.
-        target: The name it is to have, for messages.
-
     Raises:
         OutputError: If it is larger than the format allows.
     """
@@ -46,11 +40,7 @@ def write_mat(name: str, fields: Mapping[str, Any], path: Path, target: Path) ->
 
 
 def cells(items: Sequence[Any]) -> np.ndarray[tuple[int, int], np.dtype[np.object_]]:
-    """Return items as a row of MATLAB's cells [-], shape (1, n).
-
-    Args:
-        items: n texts, numbers or structs.
-    """
+    """Return n texts, numbers or structs as a row of MATLAB's cells [-], shape (1, n)."""
     row = np.empty((1, len(items)), dtype=object)
     for k, item in enumerate(items):
         row[0, k] = item

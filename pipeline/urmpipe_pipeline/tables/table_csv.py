@@ -16,11 +16,6 @@ def write_table(table: Table, part: Path, path: Path) -> None:
     The header holds the keys of the columns. Numbers stand in SI, in the shortest digits that are theirs; a
     cell is empty where there is no value.
 
-    Args:
-        table: The table.
-        part: Where to write it, as `guarded_output` gives it.
-        path: The name it is to have, for messages.
-
     Raises:
         OutputError: If it did not read back as it was written.
     """

@@ -32,8 +32,7 @@ def shown_unit(panels: Iterable[Panel]) -> str:
 def whole_axis(figures: Iterable[Figure]) -> tuple[tuple[int, int] | None, bool]:
     """Return the first and the last time of all panels in [ns], without times their first and last row.
 
-    Returns:
-        Both ends, None where nothing is plotted; and whether they are times.
+    None where nothing is plotted; and whether they are times.
     """
     times: list[int] = []
     rows = 0
@@ -52,11 +51,6 @@ def span_with_numbers(low: float, high: float, most: int = TALL) -> tuple[float,
 
     The viewer writes powers of ten: the multiples of the largest one in the range where they are few, else
     those of the next. So the longer side of a range whose multiples are many is drawn out to that.
-
-    Args:
-        low: Least value.
-        high: Largest value.
-        most: Multiples that the height has room for.
     """
     low, high = min(low, 0.0), max(high, 0.0)
     longest = max(-low, high)

@@ -57,10 +57,7 @@ def send_views(
 ) -> tuple[Blueprint, Opening, set[str]]:
     """Send what is there to be looked at of a presentation, and return the layout and where it opens.
 
-    Args:
-        stream: Where to.
-        shown: The presentation.
-        entity_of: Where arrays of the result stand as scalars in their own unit.
+    Where arrays of the result stand as scalars in their own unit, their entities are drawn.
 
     Returns:
         The layout, where it opens, and the entities of the arrays of the result that it plots.
@@ -152,13 +149,7 @@ def _plots(plots: Plots, parts: Sequence[_Part]) -> View | Container | None:
 
 
 def _rows(plots: Plots, part: _Part, about: str = "") -> list[Row]:
-    """Return the figures of a section from top to bottom; the events share the row of the last.
-
-    Args:
-        plots: Sends them.
-        part: The section, with at least one figure.
-        about: What stands before the names of the plots.
-    """
+    """Return the figures of a section from top to bottom; the events share the row of the last."""
     rows: list[Row] = []
     last: list[View | Container] = [_events(plots, part)] if part.events else []
     height = sum(one.share * (len(one.views) if one.opened is None else 1) for one in part.figures)

@@ -16,14 +16,7 @@ Eye::DEFAULT_FOV_Y), the share of it that the scene fills, and how wide a view i
 
 
 def seen(points: FloatArray) -> FloatArray:
-    """Return how far points lie to the right, upwards and towards the eye.
-
-    Args:
-        points: In [m], shape (..., 3).
-
-    Returns:
-        In [m], shape (..., 3).
-    """
+    """Return how far points in [m], shape (..., 3), lie to the right, upwards and towards the eye in [m]."""
     right = np.cross((0.0, 0.0, 1.0), EYE)
     right /= np.linalg.norm(right)
     return np.asarray(points @ np.column_stack((right, np.cross(EYE, right), EYE)))
@@ -32,8 +25,7 @@ def seen(points: FloatArray) -> FloatArray:
 def eye_distance(points: FloatArray) -> float:
     """Return how far the eye is from the middle of a scene, so that all of it is in view, in [m].
 
-    Args:
-        points: What `seen` returns of points from the middle in [m], shape (..., 3); NaN where there is none.
+    The points are what `seen` returns of them from the middle in [m], shape (..., 3); NaN is no point.
     """
     aside, above, ahead = np.moveaxis(points, -1, 0)
     distance = ahead + np.maximum(np.abs(above), np.abs(aside) / WIDE) / (FILLED * np.tan(FIELD_OF_VIEW / 2))
@@ -43,12 +35,8 @@ def eye_distance(points: FloatArray) -> float:
 def in_the_picture(points: FloatArray) -> FloatArray:
     """Return where points are in the picture that the eye sees of them: what is nearer is larger.
 
-    Args:
-        points: In [m], shape (..., 3); NaN where there is none.
-
-    Returns:
-        To the right and upwards of the middle, as long as in the plane through the middle in [m],
-        shape (..., 2).
+    Points are in [m], shape (..., 3), NaN where there is none; to the right and upwards of the middle they
+    are in [m], shape (..., 2), as long as in the plane through the middle.
     """
     found = seen(points)
     flat = found.reshape(-1, 3)

@@ -23,13 +23,9 @@ LEVELS = {"info": "INFO", "warning": "WARN", "error": "ERROR"}
 def events_view(
     stream: RecordingStream, events: Sequence[Event], entity: str, first_ns: int | None
 ) -> TextLogView:
-    """Send events and return their list, each beginning with its time: the list's own column is too narrow.
+    """Send one event or more and return their list, each beginning with its time: its column is too narrow.
 
-    Args:
-        stream: Where to.
-        events: At least one.
-        entity: Where they stand.
-        first_ns: The first time in [ns], for what holds for all of it; None without times: all is in row 1.
+    What holds for all of it stands at the first time, in [ns]; None without times: all is in row 1.
     """
     import rerun as rr
     import rerun.blueprint as rrb

@@ -14,12 +14,7 @@ NAME_SIZE = (0.3, 0.035)
 def name_places(start: FloatArray, end: FloatArray) -> FloatArray:
     """Return where the name of an arm may stand: at the end of each bone, or in its middle.
 
-    Args:
-        start: Where each bone starts in [m], shape (..., bones, 3).
-        end: Where it ends, likewise.
-
-    Returns:
-        In [m], shape (..., 2 bones, 3).
+    Bones start and end in [m], shape (..., bones, 3) each; the places are in [m], shape (..., 2 bones, 3).
     """
     return np.concatenate((end, (start + end) / 2), axis=-2)
 
@@ -54,10 +49,6 @@ def placed_names(arms: FloatArray, view: float = 0.0) -> IntArray:
 
 
 def extent_of(points: FloatArray) -> float:
-    """Return the diagonal of the box around points in [m]; 1 around one point. NaN is no point.
-
-    Args:
-        points: In [m], shape (..., 3).
-    """
+    """Return the diagonal of the box around points in [m], shape (..., 3); 1 around one. NaN is no point."""
     flat = points.reshape(-1, 3)
     return float(np.linalg.norm(np.fmax.reduce(flat) - np.fmin.reduce(flat))) or 1.0

@@ -297,14 +297,9 @@ class _Look:
 
 
 def overview(values: FloatArray, most: int) -> IntArray:
-    """Return the rows of an array that a drawing needs, so many at most: every peak stays.
+    """Return the rows of an array, shape (m,), that a drawing needs, so many at most: every peak stays.
 
-    Args:
-        values: In any unit, shape (n,) or (n, k).
-        most: Rows.
-
-    Returns:
-        Rows, in order, shape (m,).
+    Values are in any unit, shape (n,) or (n, k).
     """
     starts = range(0, max(len(values), 1), SLICE)
     each = max(most // len(starts), 1)

@@ -57,13 +57,7 @@ LABEL_COLOUR = "#ffffff"
 
 
 def scene_view(stream: RecordingStream, scene: Scene, opens_at_ns: int) -> Spatial3DView | None:
-    """Send a scene and return its view; None if there is nothing to see.
-
-    Args:
-        stream: Where to.
-        scene: What is drawn.
-        opens_at_ns: Where the viewer opens in [ns].
-    """
+    """Send a scene that opens at a time in [ns] and return its view; None if there is nothing to see."""
     import rerun as rr
     import rerun.blueprint as rrb
 
@@ -223,13 +217,8 @@ def capsules(bones: FloatArray) -> tuple[NDArray[np.float32], NDArray[np.float32
     """Return how long bones are and how they are turned: a capsule without a turn lies along z.
 
     The least turn that takes z to the unit vector d is the quaternion (z x d, 1 + z.d), normalised; to -z it
-    is half a turn about x.
-
-    Args:
-        bones: From start to end in [m], shape (..., 3).
-
-    Returns:
-        Lengths in [m], shape (...), and quaternions x, y, z, w [-], shape (..., 4).
+    is half a turn about x. Bones go from start to end in [m], shape (..., 3); lengths are in [m], shape
+    (...), and quaternions x, y, z, w [-], shape (..., 4).
     """
     length = np.linalg.norm(bones, axis=-1)
     x, y, z = np.moveaxis(bones / np.where(length > 0.0, length, 1.0)[..., None], -1, 0)

@@ -45,9 +45,7 @@ class Body:
 def bodies_over_log(robot: Chain, q: FloatArray) -> tuple[Body, ...]:
     """Return the links of an arm that have shapes which can be drawn.
 
-    Args:
-        robot: The arm.
-        q: Joint values in [rad] or [m], shape (m, joints).
+    Its joint values are in [rad] or [m], shape (m, joints).
     """
     shown = [visual for visual in robot.visuals if drawable(visual)]
     if not shown:
@@ -97,15 +95,9 @@ def draw_body(stream: RecordingStream, body: Body, times: list[TimeColumn]) -> N
 
 
 def hide_body(stream: RecordingStream, body: Body, times: list[TimeColumn], count: int) -> None:
-    """Hide the shapes of a link that moves from some times on, until it has a pose again.
+    """Hide the shapes of a link that moves from some times on, until it has a pose again; none of the base.
 
     They stand there once for all times, so they are made too small to be seen.
-
-    Args:
-        stream: Where to.
-        body: The link; nothing is done to the base.
-        times: The times.
-        count: How many.
     """
     import rerun as rr
 

@@ -24,12 +24,7 @@ NAMED = 12
 
 
 def summary(shown: Presentation, scene: Scene | None = None) -> tuple[str, str]:
-    """Return a presentation in a few lines of Markdown: what is to be seen at once, and further tables below.
-
-    Args:
-        shown: The presentation.
-        scene: Its scene, if there is one: which path has which colour.
-    """
+    """Return a presentation as Markdown: a few lines that are seen at once, and further tables below."""
     word = (shown.verdict or shown.word).upper()
     title = f"{word}: {plain(shown.headline)}" if word else plain(shown.headline)
     sections = [shown.body, *(shown.body.sections if len(shown.body.sections) == 1 else ())]

@@ -106,14 +106,7 @@ def lines_of(
 
 
 def dashed(strips: Sequence[FloatArray]) -> tuple[FloatArray, ...]:
-    """Return every second piece of the lines, all pieces equally long.
-
-    Args:
-        strips: In [m], shape (any, 3) each.
-
-    Returns:
-        In [m], shape (any, 3) each.
-    """
+    """Return every second piece of lines in [m], shape (any, 3) each; all pieces are equally long."""
     if not strips:
         return ()
     lengths = [np.r_[0.0, np.cumsum(np.linalg.norm(np.diff(strip, axis=0), axis=1))] for strip in strips]

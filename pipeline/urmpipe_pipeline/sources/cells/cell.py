@@ -117,10 +117,7 @@ def significant_digits(cells: Iterable[str]) -> int | None:
     """Return the digits of a coarse fixed format such as +1.571e+00 (4), or None.
 
     Only numbers with an exponent tell: their mantissa shows the digits that the writer allowed itself.
-    Zeros are left out, since writers shorten them.
-
-    Args:
-        cells: Cells of the joint columns, with a decimal point.
+    Zeros are left out, since writers shorten them. The cells have a decimal point.
     """
     lengths = set()
     for cell in cells:

@@ -117,9 +117,6 @@ class Form:
         """Return what cells mean in [ns], and which of them mean something, a value a cell: shape (n,).
 
         A date counts from 1970 in UTC (without a time zone it is taken as UTC), a time of day from midnight.
-
-        Args:
-            parts: The cells.
         """
         if parts.text("word"):
             return _length(parts)

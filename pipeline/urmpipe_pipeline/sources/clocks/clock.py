@@ -98,14 +98,6 @@ def find_clock(
 ) -> Clock:
     """Return the clock of a table.
 
-    Args:
-        columns: The table's columns.
-        layout: The table.
-        options: What the user says.
-        source: The source, if it is known.
-        units: Units given by the user, by the column's number.
-        joints: How many joints the robot has, if there is one.
-
     Raises:
         LogError: If the time is text in no form that is known, or its unit cannot be told.
         OptionError: If its unit is given as one that is no time.
@@ -121,13 +113,6 @@ def clock_of(
     units: Mapping[int, Unit],
 ) -> Clock:
     """Return the clock that columns make.
-
-    Args:
-        chosen: The columns: one, a date and a time of day, seconds and nanoseconds; or none.
-        why: Why these.
-        layout: Their table.
-        source: The source, if it is known.
-        units: Units given by the user, by the column's number.
 
     Raises:
         LogError: If the time is text in no form that is known, or its unit cannot be told.

@@ -26,12 +26,6 @@ def time_columns(
 ) -> tuple[tuple[Column, ...], str]:
     """Return the columns that hold the time, and why; none if there is no time.
 
-    Args:
-        columns: The table's columns.
-        layout: The table.
-        options: What the user says.
-        joints: How many joints the robot has, if there is one.
-
     Raises:
         LogError: If the column that the user names is not there, or the first one of a table without a
             header may be the time or not.
@@ -173,11 +167,6 @@ def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Colu
 
     It is told, not taken: a way or a counter of pulses increases from row to row as well. One with another
     unit than that of a time is none.
-
-    Args:
-        columns: The table's columns.
-        layout: The table.
-        used: The columns that have a role.
     """
     free = (one for one in columns if one not in used and not one.text)
     may_be = (one for one in free if not one.unit_text or (one.unit and one.unit.quantity == "time"))
@@ -189,23 +178,13 @@ def _runs_like_a_clock(cells: Sequence[str], layout: Layout) -> bool:
 
 
 def steps_of(cells: Sequence[str], layout: Layout) -> list[float]:
-    """Return the steps between sampled times.
-
-    Args:
-        cells: Sampled cells.
-        layout: Their table.
-    """
+    """Return the steps between sampled times."""
     times = times_of(cells, layout)
     return [after - before for before, after in pairwise(times)]
 
 
 def times_of(cells: Sequence[str], layout: Layout) -> list[float]:
-    """Return the sampled times, without those that are missing or text.
-
-    Args:
-        cells: Sampled cells.
-        layout: Their table.
-    """
+    """Return the sampled times, without those that are missing or text."""
     values = (to_float(cell, layout.decimal) for cell in cells)
     return [value for value in values if value is not None and math.isfinite(value)]
 
@@ -222,11 +201,6 @@ def _increases(cells: Sequence[str], layout: Layout) -> bool:
 
 
 def runs_evenly(cells: Sequence[str], layout: Layout) -> bool:
-    """Return whether numbers increase in steps that differ by less than 1 %.
-
-    Args:
-        cells: Sampled cells.
-        layout: Their table.
-    """
+    """Return whether numbers increase in steps that differ by less than 1 %."""
     steps = steps_of(cells, layout)
     return len(steps) >= 2 and min(steps) > 0 and max(steps) - min(steps) <= _EVEN * max(steps)

@@ -39,12 +39,6 @@ Found = tuple[str, str, tuple[LogWarning, ...]]
 def unit_of(time: Column, layout: Layout, source: KnownSource | None, units: Mapping[int, Unit]) -> Found:
     """Return the unit of a time column, why, and a warning if it is assumed.
 
-    Args:
-        time: The column.
-        layout: Its table.
-        source: The source, if it is known.
-        units: Units given by the user, by the column's number.
-
     Raises:
         LogError: If it is a unit that is not read, or cannot be told.
         OptionError: If it is given as one that is no time.

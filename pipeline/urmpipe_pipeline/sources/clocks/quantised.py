@@ -43,8 +43,7 @@ class Regular:
 def behind_rounded(stamps: IntArray) -> Regular | None:
     """Return the regular clock behind stamps that differ, such as 3, 7, 10, 13, 17 ms; None if there is none.
 
-    Args:
-        stamps: Times in integer [ns], strictly increasing, shape (n,).
+    Stamps are in integer [ns], strictly increasing, shape (n,).
     """
     steps = np.diff(stamps)
     if len(steps) < LEAST_CHANGES:
@@ -64,8 +63,7 @@ def behind_rounded(stamps: IntArray) -> Regular | None:
 def behind_repeated(stamps: IntArray) -> Regular | None:
     """Return the regular clock behind stamps that repeat about equally often; None if there is none.
 
-    Args:
-        stamps: Times in integer [ns], never running backwards, shape (n,).
+    Stamps are in integer [ns], never running backwards, shape (n,).
     """
     steps = np.diff(stamps)
     changes = np.flatnonzero(steps) + 1

@@ -14,12 +14,7 @@ from urmpipe_pipeline.sources.tables.numbers import NO_TIME, UNREADABLE
 
 
 def read_cells(cells: TextCells, form: Form) -> IntArray:
-    """Return the times of cells in [ns], shape (n,): NO_TIME for a missing one, UNREADABLE for no such time.
-
-    Args:
-        cells: The cells.
-        form: How they are written.
-    """
+    """Return the times of cells in [ns], shape (n,): NO_TIME for an empty one, UNREADABLE for no time."""
     times = np.where(np.diff(cells.starts) == 0, NO_TIME, UNREADABLE)
     for rows, block in cells.blocks():
         for same in _shapes(block):
@@ -28,11 +23,7 @@ def read_cells(cells: TextCells, form: Form) -> IntArray:
 
 
 def known_forms(texts: Sequence[str]) -> tuple[Form, ...]:
-    """Return the forms in which at least half of the cells with content are times, the usual ones first.
-
-    Args:
-        texts: Sampled cells.
-    """
+    """Return the forms in which at least half of the cells with content are times, the usual ones first."""
     cells = TextCells.of([text for text in texts if not is_missing(text)])
     if not len(cells):
         return ()

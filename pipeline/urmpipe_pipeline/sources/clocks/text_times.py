@@ -31,11 +31,6 @@ ZONED = "form of the time with a zone"
 def timed(layout: Layout, parts: Sequence[ClockColumn], numbers: Numbers) -> Numbers:
     """Return the numbers of a table with the times that the texts of its clock mean; others as they are.
 
-    Args:
-        layout: How the table is written.
-        parts: The columns of its clock.
-        numbers: What was read.
-
     Raises:
         LogError: If the cells may be read in two ways and nothing in the file decides.
     """

@@ -22,10 +22,6 @@ def time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
 
     It is a single column, or a single row, that is named like a time (the column or the file), or the only
     one of the two, without a header, that runs in even steps.
-
-    Args:
-        tables: The tables.
-        columns: Their columns.
     """
     if len(tables.layouts) != 2 or len(set(tables.paths)) != 2:
         return None
@@ -43,12 +39,6 @@ def time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
 
 def clock_of_file(tables: Tables, columns: Sequence[Column], index: int, units: dict[int, Unit]) -> Clock:
     """Return the clock that a file of times makes.
-
-    Args:
-        tables: The tables.
-        columns: Their columns.
-        index: The table of the times.
-        units: Units given by the user, by the column's number.
 
     Raises:
         LogError: If the other table has a time as well, or the unit of the times cannot be told.

@@ -169,12 +169,6 @@ def refuse_twins(
     A rate of the same name is no twin, nor is an angle "t (rad)" one of the time "t (s)": the unit says what
     it is.
 
-    Args:
-        used: The columns that were found to matter.
-        columns: All columns of the log.
-        layouts: The tables.
-        remedy: What the user can do.
-
     Raises:
         LogError: With a finding for each such column.
     """

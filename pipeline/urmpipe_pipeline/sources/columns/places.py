@@ -119,11 +119,6 @@ def one_plot_a_file(
     the numbers in the files' names; else the order in which the files were given. Where both have numbers
     and the orders differ, a warning says so.
 
-    Args:
-        columns: The columns of all files, without the clocks.
-        paths: The files, one a table.
-        robot: The arm: a plot for each of its joints is needed.
-
     Raises:
         LogError: If a number is missing among those of the plots, and there is no robot.
     """

@@ -26,11 +26,7 @@ _BESIDE = frozenset({"analog", "digital", "input", "output", "in", "out", "bits"
 
 
 def about_tcp(rest: Sequence[Column]) -> list[LogWarning]:
-    """Return a warning if two columns or more look like a tool centre point.
-
-    Args:
-        rest: The columns of a log that have no role; it has no tool centre point.
-    """
+    """Return a warning if two columns or more look like a tool centre point."""
     alike = [column for column in rest if _is_like(column)]
     if len(alike) < 2:
         return []

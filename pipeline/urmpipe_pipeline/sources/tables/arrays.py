@@ -37,11 +37,6 @@ def sniff_arrays(segment: Segment, delimiter: str | None = None, decimal: str | 
 
     A column NAME of arrays becomes NAME_1, NAME_2, ...
 
-    Args:
-        segment: The table's text.
-        delimiter: The sign between cells, or its name, if the file need not tell.
-        decimal: The decimal sign of the plain cells, or its name, if the file need not tell.
-
     Raises:
         LogError: As `sniff`, or if the arrays have decimal commas.
         OptionError: As `sniff`.

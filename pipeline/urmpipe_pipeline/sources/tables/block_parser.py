@@ -43,13 +43,8 @@ def parse_block(
 ) -> Numbers | None:
     """Return the numbers of some columns, or None if the parser stumbles over a row or a cell.
 
-    Args:
-        layout: How the table is written.
-        columns: Which columns hold numbers.
-        clock: The columns of its clock; their values in [ns] are added. If they are text, their cells are
-            read as they are.
-        block: Some whole rows, as they stand in the file.
-        scales: What `clock_scales` returned.
+    The block is some whole rows as they stand in the file, the scales are those of `clock_scales`. The values
+    of the clock in [ns] are added; if they are text, their cells are read as they are.
     """
     texts = [part for part in clock if part.forms]
     numeric = [part for part in clock if not part.forms]

@@ -31,11 +31,7 @@ def as_written(layout: Layout, cells: Bytes) -> Bytes:
 
 
 def row_blocks(layout: Layout) -> Iterator[bytes]:
-    """Yield the rows of a table as they stand in the file, some thousand at a time, in `byte_encoding`.
-
-    Args:
-        layout: How the table is written.
-    """
+    """Yield the rows of a table as they stand in the file, some thousand at a time, in `byte_encoding`."""
     segment = layout.segment
     left = segment.end - layout.offset
     wide = segment.encoding.startswith("utf-16")
@@ -67,10 +63,6 @@ def converted(layout: Layout, block: bytes) -> tuple[bytes, int]:
     Decimal commas become points here, since pyarrow 26 parses decimals with another point wrongly in threads
     (they share a buffer); a point becomes a sign that no number has, so that 1.5 stays no number.
 
-    Args:
-        layout: How the table is written.
-        block: Whole rows as they stand in the file.
-
     Raises:
         UnfitError: If rows with arrays or labels are not written like the others.
     """
@@ -92,11 +84,7 @@ def end_of_rows(block: bytes, layout: Layout) -> int:
 
 
 def squeeze(block: bytes) -> bytes:
-    """Return whole lines with every run of spaces and tabs as one space, and none at either end of a line.
-
-    Args:
-        block: Whole lines.
-    """
+    """Return whole lines with every run of spaces and tabs as one space, and none at either end of a line."""
     if not any(run in block for run in _RUNS) and block[:1] != b" " != block[-1:]:
         return block
     signs: Bytes = np.frombuffer(block, dtype=np.uint8)

@@ -23,11 +23,7 @@ def is_export(segment: Segment) -> bool:
 
 
 def graphs(segment: Segment) -> list[tuple[str, Segment]]:
-    """Return the graphs of an export: the path of each, and where it stands.
-
-    Args:
-        segment: The whole file.
-    """
+    """Return the graphs of an export: the path of each, and where it stands."""
     result = []
     with segment.path.open("rb") as file, mmap.mmap(file.fileno(), 0, access=mmap.ACCESS_READ) as content:
         starts = _starts(content, segment.start)

@@ -45,11 +45,7 @@ class _Labelled:
 
 
 def sniff_labels(segment: Segment) -> Layout | None:
-    """Return how a text log with labels in its rows is written, as rows of plain cells; None if it has none.
-
-    Args:
-        segment: The log's text.
-    """
+    """Return how a log with labels in its rows is written, as rows of plain cells; None if it has none."""
     lines = head_lines(segment)[:SAMPLED_LINES]
     labelled = [found for found in map(_labelled, lines) if found]
     if not labelled or 2 * len(labelled) < len(lines):

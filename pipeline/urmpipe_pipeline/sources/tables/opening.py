@@ -64,11 +64,6 @@ _OTHER = (Hint("source"),)
 def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff = sniff) -> Tables:
     """Return the tables of a log's files.
 
-    Args:
-        files: The files.
-        options: What the user says.
-        sniff_plain: What finds out how a table without labels and arrays is written.
-
     Raises:
         LogError: If a file is no text table; all files are looked at first.
         OptionError: If there is no file, or the source is unknown.

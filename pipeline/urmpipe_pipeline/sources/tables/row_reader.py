@@ -44,12 +44,7 @@ def lines_of_rows(layout: Layout, rows: Sequence[int]) -> dict[int, int]:
 
 
 def data_lines(layout: Layout, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
-    """Yield number and text of each line with a data row, not of blank lines and comments.
-
-    Args:
-        layout: How the table is written.
-        lines: Lines of the file with their numbers.
-    """
+    """Yield number and text of each line with a data row, not of blank lines and comments."""
     lines = (line for line in lines if line[0] >= layout.first_line)
     for number, line in lines if layout.form is None else layout.form.rows(lines):
         text = line.strip()

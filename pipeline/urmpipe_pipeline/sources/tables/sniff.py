@@ -157,11 +157,7 @@ def _told_delimiter(lines: Sequence[HeadLine]) -> tuple[str | None, Sequence[Hea
 
 
 def across(layout: Layout) -> Layout:
-    """Return a table of a single line of numbers as one column; any other as it is.
-
-    Args:
-        layout: How the table is written, as far as its beginning tells.
-    """
+    """Return a table of a single line of numbers as one column; any other as it is."""
     if layout.header is not None or len(layout.sample) != 1 or len(layout.names) < 3:
         return layout
     lines = layout.segment.lines()

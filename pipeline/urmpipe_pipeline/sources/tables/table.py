@@ -25,14 +25,7 @@ def read_table(
     """Return the numbers of some columns, with a finding for each row and cell that holds none.
 
     Read row by row is also what the parser refuses though it is sound: blanks as missing samples, 1.5d0,
-    comments.
-
-    Args:
-        layout: How the table is written.
-        columns: Which columns hold numbers.
-        clock: The columns of its clock; their values in [ns] are added. If they are text, their cells are
-            read as they are.
-        allowed: What a cell may hold, for the findings.
+    comments. The values of the clock in [ns] are added; if they are text, their cells are read as they are.
     """
     reader = RowReader(layout, columns, clock, allowed)
     scales = clock_scales(layout, clock)

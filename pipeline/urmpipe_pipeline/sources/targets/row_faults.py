@@ -59,9 +59,6 @@ def read_rows(plan: Plan) -> Rows:
     is missing. Times that repeat or run backwards are an error of the file, as in a log: nothing tells
     which of two rows is wrong.
 
-    Args:
-        plan: What is to be read.
-
     Raises:
         LogError: If there is no row, with what leaving out rows does not mend (the header again, a merge
             conflict), or if the known times are no clock.

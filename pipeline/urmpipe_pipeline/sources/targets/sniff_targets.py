@@ -17,22 +17,16 @@ from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
 def sniff_targets(
     segment: Segment, delimiter: str | None = None, decimal: str | None = None, position: Sequence[str] = ()
 ) -> Layout:
-    """Return how a table is written: by its soundest rows, if a header names x, y, z.
+    """Return how a table is written: by its soundest rows, if a header names x, y, z or the columns given.
 
     These are the rows with a cell for each name and the most numbers for x, y, z. All lines below the header
     are rows then, but for comments and a line of units. If no row is sound, the first line that is no comment
     may be such a header still, or the next one below a title.
 
-    Args:
-        segment: The table's text.
-        delimiter: The sign between cells, or its name, if the file need not tell.
-        decimal: The decimal sign, or its name, if the file need not tell.
-        position: Names of the columns of x, y, z, if the user tells.
-
     Raises:
         LogError: If it holds no rows, no numbers below a header without x, y, z, or a header that does not
             fit its rows.
-        OptionError: If delimiter or decimal is none that is allowed.
+        OptionError: As `sniff`.
     """
     lines = head_lines(segment)[:SAMPLED_LINES]
     for place, line in enumerate(lines):

@@ -43,12 +43,6 @@ def target_form(
     rz, ry, rx are angles about the moving axes Z, Y, X; a header in the order rx, ry, rz may also mean a
     rotation vector, as UR writes: it is taken as the angles, with a warning.
 
-    Args:
-        roles: The columns of the poses.
-        columns: All columns of the file without its clock.
-        file: The file, for errors.
-        options: What the user says: the columns of the position, the form.
-
     Raises:
         LogError: If only a part of an orientation is there, its form cannot be told, or it is told of none.
     """
@@ -80,14 +74,9 @@ def rotation_units(
 ) -> tuple[list[Unit], list[LogWarning]]:
     """Return the unit of each column of an orientation, rad where none is told, and what was assumed.
 
-    That angles are in rad is the form of targets, and no assumption, unless most of them are beyond a turn
-    or they are called A, B, C as KUKA's, which are in degrees.
-
-    Args:
-        columns: The columns.
-        form: Their form.
-        values: Their finite rows in the file's own units, shape (n, columns).
-        told: The unit that each tells, if it does.
+    That angles are in rad is the form of targets, and no assumption, unless most of them are beyond a turn or
+    they are called A, B, C as KUKA's, which are in degrees. Values are those of finite rows in the file's own
+    units, shape (n, columns).
     """
     if not angles(form):
         return [PURE] * len(columns), []
@@ -106,15 +95,9 @@ def rotation_units(
 def target_rotations(
     columns: Sequence[Column], form: RotationForm, values: FloatArray
 ) -> tuple[FloatArray, dict[int, str]]:
-    """Return the rotation matrices, and what is wrong with rows that hold none.
+    """Return the rotation matrices [-], shape (n, 3, 3), and by index what is wrong with rows that hold none.
 
-    Args:
-        columns: The columns, for messages.
-        form: Their form.
-        values: In [rad] or [-], shape (n, columns); a row with NaN stays NaN and is not told of.
-
-    Returns:
-        [-], shape (n, 3, 3), NaN where there is none, and the reasons by index.
+    Values are in [rad] or [-], shape (n, columns); a row with NaN stays NaN and is not told of.
     """
     names = f"columns {listed(columns)}"
     faults = {row: f"{names}: {said}" for row, said in _no_rotations(values, form)}

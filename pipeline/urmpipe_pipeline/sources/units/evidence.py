@@ -65,10 +65,7 @@ def spread(rows: int) -> slice:
 def fit(robot: Chain, q: FloatArray, recorded: FloatArray) -> Fit | None:
     """Return how near a robot comes to recorded points; None if no row has both.
 
-    Args:
-        robot: The arm.
-        q: Joint values in [rad] or [m], shape (n, joints).
-        recorded: Recorded positions in [m], shape (n, 3).
+    Joint values are in [rad] or [m], shape (n, joints), recorded positions in [m], shape (n, 3).
     """
     known = np.isfinite(q).all(axis=1) & np.isfinite(recorded).all(axis=1)
     q, recorded = q[known], recorded[known]
@@ -85,11 +82,7 @@ def fit(robot: Chain, q: FloatArray, recorded: FloatArray) -> Fit | None:
 
 
 def single_out(fits: Mapping[Key, Fit]) -> tuple[Key, bool] | None:
-    """Return the only explanation that agrees with the recorded points, and whether it needs a tool.
-
-    Args:
-        fits: How near each explanation comes.
-    """
+    """Return the only explanation that agrees with the recorded points, and whether it needs a tool."""
     for needs_tool, close in ((False, CLOSE), (True, CLOSE_WITH_TOOL)):
         ranked = sorted(
             (one.with_tool if needs_tool else one.distance, k) for k, one in enumerate(fits.values())
@@ -109,12 +102,8 @@ def turned_apart(computed: FloatArray, recorded: FloatArray, *, tool: bool) -> f
     """Return the rms angle between orientations in [rad], with a tool after its constant turn that fits best.
 
     The turn is the mean of the relative quaternions: the eigenvector of sum(q q^T) with the largest
-    eigenvalue (Markley et al. 2007, "Averaging quaternions", eq. 12).
-
-    Args:
-        computed: Orientation of the tip as unit quaternions x, y, z, w [-], shape (n, 4).
-        recorded: The recorded ones, likewise.
-        tool: Whether a tool may turn the recorded ones.
+    eigenvalue (Markley et al. 2007, "Averaging quaternions", eq. 12). Computed and recorded orientations are
+    unit quaternions x, y, z, w [-], shape (n, 4).
     """
     if not tool:
         return float(np.sqrt(np.mean(angle_between(computed, recorded) ** 2)))

@@ -55,10 +55,8 @@ class KinematicUnits:
 def by_kinematics(robot: Chain | None, q: FloatArray, position: FloatArray) -> KinematicUnits | None:
     """Return the units that the kinematics single out; None if they do not, or nothing was recorded.
 
-    Args:
-        robot: The arm, or None; one with a joint that slides is not judged.
-        q: Joint values in the file's own unit, shape (n, joints).
-        position: Recorded positions in the file's own unit, shape (n, 3) or without columns.
+    An arm with a joint that slides is not judged. In the file's own units are joint values, shape (n,
+    joints), and positions, shape (n, 3) or without columns.
     """
     if robot is None or position.shape[1] != 3 or q.shape[1] != len(robot.moving):
         return None

@@ -49,12 +49,7 @@ def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds |
 
     They cannot if they wrap by about 360, or if it is in degrees only that they are no faster than a joint
     can be for a tenth of the time, or that they keep the robot's limits. Values within one turn in rad are
-    never doubted.
-
-    Args:
-        values: Joint values in the file's own units, shape (n, joints).
-        t_ns: Recorded times in [ns], shape (n,), or None.
-        bounds: What the robot's joints can do, or None.
+    never doubted. They are in the file's own units, shape (n, joints), at times in [ns], shape (n,), or None.
     """
     if peak(values) <= math.tau:
         return None
@@ -74,11 +69,8 @@ def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds |
 def radians_evidence(values: FloatArray) -> str | None:
     """Return why joint values cannot be in deg, or None if they can.
 
-    They cannot if they stay within a turn in rad and wrap by about 2 pi: in deg all these jumps would be of
-    the same six degrees.
-
-    Args:
-        values: Joint values in the file's own units, shape (n, joints).
+    They are in the file's own units, shape (n, joints). They cannot if they stay within a turn in rad and
+    wrap by about 2 pi: in deg all these jumps would be of the same six degrees.
     """
     if peak(values) > math.tau:
         return None
@@ -90,11 +82,7 @@ def radians_evidence(values: FloatArray) -> str | None:
 
 
 def peak(values: FloatArray) -> float:
-    """Return the largest absolute value, missing samples left out; NaN if there is none.
-
-    Args:
-        values: In any unit, which the result has, too, shape (n, columns), n > 0.
-    """
+    """Return the largest absolute value in any unit, shape (n, columns), n > 0; NaN if there is none."""
     largest = max(values.max(), -values.min())
     if np.isnan(largest):  # slower, but deaf to NaN
         largest = max(np.fmax.reduce(values, axis=None), -np.fmin.reduce(values, axis=None))

@@ -70,11 +70,8 @@ class UnitFinder:
     ) -> list[Unit]:
         """Return the units of the joint columns.
 
-        Args:
-            columns: The joint columns.
-            values: Their values in the file's own units, shape (n, joints).
-            t_ns: Recorded times in [ns], shape (n,); None if the log has none.
-            robot: The arm, or None.
+        Their values are in the file's own units, shape (n, joints), at recorded times in [ns], shape (n,), if
+        any.
 
         Raises:
             LogError: If a unit is not known, does not fit the robot, or cannot be told.
@@ -110,12 +107,7 @@ class UnitFinder:
         return units
 
     def positions(self, columns: Sequence[Column], values: FloatArray) -> list[Unit]:
-        """Return the units of recorded x, y, z.
-
-        Args:
-            columns: The three columns.
-            values: Their values in the file's own units, shape (n, 3).
-        """
+        """Return the units of recorded x, y, z; their values are in the file's own units, shape (n, 3)."""
         found = [self._told(column, "prismatic") for column in columns]
         told = [unit for unit in found if unit is not None]
         unsaid = [k for k, unit in enumerate(found) if unit is None]
@@ -126,10 +118,6 @@ class UnitFinder:
 
     def rotations(self, columns: Sequence[Column], forms: Sequence[RotationForm]) -> list[Unit | None]:
         """Return the units that the columns of a recorded orientation tell, None where they do not.
-
-        Args:
-            columns: The columns.
-            forms: The forms that it may have: only angles have a unit.
 
         Raises:
             LogError: If a unit is not known or is none of an angle.
