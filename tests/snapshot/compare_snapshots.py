@@ -62,7 +62,7 @@ def differences(before: Case, after: Case) -> Iterator[Difference]:
         if found != name:
             new.remove(found)
             yield _moved(name, one), f"{name} -> {found.partition('|')[2]}", "renamed"
-        if (one["hash"], one["kind"]) != (other["hash"], other["kind"]):
+        if (_values(one), one["kind"]) != (_values(other), other["kind"]):
             yield _kind(name, one), name, _how(one, other)
         elif one.get("t") != other.get("t"):
             yield "times", name, "its values stand at other times"
@@ -71,9 +71,14 @@ def differences(before: Case, after: Case) -> Iterator[Difference]:
 
 def _renamed(name: str, one: Column, new: list[str], after: Case) -> str | None:
     """Return which new column of the same file holds the same: of several that with the most alike name."""
-    same = [key for key in new if _file(key) == _file(name) and after[key]["hash"] == one["hash"]]
+    same = [key for key in new if _file(key) == _file(name) and _values(after[key]) == _values(one)]
     alike = [(after[key].get("t") == one.get("t"), SequenceMatcher(None, name, key).ratio()) for key in same]
     return same[alike.index(max(alike))] if same else None
+
+
+def _values(one: Column) -> str:
+    """Return the hash of a column's values; of an array in whichever shape they stand."""
+    return str(one["flat"] if one["kind"] == "arrays" else one["hash"])
 
 
 def _gone(name: str, one: Column, after: Case) -> Difference:

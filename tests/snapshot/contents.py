@@ -1,7 +1,8 @@
 """What stands in a file that a command wrote: named columns of values. Nothing of urmpipe reads it.
 
 A column is a dict: its `kind` (of `compare_snapshots.KINDS`), how many values it has (`n`), their `hash`, and
-the `values` if they are few. An array has its `shape`, hashes of its `columns`, and one of its times (`t`).
+the `values` if they are few. An array has its `shape`, hashes of its `columns` and of its values row by row,
+whatever its shape (`flat`), and one of its times (`t`).
 """
 
 from __future__ import annotations
@@ -81,6 +82,7 @@ def array(
         "shape": list(values.shape),
         "columns": each,
         "hash": _sha("".join(each).encode()),
+        "flat": _sha(np.ascontiguousarray(flat).tobytes()),
     }
     return found if times is None else found | {"t": _sha(times.tobytes())}
 
@@ -219,8 +221,8 @@ def _recording(path: Path) -> Columns:
     parts: dict[str, list[tuple[NDArray[Any], NDArray[Any], NDArray[Any]]]] = defaultdict(list)
     for chunk in (chunk for entry in reader.recordings() for chunk in reader.store(store=entry).stream()):
         batch = chunk.to_record_batch()
-        timed = "t" in batch.schema.names
-        t = batch.column("t").cast("int64").to_numpy() if timed else np.zeros(len(batch), np.int64)
+        clock = next((name for name in ("t", "row") if name in batch.schema.names), None)
+        t = batch.column(clock).cast("int64").to_numpy() if clock else np.zeros(len(batch), np.int64)
         for about, cells in zip(batch.schema, batch.columns, strict=True):
             if about.metadata[b"rerun:kind"] == b"data" and about.name != "metadata":
                 there = cells.is_valid().to_numpy(zero_copy_only=False)
@@ -245,7 +247,7 @@ def _joined(name: str, parts: list[tuple[NDArray[Any], NDArray[Any], NDArray[Any
     rows = np.split(values, np.cumsum(widths)[:-1])
     values = np.concatenate([rows[k] for k in order]) if len(order) else values
     component = name.rpartition(":")[2]
-    kind = "arrays" if component == "scalars" else "looks" if component in LOOKS else "scene"
+    kind = "arrays" if component in {"scalars", "packed"} else "looks" if component in LOOKS else "scene"
     if len(np.unique(widths)) == 1 and widths[0]:
         return array(values.reshape(len(t), -1), t[order], kind)
     return array(values, t[order], kind, widths[order].tobytes())
