@@ -7,40 +7,32 @@ dark ground alike; the tests hold this.
 
 from __future__ import annotations
 
-JOINT_COLOURS = (
-    "#8652ed",  # violet
-    "#fda201",  # orange
-    "#03835c",  # green
-    "#21c3ff",  # sky blue
-    "#c25000",  # vermilion
-    "#a457a0",  # purple
-    "#ccb671",  # sand
-    "#a2bcbc",  # silver
-)
+_COLOURS = {
+    "violet": "#8652ed",
+    "orange": "#fda201",
+    "green": "#03835c",
+    "sky blue": "#21c3ff",
+    "vermilion": "#c25000",
+    "purple": "#a457a0",
+    "sand": "#ccb671",
+    "silver": "#a2bcbc",
+}
+
+JOINT_COLOURS = tuple(_COLOURS.values())
 """One a joint, from the base outwards; a ninth joint starts again."""
 
-AXIS_COLOURS = {"x": "#c25000", "y": "#03835c", "z": "#21c3ff", "norm": "#fda201"}
+_AXES = {"x": "vermilion", "y": "green", "z": "sky blue", "norm": "orange"}
+AXIS_COLOURS = {axis: _COLOURS[word] for axis, word in _AXES.items()}
 """One a coordinate, and one for the Euclidean norm."""
 
 REFERENCE_COLOUR = "#8f9ba0"
 """What was asked for: the reference, and the lines of a tolerance; grey."""
 
-RUN_COLOURS = {
-    "orange": "#fda201",
-    "sky blue": "#21c3ff",
-    "violet": "#8652ed",
-    "vermilion": "#c25000",
-    "green": "#03835c",
-    "purple": "#a457a0",
-    "sand": "#ccb671",
-}
+_RUNS = ("orange", "sky blue", "violet", "vermilion", "green", "purple", "sand")
+RUN_COLOURS = {word: _COLOURS[word] for word in _RUNS}
 """One a run of a comparison, by the word for it; none like the reference."""
 
-GHOST_COLOURS = {
-    **{word: colour for word, colour in RUN_COLOURS.items() if word != "orange"},
-    "silver": "#a2bcbc",
-    "orange": RUN_COLOURS["orange"],
-}
+GHOST_COLOURS = {word: _COLOURS[word] for word in (*_RUNS[1:], "silver", "orange")}
 """One a further branch of solved joint values, by the word for it: eight, as many as an arm with a spherical
 wrist has. The first run's, in which the chosen solution has its tip and its path, comes last."""
 
