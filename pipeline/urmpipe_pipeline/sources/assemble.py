@@ -24,7 +24,6 @@ from urmpipe_pipeline.sources.plan import Plan
 from urmpipe_pipeline.sources.tables.opening import PATH, TABLE
 from urmpipe_pipeline.sources.units.kinematic_units import by_kinematics
 from urmpipe_pipeline.sources.units.rotation import settle_rotation
-from urmpipe_pipeline.sources.units.unit_hints import called
 from urmpipe_pipeline.sources.units.units import UnitFinder
 from urmpipe_pipeline.sources.vocabulary import Unit
 
@@ -180,7 +179,7 @@ def _times(
     """Return the rows' times in [ns] from the first, the clock there in [ns], and what there is to say."""
     if content.clock is None:
         like = None if options.time else _like_a_time(plan, content.roles.columns)
-        t_ns, said, noticed = even_clock(content.rows, options.period, like=called(like) if like else "")
+        t_ns, said, noticed = even_clock(content.rows, options.period, like=like.called if like else "")
         return t_ns, 0, said, noticed
     start = int(content.clock[0])
     counted = Inference(

@@ -45,9 +45,7 @@ def trimmed(numbers: Numbers) -> Numbers:
     end = len(numbers.clock)
     while end and numbers.clock[end - 1] == NO_TIME and np.isnan(numbers.values[end - 1]).all():
         end -= 1
-    if end == len(numbers.clock):
-        return numbers
-    return replace(numbers, values=numbers.values[:end], clock=numbers.clock[:end])
+    return numbers if end == len(numbers.clock) else numbers.at(slice(end))
 
 
 def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
@@ -55,12 +53,8 @@ def without_unread(numbers: Numbers) -> tuple[Numbers, list[LogWarning]]:
     if not numbers.unread:
         return numbers, []
     rows = np.delete(np.arange(len(numbers.values)), sorted(numbers.unread))
-    clock = None if numbers.clock is None else numbers.clock[rows]
-    texts, lasting = tuple(cells.at(rows) for cells in numbers.texts), numbers.lasting
-    read = replace(
-        numbers, values=numbers.values[rows], clock=clock, texts=texts, findings=lasting, wrong=len(lasting),
-        rows=rows + 1,
-    )  # fmt: skip
+    lasting = numbers.lasting
+    read = replace(numbers.at(rows), findings=lasting, wrong=len(lasting), rows=rows + 1)
     shown = sorted(numbers.unread.items())[:SHOWN_FINDINGS]
     warnings = [
         LogWarning(

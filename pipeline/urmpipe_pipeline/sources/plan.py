@@ -9,7 +9,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, OptionError
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.sources.clocks.clock import Clock, find_clock
+from urmpipe_pipeline.sources.clocks.clock import Clock, find_clocks
 from urmpipe_pipeline.sources.clocks.time_file import clock_of_file, time_file
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, given_units, refuse_twins
 from urmpipe_pipeline.sources.columns.places import one_plot_a_file, without_header
@@ -66,17 +66,13 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
     """
     columns = columns_of(tables.layouts, tables.titles)
     units = given_units(columns, options)
-    joints = len(robot.coordinates) if robot else None
     apart = None if options.time else time_file(tables, columns)
     if apart is not None:
         found = clock_of_file(tables, columns, apart, units)
         rest = [column for column in columns if column.table != apart]
         roles = _renamed(_roles(rest, tables, options, robot, only=1 - apart), options.names)
         return Plan(tables, tuple(found if i == apart else Clock() for i in (0, 1)), roles, units, apart)
-    clocks = tuple(
-        find_clock([c for c in columns if c.table == i], layout, options, tables.known, units, joints)
-        for i, layout in enumerate(tables.layouts)
-    )
+    clocks = find_clocks(tables, columns, options, units, len(robot.coordinates) if robot else None)
     for i, clock in enumerate(() if options.time else clocks):
         own = [column for column in columns if column.table == i]
         refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "says which: give its number"))

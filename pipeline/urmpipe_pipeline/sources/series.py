@@ -11,7 +11,7 @@ import numpy as np
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.errors import Finding, LogError, for_each
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.sources.clocks.clock import even_clock, find_clock
+from urmpipe_pipeline.sources.clocks.clock import even_clock, find_clocks
 from urmpipe_pipeline.sources.columns.columns import Column, columns_of, find_column, given_units
 from urmpipe_pipeline.sources.columns.roles import Roles
 from urmpipe_pipeline.sources.content import read_content
@@ -63,11 +63,7 @@ def read_series(file: Path, names: Sequence[str], options: ReadOptions | None = 
     columns = columns_of(tables.layouts, tables.titles)
     chosen = for_each(lambda name: find_column(columns, name, file=str(file)), names)
     units = given_units(columns, options)
-    clocks = tuple(
-        find_clock([one for one in columns if one.table == i], layout, options, tables.known, units)
-        for i, layout in enumerate(tables.layouts)
-    )
-    plan = Plan(tables, clocks, Roles(joints=tuple(chosen)), units)
+    plan = Plan(tables, find_clocks(tables, columns, options, units), Roles(joints=tuple(chosen)), units)
     content = read_content(plan, skip_bad=options.skip_bad)
     values = content.values(plan.roles.joints).copy()
     _refuse_missing(file, chosen, values)

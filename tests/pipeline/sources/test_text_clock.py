@@ -14,8 +14,7 @@ from hypothesis import strategies as st
 
 from urmpipe_pipeline.joint_log import JointLog
 from urmpipe_pipeline.sources import read_log
-from urmpipe_pipeline.sources.clocks.stamps import known_forms
-from urmpipe_pipeline.sources.clocks.text_times import timed
+from urmpipe_pipeline.sources.clocks.text_times import known_forms, timed
 from urmpipe_pipeline.sources.tables.block_parser import clock_scales, parse_block
 from urmpipe_pipeline.sources.tables.blocks import row_blocks
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn

@@ -45,8 +45,8 @@ class TextCells:
         starts = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(lengths)))
         return cls(np.concatenate([part.data[part.starts[0] : part.starts[-1]] for part in parts]), starts)
 
-    def at(self, rows: IntArray) -> TextCells:
-        """Return the cells of some rows, shape (k,)."""
+    def at(self, rows: IntArray | slice) -> TextCells:
+        """Return the cells of some rows: by index, shape (k,), or as a slice from the first one on."""
         lengths = np.diff(self.starts)[rows]
         starts = np.concatenate((np.zeros(1, dtype=np.int64), np.cumsum(lengths)))
         place = np.repeat(self.starts[rows] - starts[:-1], lengths) + np.arange(starts[-1])

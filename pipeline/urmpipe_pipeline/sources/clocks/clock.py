@@ -10,19 +10,19 @@ from decimal import Decimal
 import numpy as np
 
 from urmpipe_models.arrays import IntArray
-from urmpipe_models.errors import Finding, LogError, OptionError, shown
+from urmpipe_models.errors import Finding, OptionError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
 from urmpipe_pipeline.sources.cells.text_clock import DATE, SECOND_NS, TIME_OF_DAY
 from urmpipe_pipeline.sources.clocks.clock_columns import time_columns, times_of
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS, unit_of
-from urmpipe_pipeline.sources.clocks.stamps import known_forms
+from urmpipe_pipeline.sources.clocks.text_times import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.numbers import ClockColumn
+from urmpipe_pipeline.sources.tables.opening import Tables
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.units.unit_hints import called
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit
 
 PAPER_PERIOD = 0.005
@@ -88,21 +88,24 @@ def _unit_of(part: ClockColumn) -> str:
     return next(unit for unit, exponent in EXPONENTS.items() if exponent == part.exponent)
 
 
-def find_clock(
+def find_clocks(
+    tables: Tables,
     columns: Sequence[Column],
-    layout: Layout,
     options: ReadOptions,
-    source: KnownSource | None,
     units: Mapping[int, Unit],
     joints: int | None = None,
-) -> Clock:
-    """Return the clock of a table.
+) -> tuple[Clock, ...]:
+    """Return the clock of each table.
 
     Raises:
-        LogError: If the time is text in no form that is known, or its unit cannot be told.
+        LogError: If a time is text in no form that is known, or its unit cannot be told.
         OptionError: If its unit is given as one that is no time.
     """
-    return clock_of(*time_columns(columns, layout, options, joints), layout, source, units)
+    clocks = []
+    for table, layout in enumerate(tables.layouts):
+        own = [column for column in columns if column.table == table]
+        clocks.append(clock_of(*time_columns(own, layout, options, joints), layout, tables.known, units))
+    return tuple(clocks)
 
 
 def clock_of(
@@ -132,7 +135,7 @@ def clock_of(
     unit, evidence, warnings = unit_of(time, layout, source, units)
     _refuse_ages(time, layout, unit)
     parts = (ClockColumn(time.index, EXPONENTS[unit]),)
-    other = (Hint("unit", {called(time): "s" if unit != "s" else "ms"}),)
+    other = (Hint("unit", {time.called: "s" if unit != "s" else "ms"}),)
     said = (found, Inference("unit of the time", unit, evidence, columns=names, hints=other))
     told = time.number in units or time.unit is not None
     by_source = not told and source is not None and "time" in source.units
@@ -144,8 +147,7 @@ def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> Clo
     cells, given = layout.cells(column.index), units.get(column.number)
     forms = known_forms(cells)
     if not forms:
-        message = f"found {shown(cells[0])}, allowed: {FORMS_TOLD}"
-        raise LogError(Finding(message, layout.file, layout.first_line, 1, column.header))
+        raise layout.error(f"found {shown(cells[0])}, allowed: {FORMS_TOLD}", column.header)
     wanted = given or column.unit
     asked = tuple(form for form in forms if wanted is not None and wanted.name in form.keys)
     if given is not None and not asked:
@@ -159,12 +161,11 @@ def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
     """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
     for value in times_of(layout.cells(time.index), layout)[:1]:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
-            place = (layout.file, layout.first_line, 1, time.header)
-            hint = Hint("unit", {called(time): "ns"}, "reads them so")
+            hint = Hint("unit", {time.called: "ns"}, "reads them so")
             if unit == "s" and _DATES[0] <= value < _DATES[1]:
                 hint = Hint("", does="a date is read if it is written as 2021-04-11 22:27:21.5")
             message = f"found {value:g} {unit}, allowed: times within 146 years of 0"
-            raise LogError(Finding(message, *place, hints=(hint,)))
+            raise layout.error(message, time.header, hint)
 
 
 def unused_period(keyword: str) -> LogWarning:

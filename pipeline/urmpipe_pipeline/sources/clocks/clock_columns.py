@@ -6,12 +6,11 @@ import math
 from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
-from urmpipe_models.errors import Finding, LogError
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import width
 from urmpipe_pipeline.sources.cells.cell import count_up, is_missing, to_float
 from urmpipe_pipeline.sources.cells.text_clock import DATE, TIME_OF_DAY
-from urmpipe_pipeline.sources.clocks.stamps import known_forms
+from urmpipe_pipeline.sources.clocks.text_times import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column, find_column
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.tables.opening import PATH
@@ -158,8 +157,7 @@ def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | Non
     message = f"found a first column that increases from row to row, which may be {what}"
     hints = [Hint("time", "1", "says which"), Hint("time", "none", "says which")]
     hints += [] if path else [Hint("joints", None, "names the joint columns")]
-    place = (layout.file, layout.first_line, 1)
-    raise LogError(Finding(message, *place, hints=tuple(hints)))
+    raise layout.error(message, None, *hints)
 
 
 def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Column]) -> Column | None:

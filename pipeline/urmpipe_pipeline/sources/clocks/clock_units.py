@@ -10,7 +10,7 @@ from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.clocks.clock_columns import steps_of, times_of
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.tables.sniff import Layout
-from urmpipe_pipeline.sources.units.unit_hints import called, unit_hints
+from urmpipe_pipeline.sources.units.unit_hints import unit_hints
 from urmpipe_pipeline.sources.vocabulary import KnownSource, Unit, vocabulary
 
 EXPONENTS = {"s": 9, "ms": 6, "us": 3, "ns": 0}
@@ -53,7 +53,7 @@ def unit_of(time: Column, layout: Layout, source: KnownSource | None, units: Map
         return time.unit.name, "its name", ()
     if time.unit_text is not None and time.unit_text.lower() in vocabulary().long_times:
         message = f"found the unit {shown(time.unit_text)}, allowed: {_UNITS}; convert the times"
-        raise _error(message, time, layout, *EVEN)
+        raise layout.error(message, time.header, *EVEN)
     if source is not None and "time" in source.units:
         return source.units["time"].name, f"{source.name} writes {source.units['time'].name}", ()
     return _by_values(time, layout)
@@ -94,8 +94,8 @@ def _short(time: Column, layout: Layout, step: float) -> Found:
     """Return s for short steps, or for none; raise where they are too short for a log."""
     if 0 < step < _IMPOSSIBLE:
         said = f"found steps of {step:.3g}, as of days or hours, allowed: times in {_UNITS}"
-        hint = Hint("unit", {called(time): "s"}, "takes them as they are")
-        raise _error(f"{said}; convert them", time, layout, hint)
+        hints = unit_hints([time], "s", "takes them as they are")
+        raise layout.error(f"{said}; convert them", time.header, *hints)
     return "s", "the usual unit", (_assumed(time, step),) if 0 < step < _UNUSUAL else ()
 
 
@@ -106,11 +106,5 @@ def _assumed(time: Column, step: float) -> LogWarning:
 
 def _question(time: Column, layout: Layout, found: str, units: list[str]) -> LogError:
     """Ask which of some units is meant."""
-    hints = (Hint("unit", {called(time): unit}, "says which") for unit in units)
-    return _error(f"found {found}, which may be {' or '.join(units)}", time, layout, *hints)
-
-
-def _error(message: str, time: Column, layout: Layout, *hints: Hint) -> LogError:
-    """Return an error about a time column."""
-    place = (layout.file, layout.first_line, 1, time.header)
-    return LogError(Finding(message, *place, hints=hints))
+    hints = (Hint("unit", {time.called: unit}, "says which") for unit in units)
+    return layout.error(f"found {found}, which may be {' or '.join(units)}", time.header, *hints)

@@ -1,21 +1,24 @@
-"""The times of a text clock: what its cells may mean, and what the whole column decides."""
+"""The times of a text clock: what its cells may mean, and what the whole column decides.
+
+All cells of one shape are read at once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
 import numpy as np
 
 from urmpipe_models.arrays import IntArray
-from urmpipe_models.errors import Finding, LogError, shown
+from urmpipe_models.errors import LogError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference
-from urmpipe_pipeline.sources.cells.text_cells import TextCells
-from urmpipe_pipeline.sources.cells.text_clock import DAY_NS, TIME_OF_DAY, Form
-from urmpipe_pipeline.sources.clocks.stamps import read_cells
-from urmpipe_pipeline.sources.tables.numbers import REPORTED, UNREADABLE, ClockColumn, Numbers
+from urmpipe_pipeline.sources.cells.cell import is_missing
+from urmpipe_pipeline.sources.cells.text_cells import Bytes, TextCells
+from urmpipe_pipeline.sources.cells.text_clock import DAY_NS, FORMS, TIME_OF_DAY, Form, Parts
+from urmpipe_pipeline.sources.tables.numbers import NO_TIME, REPORTED, UNREADABLE, ClockColumn, Numbers
 from urmpipe_pipeline.sources.tables.sniff import Layout
 
 MIDNIGHT_NS = DAY_NS - 3600 * 10**9
@@ -38,7 +41,7 @@ def timed(layout: Layout, parts: Sequence[ClockColumn], numbers: Numbers) -> Num
         return numbers
     readings, evidence = read_columns(numbers.texts, [part.forms for part in parts])
     if len(readings) > 1:
-        raise LogError(_question(layout, parts, readings))
+        raise _question(layout, parts, readings)
     reading = readings[0]
     if numbers.clock is not None:
         reading.times[numbers.clock == REPORTED] = REPORTED
@@ -153,7 +156,7 @@ def _said(reading: Reading, columns: Sequence[TextCells], evidence: Sequence[str
     return tuple(said)
 
 
-def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[Reading]) -> Finding:
+def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[Reading]) -> LogError:
     """Ask which of several readings is meant, for the first column in which they differ."""
     choices = list(zip(*(reading.forms for reading in readings), strict=True))
     place = next(k for k, forms in enumerate(choices) if len(set(forms)) > 1)
@@ -162,6 +165,47 @@ def _question(layout: Layout, parts: Sequence[ClockColumn], readings: Sequence[R
     keys = dict.fromkeys(key for form in choices[place] for key in form.keys if key not in shared)
     column = layout.names[parts[place].column]
     cell = layout.cells(parts[place].column)[0]
-    hints = tuple(Hint("unit", {column: key}, "says which") for key in keys)
-    message = f"found {shown(cell)}, which may be {names}"
-    return Finding(message, layout.file, layout.first_line, 1, column, hints=hints)
+    hints = (Hint("unit", {column: key}, "says which") for key in keys)
+    return layout.error(f"found {shown(cell)}, which may be {names}", column, *hints)
+
+
+def read_cells(cells: TextCells, form: Form) -> IntArray:
+    """Return the times of cells in [ns], shape (n,): NO_TIME for an empty one, UNREADABLE for no time."""
+    times = np.where(np.diff(cells.starts) == 0, NO_TIME, UNREADABLE)
+    for rows, block in cells.blocks():
+        for same in _shapes(block):
+            times[rows[same]] = _read_shape(block[same], form)
+    return times
+
+
+def known_forms(texts: Sequence[str]) -> tuple[Form, ...]:
+    """Return the forms in which at least half of the cells with content are times, the usual ones first."""
+    cells = TextCells.of([text for text in texts if not is_missing(text)])
+    if not len(cells):
+        return ()
+    counts = [np.count_nonzero(read_cells(cells, form) != UNREADABLE) for form in FORMS]
+    return tuple(form for form, count in zip(FORMS, counts, strict=True) if 2 * count >= len(cells))
+
+
+def _shapes(block: Bytes) -> Iterator[IntArray | slice]:
+    """Yield where cells of one length have the same signs but for their digits."""
+    shapes = np.where(block - np.uint8(ord("0")) < 10, np.uint8(ord("0")), block)
+    keys = shapes.view(f"S{block.shape[1]}").ravel()
+    others = np.flatnonzero(keys != keys[0])
+    if not len(others):
+        yield slice(None)
+        return
+    yield np.flatnonzero(keys == keys[0])
+    others = others[np.argsort(keys[others], kind="stable")]
+    ordered = keys[others]
+    yield from np.split(others, np.flatnonzero(ordered[1:] != ordered[:-1]) + 1)
+
+
+def _read_shape(cells: Bytes, form: Form) -> IntArray | int:
+    """Return the times of cells of one shape."""
+    text = cells[0].tobytes().decode("latin-1")
+    match = form.pattern.match(text)
+    if match is None:
+        return NO_TIME if is_missing(text.strip()) else UNREADABLE
+    times, valid = form.nanoseconds(Parts(match, cells))
+    return np.where(valid, times, UNREADABLE)

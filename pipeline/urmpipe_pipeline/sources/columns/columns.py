@@ -56,6 +56,11 @@ class Column:
         """The words of its name."""
         return frozenset(self.key.split("_"))
 
+    @property
+    def called(self) -> str:
+        """What a reading option calls it: its number where it has no name."""
+        return self.name if self.header and not self.header.isdigit() else str(self.number)
+
 
 def columns_of(layouts: Sequence[Layout], titles: Sequence[str]) -> tuple[Column, ...]:
     """Return the columns of some tables.
@@ -115,7 +120,8 @@ def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
     Raises:
         LogError: If no column or more than one is meant.
     """
-    found = called(columns, text)
+    exact = [column for column in columns if text in (column.header, column.name)]
+    found = exact or [column for column in columns if key(text) == column.key != ""]
     if len(found) == 1:
         return found[0]
     if found:
@@ -127,12 +133,6 @@ def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
             return column
     none = f"no column {shown(text)}"
     raise LogError(Finding(found=none, allowed=listed(columns), **place))  # type: ignore[arg-type]
-
-
-def called(columns: Sequence[Column], text: str) -> list[Column]:
-    """Return the columns of a name, with or without unit."""
-    exact = [column for column in columns if text in (column.header, column.name)]
-    return exact or [column for column in columns if key(text) == column.key != ""]
 
 
 def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Unit]:

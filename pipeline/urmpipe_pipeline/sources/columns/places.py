@@ -66,7 +66,7 @@ def without_header(
         if column.text:
             cell = layout.cells(column.index)[0]
             message = f"found {shown(cell)} in a table without a header, allowed: numbers"
-            raise LogError(Finding(message, file, layout.first_line, 1, column.name, hints=(NAME_JOINTS,)))
+            raise layout.error(message, column.name, NAME_JOINTS)
     if path:
         return _path_by_place(columns, layout, options, pose)
     if not columns:

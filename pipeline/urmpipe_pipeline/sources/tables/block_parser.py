@@ -118,16 +118,11 @@ def _parse(
 
 def _text_cells(table: pa.Table, layout: Layout, part: ClockColumn) -> TextCells:
     """Return the cells of a parsed column of bytes: offsets of 32 bits, and the bytes between them."""
-    data, starts, total = [], [np.zeros(1, dtype=np.int64)], 0
-    for chunk in table.column(str(part.column)).chunks:
-        _, offsets, content = chunk.buffers()
-        own = np.frombuffer(offsets, dtype="<i4")[chunk.offset : chunk.offset + len(chunk) + 1]
-        if len(chunk) and content is not None:
-            data.append(np.frombuffer(content, dtype=np.uint8)[own[0] : own[-1]])
-        starts.append(own[1:].astype(np.int64) + (total - own[0]))
-        total += int(own[-1] - own[0])
-    joined = np.concatenate(data) if data else np.empty(0, dtype=np.uint8)
-    return TextCells(as_written(layout, joined), np.concatenate(starts))
+    cells = table.column(str(part.column)).combine_chunks(pa.system_memory_pool())
+    _, offsets, content = cells.buffers()
+    starts = np.frombuffer(offsets, dtype="<i4")[cells.offset : cells.offset + len(cells) + 1]
+    data = np.frombuffer(content or b"", dtype=np.uint8)
+    return TextCells(as_written(layout, data), starts.astype(np.int64))
 
 
 def _fill(target: FloatArray, chunk: pa.Array) -> None:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -84,6 +84,12 @@ class Numbers:
     texts: tuple[TextCells, ...] = ()
     inferences: tuple[Inference, ...] = ()
     warnings: tuple[LogWarning, ...] = ()
+
+    def at(self, rows: IntArray | slice) -> Numbers:
+        """Return some of the rows alone; by index, shape (k,), or as a slice from the first one on."""
+        clock = None if self.clock is None else self.clock[rows]
+        texts = tuple(cells.at(rows) for cells in self.texts)
+        return replace(self, values=self.values[rows], clock=clock, texts=texts)
 
     def file_row(self, row: int) -> int:
         """Return the data row of the file of a row that was read, both from 1."""

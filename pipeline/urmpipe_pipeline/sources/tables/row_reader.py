@@ -96,7 +96,6 @@ class RowReader:
         self._wrong = 0
         self._last: _Fault | None = None
         self._unread: dict[int, list[RowFault]] = {}
-        self._left_out = 0
         self._next_line = layout.first_line
         self._line = 0
         self._row = 0

@@ -86,6 +86,10 @@ class Layout:
         """The path of the file that it stands in."""
         return str(self.segment.path)
 
+    def error(self, message: str, column: str | None, *hints: Hint) -> LogError:
+        """Return an error about its first row, or a column there."""
+        return LogError(Finding(message, self.file, self.first_line, 1, column, hints=hints))
+
     def cells(self, column: int) -> list[str]:
         """Return the sampled cells of a column."""
         return [row[column] for row in self.sample if column < len(row)]

@@ -110,13 +110,7 @@ def _without_blank_end(layout: Layout, numbers: Numbers) -> Numbers:
     for row, (_, text) in enumerate(data_lines(layout, layout.segment.lines()), start=1):
         if any(split_line(text, layout.delimiter)):
             last = row
-    kept = slice(0, last)
-    return replace(
-        numbers,
-        values=numbers.values[kept],
-        clock=None if numbers.clock is None else numbers.clock[kept],
-        texts=tuple(cells.at(np.arange(last)) for cells in numbers.texts),
-    )
+    return numbers.at(slice(last))
 
 
 def _whole_clock(layout: Layout, numbers: Numbers, clock: Clock) -> tuple[IntArray | None, Numbers]:
@@ -131,14 +125,9 @@ def _whole_clock(layout: Layout, numbers: Numbers, clock: Clock) -> tuple[IntArr
     if not len(known):
         said = f"found no time in any of {len(numbers.clock)} rows, allowed: at least one"
         hints = (Hint("time", "none", "leaves the column out"),)
-        place = (layout.file, None, None, clock.columns[0].header)
-        raise LogError(Finding(said, *place, hints=hints))
-    texts = tuple(cells.at(known) for cells in numbers.texts)
-    told = replace(
-        numbers, values=np.empty((len(known), 0)), clock=numbers.clock[known], texts=texts, findings=(),
-        wrong=0, rows=known + 1,
-    )  # fmt: skip
-    told = rebuilt(told)
+        raise LogError(Finding(said, layout.file, column=clock.columns[0].header, hints=hints))
+    timed_rows = replace(numbers, values=np.empty((len(numbers.clock), 0)), findings=(), wrong=0).at(known)
+    told = rebuilt(replace(timed_rows, rows=known + 1))
     findings = find_errors(layout, told, (), clock)
     if findings:
         raise LogError(*findings)

@@ -14,17 +14,12 @@ OTHER_UNIT = {"rad": "deg", "deg": "rad", "m": "mm", "mm": "m", "cm": "m"}
 
 def unit_hints(columns: Sequence[Column], unit: str, does: str = "reads them otherwise") -> tuple[Hint, ...]:
     """Return the hint that gives all of some columns a unit."""
-    return (Hint("unit", {called(column): unit for column in columns}, does),)
+    return (Hint("unit", {column.called: unit for column in columns}, does),)
 
 
 def unit_inference(columns: Sequence[Column], unit: str, evidence: str) -> Inference:
     """Return what is said of the unit of some columns, and why; with the other unit that it may be."""
     names, other = tuple(column.name for column in columns), OTHER_UNIT.get(unit)
     turning = len(columns) > 1 and unit in ("rad", "deg")
-    hints = (Hint("unit", {"" if turning else called(columns[0]): other}),) if other else ()
+    hints = (Hint("unit", {"" if turning else columns[0].called: other}),) if other else ()
     return Inference(f"unit of {', '.join(names)}", unit, evidence, "unit", names, hints)
-
-
-def called(column: Column) -> str:
-    """Return what a reading option calls a column: its number where it has no name."""
-    return column.name if column.header and not column.header.isdigit() else str(column.number)
