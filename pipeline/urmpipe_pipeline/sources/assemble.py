@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import OptionError
 from urmpipe_models.orientation import RotationForm
 from urmpipe_pipeline.joint_log import ROLES, Inference, JointLog, LogColumn, LogWarning, SourceFile
-from urmpipe_pipeline.sources.cells.cell import is_number, plain, significant_digits
+from urmpipe_pipeline.sources.cells.cell import significant_digits
 from urmpipe_pipeline.sources.checks import gaps, missing_samples, refuse_empty
 from urmpipe_pipeline.sources.clocks.clock import even_clock
 from urmpipe_pipeline.sources.clocks.clock_columns import like_a_time
@@ -79,7 +80,8 @@ def assemble(
     signs, offsets = _corrections(options, len(roles.joints))
     measured = _measured(plan, content, robot, t_ns, signs, offsets)
     joints, rates, seconds, position, rotation = measured.groups
-    digits, coarse = _digits(plan, roles.joints), "every joint value is written with as many"
+    written = (plan.tables.layouts[column.table].number_texts(column.index) for column in roles.joints)
+    digits, coarse = significant_digits(chain(*written)), "every joint value is written with as many"
     return JointLog(
         name=name,
         source=PATH if not roles.joints and plan.tables.source == TABLE else plan.tables.source,
@@ -116,13 +118,7 @@ def assemble(
 
 
 def _not_used(plan: Plan, options: ReadOptions, *, by_source: bool) -> Iterator[LogWarning]:
-    """Yield the options that say what the log does not have.
-
-    Args:
-        plan: What was read.
-        options: What the user says.
-        by_source: Whether the source told a unit, as it does where names do not.
-    """
+    """Yield the options that say what the log does not have; a source is used if it told a unit."""
     if plan.tables.foreign and not by_source:
         said = f"{options.source} has no effect: the log has none of its columns or graphs"
         yield LogWarning("source-not-used", said, parameter="source")
@@ -139,11 +135,7 @@ def _measured(
     signs: Sequence[int],
     offsets: Sequence[float],
 ) -> _Measured:
-    """Return what was recorded in SI: the units of the joints first, since others rest on them.
-
-    Raises:
-        LogError: If a column has no value, or a unit cannot be told or contradicts the data.
-    """
+    """Return what was recorded in SI: the units of the joints first, since others rest on them."""
     roles, file = content.roles, plan.tables.layouts[plan.main].file
     q, qd, qdd, tcp, rotation = (content.values(group) for group in roles.groups)
     refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], file)
@@ -191,18 +183,12 @@ def _times(
 def _like_a_time(plan: Plan, used: Sequence[Column]) -> Column | None:
     """Return a column of the main table that may be the time though its name does not say so."""
     layout = plan.tables.layouts[plan.main]
-    if layout.header is None:
-        return None
-    columns = columns_of(plan.tables.layouts, plan.tables.titles)
+    columns = columns_of(plan.tables.layouts, plan.tables.titles) if layout.header else ()
     return like_a_time([one for one in columns if one.table == plan.main], layout, used)
 
 
 def _corrections(options: ReadOptions, joints: int) -> tuple[tuple[int, ...], tuple[float, ...]]:
-    """Return the sign and the offset of each joint.
-
-    Raises:
-        OptionError: If there are others than one a joint, or a sign is neither 1 nor -1.
-    """
+    """Return the sign and the offset of each joint, having refused others than one a joint."""
     for what, given in (("signs", options.signs), ("offsets", options.offsets)):
         if given and len(given) != joints:
             raise OptionError(f"{what}: found {len(given)}, allowed: one for each of the {joints} joints")
@@ -254,12 +240,3 @@ def _in_si(values: FloatArray, units: Sequence[Unit]) -> FloatArray:
     if len(units) and (factors != 1.0).any():
         values *= factors
     return values
-
-
-def _digits(plan: Plan, joints: Sequence[Column]) -> int | None:
-    cells = []
-    for column in joints:
-        layout = plan.tables.layouts[column.table]
-        numbers = (cell for cell in layout.cells(column.index) if is_number(cell, layout.decimal))
-        cells += [plain(cell, layout.decimal) for cell in numbers]
-    return significant_digits(cells)

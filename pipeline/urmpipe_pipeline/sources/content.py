@@ -65,10 +65,8 @@ class Content:
         table = group[0].table
         if tuple(group) == self.columns[table]:
             return self.numbers[table].values
-        return np.stack([self._column(column) for column in group], axis=1)
-
-    def _column(self, column: Column) -> FloatArray:
-        return self.numbers[column.table].values[:, self.columns[column.table].index(column)]
+        places = ((column.table, self.columns[column.table].index(column)) for column in group)
+        return np.stack([self.numbers[table].values[:, place] for table, place in places], axis=1)
 
 
 def read_content(plan: Plan, *, skip_bad: bool = False) -> Content:
@@ -118,18 +116,11 @@ def _numbers(plan: Plan, table: int, columns: Sequence[Column], skip_bad: bool) 
 
 
 def _with_times(plan: Plan, main: Numbers, skip_bad: bool) -> Numbers:
-    """Return the numbers of the main table with the times of the other file.
-
-    Raises:
-        LogError: If these are wrong, or more or fewer than the rows.
-    """
+    """Return the numbers of the main table with the times of the other file, one for each row."""
     assert plan.time_file is not None
     times = _numbers(plan, plan.time_file, (), skip_bad)
     if len(times.values) != len(main.values):
-        file, title = (
-            plan.tables.layouts[plan.time_file].file,
-            plan.tables.layouts[plan.main].segment.path.name,
-        )
+        file, title = plan.tables.layouts[plan.time_file].file, plan.tables.paths[plan.main].name
         message = f"found {len(times.values)} times, allowed: {len(main.values)}, as {title} has rows"
         raise LogError(Finding(message, file))
     warnings = (*main.warnings, *times.warnings)
@@ -157,14 +148,10 @@ def _joined(plan: Plan, numbers: Mapping[int, Numbers]) -> tuple[Roles, tuple[In
 
 
 def _without(roles: Roles, table: int) -> Roles:
-    """Return the roles without the groups that have a column in a table."""
-
-    def kept(group: tuple[Column, ...]) -> tuple[Column, ...]:
-        """Return a group, or none of it: half a group has no meaning."""
-        return () if any(column.table == table for column in group) else group
-
+    """Return the roles without the groups that have a column in a table: half a group has no meaning."""
     names = ("rates", "accelerations", "position", "rotation")
-    return replace(roles, **{name: kept(getattr(roles, name)) for name in names})  # type: ignore[arg-type]
+    partly = [name for name in names if any(column.table == table for column in getattr(roles, name))]
+    return replace(roles, **dict.fromkeys(partly, ()))
 
 
 def _difference(plan: Plan, numbers: Mapping[int, Numbers], table: int) -> Finding | None:

@@ -59,10 +59,6 @@ class KnownSource:
         """Return whether a file with these column names comes from this source."""
         return bool(self.columns) and all(any(p.search(n) for n in names) for p in self.columns)
 
-    def is_foreign(self, names: Sequence[str]) -> bool:
-        """Return whether this source would have given a file other column names than these."""
-        return bool(self.columns) and not self.wrote(names)
-
 
 @dataclass(frozen=True, slots=True)
 class Container:
@@ -91,7 +87,7 @@ class Vocabulary:
     dates: Patterns
     long_times: frozenset[str]
     months: Mapping[str, int]
-    time_pairs: tuple[tuple[re.Pattern[str], re.Pattern[str]], ...]
+    time_pairs: tuple[Patterns, ...]
     index: Patterns
     joint: Mapping[str, Patterns]
     joint_words: Mapping[str, frozenset[str]]
@@ -130,51 +126,44 @@ class Vocabulary:
 def vocabulary() -> Vocabulary:
     """Return the words that are shipped with urmpipe."""
     data = tomllib.loads(files(__package__).joinpath("vocabulary.toml").read_text(encoding="utf-8"))
-    units = dict(_units(data["units"]))
-    joint = data["joint"]
+    time, joint, tcp, units = data["time"], data["joint"], data["tcp"], dict(_units(data["units"]))
+    roles = ("position", "rate", "acceleration")
     return Vocabulary(
-        time=_compiled(data["time"]["patterns"]),
-        dates=_compiled(data["time"]["dates"]),
-        long_times=frozenset(data["time"]["long"]),
-        months={word: k for k, words in enumerate(data["time"]["months"], start=1) for word in words},
-        time_pairs=tuple(
-            (re.compile(pair["seconds"]), re.compile(pair["nanoseconds"])) for pair in data["time"]["pairs"]
-        ),
+        time=_compiled(time["patterns"]),
+        dates=_compiled(time["dates"]),
+        long_times=frozenset(time["long"]),
+        months={word: k for k, words in enumerate(time["months"], start=1) for word in words},
+        time_pairs=tuple(_compiled((pair["seconds"], pair["nanoseconds"])) for pair in time["pairs"]),
         index=_compiled(data["index"]["patterns"]),
-        joint={role: _compiled(joint[role]) for role in ("position", "rate", "acceleration")},
-        joint_words={
-            role: frozenset(joint[f"{role}_words"]) for role in ("position", "rate", "acceleration")
-        },
+        joint={role: _compiled(joint[role]) for role in roles},
+        joint_words={role: frozenset(joint[f"{role}_words"]) for role in roles},
         marks=frozenset(joint["marks"]),
         orders=tuple(tuple(order) for order in joint["orders"]),
         other=frozenset(joint["other"]),
         commanded=frozenset(joint["commanded"]),
-        tcp_position=_compiled(data["tcp"]["position"]),
-        tcp_pose_vector=_compiled(data["tcp"]["pose_vector"]),
-        tcp_matrix=_compiled(data["tcp"]["matrix"]),
+        tcp_position=_compiled(tcp["position"]),
+        tcp_pose_vector=_compiled(tcp["pose_vector"]),
+        tcp_matrix=_compiled(tcp["matrix"]),
         tcp_rotations=tuple(
-            RotationWords(_compiled(entry["patterns"]), tuple(entry["forms"]))
-            for entry in data["tcp"]["rotation"]
+            RotationWords(_compiled(one["patterns"]), tuple(one["forms"])) for one in tcp["rotation"]
         ),
         units=units,
         missing=frozenset(data["missing"]["words"]),
         sources=tuple(
             KnownSource(
-                entry["name"],
-                _compiled(entry["columns"]),
-                {quantity: units[word] for quantity, word in entry["units"].items()},
+                one["name"], _compiled(one["columns"]), {of: units[u] for of, u in one["units"].items()}
             )
-            for entry in data["source"]
+            for one in data["source"]
         ),
         containers=tuple(
             Container(
-                entry["what"],
-                tuple(entry["suffixes"]),
-                tuple(magic.encode("latin-1") for magic in entry["magic"]),
-                entry["advice"],
-                entry.get("parameters", {}),
+                one["what"],
+                tuple(one["suffixes"]),
+                tuple(magic.encode("latin-1") for magic in one["magic"]),
+                one["advice"],
+                one.get("parameters", {}),
             )
-            for entry in data["container"]
+            for one in data["container"]
         ),
     )
 

@@ -15,7 +15,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import Inference, LogWarning
 from urmpipe_pipeline.sources.cells.cell import LONGEST_NS
 from urmpipe_pipeline.sources.cells.text_clock import DATE, SECOND_NS, TIME_OF_DAY
-from urmpipe_pipeline.sources.clocks.clock_columns import time_columns, times_of
+from urmpipe_pipeline.sources.clocks.clock_columns import time_columns
 from urmpipe_pipeline.sources.clocks.clock_units import EXPONENTS, unit_of
 from urmpipe_pipeline.sources.clocks.text_times import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column
@@ -159,7 +159,7 @@ def _text_part(column: Column, layout: Layout, units: Mapping[int, Unit]) -> Clo
 
 def _refuse_ages(time: Column, layout: Layout, unit: str) -> None:
     """Raise if the times are beyond what integers of 64 bits hold in [ns]: they are of another unit."""
-    for value in times_of(layout.cells(time.index), layout)[:1]:
+    for value in layout.numbers(time.index)[:1]:
         if abs(value) * 10.0 ** EXPONENTS[unit] >= LONGEST_NS:
             hint = Hint("unit", {time.called: "ns"}, "reads them so")
             if unit == "s" and _DATES[0] <= value < _DATES[1]:

@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Iterator, Sequence
 from itertools import pairwise
 
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import width
-from urmpipe_pipeline.sources.cells.cell import count_up, is_missing, to_float
+from urmpipe_pipeline.sources.cells.cell import count_up, is_missing
 from urmpipe_pipeline.sources.cells.text_clock import DATE, TIME_OF_DAY
 from urmpipe_pipeline.sources.clocks.text_times import known_forms
 from urmpipe_pipeline.sources.columns.columns import Column, find_column
@@ -72,7 +71,7 @@ def _halves(columns: Sequence[Column], layout: Layout) -> Iterator[tuple[Column,
             for second in columns:
                 same = nanoseconds.search(second.key) and nanoseconds.sub("", second.key) == stem
                 whole = all(cell.isdigit() for cell in layout.cells(first.index) if not is_missing(cell))
-                if same and whole and max(times_of(layout.cells(second.index), layout), default=0) < 1e9:
+                if same and whole and max(layout.numbers(second.index), default=0) < 1e9:
                     yield first, second
 
 
@@ -112,8 +111,8 @@ def _by_content(columns: Sequence[Column], layout: Layout) -> tuple[tuple[Column
     if len(timed) == 1:
         return (timed[0],), f"its unit, {timed[0].unit_text}"
     first = columns[0]
-    if first.key == "" and not first.text and _runs_like_a_clock(layout.cells(0), layout):
-        return (columns[0],), "the first column has no name and always increases"
+    if first.key == "" and not first.text and _runs_like_a_clock(first, layout):
+        return (first,), "the first column has no name and always increases"
     return None
 
 
@@ -121,7 +120,7 @@ def _without_header(
     columns: Sequence[Column], layout: Layout, joints: int | None
 ) -> tuple[tuple[Column, ...], str] | None:
     """Return the first column if it alone runs in even steps, unless the robot's joints take all columns."""
-    even = [one for one in columns if not one.text and runs_evenly(layout.cells(one.index), layout)]
+    even = [one for one in columns if not one.text and runs_evenly(layout.numbers(one.index))]
     counts = count_up(layout.cells(0))
     if even == [columns[0]] and not counts and len(columns) > 1 and len(columns) != joints:
         return (columns[0],), "the first column alone increases in even steps"
@@ -136,7 +135,7 @@ def _before_pose(
     if len(columns) == pose:
         return (), f"the {pose} columns are a pose" if options.rotation else "three columns are x, y, z"
     one_more = options.rotation and len(columns) == pose + 1 and not columns[0].text
-    if one_more and _increases(layout.cells(0), layout):
+    if one_more and _increases(layout.numbers(0)):
         return (columns[0],), f"the {pose} columns behind it are a pose, and it increases"
     return None
 
@@ -147,9 +146,9 @@ def _refuse_unclear(columns: Sequence[Column], layout: Layout, joints: int | Non
     It may if it increases from row to row, and there is one column more than the robot has joints, or it
     begins at 0, as clocks and counters do and joints seldom, and keeps near a straight line.
     """
-    times = times_of(layout.cells(columns[0].index), layout)
+    times = layout.numbers(columns[0].index)
     one_more = joints is not None and len(columns) == joints + 1
-    if columns[0].text or not _increases(layout.cells(columns[0].index), layout):
+    if columns[0].text or not _increases(times):
         return
     if not one_more and (len(times) < 3 or times[0] != 0.0 or not _keeps_near_a_line(times)):
         return
@@ -168,23 +167,16 @@ def like_a_time(columns: Sequence[Column], layout: Layout, used: Collection[Colu
     """
     free = (one for one in columns if one not in used and not one.text)
     may_be = (one for one in free if not one.unit_text or (one.unit and one.unit.quantity == "time"))
-    return next((one for one in may_be if _runs_like_a_clock(layout.cells(one.index), layout)), None)
+    return next((one for one in may_be if _runs_like_a_clock(one, layout)), None)
 
 
-def _runs_like_a_clock(cells: Sequence[str], layout: Layout) -> bool:
-    return not count_up(cells) and _increases(cells, layout)
+def _runs_like_a_clock(column: Column, layout: Layout) -> bool:
+    return not count_up(layout.cells(column.index)) and _increases(layout.numbers(column.index))
 
 
-def steps_of(cells: Sequence[str], layout: Layout) -> list[float]:
-    """Return the steps between sampled times."""
-    times = times_of(cells, layout)
+def steps_of(times: Sequence[float]) -> list[float]:
+    """Return the steps between times."""
     return [after - before for before, after in pairwise(times)]
-
-
-def times_of(cells: Sequence[str], layout: Layout) -> list[float]:
-    """Return the sampled times, without those that are missing or text."""
-    values = (to_float(cell, layout.decimal) for cell in cells)
-    return [value for value in values if value is not None and math.isfinite(value)]
 
 
 def _keeps_near_a_line(times: Sequence[float]) -> bool:
@@ -193,12 +185,12 @@ def _keeps_near_a_line(times: Sequence[float]) -> bool:
     return all(abs(time - times[0] - k * step) <= step for k, time in enumerate(times))
 
 
-def _increases(cells: Sequence[str], layout: Layout) -> bool:
-    steps = steps_of(cells, layout)
+def _increases(times: Sequence[float]) -> bool:
+    steps = steps_of(times)
     return bool(steps) and min(steps) > 0
 
 
-def runs_evenly(cells: Sequence[str], layout: Layout) -> bool:
+def runs_evenly(times: Sequence[float]) -> bool:
     """Return whether numbers increase in steps that differ by less than 1 %."""
-    steps = steps_of(cells, layout)
+    steps = steps_of(times)
     return len(steps) >= 2 and min(steps) > 0 and max(steps) - min(steps) <= _EVEN * max(steps)

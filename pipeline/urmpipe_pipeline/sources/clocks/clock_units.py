@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from urmpipe_models.errors import Finding, LogError, OptionError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_pipeline.joint_log import LogWarning
-from urmpipe_pipeline.sources.clocks.clock_columns import steps_of, times_of
+from urmpipe_pipeline.sources.clocks.clock_columns import steps_of
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.tables.sniff import Layout
 from urmpipe_pipeline.sources.units.unit_hints import unit_hints
@@ -61,9 +61,9 @@ def unit_of(time: Column, layout: Layout, source: KnownSource | None, units: Map
 
 def _by_values(time: Column, layout: Layout) -> Found:
     """Tell the unit by the year that the times give, or else by their steps."""
-    cells = layout.cells(time.index)
-    start = next(iter(times_of(cells, layout)), 0.0)
-    steps = sorted(step for step in steps_of(cells, layout) if step > 0)
+    times = layout.numbers(time.index)
+    start = times[0] if times else 0.0
+    steps = sorted(step for step in steps_of(times) if step > 0)
     step = steps[len(steps) // 2] if steps else 0.0
     likely = [u for u, e in EXPONENTS.items() if SHORTEST < step * 10.0 ** (e - 9) <= LONGEST]
     epoch = _since_1970(start, step)

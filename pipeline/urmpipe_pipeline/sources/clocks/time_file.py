@@ -29,11 +29,8 @@ def time_file(tables: Tables, columns: Sequence[Column]) -> int | None:
     named = [i for i in single if _is_named(tables, columns, i)]
     if len(named) == 1:
         return named[0]
-    even = [
-        i
-        for i in single
-        if tables.layouts[i].header is None and runs_evenly(tables.layouts[i].cells(0), tables.layouts[i])
-    ]
+    layouts = tables.layouts
+    even = [i for i in single if layouts[i].header is None and runs_evenly(layouts[i].numbers(0))]
     return even[0] if len(single) == len(even) == 1 else None
 
 

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from pyarrow import csv
 
 from urmpipe_models.arrays import FloatArray, IntArray
-from urmpipe_pipeline.sources.cells.cell import is_number, plain, to_float
+from urmpipe_pipeline.sources.cells.cell import to_float
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables.blocks import as_written, converted
 from urmpipe_pipeline.sources.tables.form import UnfitError
@@ -172,7 +172,7 @@ def _scale(layout: Layout, part: ClockColumn, exact: bool) -> int:
     As many as reach [ns] if the sampled cells have no more: then the parsed integers are [ns]. Else as
     many as fit beside the digits before the point (and two more, since the clock goes on).
     """
-    cells = [plain(c, layout.decimal) for c in layout.cells(part.column) if is_number(c, layout.decimal)]
+    cells = layout.number_texts(part.column)
     decimals = max((len(cell.partition("e")[0].partition(".")[2]) for cell in cells), default=0)
     if not exact and decimals <= part.exponent:
         return part.exponent

@@ -91,7 +91,7 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
     encoding = Inference("encoding", segments[0].encoding, why, hints=(hint,))
     titles = tuple(title for title, _ in titled)
     given = vocabulary().source(options.source)
-    foreign = given is not None and given.is_foreign(_names(layouts))
+    foreign = given is not None and bool(given.columns) and not given.wrote(_names(layouts))
     foreign = not graphs if options.source == COPPELIASIM else foreign
     return Tables(name, known, tuple(layouts), titles, (encoding, said), foreign)
 

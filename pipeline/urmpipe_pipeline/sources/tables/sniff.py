@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -18,8 +19,10 @@ from urmpipe_pipeline.sources.cells.cell import (
     is_missing,
     is_number,
     is_text,
+    plain,
     printable,
     split_line,
+    to_float,
 )
 from urmpipe_pipeline.sources.cells.text_clock import looks_like_a_clock
 from urmpipe_pipeline.sources.tables.form import Form
@@ -93,6 +96,15 @@ class Layout:
     def cells(self, column: int) -> list[str]:
         """Return the sampled cells of a column."""
         return [row[column] for row in self.sample if column < len(row)]
+
+    def number_texts(self, column: int) -> list[str]:
+        """Return the sampled numbers of a column, as Python spells them."""
+        return [plain(cell, self.decimal) for cell in self.cells(column) if is_number(cell, self.decimal)]
+
+    def numbers(self, column: int) -> list[float]:
+        """Return the sampled numbers of a column, without those that are infinite."""
+        values = (to_float(cell, self.decimal) for cell in self.cells(column))
+        return [value for value in values if value is not None and math.isfinite(value)]
 
 
 @dataclass(frozen=True, slots=True)
