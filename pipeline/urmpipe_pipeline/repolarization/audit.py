@@ -93,7 +93,7 @@ def audit_log(
     given = interval or {}
     fixed, periods, limits = _repolarized(log, robot, given)
     inferences, noticed = said_intervals(log, fixed, periods, given)
-    odd = _unexplained(log, fixed)
+    odd = _steps_to(log, *fixed.unexplained.T)
     between = _in_between(log, fixed, periods)
     unsure, speeds = _ambiguous(log, fixed, periods, limits, between)
     kinds: dict[AuditKind, _Places] = {
@@ -154,14 +154,9 @@ def _steps_to(log: JointLog, rows: IntArray, joints: IntArray) -> _Places:
     return _Places(rows, joints, before, log.q[rows, joints] - log.q[before, joints])
 
 
-def _unexplained(log: JointLog, fixed: Repolarized) -> _Places:
-    rows, joints = fixed.unexplained.T
-    return _steps_to(log, rows, joints)
-
-
 def _doubled(log: JointLog, fixed: Repolarized) -> list[int]:
     """Return the joints that are seen to be limited to +-2 pi."""
-    odd = _unexplained(log, fixed)
+    odd = _steps_to(log, *fixed.unexplained.T)
     speeds = np.zeros(len(log.joints))
     for j in np.unique(odd.joints):
         speeds[j] = _held_speed(log, fixed.q, int(j), odd.rows[odd.joints == j])
@@ -244,13 +239,9 @@ def _wide_steps(log: JointLog, joint: int, longest: float) -> tuple[IntArray, In
 
 
 def _held_speed(log: JointLog, x: FloatArray, joint: int, skipped: IntArray) -> float:
-    """Return the largest speed of a joint that was held over two steps in [rad/s]: outliers do not count.
+    """Return the largest speed of a repolarized joint that was held over two steps in [rad/s].
 
-    Args:
-        log: The log.
-        x: Its joints, repolarized.
-        joint: Index of the joint.
-        skipped: Rows at which it does not move as a joint does: the steps to and from them do not count.
+    Outliers do not count, nor do the steps to and from rows at which it does not move as a joint does.
     """
     present = np.flatnonzero(~np.isnan(x[:, joint]))
     speed = np.abs(np.diff(x[present, joint])) / seconds(np.diff(log.t_ns[present]))
@@ -268,16 +259,10 @@ def _entries(
     for kind, places in kinds.items():
         most = None if kind == "wrap" else MOST
         rows, joints, before = places.rows[:most], places.joints[:most], places.before[:most]
-        ends = (log.t_ns[rows] if kind in ("in-between", "repaired") else log.t_ns[before], log.t_ns[rows])
+        begin, end = log.t_ns[rows if kind in ("in-between", "repaired") else before], log.t_ns[rows]
         turns = (_turns_at(log, fixed, periods, at, joints) for at in (before, rows))
-        columns = (
-            rows,
-            joints,
-            (ends[0] + ends[1]) / 2e9,
-            (ends[1] - ends[0]) / 2e9,
-            places.figures[:most],
-            *turns,
-        )
+        times = ((begin + end) / 2e9, (end - begin) / 2e9)
+        columns = (rows, joints, *times, places.figures[:most], *turns)
         for row, j, t, half, figure, k_before, k_after in zip(*(c.tolist() for c in columns), strict=True):
             entries.append(AuditEntry(log.joints[j], row + 1, t, half, figure, k_before, k_after, kind))
     return sorted(entries, key=lambda entry: entry.row)

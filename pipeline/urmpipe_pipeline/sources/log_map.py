@@ -1,40 +1,14 @@
 """Maps: what a lab says once about its logs - columns, units, order, signs, offsets, clock, base, tool.
 
-source = "table"
-delimiter = "semicolon"
-decimal = "comma"
-robot = "ur5e"                  # a name of the catalogue, or a file beside the map
-base = [0, 0, 0.8]              # X, Y, Z[, RX, RY, RZ] in m and rad
-tool = [0, 0, 0.15]
-
-[clock]
-column = "Zeit"                 # or "none", with period = 0.005 in s
-unit = "ms"
-
-[[joints]]                      # in the robot's order
-column = "A1"
-name = "q1"
-unit = "deg"
-sign = -1                       # q = sign * value + offset, in the unit of the column
-offset = 90
-interval = [-180, 180]          # what the environment limits it to, in the unit of the column
-
-[tcp]
-position = ["X", "Y", "Z"]
-orientation = ["A", "B", "C"]
-form = "zyx"
-
-[units]                         # of any other column
-X = "mm"
-A = "deg"
+An example stands in docs/logs.md, "Saying it once".
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 from urmpipe_models.errors import Finding, OptionError
 from urmpipe_models.files.tables import Table
@@ -46,6 +20,8 @@ from urmpipe_pipeline.sources.clocks.time_file import TIME_FILE
 from urmpipe_pipeline.sources.options import ReadOptions
 from urmpipe_pipeline.sources.units.rotation import PURE
 from urmpipe_pipeline.sources.vocabulary import split_unit, vocabulary
+
+T = TypeVar("T")
 
 CORRECTIONS = (
     "# Where the file counts a joint otherwise: sign = -1, offset = 90 (q = sign * value + offset).",
@@ -88,22 +64,22 @@ def read_map(path: Path) -> LogMap:
     columns = [_joint(joint, units) for joint in joints]
     names = tuple(name for _, name, _, _ in columns)
     intervals = zip(names, (_interval(joint) for joint in joints), strict=True)
-    time = _text(clock, "column")
+    time = _given(clock, "column", clock.text)
     _unit_of(clock, [time] if time else [], "unit", units)
-    robot = _text(table, "robot")
+    robot = _given(table, "robot", table.text)
     result = LogMap(
         ReadOptions(
-            source=_text(table, "source"),
-            delimiter=_text(table, "delimiter"),
-            decimal=_text(table, "decimal"),
+            source=_given(table, "source", table.text),
+            delimiter=_given(table, "delimiter", table.text),
+            decimal=_given(table, "decimal", table.text),
             time=time,
-            period=clock.number("period") if clock.has("period") else None,
+            period=_given(clock, "period", clock.number),
             joints=tuple(column for column, _, _, _ in columns),
             names=names,
             signs=tuple(sign for _, _, sign, _ in columns),
             offsets=tuple(offset for _, _, _, offset in columns),
-            position=_names(tcp, "position"),
-            orientation=_names(tcp, "orientation"),
+            position=_given(tcp, "position", tcp.texts) or (),
+            orientation=_given(tcp, "orientation", tcp.texts) or (),
             rotation=tcp.choice("form", FORMS) if tcp.has("form") else None,  # type: ignore[arg-type]
             unit=units,
             interval={name: interval for name, interval in intervals if interval},
@@ -190,18 +166,14 @@ def _interval(table: Table) -> tuple[float, float] | None:
 
 def _unit_of(table: Table, columns: Sequence[str], key: str, units: dict[str, str]) -> None:
     """Note the unit of some columns, if the table has one."""
-    unit = _text(table, key)
+    unit = _given(table, key, table.text)
     if unit is not None:
         units.update(dict.fromkeys(columns, unit))
 
 
-def _text(table: Table, key: str) -> str | None:
-    return table.text(key) if table.has(key) else None
-
-
-def _names(table: Table, key: str) -> tuple[str, ...]:
-    """Return a list of names."""
-    return table.texts(key) if table.has(key) else ()
+def _given(table: Table, key: str, get: Callable[[str], T]) -> T | None:
+    """Return what is got of a table under a key, if it is there."""
+    return get(key) if table.has(key) else None
 
 
 def _frame(table: Table, key: str) -> tuple[float, ...]:

@@ -83,11 +83,7 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
 
 
 def _renamed(roles: Roles, names: Sequence[str]) -> Roles:
-    """Return the roles with the joints called as the user says.
-
-    Raises:
-        OptionError: If there are others than one name a joint, each once.
-    """
+    """Return the roles with the joints called as the user says, having refused others than a name a joint."""
     if not names:
         return roles
     if len(names) != len(roles.joints) or len(set(names)) < len(names):
@@ -144,14 +140,9 @@ def _refuse_several_logs(
     *,
     joints: int | None = None,
 ) -> None:
-    """Raise a `LogError` if two files or more are logs of their own.
+    """Raise a `LogError` if two files or more are logs of their own: each with two joints or more.
 
-    Args:
-        columns: The columns of all files, without the clocks.
-        tables: The files.
-        options: What the user says.
-        robot: The arm; None to go by the names alone.
-        joints: How many joints each has, and names for them; None for any number from two on.
+    With a number of joints only those with names for so many count.
     """
     whole = []
     for i, (path, layout) in enumerate(zip(tables.paths, tables.layouts, strict=True)):

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from typing import TypeVar
 
 from urmpipe_pipeline.sources.columns.columns import Column
 from urmpipe_pipeline.sources.vocabulary import Patterns, vocabulary
 
-T = TypeVar("T")
+T = TypeVar("T", Column, "Family")
 
 _AXES = {name: k for names in ("xyzw", "abc", ("roll", "pitch", "yaw")) for k, name in enumerate(names)}
 
@@ -71,12 +71,12 @@ def families(columns: Iterable[Column], patterns: Patterns, order: int) -> list[
             family.twins.append(column)
         family.columns.setdefault(number, column)
     ranked = sorted(found.values(), key=lambda family: family.rank)
-    return measured(ranked, lambda family: family.words)
+    return measured(ranked)
 
 
-def measured(items: Sequence[T], words: Callable[[T], frozenset[str]]) -> list[T]:
+def measured(items: Sequence[T]) -> list[T]:
     """Return the items without those that hold commands, unless all do."""
-    without = [item for item in items if not words(item) & vocabulary().commanded]
+    without = [item for item in items if not item.words & vocabulary().commanded]
     return without or list(items)
 
 

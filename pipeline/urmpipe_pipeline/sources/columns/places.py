@@ -11,7 +11,7 @@ from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, shown
 from urmpipe_models.messages import Hint
 from urmpipe_models.orientation import width
-from urmpipe_pipeline.joint_log import Inference, LogWarning
+from urmpipe_pipeline.joint_log import LogWarning
 from urmpipe_pipeline.sources.columns.columns import Column, find_column, listed
 from urmpipe_pipeline.sources.columns.pose import (
     Pose,
@@ -27,6 +27,7 @@ from urmpipe_pipeline.sources.columns.roles import (
     about_pose,
     check_count,
     joint_inference,
+    not_used,
     path_inference,
 )
 from urmpipe_pipeline.sources.options import ReadOptions
@@ -35,6 +36,8 @@ from urmpipe_pipeline.sources.vocabulary import split_unit
 
 GIVEN = "given as an option"
 """The evidence for columns that the user named."""
+
+NO_HEADER = "no header tells what they are"
 
 
 def without_header(
@@ -90,13 +93,12 @@ def _path_by_place(
         raise LogError(Finding(f"found {len(columns)} columns, allowed: x, y, z", file=layout.file))
     form = options.rotation
     if pose is None and form is not None and len(columns) == 3 + width(form):
-        pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), "given as an option")
+        pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), GIVEN)
     behind = _trailing_pose(columns, layout, None, some=True) if pose is None else None
     pose = with_form(pose or behind or Pose(tuple(columns[:3]), evidence="there is no header"), form)
     rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
     said = [path_inference(listed(pose.position), pose.evidence), *about_pose(pose)[1:]]
-    if rest:
-        said.append(Inference("columns not used", listed(rest, most=8), "no header tells what they are"))
+    said += not_used(rest, NO_HEADER)
     return Roles(position=pose.position, rotation=pose.rotation, forms=pose.forms, inferences=tuple(said))
 
 
@@ -172,11 +174,8 @@ def _by_place(
 ) -> Roles:
     """Return joints that are named by the robot, or q1, q2, ..., and the pose beside them."""
     pose = pose or Pose()
-    said = [joint_inference(joints, evidence)]
-    said += about_pose(pose)
     rest = [column for column in columns if column not in (*joints, *pose.position, *pose.rotation)]
-    if rest:
-        said.append(Inference("columns not used", listed(rest, most=8), "no header tells what they are"))
+    said = [joint_inference(joints, evidence), *about_pose(pose), *not_used(rest, NO_HEADER)]
     warnings = (_about_rest(robot, joints, rest),) if robot and rest and evidence != GIVEN else ()
     names = robot.coordinates if robot else [f"q{k + 1}" for k in range(len(joints))]
     named = tuple(replace(column, name=name) for column, name in zip(joints, names, strict=True))

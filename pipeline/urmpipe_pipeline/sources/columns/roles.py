@@ -108,8 +108,7 @@ def assign(
     for what, group in (("rates", rates), ("accelerations", accelerations)):
         if group:
             said.append(Inference(what, ", ".join(column.name for column in group), "their names"))
-    said += about_pose(pose)
-    return _with_rest(roles, said, numeric)
+    return _with_rest(roles, [*said, *about_pose(pose)], numeric)
 
 
 @dataclass(frozen=True, slots=True)
@@ -186,7 +185,7 @@ def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> t
     result = []
     for name in names:
         matches = [column for column in columns if _role_beside(column, name) == role]
-        matches = measured(matches, lambda column: column.words)
+        matches = measured(matches)
         exact = [c for c in matches if c.words - _words(name) <= vocabulary().joint_words["position"]]
         matches = exact if len(exact) == 1 else matches
         if len(matches) != 1:
@@ -304,16 +303,12 @@ def path_inference(names: str, evidence: str) -> Inference:
 def about_pose(pose: Pose) -> list[Inference]:
     """Say which columns hold the recorded tool centre point."""
     said = []
-    for what, group, where in (
-        ("TCP", pose.position, "position"),
-        ("orientation", pose.rotation, "orientation"),
-    ):
-        names, hint = tuple(column.name for column in group), Hint("log_map", None, f"with tcp.{where} in it")
+    groups = {"TCP": ("position", pose.position), "orientation": ("orientation", pose.rotation)}
+    for what, (where, group) in groups.items():
+        names = tuple(column.name for column in group)
+        hints = (Hint("log_map", None, f"with tcp.{where} in it"),)
         if names:
-            found = Inference(
-                f"recorded {what}", ", ".join(names), pose.evidence, columns=names, hints=(hint,)
-            )
-            said.append(found)
+            said.append(Inference(f"recorded {what}", ", ".join(names), pose.evidence, "", names, hints))
     return said
 
 
@@ -385,7 +380,10 @@ def _as_written(row: Sequence[str], layout: Layout) -> Iterator[str]:
 
 def _with_rest(roles: Roles, said: list[Inference], numeric: Sequence[Column]) -> Roles:
     rest = [column for column in numeric if column not in roles.columns]
-    if rest:
-        said.append(Inference("columns not used", listed(rest, most=8), "no role is known for them"))
-    noticed = [] if roles.position else about_tcp(rest)
-    return replace(roles, inferences=tuple(said), warnings=(*roles.warnings, *noticed))
+    said += not_used(rest, "no role is known for them")
+    return replace(roles, inferences=tuple(said), warnings=() if roles.position else tuple(about_tcp(rest)))
+
+
+def not_used(rest: Sequence[Column], why: str) -> list[Inference]:
+    """Say which columns are not used, if any."""
+    return [Inference("columns not used", listed(rest, most=8), why)] if rest else []

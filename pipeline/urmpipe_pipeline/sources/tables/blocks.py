@@ -6,12 +6,10 @@ import codecs
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_pipeline.sources.cells.cell import SPACE
+from urmpipe_pipeline.sources.cells.text_cells import Bytes
 from urmpipe_pipeline.sources.tables.sniff import Layout
-
-Bytes = NDArray[np.uint8]
 
 BLOCK_BYTES = 1 << 22
 """What is read at once: enough rows for several threads to parse, few enough to keep memory low."""

@@ -12,16 +12,16 @@ from __future__ import annotations
 import re
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from urmpipe_pipeline.sources.cells.cell import is_missing, split_line
+from urmpipe_pipeline.sources.cells.text_cells import Bytes
 from urmpipe_pipeline.sources.vocabulary import split_unit
 
-Bytes = NDArray[np.uint8]
 Value = str | list[str]
 """A plain cell, or the cells of an array."""
 
@@ -126,12 +126,9 @@ class Form:
         """Return the values of the rows that have all of them."""
         rows = []
         for text in texts:
-            try:
+            with suppress(RowError):
                 values = self.values(text)
-            except RowError:
-                continue
-            if len(values) == len(self.names):
-                rows.append(values)
+                rows += [values] if len(values) == len(self.names) else []
         return rows
 
     def arrays(self, text: str) -> list[str]:
@@ -148,10 +145,8 @@ class Form:
         """Return the plain cells of some rows, without the rows whose arrays are not as the others."""
         sample = []
         for values in rows:
-            try:
+            with suppress(RowError):
                 sample.append(tuple(self.spread(values)))
-            except RowError:
-                continue
         return tuple(sample)
 
     def spread(self, values: Sequence[Value]) -> list[str]:

@@ -77,8 +77,7 @@ class UnitFinder:
             LogError: If a unit is not known, does not fit the robot, or cannot be told.
         """
         kinds: list[JointKind | None] = [j.kind for j in robot.moving] if robot else [None] * len(columns)
-        told_units = [self._told(column, kind) for column, kind in zip(columns, kinds, strict=True)]
-        found = told_units
+        found = told_units = [self._told(column, kind) for column, kind in zip(columns, kinds, strict=True)]
         unknown = [j for j, unit in enumerate(found) if unit is None]
         slides = [j for j in unknown if kinds[j] == "prismatic"]
         turns = [j for j in unknown if kinds[j] != "prismatic"]
@@ -100,10 +99,8 @@ class UnitFinder:
         units = []
         for column, joint in zip(columns, joints, strict=False):
             own = self._own(column)
-            if own is None or own.quantity != joint.quantity:
-                units.append(joint.per_second(order))
-            else:
-                units.append(own if own.order else own.per_second(order))
+            unit = own if own is not None and own.quantity == joint.quantity else joint
+            units.append(unit if unit.order else unit.per_second(order))
         return units
 
     def positions(self, columns: Sequence[Column], values: FloatArray) -> list[Unit]:
@@ -269,11 +266,7 @@ class UnitFinder:
         t_ns: IntArray | None,
         robot: Chain | None,
     ) -> None:
-        """Raise if the data contradict the unit that names or source tell of joints that turn.
-
-        Raises:
-            LogError: With the evidence, and the option that decides.
-        """
+        """Raise a `LogError` if the data contradict what names or source tell of joints that turn."""
         for name, other in (("rad", "deg"), ("deg", "rad")):
             which = [j for j, unit in enumerate(units) if unit and unit.name == name]
             which = [j for j in which if not {0, columns[j].number} & set(self.given)]
