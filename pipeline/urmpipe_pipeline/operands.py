@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 from urmpipe_models.chains.chain import Chain
 from urmpipe_models.errors import Finding, LogError, RecordingError, for_each
@@ -61,11 +61,11 @@ def load_runs(
         if not isinstance(operand, Path):
             return on_robot(operand.as_run(), robot)
         name = operand.resolve().name if operand.is_dir() else None
-        how: dict[str, Any] = {"robot": robot, "read": read, "tsp": tsp, "derivative": derivative}
         try:
             if _is_recording(operand):
                 return on_robot(_recorded(operand).as_run(), robot)
-            return ingest_log(log_files(operand), **how, name=name)
+            files = log_files(operand)
+            return ingest_log(files, robot=robot, read=read, tsp=tsp, derivative=derivative, name=name)
         except LogError as error:  # of several logs, each is named
             found = (one if one.file else replace(one, file=str(operand)) for one in error.findings)
             raise LogError(*found) from error
@@ -111,7 +111,6 @@ def log_files(operand: Path) -> list[Path]:
         return [operand]
     files = sorted(path for path in operand.iterdir() if path.suffix.lower() in (".csv", ".txt"))
     if not files:
-        raise LogError(
-            Finding("found a folder without CSV files, allowed: the plots of one log", file=str(operand))
-        )
+        said = "found a folder without CSV files, allowed: the plots of one log"
+        raise LogError(Finding(said, file=str(operand)))
     return files

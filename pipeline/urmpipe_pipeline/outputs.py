@@ -15,6 +15,7 @@ from pathlib import Path
 from typing import Literal
 
 from urmpipe_models.errors import Finding, OutputError
+from urmpipe_pipeline.text import encodable
 
 OutputKind = Literal[
     "recording", "report", "map", "export", "audit", "junit", "statistics", "figure", "drawing", "fmu",
@@ -39,6 +40,8 @@ OPENED: tuple[OutputKind, ...] = ("recording", "report")
 
 OTHERS = {".parquet", ".mat", ".tum", ".txt", ".xlsx", ".json", ".png", ".pdf", ".jpg", ".webp"}
 """Suffixes of what urmpipe writes as exports and figures, or not at all."""
+
+_KNOWN_SUFFIXES = OTHERS.union(*SUFFIXES.values())
 
 TABLES = (".csv", ".parquet", ".mat", ".tum")
 """Suffixes of what `export` makes of a recording."""
@@ -138,7 +141,8 @@ def know_own(kind: OutputKind, is_ours: Callable[[Path], bool]) -> None:
 
 def refuse_output(path: Path, inputs: Sequence[Path], kind: OutputKind) -> None:
     """Raise an `OutputError` if an output may not be written there: for who works long before it writes."""
-    if kind == "recording" and not _is_text(path):
+    name = os.fspath(path.absolute())
+    if kind == "recording" and encodable(name) != name:  # on Linux a name may hold any bytes
         said = "found a name that is no UTF-8 text, which Rerun cannot open, allowed: one that is"
         raise OutputError(Finding(said, str(path)))
     try:
@@ -180,23 +184,13 @@ def _is_of_another_kind(path: Path, kind: OutputKind) -> bool:
     suffix = path.suffix.lower()
     if kind in OPENED and (path.is_file() or not path.exists()):
         return suffix not in SUFFIXES[kind]
-    known = OTHERS.union(*SUFFIXES.values())
-    return kind in SUFFIXES and suffix in known.difference(SUFFIXES[kind])
+    return kind in SUFFIXES and suffix in _KNOWN_SUFFIXES.difference(SUFFIXES[kind])
 
 
 def _own_name(path: Path, kind: OutputKind) -> str:
     """Return a name with the suffix of its kind, by which it is opened: run.rrd of run.csv or run."""
-    known = path.suffix.lower() in OTHERS.union(*SUFFIXES.values())
-    return f"{path.stem if known else path.name}{SUFFIXES[kind][0]}"
-
-
-def _is_text(path: Path) -> bool:
-    """Tell whether a path can be written as UTF-8: on Linux a name may hold any bytes."""
-    try:
-        os.fspath(path.absolute()).encode()
-    except UnicodeEncodeError:
-        return False
-    return True
+    stem = path.stem if path.suffix.lower() in _KNOWN_SUFFIXES else path.name
+    return f"{stem}{SUFFIXES[kind][0]}"
 
 
 def _is_ours(path: Path, kind: OutputKind) -> bool:

@@ -17,6 +17,7 @@ from urmpipe_models.messages import Hint
 from urmpipe_models.repolarizer import FULL_TURN, Repolarized
 from urmpipe_pipeline.joint_log import Inference, JointLog, LogColumn, LogWarning
 from urmpipe_pipeline.repolarization.joint_motion import over_rows
+from urmpipe_pipeline.text import counted
 
 Interval = tuple[float, float]
 
@@ -231,7 +232,4 @@ def _evidence(log: JointLog, fixed: Repolarized, periods: FloatArray, ends: Mapp
     wraps = int(np.isin(fixed.joints, list(ends)).sum())
     period = float(periods[first]) / abs(column.factor)
     low, high = min(one for one, _ in ends.values()), max(one for _, one in ends.values())
-    return (
-        f"{wraps} wrap{'s' if wraps > 1 else ''} by {period:.6g} {column.unit}, values from {low:.6g} to"
-        f" {high:.6g}"
-    )
+    return f"{counted(wraps, 'wrap')} by {period:.6g} {column.unit}, values from {low:.6g} to {high:.6g}"

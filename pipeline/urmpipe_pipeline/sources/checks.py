@@ -99,7 +99,7 @@ def find_errors(layout: Layout, numbers: Numbers, names: Sequence[str], clock: C
     total = numbers.wrong + len(wrong)
     wrong = sorted(wrong, key=lambda one: (one.row or 0, one.column or "", one.message))[:SHOWN_FINDINGS]
     rows_in_file = [numbers.file_row(one.row or 0) for one in wrong]
-    lines = lines_of_rows(layout, rows_in_file) if wrong else {}
+    lines = lines_of_rows(layout, rows_in_file)
     file = layout.file
     placed = zip(wrong, rows_in_file, strict=True)
     here = (replace(one, file=file, line=lines.get(row), row=row) for one, row in placed)

@@ -67,19 +67,19 @@ def make_plan(tables: Tables, options: ReadOptions, robot: Chain | None) -> Plan
     columns = columns_of(tables.layouts, tables.titles)
     units = given_units(columns, options)
     apart = None if options.time else time_file(tables, columns)
-    if apart is not None:
+    if apart is None:
+        clocks = find_clocks(tables, columns, options, units, len(robot.coordinates) if robot else None)
+    else:
         found = clock_of_file(tables, columns, apart, units)
-        rest = [column for column in columns if column.table != apart]
-        roles = _renamed(_roles(rest, tables, options, robot, only=1 - apart), options.names)
-        return Plan(tables, tuple(found if i == apart else Clock() for i in (0, 1)), roles, units, apart)
-    clocks = find_clocks(tables, columns, options, units, len(robot.coordinates) if robot else None)
-    for i, clock in enumerate(() if options.time else clocks):
+        clocks = tuple(found if table == apart else Clock() for table in (0, 1))
+    for i, clock in enumerate(() if options.time or apart is not None else clocks):
         own = [column for column in columns if column.table == i]
         refuse_twins(clock.columns, own, tables.layouts, Hint("time", None, "says which: give its number"))
     times = {column for clock in clocks for column in clock.columns}
     rest = [column for column in columns if column not in times]
-    roles = _renamed(_roles(rest, tables, options, robot), options.names)
-    return Plan(tables, clocks, roles, units)
+    only = None if apart is None else 1 - apart
+    roles = _renamed(_roles(rest, tables, options, robot, only), options.names)
+    return Plan(tables, clocks, roles, units, apart)
 
 
 def _renamed(roles: Roles, names: Sequence[str]) -> Roles:

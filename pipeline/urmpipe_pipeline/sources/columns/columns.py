@@ -178,9 +178,9 @@ def refuse_twins(
         twins = [one for one in named if not one.text and _alike(one, column)]
         if twins:
             numbers = ", ".join(str(n) for n in sorted(c.number for c in (column, *twins)))
-            message, layout = f"found as columns {numbers}, allowed: once", layouts[column.table]
+            layout, said = layouts[column.table], f"found as columns {numbers}, allowed: once"
             place = (layout.file, layout.header, None, column.header)
-            findings.append(Finding(message, *place, hints=(remedy,)))
+            findings.append(Finding(said, *place, hints=(remedy,)))
     if findings:
         raise LogError(*findings)
 

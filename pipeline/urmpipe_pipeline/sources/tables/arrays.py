@@ -18,7 +18,7 @@ from urmpipe_pipeline.sources.tables.form import (
     usual_length,
     words_around,
 )
-from urmpipe_pipeline.sources.tables.sniff import COMMENTS, Layout, sniff
+from urmpipe_pipeline.sources.tables.sniff import Layout, sniff
 from urmpipe_pipeline.sources.tables.text import HeadLine, Segment, head_lines
 
 _PLAIN = "7"
@@ -52,8 +52,8 @@ def sniff_arrays(segment: Segment, delimiter: str | None = None, decimal: str | 
         segment, delimiter, decimal, [replace(row, text=_with_plain(form, row.text)) for row in rows]
     )
     form = replace(form, delimiter=outer.delimiter, decimal=outer.decimal, names=outer.names)
-    body = [row.text for row in rows if row.number >= outer.first_line]
-    values = form.readable(text for text in body if not text.lstrip().startswith(COMMENTS))
+    body = (row for row in rows if row.number >= outer.first_line and not row.is_comment)
+    values = form.readable(row.text for row in body)
     lengths = tuple(usual_length(row[j] for row in values) for j in range(len(outer.names)))
     if not any(lengths):
         return None

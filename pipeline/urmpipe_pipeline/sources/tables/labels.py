@@ -7,9 +7,8 @@ the same ones, in the same order, stand in all of them. Lines with none of them 
 from __future__ import annotations
 
 import re
-from collections import Counter
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 from urmpipe_pipeline.joint_log import Inference
 from urmpipe_pipeline.sources.cells.cell import is_number
@@ -35,40 +34,32 @@ FEWEST_LABELS = 2
 """A line with one label may be anything."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Labelled:
-    """A line, the label before each of its values, and what stands behind the last."""
-
-    line: HeadLine
-    labels: tuple[str, ...]
-    tail: str
-
-
 def sniff_labels(segment: Segment) -> Layout | None:
     """Return how a log with labels in its rows is written, as rows of plain cells; None if it has none."""
     lines = head_lines(segment)[:SAMPLED_LINES]
-    labelled = [found for found in map(_labelled, lines) if found]
-    if not labelled or 2 * len(labelled) < len(lines):
+    alike: dict[tuple[tuple[str, ...], str], list[HeadLine]] = {}
+    for line in lines:
+        if (found := _labels(line.text)) is not None:
+            alike.setdefault(found, []).append(line)
+    labelled = sum(map(len, alike.values()))
+    if not alike or 2 * labelled < len(lines):
         return None
-    (labels, tail), count = Counter((found.labels, found.tail) for found in labelled).most_common(1)[0]
-    rows = [found.line for found in labelled if (found.labels, found.tail) == (labels, tail)]
-    if 2 * count < len(labelled):
-        return None
-    return _layout(segment, rows, labels, tail)
+    (labels, tail), rows = max(alike.items(), key=lambda item: len(item[1]))
+    return _layout(segment, rows, labels, tail) if 2 * len(rows) >= labelled else None
 
 
-def _labelled(line: HeadLine) -> _Labelled | None:
-    """Return a line whose values have a label each, or None."""
+def _labels(text: str) -> tuple[tuple[str, ...], str] | None:
+    """Return the label before each value of a line, and what stands behind the last; None without labels."""
     labels, place = [], 0
-    while match := _PAIR.match(line.text, place):
+    while match := _PAIR.match(text, place):
         start = next(match.start(group) for group in ("told", "array", "number", "glued") if match[group])
-        labels.append(line.text[place:start].strip())
+        labels.append(text[place:start].strip())
         place = match.end()
-    tail = _TAIL.match(line.text, place)
+    tail = _TAIL.match(text, place)
     signed = any(label.endswith((":", "=")) for label in labels)
     if tail is None or not signed or len(labels) < FEWEST_LABELS:
         return None
-    return _Labelled(line, tuple(labels), tail[0].strip())
+    return tuple(labels), tail[0].strip()
 
 
 def _layout(segment: Segment, rows: Sequence[HeadLine], labels: tuple[str, ...], tail: str) -> Layout | None:

@@ -57,10 +57,6 @@ Sniff: TypeAlias = Callable[[Segment, str | None, str | None], Layout]
 """What finds out how a plain table is written, with delimiter and decimal sign as options give them."""
 
 
-_OTHER = (Hint("source"),)
-"""What to give for another source."""
-
-
 def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff = sniff) -> Tables:
     """Return the tables of a log's files.
 
@@ -82,14 +78,16 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
     layouts = for_each(lambda item: _layout(item[1], options, sniff_plain), titled)
     if len(files) > 1:
         layouts = [across(layout) for layout in layouts]
-    known, said = _known(layouts, options) if not forced else (None, _coppeliasim(titled, options))
-    name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
-    why, hint = (
-        "byte order mark" if segments[0].start else "its bytes",
-        Hint("", does="save the file as UTF-8"),
-    )
-    encoding = Inference("encoding", segments[0].encoding, why, hints=(hint,))
     titles = tuple(title for title, _ in titled)
+    known, why = _known(layouts, options.source)
+    if forced:
+        known, why = None, f"each graph has its path and header: {', '.join(titles)}"
+    name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
+    why = "given as an option" if options.source else why
+    mark = "byte order mark" if segments[0].start else "its bytes"
+    utf_8 = (Hint("", does="save the file as UTF-8"),)
+    encoding = Inference("encoding", segments[0].encoding, mark, hints=utf_8)
+    said = Inference("source", name, why, hints=(Hint("source"),))
     given = vocabulary().source(options.source)
     foreign = given is not None and bool(given.columns) and not given.wrote(_names(layouts))
     foreign = not graphs if options.source == COPPELIASIM else foreign
@@ -103,25 +101,15 @@ def _layout(segment: Segment, options: ReadOptions, sniff_plain: Sniff) -> Layou
     return found or sniff_arrays(segment, *given) or with_names(sniff_plain(segment, *given))
 
 
-def _known(layouts: Sequence[Layout], options: ReadOptions) -> tuple[KnownSource | None, Inference]:
-    """Return the source that the columns give away."""
-    if options.source is not None:
-        said = Inference("source", options.source, "given as an option", hints=_OTHER)
-        return vocabulary().source(options.source), said
+def _known(layouts: Sequence[Layout], given: str | None) -> tuple[KnownSource | None, str]:
+    """Return the source that is given or that the columns give away, and why it is none or that one."""
     names = _names(layouts)
-    for source in vocabulary().sources:
-        if source.wrote(names):
-            return source, Inference("source", source.name, "the names of its columns", hints=_OTHER)
-    return None, Inference("source", TABLE, "no source is known by these columns", hints=_OTHER)
+    wrote = next((source for source in vocabulary().sources if source.wrote(names)), None)
+    known = vocabulary().source(given) if given else wrote
+    return known, "the names of its columns" if known else "no source is known by these columns"
 
 
 def _names(layouts: Sequence[Layout]) -> list[str]:
     """Return the names of all columns and the labels of rows."""
     labels = (layout.form.labels if layout.form else () for layout in layouts)
     return [name for layout, more in zip(layouts, labels, strict=True) for name in (*layout.names, *more)]
-
-
-def _coppeliasim(titled: Sequence[tuple[str, Segment]], options: ReadOptions) -> Inference:
-    graphs = ", ".join(title for title, _ in titled)
-    evidence = "given as an option" if options.source else f"each graph has its path and header: {graphs}"
-    return Inference("source", COPPELIASIM, evidence, hints=_OTHER)

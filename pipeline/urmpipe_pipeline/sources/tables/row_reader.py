@@ -6,6 +6,7 @@ import math
 from array import array
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import islice
 
 import numpy as np
 
@@ -21,7 +22,9 @@ from urmpipe_pipeline.sources.cells.cell import (
 from urmpipe_pipeline.sources.cells.text_cells import TextCells
 from urmpipe_pipeline.sources.tables.form import CONFLICT_MARK, RowError, Value
 from urmpipe_pipeline.sources.tables.numbers import NO_TIME, REPORTED, ClockColumn, Numbers, RowFault
-from urmpipe_pipeline.sources.tables.sniff import COMMENTS, Layout
+from urmpipe_pipeline.sources.tables.sniff import Layout
+from urmpipe_pipeline.sources.tables.text import COMMENTS
+from urmpipe_pipeline.text import counted
 
 SHOWN_FINDINGS = 20
 """Findings that are told one by one; the others are counted."""
@@ -34,13 +37,9 @@ MAY_BE_MISSING = "a number, or an empty, Null or NaN cell where a sample is miss
 
 def lines_of_rows(layout: Layout, rows: Sequence[int]) -> dict[int, int]:
     """Return the line of the file of some data rows, both counted from 1."""
-    wanted, found = set(rows), {}
-    for row, (line, _) in enumerate(data_lines(layout, layout.segment.lines()), start=1):
-        if row in wanted:
-            found[row] = line
-            if len(found) == len(wanted):
-                break
-    return found
+    numbered = enumerate(data_lines(layout, layout.segment.lines()), start=1)
+    wanted = set(rows)
+    return {row: line for row, (line, _) in islice(numbered, max(rows, default=0)) if row in wanted}
 
 
 def data_lines(layout: Layout, lines: Iterable[tuple[int, str]]) -> Iterator[tuple[int, str]]:
@@ -154,13 +153,9 @@ class RowReader:
             if self._ended:
                 return
             self._line, self._row = line, self._row + 1
-            if CONFLICT_MARK.match(text):
+            if mark := CONFLICT_MARK.match(text):
                 self._mark(text)
-                cells = None
-            elif self._other_side:
-                cells = None
-            else:
-                cells = self._cells(text)
+            cells = None if mark or self._other_side else self._cells(text)
             for texts, part in zip(self._texts, self._text_parts, strict=True):
                 texts.append("" if cells is None else cells[part.column])
             yield (REPORTED, nothing) if cells is None else (self._time(cells), self._values(cells))
@@ -215,8 +210,7 @@ class RowReader:
         if len(values) != width and any([*values[width:], len(values) < width]):
             numbers = any(not isinstance(v, str) or is_number(v, self.layout.decimal) for v in values)
             shown = "" if numbers else f" ({_shown(text)})"
-            plural = "" if len(values) == 1 else "s"
-            self._report(f"found {len(values)} cell{plural}{shown}, allowed: {width}")
+            self._report(f"found {counted(len(values), 'cell')}{shown}, allowed: {width}")
             return False
         del values[width:]
         return True

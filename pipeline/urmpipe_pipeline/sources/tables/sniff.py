@@ -28,8 +28,8 @@ from urmpipe_pipeline.sources.cells.text_clock import looks_like_a_clock
 from urmpipe_pipeline.sources.tables.form import Form
 from urmpipe_pipeline.sources.tables.text import HEAD_BYTES, HeadLine, Segment, head_lines
 from urmpipe_pipeline.sources.vocabulary import vocabulary
+from urmpipe_pipeline.text import counted
 
-COMMENTS = ("#", "%", "//")
 LEAST_FIT = 0.2
 """A delimiter that fits less than this is not believed because it makes several columns."""
 
@@ -139,7 +139,7 @@ def sniff(
     told, lines = _told_delimiter(lines)
     delimiters = _choices("delimiter", delimiter or told, DELIMITERS)
     decimals = _choices("decimal", decimal, DECIMALS)
-    body = [line for line in lines if not line.text.lstrip().startswith(COMMENTS)][:SAMPLED_LINES]
+    body = [line for line in lines if not line.is_comment][:SAMPLED_LINES]
     style = _best_style([line.text for line in body[:SCORED_LINES]], delimiters, decimals)
     rows = [split_line(line.text, style.delimiter) for line in body]
     width = _common_width(rows, style.decimal)
@@ -294,8 +294,7 @@ def _header(before: Sequence[HeadLine], delimiter: str, width: int) -> tuple[tup
     split = [_header_cells(line.text, delimiter, width) for line in before]
     for at in reversed(range(len(before))):
         line, cells = before[at], split[at]
-        comment = line.text.lstrip().startswith(COMMENTS)
-        if abs(len(cells) - width) > 1 and (comment or len(cells) == 1):
+        if abs(len(cells) - width) > 1 and (line.is_comment or len(cells) == 1):
             continue  # a comment or a title
         if not units and at > 0 and _all_units(cells, split[:at]):
             units = cells
@@ -342,7 +341,7 @@ def _names(
     if len(cells) == width - 1 and count_up([row[0] for row in full]):
         return ("", *cells), Inference("header", f"line {line}", "the first column is an unnamed index")
     number = abs(len(cells) - width)
-    remedy = f"{'add' if len(cells) < width else 'take out'} {number} name{'s' if number > 1 else ''}"
+    remedy = f"{'add' if len(cells) < width else 'take out'} {counted(number, 'name')}"
     wrong = f"found {len(cells)} names over rows of {width} cells, allowed: a name a column; {remedy}"
     wrong += f", or delete line {line}: without names the columns are taken as joints in order"
     raise LogError(Finding(wrong, file=str(segment.path), line=line))

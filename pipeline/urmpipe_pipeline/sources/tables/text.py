@@ -26,6 +26,7 @@ _BYTE_ORDER_MARKS = (
 LOGS = (".csv", ".txt", ".tsv", ".dat", ".log", ".rrd")
 """How most logs are called, and their recordings."""
 
+COMMENTS = ("#", "%", "//")
 _CONTROL = bytes(set(range(32)) - set(b"\t\n\v\f\r\x1a\x1b"))
 
 
@@ -83,6 +84,11 @@ class HeadLine:
     number: int
     offset: int
     text: str
+
+    @property
+    def is_comment(self) -> bool:
+        """Whether it is a comment."""
+        return self.text.lstrip().startswith(COMMENTS)
 
 
 def head_lines(segment: Segment) -> list[HeadLine]:

@@ -9,8 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 from urmpipe_pipeline.sources.cells.cell import DECIMALS, DELIMITERS, count_up, is_number, split_line
-from urmpipe_pipeline.sources.tables.sniff import COMMENTS, SAMPLED_LINES, Layout, sniff
-from urmpipe_pipeline.sources.tables.text import HeadLine, Segment, head_lines
+from urmpipe_pipeline.sources.tables.sniff import SAMPLED_LINES, Layout, sniff
+from urmpipe_pipeline.sources.tables.text import COMMENTS, HeadLine, Segment, head_lines
 from urmpipe_pipeline.sources.vocabulary import key, split_unit, vocabulary
 
 
@@ -30,7 +30,7 @@ def sniff_targets(
     """
     lines = head_lines(segment)[:SAMPLED_LINES]
     for place, line in enumerate(lines):
-        below = [other for other in lines[place + 1 :] if not _is_comment(other)]
+        below = [other for other in lines[place + 1 :] if not other.is_comment]
         whole = _soundest(below, _headers(line.text, position))
         if whole:
             # The first line may tell the delimiter; any other above the header tells nothing.
@@ -38,7 +38,7 @@ def sniff_targets(
             return (
                 _from(layout, below) if layout.header == line.number else sniff(segment, delimiter, decimal)
             )
-    body = [line for line in lines if not _is_comment(line)]
+    body = [line for line in lines if not line.is_comment]
     for place, line in enumerate(body[:2]):
         header = _fitting(body[place + 1 :], _headers(line.text, position))
         if header and delimiter is None:
@@ -74,11 +74,6 @@ def _are_units(cells: Sequence[str]) -> bool:
     """Return whether the cells of a line are units."""
     told = [vocabulary().unit(cell.strip("[]() ")) for cell in cells if cell]
     return bool(told) and all(told)
-
-
-def _is_comment(line: HeadLine) -> bool:
-    """Return whether a line is a comment."""
-    return line.text.lstrip().startswith(COMMENTS)
 
 
 @dataclass(frozen=True, slots=True)

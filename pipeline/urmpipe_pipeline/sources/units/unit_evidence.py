@@ -10,6 +10,7 @@ import numpy as np
 
 from urmpipe_models.arrays import FloatArray, IntArray
 from urmpipe_models.chains.chain import Chain
+from urmpipe_pipeline.text import counted
 
 WRAP_SLACK_DEG = 20.0
 """A step this near to 360 is a wrap in degrees: in radians it would be 57 turns between two rows."""
@@ -56,7 +57,7 @@ def degrees_evidence(values: FloatArray, t_ns: IntArray | None, bounds: Bounds |
     bounds = bounds or Bounds()
     wraps = sum(int((np.abs(np.abs(np.diff(one)) - 360.0) <= WRAP_SLACK_DEG).sum()) for one in values.T)
     if wraps:
-        return f"{wraps} step{'s' if wraps > 1 else ''} of about 360 from one row to the next"
+        return f"{counted(wraps, 'step')} of about 360 from one row to the next"
     speed = 0.0 if t_ns is None else max(_usual_speed(np.abs(np.diff(one)), t_ns) for one in values.T)
     if np.radians(speed) <= bounds.speed < speed:
         return f"as rad it would turn at {speed:.3g} rad/s for a tenth of the time"
@@ -76,9 +77,7 @@ def radians_evidence(values: FloatArray) -> str | None:
         return None
     slack = math.radians(WRAP_SLACK_DEG)
     wraps = int((np.abs(np.abs(np.diff(values, axis=0)) - math.tau) <= slack).sum())
-    if not wraps:
-        return None
-    return f"{wraps} step{'s' if wraps > 1 else ''} of about 6.28 from one row to the next"
+    return f"{counted(wraps, 'step')} of about 6.28 from one row to the next" if wraps else None
 
 
 def peak(values: FloatArray) -> float:
