@@ -141,7 +141,9 @@ def _measured(
     refuse_empty(q if roles.joints else tcp, [c.header for c in roles.joints or roles.position], file)
     q, qd, qdd = _corrected(q, signs, offsets), _corrected(qd, signs), _corrected(qdd, signs)
     finder = UnitFinder(plan.units, plan.tables.known, file, by_kinematics(robot, q, tcp))
-    units = finder.joints(roles.joints, q, t_ns if content.timed else None, robot) if roles.joints else []
+    units = (
+        finder.joints(roles.joints, q, None if content.clock is None else t_ns, robot) if roles.joints else []
+    )
     rates = finder.derivatives(roles.rates, units, 1)
     seconds = finder.derivatives(roles.accelerations, units, 2)
     lengths = finder.positions(roles.position, tcp) if roles.position else []

@@ -50,11 +50,6 @@ class Content:
     inferences: tuple[Inference, ...]
     warnings: tuple[LogWarning, ...]
 
-    @property
-    def timed(self) -> bool:
-        """Whether the log recorded its times."""
-        return self.clock is not None
-
     def values(self, group: Sequence[Column]) -> FloatArray:
         """Return the numbers of some columns in the file's own units, shape (n, columns).
 

@@ -65,7 +65,7 @@ def read_map(path: Path) -> LogMap:
     names = tuple(name for _, name, _, _ in columns)
     intervals = zip(names, (_interval(joint) for joint in joints), strict=True)
     time = _given(clock, "column", clock.text)
-    _unit_of(clock, [time] if time else [], "unit", units)
+    _note_unit(clock, time or None, units)
     robot = _given(table, "robot", table.text)
     result = LogMap(
         ReadOptions(
@@ -152,7 +152,7 @@ def _joint(table: Table, units: dict[str, str]) -> tuple[str, str, int, float]:
     sign = table.number("sign", 1.0)
     if sign not in (1.0, -1.0):
         table.fault("sign", f"found {sign:g}, allowed: 1 or -1")
-    _unit_of(table, [column], "unit", units)
+    _note_unit(table, column, units)
     return column, table.text("name", column), int(sign), table.number("offset", 0.0)
 
 
@@ -164,11 +164,11 @@ def _interval(table: Table) -> tuple[float, float] | None:
     return low, high
 
 
-def _unit_of(table: Table, columns: Sequence[str], key: str, units: dict[str, str]) -> None:
-    """Note the unit of some columns, if the table has one."""
-    unit = _given(table, key, table.text)
-    if unit is not None:
-        units.update(dict.fromkeys(columns, unit))
+def _note_unit(table: Table, column: str | None, units: dict[str, str]) -> None:
+    """Note the unit of a column, if the table has both."""
+    unit = _given(table, "unit", table.text)
+    if column is not None and unit is not None:
+        units[column] = unit
 
 
 def _given(table: Table, key: str, get: Callable[[str], T]) -> T | None:

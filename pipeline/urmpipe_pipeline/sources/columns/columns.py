@@ -122,17 +122,14 @@ def find_column(columns: Sequence[Column], text: str, **place: str) -> Column:
     """
     exact = [column for column in columns if text in (column.header, column.name)]
     found = exact or [column for column in columns if key(text) == column.key != ""]
+    found = found or [column for column in columns if text == str(column.number)]
     if len(found) == 1:
         return found[0]
+    none, allowed = f"no column {shown(text)}", listed(columns)
     if found:
         numbers = ", ".join(str(column.number) for column in found)
-        found_as = f"{shown(text)} as columns {numbers}"
-        raise LogError(Finding(found=found_as, allowed="one; give its number", **place))  # type: ignore[arg-type]
-    for column in columns:
-        if text == str(column.number):
-            return column
-    none = f"no column {shown(text)}"
-    raise LogError(Finding(found=none, allowed=listed(columns), **place))  # type: ignore[arg-type]
+        none, allowed = f"{shown(text)} as columns {numbers}", "one; give its number"
+    raise LogError(Finding(found=none, allowed=allowed, **place))  # type: ignore[arg-type]
 
 
 def given_units(columns: Sequence[Column], options: ReadOptions) -> dict[int, Unit]:

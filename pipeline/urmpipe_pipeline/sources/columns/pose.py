@@ -120,11 +120,8 @@ def trailing_matrix(
     columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False
 ) -> Pose | None:
     """Return the pose in columns without names of which the last 16 or 12 are a homogeneous transform."""
-    for count in (16, 12):
-        pose = matrix_pose(columns[-count:], layouts, some=some) if len(columns) >= count else None
-        if pose is not None:
-            return pose
-    return None
+    tried = (matrix_pose(columns[-count:], layouts, some=some) for count in (16, 12))
+    return next((pose for pose in tried if pose), None)
 
 
 def matrix_pose(columns: Sequence[Column], layouts: Sequence[Layout], *, some: bool = False) -> Pose | None:

@@ -79,17 +79,14 @@ def open_tables(files: Sequence[Path], options: ReadOptions, sniff_plain: Sniff 
     if len(files) > 1:
         layouts = [across(layout) for layout in layouts]
     titles = tuple(title for title, _ in titled)
-    known, why = _known(layouts, options.source)
-    if forced:
-        known, why = None, f"each graph has its path and header: {', '.join(titles)}"
+    names = _names(layouts)
+    known, why = _known(names, options.source, titles if forced else ())
     name = options.source or (COPPELIASIM if forced else known.name if known else TABLE)
-    why = "given as an option" if options.source else why
+    said = Inference("source", name, why, hints=(Hint("source"),))
     mark = "byte order mark" if segments[0].start else "its bytes"
     utf_8 = (Hint("", does="save the file as UTF-8"),)
     encoding = Inference("encoding", segments[0].encoding, mark, hints=utf_8)
-    said = Inference("source", name, why, hints=(Hint("source"),))
-    given = vocabulary().source(options.source)
-    foreign = given is not None and bool(given.columns) and not given.wrote(_names(layouts))
+    foreign = known is not None and bool(known.columns) and not known.wrote(names)
     foreign = not graphs if options.source == COPPELIASIM else foreign
     return Tables(name, known, tuple(layouts), titles, (encoding, said), foreign)
 
@@ -101,11 +98,13 @@ def _layout(segment: Segment, options: ReadOptions, sniff_plain: Sniff) -> Layou
     return found or sniff_arrays(segment, *given) or with_names(sniff_plain(segment, *given))
 
 
-def _known(layouts: Sequence[Layout], given: str | None) -> tuple[KnownSource | None, str]:
-    """Return the source that is given or that the columns give away, and why it is none or that one."""
-    names = _names(layouts)
-    wrote = next((source for source in vocabulary().sources if source.wrote(names)), None)
-    known = vocabulary().source(given) if given else wrote
+def _known(names: Sequence[str], given: str | None, graphs: Sequence[str]) -> tuple[KnownSource | None, str]:
+    """Return the source that is given, or that graphs or the names of columns give away, and why."""
+    if given is not None:
+        return vocabulary().source(given), "given as an option"
+    if graphs:
+        return None, f"each graph has its path and header: {', '.join(graphs)}"
+    known = next((source for source in vocabulary().sources if source.wrote(names)), None)
     return known, "the names of its columns" if known else "no source is known by these columns"
 
 

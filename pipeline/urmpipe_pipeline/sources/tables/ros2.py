@@ -59,11 +59,7 @@ def _names(row: Sequence[str], decimal: str) -> tuple[str, ...]:
 
 
 def _refuse_other_publishers(layout: Layout) -> None:
-    """Raise if rows of several publishers, each with joints of its own, stand in one file.
-
-    Raises:
-        LogError: With the names of the joints of each.
-    """
+    """Raise a `LogError` if rows of several publishers, each with joints of its own, stand in one file."""
     first = _names(layout.sample[0], layout.decimal)
     for row in layout.sample:
         names = _names(row, layout.decimal)

@@ -237,13 +237,7 @@ class RowReader:
         return math.nan
 
     def _report(self, message: str, column: str | None = None, *, lasting: bool = False) -> None:
-        """Keep a finding about this row; the same in rows on end is one.
-
-        Args:
-            message: What was found, and what is allowed.
-            column: The column, if it is one.
-            lasting: Whether it stays wrong if the row is left out.
-        """
+        """Keep a finding about this row: a lasting one stays without it, the same in rows on end is one."""
         if not lasting:
             fault = RowFault(message, (column,) if column else ())
             self._unread.setdefault(self._row - 1, []).append(fault)

@@ -114,11 +114,7 @@ def _without_blank_end(layout: Layout, numbers: Numbers) -> Numbers:
 
 
 def _whole_clock(layout: Layout, numbers: Numbers, clock: Clock) -> tuple[IntArray | None, Numbers]:
-    """Return a time for every row, and what was found out about the known ones.
-
-    Raises:
-        LogError: If no time is known, or the known ones are no clock.
-    """
+    """Return a time for every row, and what was found out about the known ones, if they are a clock."""
     if numbers.clock is None:
         return None, numbers
     known = np.flatnonzero(numbers.clock > UNREADABLE)

@@ -62,12 +62,10 @@ def _by_header(
 
 def _from(layout: Layout, below: Sequence[HeadLine]) -> Layout:
     """Return a layout whose rows begin right below its header, or behind a line of units."""
-    units = split_line(below[0].text, layout.delimiter)
-    has_units = len(below) > 1 and _are_units(units)
-    first = below[1 if has_units else 0]
-    return replace(
-        layout, units=tuple(units) if has_units else (), first_line=first.number, offset=first.offset
-    )
+    cells = split_line(below[0].text, layout.delimiter)
+    units = tuple(cells) if len(below) > 1 and _are_units(cells) else ()
+    first = below[1 if units else 0]
+    return replace(layout, units=units, first_line=first.number, offset=first.offset)
 
 
 def _are_units(cells: Sequence[str]) -> bool:

@@ -123,11 +123,7 @@ def _no_rotations(values: FloatArray, form: RotationForm) -> Iterator[tuple[int,
 
 
 def _without_orientation(roles: Roles, unused: Sequence[Column], file: str) -> list[LogWarning]:
-    """Return a warning if enough columns are left for an orientation: else it would be left out in silence.
-
-    Raises:
-        LogError: If some are called as a part of an orientation is.
-    """
+    """Warn if enough columns are left for an orientation; refuse some that are called as a part of one."""
     half = [column for column in unused if _is_part(column)]
     if half:
         said = f"found {listed(half)} as a part of an orientation"
