@@ -34,17 +34,12 @@ SHOWN_SLACK = 0.01
 """Values may pass the limits of an inferred interval by this share of P: noise, overshoot."""
 
 
-def check_interval(name: str, low: float, high: float) -> Interval:
-    """Return an interval that makes sense.
-
-    Raises:
-        OptionError: If it has no positive, finite width.
-    """
+def _refuse_empty(name: str, low: float, high: float) -> None:
+    """Raise an `OptionError` if an interval has no positive, finite width."""
     if not (math.isfinite(low) and math.isfinite(high) and 0.0 < high - low < math.inf):
         found = f"{name}={low:g}:{high:g}" if name else f"{low:g}:{high:g}"
         allowed = "LOW:HIGH with LOW below HIGH, both finite"
         raise OptionError(Finding(parameter="interval", found=found, allowed=allowed))
-    return low, high
 
 
 def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, Interval]) -> FloatArray:
@@ -62,7 +57,7 @@ def given_periods(log: JointLog, turning: Sequence[bool], given: Mapping[str, In
         LogError: If values lie outside, with a finding for each joint.
     """
     for name, (low, high) in given.items():
-        check_interval(name, low, high)
+        _refuse_empty(name, low, high)
     able = [name for name, turns in zip(log.joints, turning, strict=True) if turns]
     unknown = [name for name in given if name and name not in able]
     if unknown:
@@ -149,11 +144,9 @@ def said_intervals(
             else:
                 groups.setdefault((_shown(_likely(low, high, period), column), False), []).append(j)
     said = []
-    for (value, is_given), joints in groups.items():
-        names = tuple(log.joints[j] for j in joints)
-        why = (
-            "given as an option" if is_given else _evidence(log, fixed, periods, {j: ends[j] for j in joints})
-        )
+    for (value, _), joints in groups.items():
+        names, wrapped = tuple(log.joints[j] for j in joints), {j: ends[j] for j in joints if j in ends}
+        why = _evidence(log, fixed, periods, wrapped) if wrapped else "given as an option"
         hints = (Hint("interval", {names[0]: None}),)
         said.append(Inference(f"interval of {', '.join(names)}", value, why, "interval", names, hints))
     return said, [*(_no_turns(names, *one) for one, names in broken.items()), *warnings]

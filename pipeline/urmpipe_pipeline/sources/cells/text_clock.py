@@ -104,9 +104,7 @@ class Form:
     @property
     def half(self) -> str | None:
         """What it is half a clock of, date or time of day; None if it says all."""
-        if self.dated:
-            return None if self.timed else DATE
-        return TIME_OF_DAY if self.unit == TIME_OF_DAY else None
+        return self.unit if self.unit == TIME_OF_DAY or not self.timed else None
 
     def has_zone(self, cell: str) -> bool:
         """Return whether a cell says how far its clock is ahead of UTC."""

@@ -185,17 +185,13 @@ def named_after(columns: Sequence[Column], names: Sequence[str], role: str) -> t
     result = []
     for name in names:
         matches = [column for column in columns if _role_beside(column, name) == role]
-        matches = measured(matches)
-        exact = [c for c in matches if c.words - _words(name) <= vocabulary().joint_words["position"]]
+        matches, own = measured(matches), frozenset(key(name).split("_"))
+        exact = [c for c in matches if c.words - own <= vocabulary().joint_words["position"]]
         matches = exact if len(exact) == 1 else matches
         if len(matches) != 1:
             return ()
         result.append(matches[0])
     return tuple(result) if len(set(result)) == len(result) else ()
-
-
-def _words(name: str) -> frozenset[str]:
-    return frozenset(key(name).split("_"))
 
 
 def _role_beside(column: Column, name: str) -> str | None:
