@@ -104,7 +104,7 @@ def _roles(
     main = tables.layouts[only or 0]
     several = only is None and len(set(tables.paths)) > 1
     if main.header is None and not several:
-        return without_header(columns, main, options, robot, path=options.source == PATH)
+        return without_header(columns, tables.layouts, options, robot, path=options.source == PATH)
     plots = one_plot_a_file(columns, tables.paths, robot) if several and not options.joints else None
     if plots is not None:
         return _plots(*plots, tables)
@@ -149,7 +149,7 @@ def _refuse_several_logs(
         own = [column for column in columns if column.table == i]
         try:
             if layout.header is None and joints is None:
-                count = len(without_header(own, layout, options, robot, path=False).joints)
+                count = len(without_header(own, tables.layouts, options, robot, path=False).joints)
             else:
                 count = len(_by_names(own, tables.layouts, options, robot).joints)
         except LogError:

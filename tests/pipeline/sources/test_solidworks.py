@@ -71,12 +71,14 @@ def test_a_plot_that_is_missing_between_others_is_an_error(write: Write, arm: Ar
 
 LOG = "t,q1,q2\n0,1,2\n0.1,1,2\n"
 NAMELESS = "0,1,5\n0.1,3,1\n0.2,2,6\n0.3,4,2\n"
+WIDE = "".join(f"{row}{',1,2,7,4' * 4}\n" for row in NAMELESS.split())
+"""As many columns as a log has that ends with a homogeneous transform."""
 
 
 @pytest.mark.parametrize(
     "texts",
-    [(LOG, LOG), (LOG, LOG.replace("q", "joint")), (NAMELESS, NAMELESS)],
-    ids=["of one maker", "of two makers", "without headers"],
+    [(LOG, LOG), (LOG, LOG.replace("q", "joint")), (NAMELESS, NAMELESS), (WIDE, WIDE)],
+    ids=["of one maker", "of two makers", "without headers", "without headers, wide"],
 )
 @pytest.mark.parametrize("joints", [None, 2])
 def test_a_folder_of_several_logs_is_told_as_such(

@@ -41,7 +41,12 @@ NO_HEADER = "no header tells what they are"
 
 
 def without_header(
-    columns: Sequence[Column], layout: Layout, options: ReadOptions, robot: Chain | None, *, path: bool
+    columns: Sequence[Column],
+    layouts: Sequence[Layout],
+    options: ReadOptions,
+    robot: Chain | None,
+    *,
+    path: bool,
 ) -> Roles:
     """Return the roles of the columns of a table without a header: joints in order, as many as the robot has.
 
@@ -50,7 +55,7 @@ def without_header(
 
     Args:
         columns: The columns, without the clock.
-        layout: The table.
+        layouts: All tables; the columns are of one.
         options: What the user says: joint columns, position, orientation.
         robot: The arm; without one every column is a joint.
         path: The user says that it is a path: the columns are x, y, z, and an orientation behind them.
@@ -58,6 +63,7 @@ def without_header(
     Raises:
         LogError: If there are too few columns, or one of them holds text.
     """
+    layout = layouts[columns[0].table if columns else 0]
     file = layout.file
     columns = [column for column in columns if column.header]
     pose = chosen_pose(columns, options)
@@ -71,10 +77,10 @@ def without_header(
             message = f"found {shown(cell)} in a table without a header, allowed: numbers"
             raise layout.error(message, column.name, NAME_JOINTS)
     if path:
-        return _path_by_place(columns, layout, options, pose)
+        return _path_by_place(columns, layouts, file, options, pose)
     if not columns:
         raise LogError(Finding("found no column beside the time, allowed: the joints", file=file))
-    behind = None if pose else _trailing_pose(columns, layout, robot)
+    behind = None if pose else _trailing_pose(columns, layouts, robot)
     pose = with_form(pose or behind or Pose(), options.rotation)
     used = (*pose.position, *pose.rotation)
     start = min(map(columns.index, used)) if behind else len(columns)
@@ -86,15 +92,15 @@ def without_header(
 
 
 def _path_by_place(
-    columns: Sequence[Column], layout: Layout, options: ReadOptions, pose: Pose | None
+    columns: Sequence[Column], layouts: Sequence[Layout], file: str, options: ReadOptions, pose: Pose | None
 ) -> Roles:
     """Return x, y, z and the orientation behind them: of the form told, or by what its numbers are."""
     if pose is None and len(columns) < 3:
-        raise LogError(Finding(f"found {len(columns)} columns, allowed: x, y, z", file=layout.file))
+        raise LogError(Finding(f"found {len(columns)} columns, allowed: x, y, z", file=file))
     form = options.rotation
     if pose is None and form is not None and len(columns) == 3 + width(form):
         pose = Pose(tuple(columns[:3]), tuple(columns[3:]), (form,), GIVEN)
-    behind = _trailing_pose(columns, layout, None, some=True) if pose is None else None
+    behind = _trailing_pose(columns, layouts, None, some=True) if pose is None else None
     pose = with_form(pose or behind or Pose(tuple(columns[:3]), evidence="there is no header"), form)
     rest = [column for column in columns if column not in (*pose.position, *pose.rotation)]
     said = [path_inference(listed(pose.position), pose.evidence), *about_pose(pose)[1:]]
@@ -103,13 +109,13 @@ def _path_by_place(
 
 
 def _trailing_pose(
-    columns: Sequence[Column], layout: Layout, robot: Chain | None, *, some: bool = False
+    columns: Sequence[Column], layouts: Sequence[Layout], robot: Chain | None, *, some: bool = False
 ) -> Pose | None:
     """Return the pose that stands behind the joints, or alone in a table, by what (some of) its rows are."""
-    found = trailing_matrix(columns, (layout,), some=some)
+    found = trailing_matrix(columns, layouts, some=some)
     joints = len(robot.coordinates) if robot else 0
     fits = len(columns) == 7 if robot is None else len(columns) >= joints + 7
-    return found or (trailing_quaternion(columns, (layout,), some=some) if fits else None)
+    return found or (trailing_quaternion(columns, layouts, some=some) if fits else None)
 
 
 def one_plot_a_file(
