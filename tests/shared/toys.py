@@ -13,7 +13,7 @@ from urmpipe_pipeline.palette import AXIS_COLOURS
 from urmpipe_pipeline.presentation.figure import Figure, Line, Panel, View
 from urmpipe_pipeline.presentation.section import Presentation, Section
 from urmpipe_pipeline.recording.store import Opening
-from urmpipe_pipeline.recording.views.blueprint import views_of
+from urmpipe_pipeline.recording.views.blueprint import send_views
 from urmpipe_pipeline.recording.writer import write_result
 
 if TYPE_CHECKING:
@@ -81,8 +81,8 @@ def laid_out(one: Presentation) -> tuple[Blueprint, Opening]:
     """Return the layout of a presentation and where it opens."""
     import rerun as rr
 
-    views = views_of(one)
-    return views.send(rr.RecordingStream("toy"), lambda values, t_ns: None), views.opening
+    layout, opening, _ = send_views(rr.RecordingStream("toy"), one, lambda values, t_ns: None)
+    return layout, opening
 
 
 def root_of(one: Presentation) -> Any:

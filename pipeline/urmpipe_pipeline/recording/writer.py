@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import shutil
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -18,7 +17,7 @@ from urmpipe_pipeline.recording.columns import column_rows
 from urmpipe_pipeline.recording.identity import APPLICATION_ID
 from urmpipe_pipeline.recording.store import PROPERTY, SLICE, document
 from urmpipe_pipeline.recording.verify import verified, verify
-from urmpipe_pipeline.recording.views.blueprint import views_of
+from urmpipe_pipeline.recording.views.blueprint import send_views
 from urmpipe_pipeline.recording.views.plots import LONG, EntityOf
 from urmpipe_pipeline.text import encodable
 
@@ -47,18 +46,11 @@ def write_result(
     Raises:
         OutputError: If the file may not be written there, or did not read back as it was written.
     """
-    import rerun as rr
-
     with guarded_output(path, inputs, "recording") as part:
-        views, encoded = views_of(shown), _encoded(result, path)
-        encoded = encoded.packed(LONG, views.plotted(_entities(encoded)))
-        metadata = document(kind, encoded.tree, encoded.clocks)
-        with _stream_into(part) as stream, ThreadPoolExecutor(1) as beside:
-            drawn = beside.submit(views.send, stream, _entities(encoded))  # while Rerun's thread writes
-            stream.send_recording_name(encodable(shown.name))
-            stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, **views.opening._asdict()))
+        encoded = _encoded(result, path)
+        with _stream_into(part) as stream:
+            encoded, metadata = _described(stream, kind, shown, encoded)
             _send(stream, part.parent, encoded, progress)
-            stream.send_blueprint(drawn.result())
         verify(part, path, encoded, metadata)
 
 
@@ -120,6 +112,25 @@ def _refuse_full_disk(folder: Path) -> None:
     """Raise before the disk is full: Rerun's file thread would wait forever then."""
     if shutil.disk_usage(folder).free < SPARE:
         raise OutputError(Finding(f"found less than {SPARE >> 20} MB free on the disk", str(folder)))
+
+
+def _described(
+    stream: RecordingStream, kind: str, shown: Presentation, encoded: Encoded
+) -> tuple[Encoded, str]:
+    """Send what is no array: what is there to be looked at with its layout, and the metadata.
+
+    Returns:
+        The arrays, long ones packed but those that the viewer plots whole; and the metadata.
+    """
+    import rerun as rr
+
+    stream.send_recording_name(encodable(shown.name))
+    blueprint, opening, plotted = send_views(stream, shown, _entities(encoded))
+    packed = encoded.packed(LONG, plotted)
+    metadata = document(kind, packed.tree, packed.clocks)
+    stream.send_property(PROPERTY, rr.AnyValues(metadata=metadata, **opening._asdict()))
+    stream.send_blueprint(blueprint)
+    return packed, metadata
 
 
 def _entities(encoded: Encoded) -> EntityOf:

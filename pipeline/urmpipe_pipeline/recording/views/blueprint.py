@@ -18,7 +18,7 @@ from urmpipe_pipeline.recording.sending import keys, shown_path
 from urmpipe_pipeline.recording.store import ROW, TIME, Opening
 from urmpipe_pipeline.recording.views.axes import LOW, TALL, whole_axis
 from urmpipe_pipeline.recording.views.events import events_view
-from urmpipe_pipeline.recording.views.plots import EntityOf, Plots, plotted
+from urmpipe_pipeline.recording.views.plots import EntityOf, Plots
 from urmpipe_pipeline.recording.views.scene_drawing import scene_view
 from urmpipe_pipeline.recording.views.summary import summary
 from urmpipe_pipeline.text import encodable
@@ -52,9 +52,35 @@ SEEN_AT_ONCE, COLUMNS = 8, 2
 tab."""
 
 
+def send_views(
+    stream: RecordingStream, shown: Presentation, entity_of: EntityOf
+) -> tuple[Blueprint, Opening, set[str]]:
+    """Send what is there to be looked at of a presentation, and return the layout and where it opens.
+
+    Where arrays of the result stand as scalars in their own unit, their entities are drawn.
+
+    Returns:
+        The layout, where it opens, and the entities of the arrays of the result that it plots.
+    """
+    import rerun as rr
+
+    scene = shown.scene() if shown.scene is not None else None
+    space = None if scene is None else scene_view(stream, scene, shown.opens_at_ns)
+    parts = _parts(shown.body)
+    whole, timed = whole_axis(figure for part in parts for figure in part.figures)
+    timed = shown.opens_at_row is None if whole is None else timed
+    opening = Opening(TIME, shown.opens_at_ns) if timed else Opening(ROW, (shown.opens_at_row or 0) + 1)
+    plots = Plots(stream, entity_of, whole, timed)
+    words = summary(shown, scene)
+    text = "\n".join(words)
+    stream.log(shown_path("summary"), rr.TextDocument(text, media_type="text/markdown"), static=True)
+    layout = _blueprint(_words(plots, parts), words, space, _plots(plots, parts), opening.timeline)
+    return layout, opening, plots.plotted
+
+
 @dataclass(frozen=True, eq=False)
-class Part:
-    """A section with what the viewer shows of it: computed once."""
+class _Part:
+    """A section with what the viewer shows of it, its views computed once."""
 
     title: str
     verdict: str
@@ -70,60 +96,7 @@ class Part:
         return {at: words for figure in self.figures for at, words in figure.instants.items()}
 
 
-@dataclass(frozen=True, eq=False)
-class Views:
-    """What the viewer shows of a presentation.
-
-    Attributes:
-        shown: The presentation.
-        parts: Its sections that have anything to plot, the body first.
-        whole: From the first to the last time in [ns], without times from the first to the last row; None
-            where nothing is plotted.
-        opening: Where the viewer opens.
-    """
-
-    shown: Presentation
-    parts: tuple[Part, ...]
-    whole: tuple[int, int] | None
-    opening: Opening
-
-    def plotted(self, entity_of: EntityOf) -> set[str]:
-        """Return which arrays of the result are plotted whole, by where they stand."""
-        return {
-            entity
-            for part in self.parts
-            for figure in part.figures
-            for number, view in enumerate(figure.views)
-            for entity in plotted(view, entity_of, opened=figure.opened in (None, number))
-        }
-
-    def send(self, stream: RecordingStream, entity_of: EntityOf) -> Blueprint:
-        """Send what is there to be looked at, and return the layout.
-
-        Where arrays of the result stand as scalars in their own unit, their entities are drawn.
-        """
-        import rerun as rr
-
-        scene = self.shown.scene() if self.shown.scene is not None else None
-        space = None if scene is None else scene_view(stream, scene, self.shown.opens_at_ns)
-        plots = Plots(stream, entity_of, self.whole, timed=self.opening.timeline == TIME)
-        words = summary(self.shown, scene)
-        text = "\n".join(words)
-        stream.log(shown_path("summary"), rr.TextDocument(text, media_type="text/markdown"), static=True)
-        texts, figures = _words(plots, self.parts), _plots(plots, self.parts)
-        return _blueprint(texts, words, space, figures, self.opening.timeline)
-
-
-def views_of(shown: Presentation) -> Views:
-    """Return what the viewer shows of a presentation."""
-    parts = _parts(shown.body)
-    whole, timed = whole_axis(figure for part in parts for figure in part.figures)
-    timed = shown.opens_at_row is None if whole is None else timed
-    opening = Opening(TIME, shown.opens_at_ns) if timed else Opening(ROW, (shown.opens_at_row or 0) + 1)
-    return Views(shown, parts, whole, opening)
-
-
-def _parts(body: Section) -> tuple[Part, ...]:
+def _parts(body: Section) -> list[_Part]:
     """Return the sections that have anything to plot, the body first."""
     sections = [body, *body.sections]
     found = []
@@ -133,12 +106,12 @@ def _parts(body: Section) -> tuple[Part, ...]:
         texts = tuple(one for one in blocks if isinstance(one, Text))
         events = tuple(section.events())
         found.append(
-            Part(section.title, (section.verdict or "").upper(), key, figures, texts, events, section.opened)
+            _Part(section.title, (section.verdict or "").upper(), key, figures, texts, events, section.opened)
         )
-    return tuple(found)
+    return found
 
 
-def _words(plots: Plots, parts: Sequence[Part]) -> View | Container:
+def _words(plots: Plots, parts: Sequence[_Part]) -> View | Container:
     """Return the summary, behind it texts, and the events that stand beside no plot."""
     import rerun as rr
     import rerun.blueprint as rrb
@@ -153,13 +126,13 @@ def _words(plots: Plots, parts: Sequence[Part]) -> View | Container:
     return _tabs(views)
 
 
-def _events(plots: Plots, part: Part) -> View:
+def _events(plots: Plots, part: _Part) -> View:
     """Return the list of the events of a section."""
     first = (0 if plots.whole is None else plots.whole[0]) if plots.timed else None
     return events_view(plots.stream, part.events, shown_path("events", part.key), first)
 
 
-def _plots(plots: Plots, parts: Sequence[Part]) -> View | Container | None:
+def _plots(plots: Plots, parts: Sequence[_Part]) -> View | Container | None:
     """Return the plots: those of one section as rows, of several side by side if few, else as tabs."""
     import rerun.blueprint as rrb
 
@@ -175,7 +148,7 @@ def _plots(plots: Plots, parts: Sequence[Part]) -> View | Container | None:
     return rrb.Tabs(*tabs, active_tab=next((i for i, part in enumerate(shown) if part.opened), 0))
 
 
-def _rows(plots: Plots, part: Part, about: str = "") -> list[Row]:
+def _rows(plots: Plots, part: _Part, about: str = "") -> list[Row]:
     """Return the figures of a section from top to bottom; the events share the row of the last."""
     rows: list[Row] = []
     last: list[View | Container] = [_events(plots, part)] if part.events else []

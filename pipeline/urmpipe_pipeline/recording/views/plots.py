@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 from uuid import UUID
@@ -59,12 +59,14 @@ class Plots:
         whole: From the first to the last time in [ns], without times from the first to the last row; None
             where nothing is plotted.
         timed: Whether there are times.
+        plotted: The arrays of the result that views show, by where they stand.
     """
 
     stream: RecordingStream
     entity_of: EntityOf
     whole: tuple[int, int] | None
     timed: bool
+    plotted: set[str] = field(default_factory=set)
     _looks: dict[str, _Look] = field(default_factory=dict)
     _shares_axis: bool = True
 
@@ -156,9 +158,13 @@ class Plots:
         rows, factor = len(line.values), factor_of(panel)
         single = line.points or rows == 1 or t_ns is None
         look = _Look(line.names, line.colours, points=single, steps=line.steps)
-        stored = _stored(panel, line, self.entity_of, opened=drawn.opened)
+        stored = self.entity_of(line.values, t_ns)
         drawn.names.update(line.names)
         drawn.rows = max(drawn.rows, rows)
+        if rows > LONG and not drawn.opened:
+            stored = None
+        if stored is not None:
+            self.plotted.add(stored)
         if stored is not None and factor == 1.0 and rows <= LONG:
             drawn.entities.append(stored)
             drawn.reach(line.values[:])
@@ -288,21 +294,6 @@ class _Look:
             aggregation_policy=rr.components.AggregationPolicy.MinMax,
             interpolation_mode=rr.components.InterpolationMode.StepAfter if self.steps else None,
         )
-
-
-def plotted(view: View, entity_of: EntityOf, *, opened: bool) -> Iterator[str]:
-    """Yield where the arrays stand that a view plots row by row: long ones only if it is opened."""
-    for panel in view.panels:
-        for line in panel.lines if panel.over is None else ():
-            if (stored := _stored(panel, line, entity_of, opened=opened)) is not None:
-                yield stored
-
-
-def _stored(panel: Panel, line: Line, entity_of: EntityOf, *, opened: bool) -> str | None:
-    """Return where a line's array stands among those of the result, if it is drawn from there."""
-    if len(line.values) > LONG and not opened:
-        return None
-    return entity_of(line.values, panel.t_ns if line.t_ns is None else line.t_ns)
 
 
 def overview(values: FloatArray, most: int) -> IntArray:
